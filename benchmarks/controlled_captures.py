@@ -92,8 +92,8 @@ def true_frames(source: Capture, truth: Path, work: Capture, settings: Settings)
 
 def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
     """The texture whose confident facial skin has been brought to the skin tone, sRGB [S, S, 3]."""
-    texture, tone = images.read_linear(capture.texture), np.array(parse_skin_tone(settings.solve.skin_tone).linear,
-                                                                  np.float32)
+    texture = images.read_linear(capture.texture)
+    tone = np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
     return images.linear_to_srgb(toned(texture, tone, skin))
 

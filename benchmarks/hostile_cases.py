@@ -195,8 +195,8 @@ def _settings(case: Case, stock: Stock, rng: random.Random) -> None:
             .replace("\0", "")
         )
         case.command = ["run", "-", root, "--until", "frames", f"--set={name}={value[:500]}"]
-        case.said, case.named = f"--set {name}={value[:60]!r}", (name or "''", "--set",
-                                                                 name.rpartition(".")[2] or "--set")
+        case.said = f"--set {name}={value[:60]!r}"
+        case.named = (name or "''", "--set", name.rpartition(".")[2] or "--set")
 
 
 def _cameras(case: Case, stock: Stock, rng: random.Random) -> None:
@@ -232,8 +232,8 @@ def _names(case: Case, stock: Stock, rng: random.Random) -> None:
     name, which = rng.choice(NAMES), rng.choice(["capture", "photographs", "photograph"])
     folder = stock.bring("photographs", case)
     shutil.rmtree(capture_at(case.place).root)
-    case.said, case.named = f"the {which} is named {name!r}", (name, ascii(name)[1:-1],
-                                                               ascii(name)[1:-1].replace("\\", "\\\\"))
+    escaped = ascii(name)[1:-1]
+    case.said, case.named = f"the {which} is named {name!r}", (name, escaped, escaped.replace("\\", "\\\\"))
     if which == "photograph":
         first = sorted(folder.iterdir())[0]
         first.rename(first.with_name(f"{name[:200]}.jpg"))

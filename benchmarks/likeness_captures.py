@@ -45,9 +45,8 @@ def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, said:
         return capture
     began, spent, seed = time.monotonic(), _spent(), figure.person.seed
     taken = phone.sample_phone(seed)
-    cameras, poses = scene.camera_path(seed,
-                                       frames), motion.sway(frames, taken.sway_mm, taken.sway_degrees,
-                                                            np.random.default_rng([seed, 71]))
+    cameras = scene.camera_path(seed, frames)
+    poses = motion.sway(frames, taken.sway_mm, taken.sway_degrees, np.random.default_rng([seed, 71]))
     work = folder / "rendered" / name
     filmed.render(work, figure, light, scene.Shot(cameras, range(frames), SAMPLES, SCALE, poses, room))
     rendered = time.monotonic()

@@ -37,10 +37,8 @@ def main() -> None:
     parts = {name: scene.objects[name] for name in PERSON if name in scene.objects}
     lights = traced(parts, job["sun"], images.read_linear(Path(job["sky"])))
     for name, thing in parts.items():
-        thing.data.color_attributes.new("light", 'FLOAT_COLOR',
-                                        'POINT').data.foreach_set("color",
-                                                                  np.insert(lights[name], 3, 1,
-                                                                            1).astype(np.float32).ravel())
+        attribute = thing.data.color_attributes.new("light", 'FLOAT_COLOR', 'POINT')
+        attribute.data.foreach_set("color", np.insert(lights[name], 3, 1, 1).astype(np.float32).ravel())
         tree = thing.data.materials[0].node_tree
         light = tree.nodes.new("ShaderNodeAttribute")
         light.attribute_name = "light"

@@ -151,8 +151,8 @@ def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int 
     if sun is not None:
         points = raster.interpolate(head.vertices, head.faces, face, bary)[hit]
         normals = raster.interpolate(vertex_normals(head), head.faces, face, bary)[hit]
-        dark[hit] = (normals @ sun <= 0) | scan.opaque.blocked(points + 5e-4 * normals,
-                                                               np.repeat(sun[None], len(points), 0))
+        towards_sun = np.repeat(sun[None], len(points), 0)
+        dark[hit] = (normals @ sun <= 0) | scan.opaque.blocked(points + 5e-4 * normals, towards_sun)
     cover, colour, skin, dark = (images.resize(values, view.width, view.height)
                                  for values in (hit.astype(np.float32), colour, skin, dark))
     colour, face, name = colour / np.maximum(cover, 1e-6)[..., None], (skin > 0.5) & (cover > 0.99), f"{frame:04d}.png"

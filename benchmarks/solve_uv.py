@@ -73,8 +73,8 @@ def _solve_one(capture: Capture, seed: int, options: argparse.Namespace):
     began = time.monotonic()
     solve.run(capture, settings, Reporter("solve"))
     seconds = time.monotonic() - began
-    solved, shading = images.read_linear(capture.maps
-                                         / "diffuse_albedo.exr"), images.read_linear(capture.maps / "shading.exr")
+    solved = images.read_linear(capture.maps / "diffuse_albedo.exr")
+    shading = images.read_linear(capture.maps / "shading.exr")
     face = template.mask("face", size) > 0.5
     edge = cv2.morphologyEx((shadow > 0.5).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     band = cv2.dilate(edge, np.ones((25 * size // 1024 | 1,) * 2, np.uint8)) > 0

@@ -157,8 +157,8 @@ def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, di
         together, alone = of_person(own, maps)
         for method, of_all in together.items():
             if method not in (NOTHING, TRUE):
-                scores.setdefault(method, {})[person] = {**mean_of([row[method] for row in each if method in row]),
-                                                         **of_all}
+                mean = mean_of([row[method] for row in each if method in row])
+                scores.setdefault(method, {})[person] = {**mean, **of_all}
                 for name, psnr in alone[method].items():
                     by_capture.setdefault(name, {})[method] = round(psnr, 3)
     return scores, by_capture, scales

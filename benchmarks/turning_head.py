@@ -69,9 +69,8 @@ def pictures(jaw: float):
     shirt = images.linear_to_srgb(images.resize(np.random.default_rng(2).random((40, 40, 3), np.float32) ** 2,
                                                 view.width, view.width))
     y, x = np.mgrid[:view.height, :view.width]
-    worn = y > view.height - 0.16 * view.width - 0.25 * np.sqrt(np.maximum((0.5 * view.width) ** 2
-                                                                           - (x - view.width / 2) ** 2,
-                                                                           0)) + 0.1 * view.width
+    chest = np.sqrt(np.maximum((0.5 * view.width) ** 2 - (x - view.width / 2) ** 2, 0))
+    worn = y > view.height - 0.16 * view.width - 0.25 * chest + 0.1 * view.width
     for i in range(FRAMES):
         opened = jaw * np.sin(np.pi * i / SYLLABLE) ** 2 * (i % SENTENCE < 2 * SENTENCE / 3)
         picture = photograph(view, WIDEST_DEG * np.sin(2 * np.pi * i / FRAMES), wall=False, jaw=opened)

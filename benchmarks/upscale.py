@@ -126,9 +126,9 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
     figures["diffuse FLIP"] = float(np.mean(flip))
     if (distance := feature_distance(diffuse, true_diffuse)) is not None:
         figures["diffuse features"] = float(distance.mean())
-    cosine = (result[..., 3:6]
-              * true[..., 3:6]).sum(-1) / np.maximum(np.linalg.norm(result[..., 3:6], axis=-1)
-                                                     * np.linalg.norm(true[..., 3:6], axis=-1), 1e-6)
+    ours, theirs = result[..., 3:6], true[..., 3:6]
+    lengths = np.linalg.norm(ours, axis=-1) * np.linalg.norm(theirs, axis=-1)
+    cosine = (ours * theirs).sum(-1) / np.maximum(lengths, 1e-6)
     figures["normal degrees"] = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
     return figures
 

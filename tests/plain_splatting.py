@@ -44,9 +44,8 @@ def rasterization_2dgs(means, quats, scales, opacities, colors, viewmats, Ks, wi
     shaped = [part.reshape(1, height, width, -1) for part in parts]
     points = (rays * expected).reshape(height, width, 3)
     slopes = torch.zeros_like(points)
-    slopes[1:-1,
-           1:-1] = torch.nn.functional.normalize(torch.cross(points[2:, 1:-1] - points[:-2, 1:-1],
-                                                             points[1:-1, 2:] - points[1:-1, :-2], dim=-1), dim=-1)
+    down, right = points[2:, 1:-1] - points[:-2, 1:-1], points[1:-1, 2:] - points[1:-1, :-2]
+    slopes[1:-1, 1:-1] = torch.nn.functional.normalize(torch.cross(down, right, dim=-1), dim=-1)
     return (*shaped[:3], slopes @ rotation, shaped[3], shaped[0][..., 3:], {})
 
 

@@ -51,9 +51,8 @@ def test_missing_sides_are_named():
     right = " ".join(problem
                      for problem, _ in coverage.missing(place(np.linspace(10, 80, 10), 10 * np.sin(whole[:10]))))
     assert "Nothing was seen from the person's right side" in right and "before the nose" in right
-    gap = " ".join(problem
-                   for problem, _ in coverage.missing(place(np.array([-70, -60, -50, 40, 55, 70.0]),
-                                                            10 * np.sin(whole[:6]))))
+    turned = place(np.array([-70, -60, -50, 40, 55, 70.0]), 10 * np.sin(whole[:6]))
+    gap = " ".join(problem for problem, _ in coverage.missing(turned))
     assert (
         "Between 50 degrees to the person's right and 40 degrees to the person's left there is no picture: a gap of 90 "
         "degrees"

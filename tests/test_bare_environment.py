@@ -29,9 +29,12 @@ def run(command) -> tuple[int, str]:
 
 def without(*modules: str):
     """`run` where commands that need one of these modules fail, as on a Python that was stripped of them."""
-    return lambda command: (1,
-                            f"No module named {modules[0]}") if any(module in map(str, command)
-                                                                    for module in modules) else run(command)
+    def run_without(command):
+        if any(module in map(str, command) for module in modules):
+            return 1, f"No module named {modules[0]}"
+        return run(command)
+
+    return run_without
 
 
 @pytest.fixture

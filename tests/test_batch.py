@@ -136,8 +136,8 @@ def test_the_gate_waits_for_each_mask(code, tmp_path):
     capture.shadow_mask_auto.write_text("another proposal")
     assert not gate.is_accepted(capture) and states(batch)["a"] != DONE, "another proposal has to be looked at"
     with pytest.raises(Problem, match="no proposed shadow mask"):
-        gate.accept_mask(make(code, tmp_path / "other", "c").faces[0].capture) if (tmp_path
-                                                                                   / "other").mkdir() is None else None
+        (tmp_path / "other").mkdir()
+        gate.accept_mask(make(code, tmp_path / "other", "c").faces[0].capture)
 
 
 def test_commands_do_the_batch_in_the_order_they_name(code, tmp_path):
@@ -193,9 +193,8 @@ def test_whatever_ends_it_nothing_is_lost_and_it_goes_on(code, tmp_path, way):
     assert list(capture.read()["stages"]) == ["frames", "cameras"]
     once = finished(batch)["a"]["cameras"]
     tiny_batch.set_mood(capture, {})
-    assert core(code, "batch", "run",
-                batch.root).returncode == 0 and states(batch) == {"a": DONE,
-                                                                  "b": DONE} and finished(batch)["a"]["cameras"] == once
+    assert core(code, "batch", "run", batch.root).returncode == 0
+    assert states(batch) == {"a": DONE, "b": DONE} and finished(batch)["a"]["cameras"] == once
 
 
 def test_what_somebody_else_named_like_the_request_to_stop_is_no_request_and_stays(code, tmp_path):
@@ -270,8 +269,11 @@ def test_a_second_look_reads_only_what_has_changed(code, tmp_path, monkeypatch):
     core(code, "batch", "run", batch.root)
     core(code, "batch", "status", batch.root)
     read = []
-    monkeypatch.setattr(hashes, "_hash_whole", lambda file,
-                        size: read.append(Path(file.name)) or hashlib.file_digest(file, hashes._hasher).hexdigest())
+    def hash_whole(file, size):
+        read.append(Path(file.name))
+        return hashlib.file_digest(file, hashes._hasher).hexdigest()
+
+    monkeypatch.setattr(hashes, "_hash_whole", hash_whole)
     monkeypatch.setattr(hashes, "_hashes", {})
     monkeypatch.setattr(hashes._hash_whole, "__name__", "_hash_whole")
     (batch.faces[0].capture.texture).write_text("edited")

@@ -82,8 +82,8 @@ def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, tmp_path):
     assert core(code, "batch", "run", batch.root, "h").returncode == 0
     once = finished(batch)["h"]
     (tmp_path / "films" / "c.mp4").unlink()
-    with batch.face("d").capture.locked(), tiny_batch.start(code, "batch", "run", batch.root, "--on", "ray", "--cores",
-                                                            1) as process:
+    words = "batch", "run", batch.root, "--on", "ray", "--cores", 1
+    with batch.face("d").capture.locked(), tiny_batch.start(code, *words) as process:
         wait_for(lambda: at_stage(batch, "a", "scan"), process)
         tiny_batch.set_mood(capture, {})
         os.kill(at_stage(batch, "a", "scan")[0]["pid"], signal.SIGKILL)
@@ -93,8 +93,8 @@ def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, tmp_path):
     assert set(said) == {*"abcdefgh", "8 faces"}, "nothing of Ray's own"
     assert "head stopped: The face is not there. Film it." in said["b"] and "There is no video" in said["c"]
     assert f"Another worker (process {os.getpid()}" in said["d"]
-    assert states(batch) == dict.fromkeys("aefgh", DONE) | {"b": STOPPED, "c": TO_DO,
-                                                            "d": TO_DO} and finished(batch)["h"] == once
+    assert states(batch) == dict.fromkeys("aefgh", DONE) | {"b": STOPPED, "c": TO_DO, "d": TO_DO}
+    assert finished(batch)["h"] == once
     begun, done = (collections.Counter((line["face"], line["stage"]) for line in account(batch)
                                        if line["finished"] is whether) for whether in (False, True))
     assert set(done.values()) == {1} and len(done) == 4 * 10 + 2, "each stage once"
@@ -144,9 +144,8 @@ def test_the_gate_waits(code, tmp_path, monkeypatch, own_environment):
     batch = make(code, tmp_path, "ab", None, "--gate", "artist")
     monkeypatch.setattr(ray_cluster, "ROOT", code)
     heard = []
-    with monkeypatch.context() as elsewhere, pytest.raises(Problem,
-                                                           match=f"has no WildCap at {tmp_path / 'none'}. Set "
-                                                                 "WILDCAP_CODE there"):
+    nowhere = f"has no WildCap at {tmp_path / 'none'}. Set WILDCAP_CODE there"
+    with monkeypatch.context() as elsewhere, pytest.raises(Problem, match=nowhere):
         elsewhere.setattr(ray_cluster, "ROOT", tmp_path / "none")
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     with pytest.raises(Problem, match="No node of the cluster has 1000 cores and 5 GB"):
@@ -199,8 +198,8 @@ def test_a_task_of_ours_that_died_is_waited_for(code, tmp_path, monkeypatch):
         assert "is working on this capture" in refused["words"] and time.monotonic() - began < lease.TERM_S
         with monkeypatch.context() as short:
             short.setattr(lease, "TERM_S", 0.3)
-            assert "is working on this capture" in ray_task.do_task(*words, "",
-                                                                    print)["words"], "it is alive, after all"
+            told = ray_task.do_task(*words, "", print)
+            assert "is working on this capture" in told["words"], "it is alive, after all"
         threading.Timer(1, process.kill).start()
         assert ray_task.do_task(*words, "", lambda line: None)["state"] == DONE
 

@@ -29,10 +29,8 @@ def test_tones_are_summed_up_by_group():
 def test_a_chains_rows_are_those_of_its_table(tmp_path):
     capture = Capture(tmp_path / "scan.wildcap")
     capture.root.mkdir()
-    (capture.root
-     / "capture.json").write_text(json.dumps({"stages": {"delight": {"seconds": 1.0,
-                                                                     "figures": {"delighter": "network"}}}}),
-                                  encoding="utf-8")
+    record = {"stages": {"delight": {"seconds": 1.0, "figures": {"delighter": "network"}}}}
+    (capture.root / "capture.json").write_text(json.dumps(record), encoding="utf-8")
 
     def score(psnr):
         return {"raw": {"psnr": psnr, "ssim": 0.9, "flip": 0.1}}

@@ -83,11 +83,10 @@ def test_drops_are_taken_where_the_tab_is_shown(addon):
     assert set(source.PHOTOGRAPHS) == {*known["SUFFIXES"], *known["RAW"]}
 
     def taken(tab: str) -> bool:
-        space, sidebar = SimpleNamespace(show_region_ui=bool(tab)), SimpleNamespace(type='UI',
-                                                                                    active_panel_category=tab)
-        return handler.poll_drop(SimpleNamespace(area=SimpleNamespace(type='VIEW_3D',
-                                                                      spaces=SimpleNamespace(active=space),
-                                                                      regions=[sidebar])))
+        space = SimpleNamespace(show_region_ui=bool(tab))
+        sidebar = SimpleNamespace(type='UI', active_panel_category=tab)
+        area = SimpleNamespace(type='VIEW_3D', spaces=SimpleNamespace(active=space), regions=[sidebar])
+        return handler.poll_drop(SimpleNamespace(area=area))
 
     handler = source.WILDCAP_FH_source
     assert taken("WildCap") and not taken("Item") and not taken("")

@@ -94,9 +94,8 @@ def test_what_a_stage_writes_is_named_by_its_stage(tmp_path):
     for name, stage in (("texture.exr", "texture"), ("maps/normal.png", "solve"), ("frames/00001.jpg", "frames"),
                         ("delit/shadow/00001.png", "delight")):
         assert checks.advise_remaking(tmp_path / name, "") == f"Run the stage {stage} again."
-    assert checks.advise_remaking(tmp_path / "shadow_mask.png",
-                                  "Mine.") == checks.advise_remaking(tmp_path / "a" / "frames" / "1.jpg",
-                                                                     "Mine.") == "Mine."
+    for theirs in (tmp_path / "shadow_mask.png", tmp_path / "a" / "frames" / "1.jpg"):
+        assert checks.advise_remaking(theirs, "Mine.") == "Mine."
 
 
 @pytest.mark.parametrize("mode", ["RGB", "L", "P", "CMYK", "LA", "RGBA", "I;16", "1"])
@@ -187,9 +186,8 @@ def test_unusual_objs_are_read(tmp_path):
     for text in written:
         path.write_bytes(text.encode())
         mesh = meshes.read_obj(path)
-        assert mesh.faces.tolist() == mesh.face_uvs.tolist() == [[0, 1, 2],
-                                                                 [0, 2, 3]] and np.array_equal(mesh.vertices[:4, :2],
-                                                                                               mesh.uvs[:4])
+        assert mesh.faces.tolist() == mesh.face_uvs.tolist() == [[0, 1, 2], [0, 2, 3]]
+        assert np.array_equal(mesh.vertices[:4, :2], mesh.uvs[:4])
     two = SQUARE + "f -4 -3 -2\n" + SQUARE + "f -4 -3 -2\n"  # negative numbers count from where they stand
     path.write_text(two)
     assert meshes.read_obj(path).faces.tolist() == [[0, 1, 2], [4, 5, 6]]

@@ -117,8 +117,10 @@ def test_sixteen_bits_are_read_as_the_eye_sees_them(addon, tmp_path):
 
 def test_the_chain_can_begin_at_any_stage(addon, capture, item, monkeypatch):
     started = []
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal,
-                        **span: started.append((goal, span["first"], span["last"])))
+    def start(item, goal, **span):
+        started.append((goal, span["first"], span["last"]))
+
+    monkeypatch.setattr(addon("jobs"), "start", start)
     bpy.ops.wildcap.reconstruct(first="upscale")
     bpy.ops.wildcap.reconstruct(first="transfer")
     with pytest.raises(RuntimeError, match="no video"):

@@ -69,9 +69,8 @@ def test_an_eye_is_as_deep_as_lifes_and_inside_of_the_heads_own_ball(close_up, a
         shell, inner = seen(things(close_up)[f"{side} Cornea"]) - centre, things(close_up)[f"{side} Eye"]
         apex = (shell @ gaze).max()
         assert 0.0008 < apex - ball.radius < 0.0013, "the cornea stands out by a millimetre"
-        own = coordinates(close_up.data.shape_keys.reference_key.data)[HEAD + COPIES
-                                                                       + np.flatnonzero(asset.kind == 1
-                                                                                        + number)] - centre
+        rows = HEAD + COPIES + np.flatnonzero(asset.kind == 1 + number)
+        own = coordinates(close_up.data.shape_keys.reference_key.data)[rows] - centre
         assert apex < (own @ gaze).max() + 1e-4, "no farther than the ball to which the lids were fitted"
         slots, places = np.array([p.material_index for p in inner.data.polygons]), seen(inner) - centre
         iris = np.unique([v for p in inner.data.polygons if p.material_index == 1 for v in p.vertices])

@@ -30,8 +30,10 @@ print(sys.version_info[:2], {{s.name: code_key.code_key(s.module) for s in stage
 def copy(tmp_path) -> Path:
     """core/ with its sources to be edited; its data are links."""
     copied = tmp_path / "core"
-    shutil.copytree(CORE, copied, ignore=lambda folder,
-                    names: [name for name in names if not (name.endswith(".py") or (Path(folder) / name).is_dir())])
+    def data(folder, names):
+        return [name for name in names if not (name.endswith(".py") or (Path(folder) / name).is_dir())]
+
+    shutil.copytree(CORE, copied, ignore=data)
     for name in ("weights", "assets"):
         shutil.rmtree(copied / name)
         (copied / name).symlink_to(CORE / name)

@@ -117,13 +117,11 @@ def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
     (tmp_path / "studio" / "mine.json").write_text(json.dumps(places), encoding="utf-8")
     settings = job(capture, "--settings", "studio/mine.json", "--set", "texture.perceptual_network=vgg", "--softened",
                    "~/soft")
-    assert settings.delight.folder == str(tmp_path / "studio"
-                                          / "delit") and settings.solve.prior == str(tmp_path / "home" / "authors")
+    assert settings.delight.folder == str(tmp_path / "studio" / "delit")
+    assert settings.solve.prior == str(tmp_path / "home" / "authors")
     assert settings.registration.template == "" and settings.cameras.import_from == str(tmp_path / "rig.json")
-    assert settings.texture.perceptual_network == str(tmp_path
-                                                      / "vgg") and settings.shadow_mask.softened == str(tmp_path
-                                                                                                        / "home"
-                                                                                                        / "soft")
+    assert settings.texture.perceptual_network == str(tmp_path / "vgg")
+    assert settings.shadow_mask.softened == str(tmp_path / "home" / "soft")
     assert job(capture, "--settings", "studio/mine.json", "--folder",
                "mine").delight.folder == str(tmp_path / "mine"), "the file says that it is for folder"
     assert job(capture, "--settings", "studio/mine.json", "--set", "delight.folder=").delight.folder == ""

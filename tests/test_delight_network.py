@@ -140,8 +140,8 @@ def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():
     rng = np.random.default_rng(0)
     shadow = np.zeros((64, 64), np.float32)
     shadow[:, 30:] = 1
-    light = shadow[...,
-                   None] * np.float32([-1.5, -1.3, -1.1]) + 0.02 * rng.standard_normal((64, 64, 3)).astype(np.float32)
+    noise = 0.02 * rng.standard_normal((64, 64, 3)).astype(np.float32)
+    light = shadow[..., None] * np.float32([-1.5, -1.3, -1.1]) + noise
     albedo = np.log(np.float32([0.5, 0.35, 0.27])) + np.zeros((64, 64, 3), np.float32)
     albedo[40:44, 10:50] += np.float32([0.1, -0.4, -0.3])
     said = light - shadow[..., None] * np.float32([-0.07, 0, 0.07])
@@ -225,8 +225,10 @@ def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
                           "held_out": 1, "seed": 0, "workers": 0}}
     monkeypatch.setitem(delighter.CONFIGS, "cpu", small)
     monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
-    monkeypatch.setattr(delighter, "prepare_people", lambda seeds, views, work,
-                        *rest: people.prepare_people(seeds, views, work, QUIET, processes=2))
+    def prepare(seeds, views, work, *rest):
+        return people.prepare_people(seeds, views, work, QUIET, processes=2)
+
+    monkeypatch.setattr(delighter, "prepare_people", prepare)
     with pytest.raises(Problem, match="There are no people in"):
         delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET,
                                   TrainingRun(growing=True, work=tmp_path / "work"))

@@ -31,8 +31,8 @@ def test_files_that_others_added_stay_and_the_delivery_goes_on(capture):
     (place / "look" / "shader.ma").write_text("and mine")
     first = (place / delivery_plan.PROVENANCE).stat().st_ino
     assert isinstance(delivered.deliver(capture, **{**OBJ, "hair": False}), Done)
-    assert (place / "my notes.txt").read_text() == "mine" and (place / "textures"
-                                                               / "painted.psd").read_text() == "mine too"
+    assert (place / "my notes.txt").read_text() == "mine"
+    assert (place / "textures" / "painted.psd").read_text() == "mine too"
     assert (place / "look"
             / "shader.ma").read_text() == "and mine" and (place / delivery_plan.PROVENANCE).stat().st_ino != first
     assert [path.name for path in capture.exports.iterdir()] == [place.name], "nothing is left beside it"

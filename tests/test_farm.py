@@ -49,10 +49,8 @@ def test_what_was_done_twice_or_lost_for_no_reason_is_found():
     fine = [Begun("a", 7, "f", "scan", 3, None), Begun("b", 8, "f", "scan", 5, 6)]
     kill = {"at": 4, "host": "a", "pid": 7}
     assert judge_account(fine, [kill]) == {"stages": 1, "twice": 0, "interrupted": 1, "unexplained": 0}
-    assert judge_account(fine,
-                         [{**kill, "pid": None}])["unexplained"] == judge_account(fine,
-                                                                                  [{**kill, "host": None,
-                                                                                    "pid": None}])["unexplained"] == 0
+    for account in ({**kill, "pid": None}, {**kill, "host": None, "pid": None}):
+        assert judge_account(fine, [account])["unexplained"] == 0
     for other in ({**kill, "pid": 8}, {**kill, "host": "b"}, {**kill, "at": 2}):
         assert judge_account(fine, [other])["unexplained"] == 1
     assert judge_account([*fine, Begun("a", 9, "f", "scan", 7, 8)], [kill])["twice"] == 1

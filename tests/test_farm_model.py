@@ -86,9 +86,8 @@ def test_other_numbers_of_frames_are_told_where_they_were_measured_to_their_end(
             "frames-120": {"frames": fast, "cameras": {"over_s": 480.0}}, "views-8": {"delight": fast}}
     found = model(costs(**rows), disk(), STARTS, EVEN)["frames"]
     assert list(found) == ["30", "300"] and found["30"]["seconds"] == 7 * 36 + 3 * 6
-    assert "| 300 | 270 s |" in page(model(costs(**rows), disk(), STARTS,
-                                           EVEN)) and "With other numbers" not in page(model(costs(), disk(), STARTS,
-                                                                                             EVEN))
+    assert "| 300 | 270 s |" in page(model(costs(**rows), disk(), STARTS, EVEN))
+    assert "With other numbers" not in page(model(costs(), disk(), STARTS, EVEN))
 
 
 def test_a_capture_is_weighed_by_what_its_stages_write(tmp_path):

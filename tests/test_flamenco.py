@@ -214,9 +214,8 @@ def test_the_lines_of_commands_run_in_any_folder_and_end_the_batch(farm, tmp_pat
     moods(storage / "batch")
     lines = [line.split("\t")
              for line in call(program, tmp_path, "batch", "commands", storage / "batch").stdout.splitlines()]
-    assert len(lines) == 2 * len(GROUPS) and [after
-                                              for _, after, _ in lines][:4] == ["", "Anna.head", "Anna.mask",
-                                                                                "Anna.solve"]
+    assert len(lines) == 2 * len(GROUPS)
+    assert [after for _, after, _ in lines][:4] == ["", "Anna.head", "Anna.mask", "Anna.solve"]
     for _, _, command in lines[:4]:
         assert subprocess.run(command, shell=True, cwd="/", capture_output=True).returncode == 0
     assert "Anna                 done" in call(program, tmp_path, "batch", "status", storage / "batch").stdout

@@ -70,8 +70,8 @@ def test_a_capture_with_glasses_is_refused_and_the_artist_can_overrule_it(tmp_pa
     overruled = tmp_path / "overruled"
     overruled.mkdir()
     report = take(overruled, pictures, no_glasses=True)
-    assert report.figures["frames_with_glasses_percent"] == 100 and not any("glasses" in finding["problem"]
-                                                                            for finding in report.findings)
+    assert report.figures["frames_with_glasses_percent"] == 100
+    assert not any("glasses" in finding["problem"] for finding in report.findings)
 
 
 def test_doubt_is_a_warning_and_few_photographs_refuse_nothing():

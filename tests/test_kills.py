@@ -80,10 +80,8 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
         (root / name).write_bytes(content)
         assert [told for told in kills_judge.after_kill(place, known) if fault in told], name
         (root / name).unlink() if before is None else (root / name).write_bytes(before)
-    assert kills_judge.after_kill(place, known,
-                                  {"shadow_mask.png": (b"old",
-                                                       b"new")}) == ["shadow_mask.png is neither the old mask nor a "
-                                                                     "new one"]
+    told = kills_judge.after_kill(place, known, {"shadow_mask.png": (b"old", b"new")})
+    assert told == ["shadow_mask.png is neither the old mask nor a new one"]
     (root / "notes" / "list.txt").rename(root / "list.txt")
     assert "the user's notes/list.txt is gone" in kills_judge.after_kill(place, known)
     (root / "list.txt").rename(root / "notes" / "list.txt")

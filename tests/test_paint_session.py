@@ -59,8 +59,8 @@ def test_leaving_gives_back_what_the_artist_had(addon, capture, mode, shading):
     bpy.context.object.name = "Mine"
     paint = bpy.context.scene.tool_settings.image_paint
     paint.mode, paint.canvas = 'IMAGE', bpy.data.images.new("My Canvas", 8, 8)
-    paint.stencil_image, paint.use_stencil_layer, paint.stencil_color = bpy.data.images.new("My Stencil", 8,
-                                                                                            8), False, (0.25, 0.5, 0.75)
+    paint.stencil_image = bpy.data.images.new("My Stencil", 8, 8)
+    paint.use_stencil_layer, paint.stencil_color = False, (0.25, 0.5, 0.75)
     paint.invert_stencil = True
     if paint.brush is not None:
         paint.brush.color, paint.brush.size, paint.brush.strength = (0.125, 0.25, 0.5), 77, 0.5
@@ -100,8 +100,8 @@ def test_what_an_undo_brings_back_is_followed_and_nothing_of_the_painting_is_lef
     files.settle()
     assert session.on_sheet() and bpy.context.mode == 'PAINT_TEXTURE'
     bpy.ops.wildcap.finish_mask()
-    assert "WildCap Mask Sheet" not in bpy.data.objects and {o.name for o in bpy.context.view_layer.objects
-                                                             if o.visible_get()} == visible
+    assert "WildCap Mask Sheet" not in bpy.data.objects
+    assert {o.name for o in bpy.context.view_layer.objects if o.visible_get()} == visible
     bpy.ops.ed.undo_push(message="left")
     bpy.ops.ed.undo()  # into the painting that has ended
     files.settle()

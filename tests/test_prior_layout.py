@@ -172,10 +172,8 @@ def test_the_prior_is_asked_in_its_own_window_and_coordinates(carried):
     head = template.load()
     wanted = (head.vertices[head.faces[face[[6, 197]]]] * bary[[6, 197], :, None]).sum(1).mean(0)
     assert np.linalg.norm(at.numpy() - wanted) < 0.006
-    assert layout.whole_size(1024,
-                             8) == 1024 and layout.whole_size(500,
-                                                              8) == 480 and layout.whole_size(1024,
-                                                                                              64) * 3 / 4 % 64 == 0
+    assert layout.whole_size(1024, 8) == 1024 and layout.whole_size(500, 8) == 480
+    assert layout.whole_size(1024, 64) * 3 / 4 % 64 == 0
 
 
 @pytest.mark.parametrize("recipe", ["wildcap", "released"])

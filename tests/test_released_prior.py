@@ -95,8 +95,8 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
     def norm(name, value):
         count = value.shape[1]
         grouped = value.reshape(len(value), max(1, count // 32), -1)
-        grouped = (grouped - grouped.mean(-1, keepdim=True)) / (grouped.var(-1, unbiased=False, keepdim=True)
-                                                                + 1e-5).sqrt()
+        deviation = (grouped.var(-1, unbiased=False, keepdim=True) + 1e-5).sqrt()
+        grouped = (grouped - grouped.mean(-1, keepdim=True)) / deviation
         weight, bias = affine(f"{name}.mapper", mapped)[:, :count], affine(f"{name}.mapper", mapped)[:, count:]
         return grouped.reshape(value.shape) * (1 + weight[:, :, None, None]) + bias[:, :, None, None]
 

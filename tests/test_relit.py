@@ -38,8 +38,8 @@ def test_the_people_are_six_tones_that_no_training_may_take():
         colour = pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope,
                                      p.chroma)[0]
         assert tone_group(images.linear_to_srgb(colour)).replace(" ", "_") == person.name
-    assert len({p.name for p in people.PEOPLE}) == len(TONES) and {p.light
-                                                                   for p in people.PEOPLE} == set(people_lights.KINDS)
+    assert len({p.name for p in people.PEOPLE}) == len(TONES)
+    assert {p.light for p in people.PEOPLE} == set(people_lights.KINDS)
 
 
 def test_a_panorama_is_bright_where_its_sky_and_window_are():
@@ -50,8 +50,8 @@ def test_a_panorama_is_bright_where_its_sky_and_window_are():
     # the window is on the sun's side, before the face and above
     assert np.sign(middle[0]) == side and middle[1] < 0 < middle[2]
     sky = people_lights.panorama((3, 3, 3), (1, 1, 1), (0.1, 0.1, 0.1))
-    assert sky[0, 0, 0] == pytest.approx(3, rel=0.01) and sky[people_lights.HEIGHT // 2 - 1, 0,
-                                                              0] == pytest.approx(1, rel=0.06)
+    assert sky[0, 0, 0] == pytest.approx(3, rel=0.01)
+    assert sky[people_lights.HEIGHT // 2 - 1, 0, 0] == pytest.approx(1, rel=0.06)
     assert sky[-1, 0, 0] == pytest.approx(0.1)
 
 

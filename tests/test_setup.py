@@ -141,8 +141,10 @@ def test_the_set_up_offers_a_test_once_a_solver_answers_and_no_longer_when_it_do
     assert "torch" in setup("problems").of("").problem and setup("problems").of("").remedy
     monkeypatch.setattr(checking.environment, "judge", lambda found, requirements: [])
     found = {"device": "cuda", "reason": "cuda takes 0.1 s."}
-    monkeypatch.setattr(checking.environment, "survey", lambda python, requirements,
-                        importing: found if importing else {"device": "", "reason": ""})
+    def survey(python, requirements, importing):
+        return found if importing else {"device": "", "reason": ""}
+
+    monkeypatch.setattr(checking.environment, "survey", survey)
     checking.accept(bare / "bin" / "python")
     assert "wildcap.self_test" in buttons(panel) and preferences.get().device == ""
     wait(checking)

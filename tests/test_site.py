@@ -98,8 +98,8 @@ def test_the_manifest_names_every_licence_and_holder_of_what_ships():
     assert set(MANIFEST["license"]) == {"SPDX:GPL-3.0-or-later", "SPDX:MIT", "SPDX:Apache-2.0", "SPDX:CC0-1.0"}
     notices = (ROOT / "core" / "weights" / "prior.json").read_text(encoding="utf-8")
     year, holder = re.search(r"Copyright \(c\) (\d{4}) ([A-Z]\w+ [A-Z]\w+)", notices).groups()
-    assert f"{year} {holder}" in MANIFEST["copyright"] and any("MediaPipe Authors" in name
-                                                               for name in MANIFEST["copyright"])
+    assert f"{year} {holder}" in MANIFEST["copyright"]
+    assert any("MediaPipe Authors" in name for name in MANIFEST["copyright"])
     assert MANIFEST.get("website", "") == links.WEBSITE, "one constant says where WildCap is"
 
 

@@ -51,8 +51,8 @@ def test_killed_at_any_step_it_continues_to_the_same_bytes(tmp_path):
     took_up = [m.text for m in messages if isinstance(m, Log) and m.text.startswith("Going on after step")]
     assert took_up or step <= 2, f"killed at step {step}"  # the second step's checkpoint is written after its report
     for name in (*(f"maps/{name}" for name in MAPS), "preview/albedo.png", "preview/shading.png"):
-        assert (killed.root / name).read_bytes() == (unbroken.root
-                                                     / name).read_bytes(), f"{name}, killed at step {step}"
+        again, whole = (folder.root / name for folder in (killed, unbroken))
+        assert again.read_bytes() == whole.read_bytes(), f"{name}, killed at step {step}"
     ours, theirs = load_file(killed.solved), load_file(unbroken.solved)
     assert ours.keys() == theirs.keys() and all(torch.equal(ours[name], theirs[name]) for name in ours)
 

@@ -53,10 +53,8 @@ def drawn(seed, scales, parts=("traits",)):
     rng, values = np.random.default_rng(seed), np.zeros((3, len(cells.places)))
     for part in parts:
         lower = np.linalg.cholesky(getattr(model, part) + 1e-6 * np.eye(len(cells.places)))
-        values += getattr(scales, part) * skin_or_light.OF_AXES[:,
-                                                                None] * (lower
-                                                                         @ rng.standard_normal((len(cells.places),
-                                                                                                3))).T
+        drawn = (lower @ rng.standard_normal((len(cells.places), 3))).T
+        values += getattr(scales, part) * skin_or_light.OF_AXES[:, None] * drawn
     return enlarged(torch.from_numpy(skin_or_light._spread(AXES.T @ values, cells.covered)), SIZE)
 
 

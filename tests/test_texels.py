@@ -80,8 +80,8 @@ def test_the_mirror_image_of_a_head_is_the_mirror_image_of_what_the_network_read
     known = head_in_light()
     turned = Texels(**{name: getattr(known, name)[:, ::-1].copy() for name in known.__dataclass_fields__})
     turned.normal[..., 0] *= -1
-    (layers, light, middle), (opposite, other_light, other) = (network_input(maps_of(each, "cpu"))
-                                                               for each in (known, turned))
+    (layers, light, middle), (opposite, other_light, other) = (
+        network_input(maps_of(each, "cpu")) for each in (known, turned))
     layers = layers.flip(-1)
     layers[:, 5] *= -1
     assert layers.shape == (1, CHANNELS, 64, 64) and (middle - other).abs().max() < 0.02

@@ -45,9 +45,8 @@ def shot(root, azimuths=AZIMUTHS, points: int = 300) -> Capture:
         image = pycolmap.Image(name=name, camera_id=1, image_id=number, keypoints=view.project(places[seen])[0])
         for k, i in enumerate(seen):
             members[i].append(pycolmap.TrackElement(number, k))
-        model.add_image_with_trivial_frame(image,
-                                           pycolmap.Rigid3d(np.concatenate([view.rotation, view.translation[:, None]],
-                                                                           1)))
+        pose = np.concatenate([view.rotation, view.translation[:, None]], 1)
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
     for place, elements in zip(places, members, strict=True):
         if len(elements) > 1:
             model.add_point3D(place, pycolmap.Track(elements), np.zeros(3, np.uint8))

@@ -61,8 +61,10 @@ def _masks() -> Iterator:
             output.open(str(path), spec)
             output.write_image(np.repeat(BARS[..., None] / np.float32(255), channels, -1).astype(np.float32))
             output.close()
-            return f"{path.name} of {kind} x {channels}, {attributes}", lambda: bool(np.abs(images.read_mask(path)
-                                                                                            - BARS / 255).max() < 0.06)
+            def reads_right() -> bool:
+                return bool(np.abs(images.read_mask(path) - BARS / 255).max() < 0.06)
+
+            return f"{path.name} of {kind} x {channels}, {attributes}", reads_right
 
         return "masks", make
 
@@ -196,8 +198,10 @@ def _jsons() -> Iterator:
             path.write_bytes(encode(points if of_points else chosen))
             if of_points:
                 found = lambda: artist_landmarks.read(path)  # noqa: E731 - read only when it is asked for
-                return f"{path.name}: {what}", lambda: np.allclose(found()[152],
-                                                                   points["points"]["152"]) and len(found()) == 2
+                def reads_right() -> bool:
+                    return np.allclose(found()[152], points["points"]["152"]) and len(found()) == 2
+
+                return f"{path.name}: {what}", reads_right
             return (
                 f"{path.name}: {what}",
                 lambda: command_settings.read_file(path) == chosen and read_json(path) == chosen,

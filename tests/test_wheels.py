@@ -52,8 +52,8 @@ def test_a_folder_of_wheels_is_made_and_installed_from(index, tmp_path, monkeypa
     monkeypatch.delenv("PIP_FIND_LINKS")
     assert main(["install", str(target), "--wheels", str(folder), "--compute", "cpu"]) == 0
     python = environment.python_of(target)
-    assert str(python) in capsys.readouterr().out and environment.verify(python, setup_commands.REQUIREMENTS,
-                                                                         importing=True) == []
+    assert str(python) in capsys.readouterr().out
+    assert environment.verify(python, setup_commands.REQUIREMENTS, importing=True) == []
 
 
 def test_what_keeps_wheels_from_coming_is_said(index, tmp_path, capsys):

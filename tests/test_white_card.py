@@ -55,8 +55,11 @@ def test_the_chart_that_the_solver_finds_reaches_the_settings(addon, item, monke
         figures = {"white_point": [0.9, 0.8, 0.6]}
 
     started = []
-    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool,
-                        **options: started.append((tool, options)) or Job())
+    def start_tool(item, tool, **options):
+        started.append((tool, options))
+        return Job()
+
+    monkeypatch.setattr(addon("jobs"), "start_tool", start_tool)
     bpy.ops.wildcap.find_color_checker()
     assert started[0][0] == "white_point"
     started[0][1]["then"]()

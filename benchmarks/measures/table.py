@@ -96,8 +96,8 @@ def to_record(found: dict[str, dict[str, Cell]], scores: Scores) -> dict:
 def _mean_text(cell: Cell | None, column: Column) -> str | None:
     if cell is None:
         return None
-    return f"{round(cell.mean, column.digits) + 0.0:.{column.digits}f}" + ("" if cell.spread is None
-                                                                           else f" ± {cell.spread:.{column.digits}f}")
+    spread = "" if cell.spread is None else f" ± {cell.spread:.{column.digits}f}"
+    return f"{round(cell.mean, column.digits) + 0.0:.{column.digits}f}" + spread
 
 
 def _difference_text(cell: Cell | None, column: Column) -> str | None:

@@ -120,8 +120,8 @@ def _enlarged(groups: list[dict], folder: Path) -> list[dict]:
         for name in group["names"]:
             there = (folder / FULL / name).is_file()
             width, height = images.size(folder / FULL / name) if there else (group["width"], group["height"])
-            focal = group["focal_px"] and group["focal_px"] * math.hypot(width, height) / math.hypot(group["width"],
-                                                                                                     group["height"])
+            diagonal = math.hypot(group["width"], group["height"])
+            focal = group["focal_px"] and group["focal_px"] * math.hypot(width, height) / diagonal
             one = split.setdefault((number, width, height),
                                    {"names": [], "width": width, "height": height, "focal_px": focal})
             one["names"].append(f"{FULL}/{name}" if there else name)

@@ -262,8 +262,8 @@ class Capture:
         """Whether a folder without capture.json, which a damaged one may be deleted from to start anew, has been a
         capture: by our record, or by a job."""
         with contextlib.suppress(OSError, ValueError, TypeError):
-            return (self.root / ownership.RECORD).is_file() or {"capture", "from", "until",
-                                                                "quality"} <= set(read_json(self.job))
+            today = {"capture", "from", "until", "quality"}
+            return (self.root / ownership.RECORD).is_file() or today <= set(read_json(self.job))
         return False
 
     def refuse_strangers(self) -> None:

@@ -116,8 +116,8 @@ def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, sett
 def _changed_settings(finished: dict, stage: Stage, settings: Settings) -> list[str]:
     """A setting that the record does not know had its default; one that names a path is judged by what the path
     holds."""
-    chosen, then = getattr(settings, stage.name), {**asdict(type(getattr(settings, stage.name))()),
-                                                   **finished["settings"]}
+    chosen = getattr(settings, stage.name)
+    then = {**asdict(type(chosen)()), **finished["settings"]}
     paths = {f.name for f in fields(chosen) if "path" in f.metadata}
     changed = [f"{stage.name}.{name}" for name, value in result_settings(chosen).items() if name not in paths
                and then[name] != value]

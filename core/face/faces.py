@@ -109,8 +109,8 @@ def detect_others(srgb: np.ndarray, face: Face) -> list[Face]:
     for region in _detect_regions(image, 0.0):
         if np.hypot(region[0] - x, region[1] - y) > 0.5 * max(face.width, region[2] / 1.5):
             other = _landmarks(image, region)
-            if other is not None and other.score > 0.8 and np.hypot(*np.subtract(_middle(other),
-                                                                                 (x, y))) > 0.5 * face.width:
+            sure = other is not None and other.score > 0.8
+            if sure and np.hypot(*np.subtract(_middle(other), (x, y))) > 0.5 * face.width:
                 found.append(other)
     return found
 

@@ -152,9 +152,8 @@ def _continued(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     if min(weight.shape) <= 2:
         return np.broadcast_to(weighted.sum((0, 1)) / max(weight.sum(), 1e-6), weighted.shape).astype(np.float32)
     half = (weight.shape[1] + 1) // 2, (weight.shape[0] + 1) // 2
-    down = cv2.resize(weighted, half,
-                      interpolation=cv2.INTER_AREA).reshape(*half[::-1],
-                                                            -1), cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
+    smaller = cv2.resize(weighted, half, interpolation=cv2.INTER_AREA)
+    down = smaller.reshape(*half[::-1], -1), cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
     gain = np.minimum(4 * down[1], 1) / np.maximum(down[1], 1e-6)  # one known texel of four is enough
     coarse = cv2.resize(_continued(down[0] * gain[..., None], down[1] * gain), weight.shape[::-1],
                         interpolation=cv2.INTER_LINEAR)

@@ -152,8 +152,8 @@ def write_ply(path: Path, mesh: Mesh) -> None:
     numbers."""
     _check_written(path, mesh)
     with replacing(path) as temporary:
-        temporary.write_bytes(trimesh.exchange.ply.export_ply(trimesh.Trimesh(mesh.vertices, mesh.faces,
-                                                                              process=False)))
+        triangles = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        temporary.write_bytes(trimesh.exchange.ply.export_ply(triangles))
 
 
 def write_points(path: Path, points: np.ndarray) -> None:

@@ -80,8 +80,8 @@ class RayCaster:
         count = len(directions)
         face, bary, distance = np.full(count, -1), np.zeros((count, 3)), np.full(count, np.inf)
         if count:
-            triangle, ray, location = self._intersector.intersects_id(origins, directions, multiple_hits=False,
-                                                                      return_locations=True)
+            triangle, ray, location = self._intersector.intersects_id(
+                origins, directions, multiple_hits=False, return_locations=True)
             face[ray] = triangle
             bary[ray] = trimesh.triangles.points_to_barycentric(self.mesh.vertices[self.mesh.faces[triangle]], location)
             distance[ray] = np.linalg.norm(location - origins[ray], axis=1)

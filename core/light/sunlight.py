@@ -69,9 +69,8 @@ class _SkinPoints:
 
 
 def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
-              reaches: Callable[[np.ndarray], np.ndarray],
-              weights: np.ndarray, step: Callable[[int, int], None] = lambda done,
-              of: None) -> tuple[Light, np.ndarray, np.ndarray]:
+              reaches: Callable[[np.ndarray], np.ndarray], weights: np.ndarray,
+              step: Callable[[int, int], None] = lambda done, of: None) -> tuple[Light, np.ndarray, np.ndarray]:
     """The light that explains linear skin colours [N, 3] at points with unit normals [N, 3], transfer [N, 9] and
     weights [N].
 

@@ -161,5 +161,5 @@ def _check(mesh: Mesh, path: Path) -> None:
 
 
 def _same_uvs(a: Mesh, b: Mesh) -> bool:
-    return a.uvs is not None and b.uvs is not None and np.array_equal(a.uvs, b.uvs) and np.array_equal(a.face_uvs,
-                                                                                                       b.face_uvs)
+    return (a.uvs is not None and b.uvs is not None and np.array_equal(a.uvs, b.uvs)
+            and np.array_equal(a.face_uvs, b.face_uvs))

@@ -228,9 +228,8 @@ def infer(captures: list[Cells], scales: Scales) -> Split:
     traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
     for axis, size in enumerate(OF_AXES):
         told = cho_solve(cho_factor(among.covariance(scales, axis)), values[:, axis])
-        traits[axis], local[axis] = (scales.traits
-                                     * size) ** 2 * beyond.traits @ told, (scales.local
-                                                                           * size) ** 2 * beyond.local @ told
+        traits[axis] = (scales.traits * size) ** 2 * beyond.traits @ told
+        local[axis] = (scales.local * size) ** 2 * beyond.local @ told
         prior = (scales.light * size * OF_ORDERS) ** 2 + LEVEL**2 * (OF_ORDERS == 0)
         coefficients[axis] = VISIBLE * prior * (basis.T @ told[seen.own == 0])
     return Split(AXES.T @ coefficients, *(_spread(AXES.T @ part, first.covered) for part in (traits, local)), scales)

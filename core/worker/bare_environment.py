@@ -41,9 +41,8 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
     if answer(python, "import sys; print(sys.prefix != sys.base_prefix)") != "True":
         raise Problem(f"No environment can be made from {base} ({error or 'it does not start'}).",
                       "Use an Existing Python.")
-    if wheel_only or not answer(python,
-                                "import ensurepip; print(ensurepip.version())") or run([python, "-m", "ensurepip",
-                                                                                        "--default-pip"])[0]:
+    has_pip = not wheel_only and answer(python, "import ensurepip; print(ensurepip.version())")
+    if not has_pip or run([python, "-m", "ensurepip", "--default-pip"])[0]:
         unpack_pip(folder, pip_source.fetch(requirements, wheels))
     if answer(python, "import pip; print('pip')") != "pip":
         raise Problem(f"pip does not work in {folder}.", "Use an Existing Python, or choose another folder.")

@@ -23,9 +23,8 @@ def brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Gene
     outer = np.abs(on.position[:, :1]) / np.abs(on.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
     rise = np.clip(1.5 - 2.2 * outer, -0.35, 1.3)
     way = np.sign(on.position[:, :1]) * [1.0, 0, 0] + rise * [0, 0, 1.0]
-    density = (1.25 - 0.6
-               * outer[:, 0].clip(0, 1)) * 1.15 * person.brow * np.clip(region * 2.4 - 1.5 + 0.6
-                                                                        * min(person.brow, 1.3), 0, 1)
+    chance = np.clip(region * 2.4 - 1.5 + 0.6 * min(person.brow, 1.3), 0, 1)
+    density = (1.25 - 0.6 * outer[:, 0].clip(0, 1)) * 1.15 * person.brow * chance
     roots = strewn(ground, density, way, rng)
     roots = turned(roots, rng.normal(0, 0.22, len(roots.at)))
     count = len(roots.at)

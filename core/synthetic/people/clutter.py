@@ -128,8 +128,8 @@ def _glasses(radiance: np.ndarray, landmarks: np.ndarray, light: float,
     for eye in EYES:
         one, other = landmarks[list(eye)]
         reach = 0.85 * np.linalg.norm(other - one)
-        turn, axes = float(np.degrees(np.arctan2(*(other - one)[::-1]))), (max(2, int(reach)),
-                                                                           max(2, int(reach * round_)))
+        turn = float(np.degrees(np.arctan2(*(other - one)[::-1])))
+        axes = max(2, int(reach)), max(2, int(reach * round_))
         cv2.ellipse(over, np.round((one + other) / 2).astype(int).tolist(), axes, turn, 0, 360, 255, thick, cv2.LINE_AA)
     where = over.astype(np.float32) / 255
     colour = np.float32(rng.uniform(0.005, 0.3) * light) * np.exp(rng.normal(0, 0.2, 3)).astype(np.float32)

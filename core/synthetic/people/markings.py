@@ -27,9 +27,8 @@ def moles(side: int, rng: np.random.Generator) -> np.ndarray:
         axes = (radius * np.exp(rng.normal(0, 0.2, 2)) * 16).astype(int)
         cv2.ellipse(spot, (at * 16).astype(int).tolist(), axes.tolist(), float(rng.uniform(0, 180)), 0, 360, 255, -1,
                     cv2.LINE_AA, 4)
-        log += (spot.astype(np.float32) / 255)[...,
-                                               None] * (rng.normal(-0.5, 0.4)
-                                                        + rng.normal(0, 0.1, 3)).astype(np.float32)
+        tint = rng.normal(-0.5, 0.4) + rng.normal(0, 0.1, 3)
+        log += (spot.astype(np.float32) / 255)[..., None] * tint.astype(np.float32)
     return np.clip(log, -1.6, 1.0)
 
 

@@ -119,12 +119,11 @@ def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) ->
                                                    np.cumsum([3, len(PARTS), 3, LAMPS]), 2)
     shares = shares * picture[..., -1:]
     shares[..., -1] = 1 - picture[..., -1]
-    return Unlit(_bytes(images.linear_to_srgb(albedo)), _bytes(shares),
-                 np.round(127 * normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-                                                                                   ).astype(np.int8), _bytes(reach),
-                 _bytes(free[..., 0]),
-                 lamps.astype(np.float32), view.rotation.astype(np.float32), view.centre.astype(np.float32),
-                 np.float32(view.camera.params[0]), view.project(landmarks_of(scene.figure))[0].astype(np.float32))
+    length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    return Unlit(_bytes(images.linear_to_srgb(albedo)), _bytes(shares), np.round(127 * normal / length).astype(np.int8),
+                 _bytes(reach), _bytes(free[..., 0]), lamps.astype(np.float32), view.rotation.astype(np.float32),
+                 view.centre.astype(np.float32), np.float32(view.camera.params[0]),
+                 view.project(landmarks_of(scene.figure))[0].astype(np.float32))
 
 
 def true_shares(parts: np.ndarray) -> np.ndarray:
