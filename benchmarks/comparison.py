@@ -114,8 +114,8 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
                 if not (row / "score.json").is_file():
                     seen = seen or looks(capture, truth)[0]
                     _keep(row, *solved(capture, settings, method, seed), seen)
-                found[given].setdefault(method,
-                                        {})[str(seed)] = json.loads((row / "score.json").read_text(encoding="utf-8"))
+                score = json.loads((row / "score.json").read_text(encoding="utf-8"))
+                found[given].setdefault(method, {})[str(seed)] = score
     return found
 
 

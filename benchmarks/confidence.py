@@ -91,8 +91,8 @@ def judged(error: np.ndarray, confidence: np.ndarray) -> tuple[float, float, flo
     other."""
     order = np.argsort(-confidence, kind="stable")
     half = len(order) // 2
-    return float(spearmanr(1 - confidence,
-                           error)[0]), float(error[order[:half]].mean()), float(error[order[half:]].mean())
+    correlation = spearmanr(1 - confidence, error)[0]
+    return float(correlation), float(error[order[:half]].mean()), float(error[order[half:]].mean())
 
 
 if __name__ == "__main__":

@@ -57,8 +57,8 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
                           evidence.cell_side(settings.solve.grid_cells), recipe)
     state = Sampler(prior.of_tone(start.tone), start.recipe,
                     seeded(settings.seed)).sample(start.observations, start.state)
-    return images.linear_to_srgb(maps.finished(state, evidence,
-                                               start).diffuse), {"seconds": round(time.monotonic() - began, 1)}
+    diffuse = maps.finished(state, evidence, start).diffuse
+    return images.linear_to_srgb(diffuse), {"seconds": round(time.monotonic() - began, 1)}
 
 
 def studio(source: Capture, work: Capture, settings: Settings) -> Capture:

@@ -166,15 +166,15 @@ def _photographs(case: Case, stock: Stock, rng: random.Random) -> None:
 
 def _mask(case: Case, stock: Stock, rng: random.Random) -> None:
     picture = stock.bring(rng.choice(["mask.png", "mask.exr", "mask.jpg"]), case)
-    case.command, case.outputs = ["mask", "import", str(capture_at(case.place).root),
-                                  str(picture)], ("shadow_mask.png",)
+    case.command = ["mask", "import", str(capture_at(case.place).root), str(picture)]
+    case.outputs = ("shadow_mask.png",)
     _spoil(case, picture, rng)
 
 
 def _landmarks(case: Case, stock: Stock, rng: random.Random) -> None:
     marks = stock.bring("landmarks.json", case)
-    case.command, case.outputs = ["landmarks", "import", str(capture_at(case.place).root),
-                                  str(marks)], ("landmarks_artist.json",)
+    case.command = ["landmarks", "import", str(capture_at(case.place).root), str(marks)]
+    case.outputs = ("landmarks_artist.json",)
     _spoil(case, marks, rng)
 
 

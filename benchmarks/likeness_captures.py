@@ -60,8 +60,8 @@ def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, said:
         write_views(capture, views, _developed(work, frames, faces, flows, taken, seed),
                     min(Settings().frames.views, frames))
         meshes.write_obj(capture.head, registered(figure.head, seed))
-    total, count = sum(albedo[face].sum(0, dtype=np.float64)
-                       for albedo, face in faces.values()), sum(int(face.sum()) for _, face in faces.values())
+    total = sum(albedo[face].sum(0, dtype=np.float64) for albedo, face in faces.values())
+    count = sum(int(face.sum()) for _, face in faces.values())
     with replacing(target / "skin_tone.txt") as temporary:
         temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n",
                              encoding="ascii")

@@ -133,8 +133,8 @@ def row(folder: Path, count: int, plain_times: float) -> dict:
             raise SystemExit(f"{cost['problem']} {cost['remedy']}")
     ours = stage_cost.measure(capture.root, "cameras", settings=settings)
     if "problem" not in ours:
-        ours |= _against_truth(capture, truth,
-                               count) | {"found_by": capture.read()["stages"]["cameras"]["figures"]["features"]}
+        features = capture.read()["stages"]["cameras"]["figures"]["features"]
+        ours |= _against_truth(capture, truth, count) | {"found_by": features}
     print(count, ours, flush=True)
     found = {"ours": ours, "plain": None, "times": None, "processor_times": None}
     if plain_times and "problem" not in ours:

@@ -233,10 +233,14 @@ def sheet(sitter: LightSeries, given: list[dict[str, np.ndarray]], side: int = 2
     """Three of a sitter's lights, a row per answer at the truth's tone; sRGB."""
     rows, columns = (np.flatnonzero(sitter.face.any(axis)) for axis in (1, 0))
     box, tone = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1], sitter.albedo[sitter.face].mean(0)
-    shown = [[images.resize(images.linear_to_srgb(np.clip(answer * tone / np.maximum(answer[lit].mean(0), 1e-6), 0,
-                                                          1))[box], side, side)
-              for answer, lit in ((given[i][name], sitter.lit[i])
-                                  for i in range(0, len(given), max(1, len(given) // 3)))] for name in given[0]]
+    shown = []
+    for name in given[0]:
+        row = []
+        for i in range(0, len(given), max(1, len(given) // 3)):
+            answer, lit = given[i][name], sitter.lit[i]
+            toned = np.clip(answer * tone / np.maximum(answer[lit].mean(0), 1e-6), 0, 1)
+            row.append(images.resize(images.linear_to_srgb(toned)[box], side, side))
+        shown.append(row)
     return np.vstack([np.hstack(row) for row in shown])
 
 

@@ -60,8 +60,8 @@ class Filmed:
     def true_capture(self) -> Capture:
         """A copy whose delit frames are the true albedo, up to its texture; made once, and again where the head or the
         cameras changed."""
-        copy, same = Capture(self.work
-                             / f"{self.name}.wildcap"), ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
+        copy = Capture(self.work / f"{self.name}.wildcap")
+        same = ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
         if copy.texture_confidence.is_file() and any(hash_file(copy.root / name) != hash_file(self.capture.root / name)
                                                      for name in same):
             copy.texture_confidence.unlink()

@@ -62,8 +62,8 @@ def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
     them."""
     where, points = filmed.where, landmarks_in_uv()
     truth, normals = maps[TRUE], filmed.normals[where]
-    true_contrasts, parts = contrasts(images.linear_to_srgb(truth), points,
-                                      where), {name: mask[where] for name, mask in filmed.parts().items()}
+    true_contrasts = contrasts(images.linear_to_srgb(truth), points, where)
+    parts = {name: mask[where] for name, mask in filmed.parts().items()}
     found = {}
     for method, answer in maps.items():
         alone = fit_light([log_ratio(answer[where], truth[where])], [normals])

@@ -52,9 +52,8 @@ def main() -> int:
     stages = {stage: round(done["seconds"], 1) for stage, done in record["stages"].items()}
     findings = [finding["problem"] for done in record["stages"].values() for finding in done.get("findings", [])]
     row = {"seconds": round(sum(stages.values()), 1), "stages": stages, "cost": cost, "exit": said.returncode,
-           "findings": {str(k): said for k, said in
-           enumerate(findings)}, "cameras": record["stages"].get("cameras", {}).get("figures", {}),
-           "stopped": record.get("stopped")}
+           "findings": {str(k): finding for k, finding in enumerate(findings)},
+           "cameras": record["stages"].get("cameras", {}).get("figures", {}), "stopped": record.get("stopped")}
     print(said.stdout[-2000:], *findings, row, sep="\n")
     if arguments.json:
         figures.write(arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row},

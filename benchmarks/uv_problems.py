@@ -143,8 +143,8 @@ def _light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray,
     even = _sh_part(open_light, normal, face)
     rest = open_light - even
     rest *= UNEXPLAINED * even[face].mean() / np.sqrt((rest[face] ** 2).mean())
-    return np.maximum(even + rest,
-                      0.05 * even[face].mean()), np.clip(lit / np.maximum(open_light, 1e-4), 0.05, 1), shadow
+    opened = np.clip(lit / np.maximum(open_light, 1e-4), 0.05, 1)
+    return np.maximum(even + rest, 0.05 * even[face].mean()), opened, shadow
 
 
 def _usable(shading: np.ndarray, kept: np.ndarray, shadow: np.ndarray) -> bool:

@@ -95,8 +95,8 @@ def add_evidence(root: Path) -> None:
      / "cameras.bin").write_bytes(struct.pack("<QiiQQ4d", 1, 7, 2, WIDTH, HEIGHT, FOCAL, *CENTRE, -0.004))
     images = struct.pack("<Q", len(POSES))
     for number, (name, (turn, move)) in enumerate(POSES.items(), 1):
-        images += struct.pack("<I7dI", number, *turn, *move,
-                              7) + name.encode() + b"\0" + struct.pack("<Q2dQ2dQ", 2, 1, 2, 3, 4, 5, 6)
+        images += struct.pack("<I7dI", number, *turn, *move, 7) + name.encode() + b"\0"
+        images += struct.pack("<Q2dQ2dQ", 2, 1, 2, 3, 4, 5, 6)
     (root / "cameras" / "images.bin").write_bytes(images)
     header = ("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
               "element face 2\nproperty list uchar int vertex_indices\nend_header\n")

@@ -234,9 +234,8 @@ def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, ca
     head = bpy.context.view_layer.objects.active
     with pytest.raises(RuntimeError, match="no landmarks"):
         bpy.ops.wildcap.show_landmarks()
-    (capture
-     / "landmarks.json").write_text(json.dumps({"points": {"1": [0.0, -0.1, 0.0], "152": [0.0, -0.08, -0.1],
-                                                           "7": [0, 0, 0]}}), encoding="utf-8")
+    points = {"1": [0.0, -0.1, 0.0], "152": [0.0, -0.08, -0.1], "7": [0, 0, 0]}
+    (capture / "landmarks.json").write_text(json.dumps({"points": points}), encoding="utf-8")
     bpy.ops.wildcap.show_landmarks()
     empties = {o["wildcap_landmark"]: o for o in bpy.data.collections["WildCap Landmarks"].objects}
     assert set(empties) == {1, 152} and "Chin" in empties[152].name

@@ -200,8 +200,8 @@ BODY = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
 
 
 def binary(order: str, last: float = 0.0, index: int = 3) -> bytes:
-    return struct.pack(f"{order}12f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1,
-                       last) + struct.pack(f"{order}BiiiBiii", 3, 0, 1, 2, 3, 0, 2, index)
+    vertices = struct.pack(f"{order}12f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, last)
+    return vertices + struct.pack(f"{order}BiiiBiii", 3, 0, 1, 2, 3, 0, 2, index)
 
 
 @pytest.mark.parametrize(("form", "body"),

@@ -87,8 +87,8 @@ def test_the_wipe_shows_a_frame_before_and_after_and_leaves_no_image_behind(addo
     bpy.ops.wildcap.compare_delit(which=0)
     capture_of = addon("captures").folder(item)
     assert delighters.shown_frame(capture_of) == "00003" and len(bpy.data.images) == images
-    assert at(0.3) == [200, 100, 50, 255] and at(0.7) == [100, 50, 25,
-                                                          255] and at(0.5)[:3] == [255, 255, 255] and at(0.1)[3] == 0
+    assert at(0.3) == [200, 100, 50, 255] and at(0.7) == [100, 50, 25, 255]
+    assert at(0.5)[:3] == [255, 255, 255] and at(0.1)[3] == 0
     manager.wildcap_wipe = 0.8
     assert at(0.7) == [200, 100, 50, 255]
     manager.wildcap_wipe = 0.0

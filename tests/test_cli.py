@@ -188,8 +188,8 @@ def test_the_last_ten_masks_are_kept(painted, tmp_path):
         import_mask(painted, tmp_path / "mask.png")
         time.sleep(0.002)  # the names of the history count milliseconds
     kept = [images.read_mask(path)[0, 0] for path in sorted(painted.mask_history.iterdir())]
-    assert np.allclose(kept, np.arange(2, 12) / 20,
-                       atol=0.01) and np.isclose(images.read_mask(painted.shadow_mask)[0, 0], 0.6, atol=0.01)
+    assert np.allclose(kept, np.arange(2, 12) / 20, atol=0.01)
+    assert np.isclose(images.read_mask(painted.shadow_mask)[0, 0], 0.6, atol=0.01)
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89PNG\r\n\x1a\n cut off"])

@@ -177,9 +177,8 @@ def test_it_follows_another_shape_and_another_colour_and_what_was_set_stays(clos
     bpy.ops.wildcap.assemble_material()
     assert set(things(close_up).values()) == objects and shader.inputs["Roughness"].default_value == pytest.approx(0.77)
     for number, side in enumerate(("Left", "Right")):
-        assert ball_and_gaze(close_up,
-                             side)[0] == pytest.approx(addon("acting.close_up.ball").of(close_up, number).centre,
-                                                       abs=1e-5)
+        centre = addon("acting.close_up.ball").of(close_up, number).centre
+        assert ball_and_gaze(close_up, side)[0] == pytest.approx(centre, abs=1e-5)
     scene = addon("relight.picture").set_up(close_up, "three_point", 64, 1)
     assert objects <= set(scene.collection.objects)
 

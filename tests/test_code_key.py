@@ -171,8 +171,8 @@ def test_only_a_plain_name_after_the_package_means_a_module_that_is_run(copy):
         source.write('\nname = "x"\nNAMES = (f"{__package__}{name}", f"{__package__}", f"{name}.colmap", '
                      'f"{__package__}.pairs")\n')
     forget()
-    assert "cameras/colmap.py" not in code_key.modules("core.scan",
-                                                       copy) and "scan/pairs.py" in code_key.modules("core.scan", copy)
+    of_scan = code_key.modules("core.scan", copy)
+    assert "cameras/colmap.py" not in of_scan and "scan/pairs.py" in of_scan
 
 
 def test_every_python_gives_the_same_keys():

@@ -125,16 +125,16 @@ def test_gltf_in_one_file(capture):
     for i, move in enumerate(KEYS.values()):
         accessor = document["accessors"][mesh["primitives"][0]["targets"][i]["POSITION"]]
         low, high = np.array(accessor["min"]), np.array(accessor["max"])
-        assert np.allclose(np.where(np.abs(low) > high, low, high), y_up(np.array([move]))[0],
-                           atol=1e-6), "metres, Y up"
+        farthest = np.where(np.abs(low) > high, low, high)
+        assert np.allclose(farthest, y_up(np.array([move]))[0], atol=1e-6), "metres, Y up"
 
 
 def test_gltf_with_files_refers_to_the_delivered_maps(capture):
     folder = deliver(capture, format="gltf", preset="unreal")
     document = json.loads((folder / "face.gltf").read_text())
     uris = {image["uri"] for image in document["images"]}
-    assert uris == {"textures/T_face_BaseColor.png",
-                    "textures/T_face_N.png"} and all((folder / uri).is_file() for uri in uris)
+    assert uris == {"textures/T_face_BaseColor.png", "textures/T_face_N.png"}
+    assert all((folder / uri).is_file() for uri in uris)
     normal = (folder / "textures" / "T_face_N.png").stat().st_size
     assert normal and json.loads((folder / "provenance.json").read_text())["delivery"]["normals"] == "opengl", (
         "glTF has no other"
@@ -198,8 +198,8 @@ def test_fbx_for_arnold_refers_to_linear_exr_numbered_by_tile(capture):
     folder = deliver(capture, preset="arnold")
     read = by_another_reader(folder / "face.fbx")
     linked = {"base_color", "normal_camera", "specular", "specular_roughness"}
-    assert set(read["textures"]) == {f"textures/face_{name}.1001.exr"
-                                     for name in linked} and all((folder / name).is_file() for name in read["textures"])
+    assert set(read["textures"]) == {f"textures/face_{name}.1001.exr" for name in linked}
+    assert all((folder / name).is_file() for name in read["textures"])
 
 
 def test_obj_for_character_creator(capture):
@@ -208,8 +208,8 @@ def test_obj_for_character_creator(capture):
     read = next(iter(trimesh.load_scene(folder / "face.obj", process=False).geometry.values()))
     same_points(np.asarray(read.vertices), 100 * y_up(truth()), 20)
     named = [line.split()[-1] for line in (folder / "face.mtl").read_text().splitlines() if line.startswith("map_")]
-    assert {"textures/face_Diffuse.png",
-            "textures/face_Normal.png"} <= set(named) and all((folder / name).is_file() for name in named)
+    assert {"textures/face_Diffuse.png", "textures/face_Normal.png"} <= set(named)
+    assert all((folder / name).is_file() for name in named)
 
 
 def test_the_artists_own_mesh_has_a_material_per_tile(capture):

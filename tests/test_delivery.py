@@ -115,8 +115,8 @@ def test_exr_is_linear_half_float_and_numbered_by_tile(capture):
     assert str(spec.format) == "half" and spec.getattribute("oiio:ColorSpace") in linear
     assert np.allclose(images.read_data(made / "Zoe_et_moi_base_color.1001.exr"),
                        images.read_data(capture.maps / "diffuse_albedo.exr"), atol=3e-4)
-    assert np.allclose(images.read_data(made / "Zoe_et_moi_displacement.1001.exr"), -0.2,
-                       atol=1e-4), "centimetres, as the mesh"
+    displacement = images.read_data(made / "Zoe_et_moi_displacement.1001.exr")
+    assert np.allclose(displacement, -0.2, atol=1e-4), "centimetres, as the mesh"
 
 
 def test_roughness_follows_the_regions_of_the_built_in_head_alone(capture):
@@ -274,9 +274,8 @@ def test_every_preset_has_an_albedo_that_is_linked_and_names_of_its_own():
             and preset.maps[0].slot == "base_color"
             and preset.maps[0].kind == delivery_presets.COLOUR
         )
-        assert len({picture.name
-                    for picture in (*preset.maps,
-                                    *delivery_presets.HAIR)}) == len(preset.maps) + len(delivery_presets.HAIR)
+        pictures = (*preset.maps, *delivery_presets.HAIR)
+        assert len({picture.name for picture in pictures}) == len(pictures)
     with pytest.raises(Problem):
         delivery_plan.needs(Capture("/none"), "head")
     assert delivery_plan.safe_name("山田") == "head" and delivery_plan.safe_name("Zoë & moi") == "Zoe_moi"

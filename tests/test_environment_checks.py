@@ -18,8 +18,8 @@ REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 
 def test_a_base_python_is_found_and_fits():
     found = find_python()
-    assert tuple(map(int,
-                     environment.answer(found, "import sys; print(*sys.version_info[:2])").split())) in locks.PYTHONS
+    version = environment.answer(found, "import sys; print(*sys.version_info[:2])")
+    assert tuple(map(int, version.split())) in locks.PYTHONS
 
 
 def test_this_environment_is_judged_fit():

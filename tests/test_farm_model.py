@@ -21,9 +21,8 @@ EVEN = Assumptions(faces=1000, eur_core_hour=0.1, eur_gpu_hour=1.0, eur_gb_month
 def costs(**other) -> dict:
     """Ten stages of 36 s each on four cores, of which they use two."""
     stage = {"seconds": 36.0, "processor_s": 72.0, "peak_mb": 2000}
-    return {"machine": {"cores": 4, "processor": "a processor", "networks": "float32"},
-            "standard": dict.fromkeys(stages.NAMES, stage) | {
-        "solve": {**stage, "peak_mb": 6000}}, **other}
+    standard = dict.fromkeys(stages.NAMES, stage) | {"solve": {**stage, "peak_mb": 6000}}
+    return {"machine": {"cores": 4, "processor": "a processor", "networks": "float32"}, "standard": standard, **other}
 
 
 def disk(size: float = 10.0) -> dict[str, float]:

@@ -258,8 +258,8 @@ def test_a_run_keeps_what_older_code_made_says_so_and_forced_makes_it_again(capt
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
     runner.run_job(write_job(capture, last="cameras"), said.append)
     assert ran == [] and states(capture) == ["older", "older"]
-    assert [line.text for line in said
-            if isinstance(line, Log)][-1].startswith("Made by older code and kept: Frames, Cameras. Run a stage again")
+    told = [line.text for line in said if isinstance(line, Log)]
+    assert told[-1].startswith("Made by older code and kept: Frames, Cameras. Run a stage again")
     runner.run_job(write_job(capture, first="cameras", last="cameras"), said.append)
     assert ran == ["cameras"] and states(capture) == ["older", "done"]
 

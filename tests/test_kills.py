@@ -146,8 +146,8 @@ def test_a_camera_model_that_did_not_fit_on_the_disk_gets_no_name(tmp_path):
 
 def test_a_checkpoint_that_did_not_fit_on_the_disk_is_told_by_name(tmp_path, monkeypatch):
     """safetensors has an error of its own, with the system's in words."""
-    state, path = State(1, None, torch.ones(1, 7, 32, 32), Lights(*torch.ones(3, 4)),
-                        []), tmp_path / "solve.safetensors"
+    state = State(1, None, torch.ones(1, 7, 32, 32), Lights(*torch.ones(3, 4)), [])
+    path = tmp_path / "solve.safetensors"
     assert (
         "solve.safetensors could not be written" in with_limit(4096, lambda: checkpoint.write(path, state, "key"))
         and os.listdir(tmp_path) == []

@@ -128,8 +128,8 @@ def test_who_was_replaced_writes_nothing_more(capture):
                         lambda: capture.forget(["frames"]) or capture.stop("x", Problem("a", "b"))):
             with pytest.raises(Problem, match="taken this capture over"):
                 attempt()
-        with pytest.raises(Problem,
-                           match="taken this capture over"), replacing(capture.root / "deep" / "new.txt") as temporary:
+        taken = pytest.raises(Problem, match="taken this capture over")
+        with taken, replacing(capture.root / "deep" / "new.txt") as temporary:
             temporary.write_text("x")
         after = {path: path.read_bytes() for path in capture.root.iterdir() if path.is_file()
                  and path.name != "written.jsonl"}

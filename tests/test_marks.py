@@ -53,8 +53,8 @@ def skin(strength=0.05):
 def test_a_mole_is_found_where_and_as_large_as_it_is(diameter):
     marks = find(skin() * np.exp(-spot(200, 300, diameter) * MELANIN), SKIN, TEXEL)
     assert len(marks) == 1
-    assert np.hypot(marks[0].row - 200,
-                    marks[0].column - 300) < 1.5 and 0.6 < marks[0].radius * TEXEL / (diameter / 2) < 1.6
+    assert np.hypot(marks[0].row - 200, marks[0].column - 300) < 1.5
+    assert 0.6 < marks[0].radius * TEXEL / (diameter / 2) < 1.6
     assert 0.6 * MELANIN.mean() < marks[0].contrast < 1.2 * MELANIN.mean()
     assert unlike_shadow(marks[0], TAKEN / TAKEN.mean())
 

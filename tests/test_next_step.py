@@ -81,5 +81,5 @@ def test_the_sample_head_needs_no_solver(step):
 
 def test_without_a_solver_whatever_needs_one_leads_to_its_set_up(step):
     assert step(python=False).operator == "wildcap.install_solver"
-    assert step(python=False, done=BEFORE, has_head=True, head_time=5.0, head=5.0,
-                has_mask=True).operator == "wildcap.install_solver"
+    offered = step(python=False, done=BEFORE, has_head=True, head_time=5.0, head=5.0, has_mask=True)
+    assert offered.operator == "wildcap.install_solver"

@@ -102,8 +102,8 @@ def test_a_known_head_is_recovered(known):
 
 def test_the_stage_writes_a_head_of_the_frozen_topology(tmp_path, monkeypatch, known):
     model, truth, points, _ = known
-    capture, report = _capture(tmp_path / "Café Müller.wildcap", truth, model, points,
-                               monkeypatch), Reporter("registration")
+    capture = _capture(tmp_path / "Café Müller.wildcap", truth, model, points, monkeypatch)
+    report = Reporter("registration")
     registration.run(capture, from_json({"registration": {"iterations": 8}}), report)
     head = meshes.read_obj(capture.head)
     assert template.template_hash(head) == template.template_hash(template.load())

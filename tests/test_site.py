@@ -88,8 +88,8 @@ def test_the_listing_and_the_page_name_the_zip(sources, tmp_path):
         and entry["archive_hash"] == f"sha256:{hashlib.sha256(archive.read_bytes()).hexdigest()}"
     )
     page = (site / "index.html").read_text(encoding="utf-8")
-    assert re.search(rf'href="[^"]*{re.escape(archive.name)}\?repository=[^"]*index\.json',
-                     page), "the drag brings the repository along"
+    link = rf'href="[^"]*{re.escape(archive.name)}\?repository=[^"]*index\.json'
+    assert re.search(link, page), "the drag brings the repository along"
     assert "${" not in page
     assert "Why it is here and not on extensions.blender.org" in page
 

@@ -64,8 +64,8 @@ def test_every_other_frame_is_matched_with_the_chosen_ones_around_it():
     for one, other in skeleton.pairs_between(frames, chosen):
         around.setdefault(other, []).append(one)
     assert set(around) == {name for name, _, _ in frames} - set(chosen)
-    assert around["00015.jpg"] == [chosen[0], chosen[1], chosen[2],
-                                   chosen[3]] and around["00035.jpg"] == [chosen[2], chosen[3]]
+    assert around["00015.jpg"] == [chosen[0], chosen[1], chosen[2], chosen[3]]
+    assert around["00035.jpg"] == [chosen[2], chosen[3]]
 
 
 @pytest.fixture(scope="module")

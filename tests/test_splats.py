@@ -84,8 +84,8 @@ def test_training_lowers_the_depth_error(seen):
     assert errors_of(after, seen) < 0.65 * errors_of(before, seen)
     assert np.mean(losses[-10:]) < 0.7 * np.mean(losses[:10])
     fused = fuse(after, np.array([[-0.05, -1.03, -0.05], [0.05, -0.96, 0.05]]), 0.003)
-    assert np.median(np.abs(np.linalg.norm(fused.mesh.vertices, axis=1)
-                            - RADIUS)) < 0.0015, "the same fusion makes a scan of them"
+    distance = np.linalg.norm(fused.mesh.vertices, axis=1)
+    assert np.median(np.abs(distance - RADIUS)) < 0.0015, "the same fusion makes a scan of them"
 
 
 def test_splats_without_a_gpu_are_a_problem_only_when_asked_for():

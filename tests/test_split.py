@@ -31,8 +31,8 @@ def face():
     small = raster.sample(skin[0] * skin[1],
                           np.stack(np.meshgrid(np.arange(SIZE), np.arange(SIZE)), -1).reshape(-1, 2) * 512 / SIZE
                           + 1).reshape(SIZE, SIZE)
-    return torch.from_numpy(normal.transpose(2, 0,
-                                             1).astype(np.float32)), torch.from_numpy((small > 0.9).astype(np.float32))
+    inside = torch.from_numpy((small > 0.9).astype(np.float32))
+    return torch.from_numpy(normal.transpose(2, 0, 1).astype(np.float32)), inside
 
 
 def lamp(seed, amount):

@@ -124,8 +124,8 @@ def test_pictures_are_judged_as_the_maps_are_seen():
     side, rng = 160, np.random.default_rng(3)
     truth = (SKIN * np.exp(0.1 * rng.standard_normal((side, side, 1)))).astype(np.float32)
     y, x = (np.mgrid[0:side, 0:side] + 0.5) / side
-    uv, face, shadow = np.stack([x.ravel(), 1 - y.ravel()],
-                                1), (np.abs(x - 0.5) < 0.45) & (np.abs(y - 0.5) < 0.45), x > 0.5
+    uv = np.stack([x.ravel(), 1 - y.ravel()], 1)
+    face, shadow = (np.abs(x - 0.5) < 0.45) & (np.abs(y - 0.5) < 0.45), x > 0.5
     look = HeadInView(AlbedoTruth(0, images.linear_to_srgb(truth), face, shadow), np.ones((side, side), bool), uv)
     filmed = truth * np.where(shadow, 0.4, 1.0)[..., None]
     found = state_scores.in_pictures({NOTHING: filmed, TRUE: truth, FLAT: np.broadcast_to(SKIN, truth.shape)}, [look])
@@ -200,8 +200,8 @@ def test_people_measured_before_by_the_same_code_stay_in_the_record():
     record = {"people": {DELIT: {"anna": row}}, "captures": {"anna": {DELIT: row}}, "code": code}
     scores, by_capture = state.with_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}},
                                             code)
-    assert scores == {DELIT: {"anna": row, "ben": row},
-                      SOLVED: {"ben": row}} and list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
+    assert scores == {DELIT: {"anna": row, "ben": row}, SOLVED: {"ben": row}}
+    assert list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
     assert state.with_earlier(record, {}, {}, {**code, "solve": "c"}) == ({}, {})
 
 

@@ -52,8 +52,8 @@ def test_the_frames_asked_are_spread_over_the_film_and_hold_those_of_the_texture
     asked = spread_over(records(400))
     numbers = [int(record.name[:5]) for record in asked]
     assert numbers == sorted(numbers) and numbers[0] == 0 and numbers[-1] == 399 and max(np.diff(numbers)) <= 6
-    assert {record for record in records(400)
-            if record.selected} <= set(asked) and MOST_FRAMES <= len(asked) <= MOST_FRAMES + 13
+    selected = {record for record in records(400) if record.selected}
+    assert selected <= set(asked) and MOST_FRAMES <= len(asked) <= MOST_FRAMES + 13
     assert spread_over(records(30)) == tuple(records(30))
 
 

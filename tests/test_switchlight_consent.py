@@ -40,9 +40,9 @@ def test_consent_holds_for_these_pictures_here_and_nothing_else(capture, serve, 
     assert consent.is_given(capture, consent.sending(capture, False))
     other = make(tmp_path / "other.wildcap", selected=4)
     other.consent.write_bytes(capture.consent.read_bytes())
-    assert not consent.is_given(other,
-                                consent.sending(other,
-                                                False)), "copied to another capture, though its frames are the same"
+    assert not consent.is_given(other, consent.sending(other, False)), (
+        "copied to another capture, though its frames are the same"
+    )
     with pytest.raises(Problem, match="consent"):
         consent.require(other, consent.sending(other, False))
     kept = (capture.frames / "00001.png").read_bytes()
@@ -50,8 +50,8 @@ def test_consent_holds_for_these_pictures_here_and_nothing_else(capture, serve, 
     assert not consent.is_given(capture, consent.sending(capture, False)), "another picture under the same name"
     (capture.frames / "00001.png").write_bytes(kept)
     assert consent.is_given(capture, consent.sending(capture, False))
-    assert not consent.is_given(capture,
-                                consent.sending(capture, False, [f"0000{i}.png" for i in range(4)])), "one more frame"
+    more = consent.sending(capture, False, [f"0000{i}.png" for i in range(4)])
+    assert not consent.is_given(capture, more), "one more frame"
     assert not consent.is_given(capture, consent.sending(capture, True)), "other answers"
     serve()
     assert consent.is_given(capture, consent.sending(capture, False)), "the same machine"

@@ -93,8 +93,8 @@ def test_the_network_begins_with_the_fitted_light_half_of_its_sun_blocked():
     light = torch.rand(2, 6, 128, 128) + 0.1
     shading, shadow, spread = TexelNet(**MODEL)(torch.randn(2, CHANNELS, 128, 128), light)
     assert shading.shape == (2, 3, 128, 128) and shadow.shape == (2, 1, 128, 128) and spread.shape == (2, 3, 32, 32)
-    assert torch.allclose(shading,
-                          torch.log(light[:, :3] + 0.5 * light[:, 3:])) and not shadow.any() and (spread == -2).all()
+    assert torch.allclose(shading, torch.log(light[:, :3] + 0.5 * light[:, 3:]))
+    assert not shadow.any() and (spread == -2).all()
 
 
 @pytest.fixture(scope="module")

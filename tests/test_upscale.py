@@ -97,8 +97,8 @@ def test_maps_of_the_wanted_size_are_left_as_they_are(capture):
 
 @pytest.mark.parametrize("name", ["normal.png", "specular_albedo.png", "confidence.png", "shading.exr"])
 def test_a_map_of_another_size_is_named(capture, name):
-    (images.write_linear if name.endswith(".exr")
-     else images.write_data)(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
+    write = images.write_linear if name.endswith(".exr") else images.write_data
+    write(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
     with pytest.raises(Problem, match=f"{name} is 33 x 33 pixels, but diffuse_albedo.exr is 256 x 256") as caught:
         read_maps(capture.maps)
     assert caught.value.remedy == "Run the stage solve again."
@@ -165,8 +165,8 @@ def test_an_untrained_network_resamples(capture):
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]
     linear = np.stack([truth, truth ** 2, truth / 2], 2)
     assert np.abs(images.srgb_to_linear(large[..., :3]) - linear)[inner].max() < 2e-3
-    assert np.abs(large[..., 3:6]
-                  - tilted(LARGE))[inner].max() < 4e-3 and np.abs(large[..., 6] - truth)[inner].max() < 2e-3
+    assert np.abs(large[..., 3:6] - tilted(LARGE))[inner].max() < 4e-3
+    assert np.abs(large[..., 6] - truth)[inner].max() < 2e-3
 
 
 def test_a_block_begins_as_the_identity():

@@ -120,8 +120,8 @@ def test_saturated_colours_keep_luminance_and_hue_and_nothing_leaves_the_gamut()
 def test_wide_gamut_without_hdr_is_converted(tmp_path):
     # Display P3's (0.8, 0.5, 0.4) is sRGB's (0.838, 0.486, 0.374), by the matrices of both standards
     path = write(tmp_path / "p3.mov", [patches([[0.8, 0.5, 0.4], [0.5] * 3])] * 3, primaries=P3, bits=10)
-    linear = ((np.array([0.8, 0.5, 0.4]) + 0.055)
-              / 1.055) ** 2.4 @ np.array([[1.2249, -0.2249, 0], [-0.0421, 1.0421, 0], [-0.0196, -0.0786, 1.0983]]).T
+    to_709 = np.array([[1.2249, -0.2249, 0], [-0.0421, 1.0421, 0], [-0.0196, -0.0786, 1.0983]])
+    linear = ((np.array([0.8, 0.5, 0.4]) + 0.055) / 1.055) ** 2.4 @ to_709.T
     assert np.abs(shown(path) - [1.055 * linear ** (1 / 2.4) - 0.055, [0.5] * 3]).max() < 0.012
 
 

@@ -78,8 +78,8 @@ def to_markdown(found: dict[str, dict[str, Cell]], columns: dict[str, Column], t
         rows = [[method, *(_difference_text(row.get(name), column) for name, column in shown.items())]
                 for method, row in found.items() if method != against]
         if any(cell is not None for row in rows for cell in row[1:]):
-            tables.append(markdown([f"less *{against}*, person by person",
-                                    *(column.label for column in shown.values())], rows))
+            heads = [f"less *{against}*, person by person", *(column.label for column in shown.values())]
+            tables.append(markdown(heads, rows))
     return "\n\n".join(tables)
 
 

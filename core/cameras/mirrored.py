@@ -100,8 +100,8 @@ def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
     points, values = cv2.SIFT_create(MOST_FEATURES, contrastThreshold=0.02).detectAndCompute(grey, None)
     if values is None:
         return np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)
-    return np.array([point.pt for point in points],
-                    np.float32), np.sqrt(values / np.maximum(values.sum(1, keepdims=True), 1e-9))
+    described = np.sqrt(values / np.maximum(values.sum(1, keepdims=True), 1e-9))
+    return np.array([point.pt for point in points], np.float32), described
 
 
 def _agreeing(a: tuple, b: tuple) -> int:

@@ -60,9 +60,9 @@ def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict
         return Verdict(TO_DO)
     version = str(finished.get("version", ""))
     if "inputs" not in finished:  # by WildCap 0.1.0, which kept one hash of everything
-        same = format_1.matches(root, record, stage,
-                                settings) and (bool(stage.reads)
-                                               or not _other_source(record.get("source_stamp", []), root, record))
+        same = format_1.matches(root, record, stage, settings)
+        if same and not stage.reads:
+            same = not _other_source(record.get("source_stamp", []), root, record)
         return Verdict(OLDER, version=version) if same else Verdict(STALE, ("an input or a setting",), version)
     changed = [*_changed_inputs(finished["inputs"], root, record, stage, settings),
                *_changed_settings(finished, stage, settings)]

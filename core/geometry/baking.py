@@ -65,8 +65,8 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
     part = atlas.in_tile(whole, tile, where)
     low, high = _rows(part, size)
     uv = np.full((size, size, 2), np.nan, np.float32)
-    turn, mirrored, covered = np.zeros((size, size),
-                                       np.float32), np.zeros((size, size), bool), np.zeros((size, size), bool)
+    turn = np.zeros((size, size), np.float32)
+    mirrored, covered = np.zeros((size, size), bool), np.zeros((size, size), bool)
     for row in range(0, size, STRIP_ROWS):
         tick(row / size)
         end = min(row + STRIP_ROWS, size)

@@ -173,8 +173,10 @@ def _sound(path: Path, mesh: Mesh) -> Mesh:
 
 
 def _check_written(path: Path, mesh: Mesh) -> None:
-    if fault := find_fault(mesh.vertices, mesh.faces, mesh.uvs,
-                           mesh.face_uvs) or ("" if len(mesh.faces) else "it has no faces"):
+    fault = find_fault(mesh.vertices, mesh.faces, mesh.uvs, mesh.face_uvs)
+    if not fault and not len(mesh.faces):
+        fault = "it has no faces"
+    if fault:
         raise Problem(f"{path} was not written: {fault}.",
                       advise_remaking(Path(path),
                                       "Run again, and if it stays, report it with the logs of this capture. Finished "

@@ -126,9 +126,8 @@ def _box(mesh: Mesh, view: View, width: int, height: int) -> tuple[slice, slice]
     if not np.isfinite(pixels).all():
         return slice(0, height), slice(0, width)
     low, high = (edge * [width / view.width, height / view.height] for edge in (pixels.min(0), pixels.max(0)))
-    (left, top), (right,
-                  bottom) = np.floor(low - BENT_SIDE_SHARE
-                                     * (width + height)), np.ceil(high + BENT_SIDE_SHARE * (width + height))
+    margin = BENT_SIDE_SHARE * (width + height)
+    (left, top), (right, bottom) = np.floor(low - margin), np.ceil(high + margin)
     return tuple(slice(int(np.clip(first, 0, size)), int(np.clip(end, 0, size)))
                  for first, end, size in ((top, bottom, height), (left, right, width)))
 

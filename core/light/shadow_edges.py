@@ -104,8 +104,8 @@ def _segmented(value: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight:
         gap = lit - shaded
         odds = np.where(gap > 0.02, ((lit + shaded) / 2 - value) / np.maximum(gap, 0.05),
                         np.where(dark > 0.5, 0.5, -0.5))
-        odds = _blur(np.clip(odds, -0.5, 0.5) * np.maximum(weight, 0.02),
-                     smooth) / np.maximum(_blur(np.maximum(weight, 0.02), smooth), 1e-4)
+        known = np.maximum(weight, 0.02)
+        odds = _blur(np.clip(odds, -0.5, 0.5) * known, smooth) / np.maximum(_blur(known, smooth), 1e-4)
         dark = np.where(free, odds > 0, inside).astype(np.float32)
     return dark > 0.5
 

@@ -130,9 +130,8 @@ def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np
     count = len(colours)
     prior = 0.03 + 0.67 * visible * (cosine > 0)  # that the sun reaches a point
     # a first guess of the two states: the sky gives the darker skin its colour, sky and sun the brightest
-    bright = (log.mean(1)
-              - np.quantile(log.mean(1), 0.3)) / max(np.quantile(log.mean(1), 0.97) - np.quantile(log.mean(1), 0.3),
-                                                     1e-3)
+    low, high = np.quantile(log.mean(1), 0.3), np.quantile(log.mean(1), 0.97)
+    bright = (log.mean(1) - low) / max(high - low, 1e-3)
     lit = visible * (bright > 0.5) if start is None else start[0]
     inlier = np.ones(count) if start is None else start[1]
     scale = np.average(colours, axis=0, weights=weights)

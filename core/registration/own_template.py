@@ -200,8 +200,8 @@ def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficien
     face, bary = surface.nearest(at.vertices, normals, REACH_M[1])
     there = face >= 0
     distance = np.full(len(face), np.inf)
-    distance[there] = np.linalg.norm(raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there],
-                                                        bary[there]) - at.vertices[there], axis=1)
+    nearest = raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there], bary[there])
+    distance[there] = np.linalg.norm(nearest - at.vertices[there], axis=1)
     follow = np.interp(distance, REACH_M, (1, 0)) * np.interp(_free_sky(at, normals), OPEN_SKY_SHARES, (0, 1))
     follow *= np.interp(cKDTree(_rim(surface.mesh)).query(at.vertices)[0], RIM_M, (0, 1))
     uv = np.zeros((len(face), 2))

@@ -79,9 +79,9 @@ def read_weights(folder: Path) -> dict[str, torch.Tensor]:
                       f"({type(error).__name__}). Nothing in it was run.",
                       "Download it again from the authors' page.") from error
     state = state.get("model_ema", state) if isinstance(state, dict) else None
-    if not isinstance(state,
-                      dict) or not state or not all(isinstance(name, str) and isinstance(value, torch.Tensor)
-                                                    for name, value in state.items()):
+    of_tensors = isinstance(state, dict) and state and all(
+        isinstance(name, str) and isinstance(value, torch.Tensor) for name, value in state.items())
+    if not of_tensors:
         raise Problem(f"{path} holds no state dict of a network.", CHOOSE)
     return {name: value.float() for name, value in state.items()}
 

@@ -214,8 +214,8 @@ def log_probability(together: Covariances, values: np.ndarray, scales: Scales, t
     total = -0.5 * sum((np.log(found / usual) / VARIED) ** 2 for found, usual in zip(scales, typical, strict=True))
     for axis in range(3):
         lower, column = cholesky(together.covariance(scales, axis), lower=True), values[:, axis]
-        total -= 0.5 * float(np.square(solve_triangular(lower, column,
-                                                        lower=True)).sum()) + float(np.log(np.diag(lower)).sum())
+        white = solve_triangular(lower, column, lower=True)
+        total -= 0.5 * float(np.square(white).sum()) + float(np.log(np.diag(lower)).sum())
     return total
 
 

@@ -177,8 +177,8 @@ def _softened(sight: Sight, direct: np.ndarray, radius: float) -> np.ndarray:
         if share * radius < 0.25:
             channels.append(direct)
             continue
-        spread = cv2.GaussianBlur(picture, (0, 0),
-                                  share * radius) / np.maximum(cv2.GaussianBlur(head, (0, 0), share * radius), 1e-3)
+        spread = cv2.GaussianBlur(picture, (0, 0), share * radius)
+        spread = spread / np.maximum(cv2.GaussianBlur(head, (0, 0), share * radius), 1e-3)
         channels.append(spread.reshape(-1)[sight.pixel])
     return np.stack(channels, -1).astype(np.float32)
 

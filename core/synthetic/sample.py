@@ -160,8 +160,8 @@ def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarra
     albedo = _shrunk(colour, over) / np.maximum(cover, 1e-6)[..., None]
     in_face = np.zeros(hit.shape, np.float32)
     in_face[hit] = raster.sample(template.mask("face", 1024), at * 1024 / MAPS)
-    points, normals = raster.interpolate(head.vertices, head.faces, face,
-                                         bary), raster.interpolate(vertex_normals(head), head.faces, face, bary)
+    points = raster.interpolate(head.vertices, head.faces, face, bary)
+    normals = raster.interpolate(vertex_normals(head), head.faces, face, bary)
     dark = np.zeros(hit.shape, np.float32)
     if sun is not None:
         away = (normals[hit] @ sun) <= 0

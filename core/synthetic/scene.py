@@ -122,8 +122,8 @@ def rig() -> np.ndarray:
     """Camera-to-world matrices [16, 4, 4] of a studio: two fixed rows of eight cameras, over 100 degrees from side to
     side, as in multi-view face datasets."""
     height, azimuth = (np.radians(a).ravel() for a in np.meshgrid([-6.0, 22.0], np.linspace(-50, 50, 8), indexing="ij"))
-    position = DISTANCE * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height),
-                                    np.sin(height)], -1)
+    direction = np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
+    position = DISTANCE * direction
     return looking(position, np.broadcast_to([0, -0.01, -0.035], position.shape), np.zeros(len(position)))
 
 

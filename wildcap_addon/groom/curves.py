@@ -104,8 +104,8 @@ def _made(name: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray)
     data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
     _attribute(data, "radius", 'FLOAT', 'POINT').data.foreach_set("value", radius.astype(np.float32).ravel())
     rgba = np.concatenate([colour, np.ones((count, 1))], 1)
-    _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR',
-               'CURVE').data.foreach_set("color", rgba.astype(np.float32).ravel())
+    colours = _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR', 'CURVE').data
+    colours.foreach_set("color", rgba.astype(np.float32).ravel())
     return data
 
 

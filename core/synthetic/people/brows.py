@@ -50,8 +50,8 @@ def lashes(person: Person, head: OpenHead, rng: np.random.Generator) -> Strands:
             shut = person.openness < 0.2
             outward = np.array([0, -1.0, -0.55 if shut else 0.05 * up]) + 28 * aside + rng.normal(0, 0.13, at.shape)
             outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-            size = length * rng.uniform(0.65, 1.1,
-                                        count) * np.interp(t / (len(edge) - 1), [0, 0.35, 1], [0.55, 0.9, 1.0])
+            along = np.interp(t / (len(edge) - 1), [0, 0.35, 1], [0.55, 0.9, 1.0])
+            size = length * rng.uniform(0.65, 1.1, count) * along
             bow = np.array([0, 0, 0.7 * up if not shut else 0.25])
             roots = Roots(at + 0.0002 * out, out, outward, at)
             points.append(_bowed(roots, size, bow))

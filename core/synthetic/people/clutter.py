@@ -30,10 +30,10 @@ def backdrop(directions: np.ndarray, environment: Environment, light: float, rng
         ground = np.broadcast_to(rng.uniform(0.02, 0.8) * np.exp(rng.normal(0, 0.3, 3)),
                                  (size, size, 3)).astype(np.float32) * light
         for scale in (2, 5, 12, 40):
-            blobs = rng.normal(0, 0.3 * rng.random(),
-                               (scale, scale, 1)) + rng.normal(0, 0.12 * rng.random() / scale**0.4, (scale, scale, 3))
-            ground = ground * np.clip(cv2.resize(np.exp(blobs).astype(np.float32), (size, size),
-                                                 interpolation=cv2.INTER_CUBIC), 0.1, 5)
+            bright = rng.normal(0, 0.3 * rng.random(), (scale, scale, 1))
+            blobs = bright + rng.normal(0, 0.12 * rng.random() / scale**0.4, (scale, scale, 3))
+            blobs = cv2.resize(np.exp(blobs).astype(np.float32), (size, size), interpolation=cv2.INTER_CUBIC)
+            ground = ground * np.clip(blobs, 0.1, 5)
     if rng.random() < 0.6:
         for _ in range(int(rng.integers(1, 14))):
             ground = _thing(ground, rng.uniform(-0.1, 1.1, 2) * size,

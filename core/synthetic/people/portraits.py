@@ -97,8 +97,8 @@ class Sitter:
     def _position(self, view: View) -> np.ndarray:
         face, bary, _ = raster.render_view(self.scene.whole, view, 1)
         mesh = self.scene.whole.mesh
-        points = raster.interpolate(mesh.vertices, mesh.faces, np.maximum(face, 0),
-                                    bary) - self.bald.mesh.vertices.mean(0)
+        points = raster.interpolate(mesh.vertices, mesh.faces, np.maximum(face, 0), bary)
+        points = points - self.bald.mesh.vertices.mean(0)
         return np.where(face[..., None] >= 0, points, 0).astype(np.float16)
 
 
@@ -239,8 +239,8 @@ def _lit(stage: RelightableView, surface: _Surface, sky: np.ndarray, lamps: list
         lamp = stage.unlit.lamps[k]
         arrives = surface.reach[..., k] * through
         diffuse = diffuse + _softened(np.maximum(surface.normal @ lamp, 0) * arrives, surface.there, radius) * tint
-        shine = shine + (highlight(surface.normal, towards, lamp, surface.rough)
-                         * arrives)[..., None] * surface.reflectance * tint
+        glint = highlight(surface.normal, towards, lamp, surface.rough) * arrives
+        shine = shine + glint[..., None] * surface.reflectance * tint
     return diffuse.astype(np.float32), shine.astype(np.float32)
 
 

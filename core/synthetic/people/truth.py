@@ -45,8 +45,8 @@ class Scene:
     def __init__(self, figure: Figure, blockers: Mesh | None = None):
         body = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)]
         meshes, part = [*body, figure.shirt], [SKIN, EYES, EYES, CLOTHES]
-        flat = [np.zeros((len(mesh.faces), 3), np.float32)
-                for mesh in body] + [np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
+        flat = [*(np.zeros((len(mesh.faces), 3), np.float32) for mesh in body),
+                np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
         for strands in figure.strands:
             mesh = prisms(strands)
             meshes.append(mesh)
