@@ -55,8 +55,8 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
     start = initial.start(prior, evidence, parse_skin_tone(settings.solve.skin_tone),
                           evidence.cell_side(settings.solve.grid_cells), recipe)
-    state = Sampler(prior.of_tone(start.tone), start.recipe,
-                    seeded(settings.seed)).sample(start.observations, start.state)
+    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seeded(settings.seed))
+    state = sampler.sample(start.observations, start.state)
     diffuse = maps.finished(state, evidence, start).diffuse
     return images.linear_to_srgb(diffuse), {"seconds": round(time.monotonic() - began, 1)}
 

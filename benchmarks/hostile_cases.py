@@ -60,8 +60,8 @@ class Stock:
         shutil.copytree(end.frames, folder / "photographs", ignore=shutil.ignore_patterns("*.json", "*.psd", ".*"))
         shutil.copytree(end.cameras, folder / "model", ignore=shutil.ignore_patterns("*.txt"))
         shutil.copy(SAMPLE / "cameras.json", folder / "cameras.json")
-        (folder
-         / "landmarks.json").write_text(json.dumps({"points": {"152": [0.0, -0.1, -0.1], "1": [0.0, -0.13, -0.03]}}))
+        points = {"152": [0.0, -0.1, -0.1], "1": [0.0, -0.13, -0.03]}
+        (folder / "landmarks.json").write_text(json.dumps({"points": points}))
         (folder / "settings.json").write_text(json.dumps({"frames": {"views": 3}, "scan": {"pairs": 4}, "seed": 7}))
         if end.head.is_file():
             shutil.copy(end.head, folder / "mesh.obj")

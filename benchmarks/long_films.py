@@ -113,8 +113,8 @@ def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: 
     camera."""
     views, still = [sample.view_of(matrix) for matrix in cameras], np.tile(np.eye(4), (3, 1, 1))
     first = images.read_linear(work / f"{numbers[0]:05d}.exr")
-    gain = TO / np.percentile(first[first.shape[0] // 4:-first.shape[0] // 4,
-                                    first.shape[1] // 4:-first.shape[1] // 4].max(-1), METERED)
+    rows, columns = first.shape[0] // 4, first.shape[1] // 4
+    gain = TO / np.percentile(first[rows:-rows, columns:-columns].max(-1), METERED)
     for k in numbers:
         around = max(k - 1, 0), k, min(k + 1, len(views) - 1)
         flow = motion.image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])

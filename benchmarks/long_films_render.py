@@ -64,8 +64,8 @@ def traced(parts: dict[str, bpy.types.Object], sun: dict, sky: np.ndarray) -> di
         towards = _unit(normals + 0.999 * _unit(rng.normal(size=points.shape)))
         free = ~caster.blocked(start, towards)
         row = (np.arccos(np.clip(towards[:, 2], -1, 1)) / np.pi * len(sky)).astype(int).clip(0, len(sky) - 1)
-        column = ((0.5 - np.arctan2(towards[:, 1], towards[:, 0]) / (2 * np.pi))
-                  * sky.shape[1]).astype(int) % sky.shape[1]
+        turn = 0.5 - np.arctan2(towards[:, 1], towards[:, 0]) / (2 * np.pi)
+        column = (turn * sky.shape[1]).astype(int) % sky.shape[1]
         light += free[:, None] * sky[row, column] / RAYS
     middle = np.array(sun["direction"])
     for _ in range(SUN_RAYS):

@@ -181,8 +181,8 @@ def of_pairs(subjects: int, delighter: str) -> Scores:
         for answer in given[0]:
             value = slope((given[0][answer], given[1][answer]), causes, pair.where)
             if value is not None:
-                found.setdefault(answer, {}).setdefault(pair.group,
-                                                        {}).setdefault(f"{pair.kind}_slope", []).append(value)
+                of_group = found.setdefault(answer, {}).setdefault(pair.group, {})
+                of_group.setdefault(f"{pair.kind}_slope", []).append(value)
         print(pair.name, file=sys.stderr, flush=True)
     return {answer: {group: {name: float(np.mean(values)) for name, values in row.items()}
                      for group, row in groups.items()}

@@ -90,8 +90,8 @@ def problem(seed: int, size: int, shadows: str) -> tuple[np.ndarray, np.ndarray,
     sun and ambient occlusion."""
     p = uv_problem(seed, size, shadows)
     noisy = p.texture + np.random.default_rng(seed).normal(0, 0.004, p.texture.shape)
-    mask = cv2.dilate((p.shadow > 0.08).astype(np.uint8),
-                      np.ones((9 * size // 1024 | 1,) * 2, np.uint8)).astype(np.float32)
+    around = np.ones((9 * size // 1024 | 1,) * 2, np.uint8)
+    mask = cv2.dilate((p.shadow > 0.08).astype(np.uint8), around).astype(np.float32)
     return p.albedo, np.maximum(noisy, 0).astype(np.float32), p.shadow, mask
 
 

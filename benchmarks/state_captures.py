@@ -92,8 +92,8 @@ class Filmed:
         """What a method takes for the albedo, linear [S, S, 3]; None where the capture was not taken so far."""
         if method == TRUE:
             return self.truth_map
-        path = {DELIT: self.capture.texture,
-                SOLVED: self.capture.maps / "diffuse_albedo.png"}.get(method, self.capture.texture_filmed)
+        paths = {DELIT: self.capture.texture, SOLVED: self.capture.maps / "diffuse_albedo.png"}
+        path = paths.get(method, self.capture.texture_filmed)
         if not path.is_file():
             return None
         answer = images.read_linear(path)

@@ -69,9 +69,8 @@ def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
         alone = fit_light([log_ratio(answer[where], truth[where])], [normals])
         figures: Figures = {"psnr_uv": psnr_after_gain(answer[where], truth[where]), "light_alone": alone.deviation,
                             "psnr_alone": psnr_after_gain(without_light(answer[where], normals, alone), truth[where])}
-        figures |= {f"kept_{name}": value
-                    for name, value in contrast_kept(contrasts(images.linear_to_srgb(answer), points, where),
-                                                     true_contrasts).items()}
+        kept = contrast_kept(contrasts(images.linear_to_srgb(answer), points, where), true_contrasts)
+        figures |= {f"kept_{name}": value for name, value in kept.items()}
         for name, part in score_parts(answer[where], truth[where], parts).items():
             figures |= {f"psnr_{name}": part.psnr, f"bias_{name}": part.bias}
         found[method] = figures

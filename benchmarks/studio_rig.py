@@ -62,9 +62,8 @@ def photograph(views: list, folder: Path, seed: int) -> None:
         matrix[:3, :3], matrix[:3, 3] = view.rotation.T @ np.diag([1, -1, -1]), view.centre
         cameras.append({"name": f"cam_{i:02d}", "matrix_world": matrix.tolist()})
     camera = views[0].camera
-    (folder
-     / "rig.json").write_text(json.dumps({"width": camera.width, "height": camera.height,
-                                          "focal_px": camera.mean_focal_length(), "cameras": cameras}))
+    rig = {"width": camera.width, "height": camera.height, "focal_px": camera.mean_focal_length(), "cameras": cameras}
+    (folder / "rig.json").write_text(json.dumps(rig))
 
 
 def judge(capture: Capture, views: list, seed: int) -> dict:

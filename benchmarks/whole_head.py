@@ -79,10 +79,10 @@ def whole(seed: int, surface: HeadSurface) -> dict:
     tone = torch.from_numpy((truth.diffuse * skin.numpy()[..., None]).sum((0, 1)) / float(skin.sum())).float()
     mean = face_of_tone(load().mean_face, tone, skin)[0].numpy().transpose(1, 2, 0)
     shown = np.clip(2 * face, 0, 1)[..., None]
-    cut = replace(truth, confidence=(0.7 * face).astype(np.float32),
-                  diffuse=(truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)).astype(np.float32),
-                  specular=(truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2
-                            * (1 - shown[..., 0])).astype(np.float32))
+    diffuse = truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)
+    specular = truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2 * (1 - shown[..., 0])
+    cut = replace(truth, confidence=(0.7 * face).astype(np.float32), diffuse=diffuse.astype(np.float32),
+                  specular=specular.astype(np.float32))
     done, hidden = complete(cut, surface, Reporter("upscale"), seed), face < 0.02
     row: dict = {}
     for region in ("neck", "ears", "scalp"):

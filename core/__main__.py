@@ -70,8 +70,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_chain(commands)
     capture_commands.add_commands(commands)
     _add_white(commands)
-    commands.add_parser("doctor",
-                        help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
+    doctor = commands.add_parser("doctor", help="say what is installed, what is missing and what to do")
+    doctor.set_defaults(command=_doctor)
     test = commands.add_parser(
         "self-test", help="solve the sample head again on this machine, and compare it with what it should be"
     )

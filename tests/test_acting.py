@@ -96,8 +96,8 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     assert np.abs(wide - rest)[:HEAD, 2].max() > 0.005
     blocks["eyeBlinkLeft"].value = 1
     shut = shown(head)
-    assert np.abs(shut - rest)[rest[:, 0]
-                               > 0.005].max() < 1e-6 and np.abs(shut - wide)[rest[:, 0] < -0.005].max() < 1e-6
+    assert np.abs(shut - rest)[rest[:, 0] > 0.005].max() < 1e-6
+    assert np.abs(shut - wide)[rest[:, 0] < -0.005].max() < 1e-6
     bpy.ops.wildcap.rest_face()
     assert np.abs(shown(head) - rest).max() < 1e-6
     blocks["eyeLookUpRight"].value = 1

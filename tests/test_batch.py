@@ -230,8 +230,8 @@ def test_what_is_delivered_is_what_the_maps_are_now(code, tmp_path):
     batch = make(code, tmp_path, "ab", None, "--deliver", "unreal", "--to", tmp_path / "out")
     assert core(code, "batch", "run", batch.root).returncode == 0 and states(batch) == {"a": DONE, "b": DONE}
     made = sorted((tmp_path / "out").rglob("*.obj"))
-    assert [path.relative_to(tmp_path / "out").as_posix()
-            for path in made] == ["a/a_head_unreal_obj/a.obj", "b/b_head_unreal_obj/b.obj"]
+    written = [path.relative_to(tmp_path / "out").as_posix() for path in made]
+    assert written == ["a/a_head_unreal_obj/a.obj", "b/b_head_unreal_obj/b.obj"]
     made[0].unlink()
     assert states(batch) == {"a": TO_DO, "b": DONE}
     assert core(code, "batch", "run", batch.root).returncode == 0 and made[0].is_file()

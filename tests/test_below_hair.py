@@ -52,9 +52,9 @@ def test_a_photograph_keeps_a_brow_where_the_parser_sees_one(monkeypatch):
     brow, shadow = (slice(90, 102), slice(80, 120)), (slice(160, 172), slice(80, 120))
     picture[brow] = picture[shadow] = 0.25
     landmarks = np.array([[x, y, 0] for x in (60, 200) for y in (60, 200)] * 117, np.float32)
-    parts = SimpleNamespace(of=lambda
-                            *names: np.where(np.indices(picture.shape[:2])[0] < 128, picture[..., 0] < 0.4,
-                                             False).astype(np.float32))
+    upper = np.indices(picture.shape[:2])[0] < 128
+    dark = np.where(upper, picture[..., 0] < 0.4, False).astype(np.float32)
+    parts = SimpleNamespace(of=lambda *names: dark)
     monkeypatch.setattr(network.faces, "detect", lambda srgb: SimpleNamespace(landmarks=landmarks))
     monkeypatch.setattr(network, "parser", SimpleNamespace(parse=lambda srgb, found: parts))
     monkeypatch.setattr(network, "load", lambda device: None)

@@ -220,9 +220,8 @@ def test_plys_of_every_kind_are_read(tmp_path, form, body):
     (4, 2, binary("<", np.nan)), (4, 2, binary("<", np.inf)), (4, 2, binary("<", index=9)),
     (4, 2, binary("<", index=-1)), (4, 0, binary("<")[:48])])
 def test_damaged_plys(tmp_path, vertices, faces, body):
-    (tmp_path
-     / "scan.ply").write_bytes(HEADER.format(form="binary_little_endian", vertices=vertices, faces=faces).encode()
-                               + body)
+    header = HEADER.format(form="binary_little_endian", vertices=vertices, faces=faces)
+    (tmp_path / "scan.ply").write_bytes(header.encode() + body)
     refused(lambda: meshes.read_ply(tmp_path / "scan.ply"), "scan.ply is damaged")
     (tmp_path / "scan.ply").write_bytes(b"no mesh at all")
     refused(lambda: meshes.read_ply(tmp_path / "scan.ply"), "header")

@@ -56,8 +56,8 @@ def write_model(capture: Capture, name: str, text: bool = False) -> None:
 
 
 def test_sound_models_are_read(capture):
-    assert [view.name
-            for view in read_views(capture)] == ["00000.jpg"] and len(read_model(capture.cameras).points3D) == 1
+    assert [view.name for view in read_views(capture)] == ["00000.jpg"]
+    assert len(read_model(capture.cameras).points3D) == 1
     shutil.rmtree(capture.cameras)
     capture.cameras.mkdir()
     write_model(capture, "00000.jpg", text=True)

@@ -196,8 +196,8 @@ def test_both_engines_have_an_output_that_shows_something(close_up):
 def test_solid_shading_shows_no_relief_for_a_colour(close_up):
     for slot in things(close_up)["Left Eye"].material_slots:
         pictures = [node for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE']
-        assert [node.image for node in pictures
-                if node.show_texture] == [None] * bool(pictures), "the picture holds no colour"
+        shown = [node.image for node in pictures if node.show_texture]
+        assert shown == [None] * bool(pictures), "the picture holds no colour"
 
 
 def test_nothing_of_the_mouth_comes_through_the_skin_at_rest_and_in_any_unit(close_up, addon):

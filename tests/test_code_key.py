@@ -67,8 +67,8 @@ def dependent_stages() -> dict[str, set[str]]:
     edges: dict[str, set[str]] = {}
     for found in house.CORE:
         if found.level and found.target != "core":
-            edges.setdefault(found.file.removesuffix(".py").removesuffix("/__init__").replace("/", "."),
-                             set()).add(found.target)
+            name = found.file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+            edges.setdefault(name, set()).add(found.target)
     reached: dict[str, set[str]] = {}
     for stage in stages.STAGES:
         known, waiting = set(), [stage.module]
@@ -138,9 +138,8 @@ def test_modules_that_read_shipped_files_name_them():
             assert bool(paths) == bool(named), f"{file} speaks of {paths} and names {named}"
             assert all((CORE / name).exists() for name in named), file
             seen |= set(named)
-    assert {name for name in seen
-            if name.endswith(".safetensors")} == {f"weights/{path.name}"
-                                                  for path in (CORE / "weights").glob("*.safetensors")}
+    weights = {f"weights/{path.name}" for path in (CORE / "weights").glob("*.safetensors")}
+    assert {name for name in seen if name.endswith(".safetensors")} == weights
 
 
 WORDS = ('"""Another docstring."""', "# a comment",

@@ -70,8 +70,8 @@ def deliver(capture, **settings) -> Path:
         told["versions"]["Blender"] == bpy.app.version_string
         and f"textures/{sorted((made[0] / 'textures').iterdir())[0].name}" in told["files"]
     )
-    assert str(capture.root) not in (made[0]
-                                     / "provenance.json").read_text() and not (made[0] / "packing.json").exists()
+    assert str(capture.root) not in (made[0] / "provenance.json").read_text()
+    assert not (made[0] / "packing.json").exists()
     return made[0]
 
 
@@ -181,8 +181,8 @@ def test_usd_with_blend_shapes_and_colour_spaces(capture):
         pytest.skip("no usd-core here, or a Blender without USD")
     folder = deliver(capture, format="usd")
     read = by_another_reader(folder / "face.usdc")
-    assert (read["metres_per_unit"], read["up"],
-            read["subdivision"]) == (1, "Z", "none") and np.allclose(read["to_world"], np.eye(4))
+    assert (read["metres_per_unit"], read["up"], read["subdivision"]) == (1, "Z", "none")
+    assert np.allclose(read["to_world"], np.eye(4))
     assert np.allclose(read["points"], truth(), atol=1e-6) and {"st", "UVMap"} & set(read["primvars"])
     assert set(read["shapes"]) == set(KEYS)
     for name, move in KEYS.items():
@@ -220,8 +220,8 @@ def test_the_artists_own_mesh_has_a_material_per_tile(capture):
         sorted(material["name"] for material in document["materials"]) == ["face_1001", "face_1002"]
         and len(document["meshes"][0]["primitives"]) == 2
     )
-    assert {path.name
-            for path in (folder / "textures").glob("*albedo*")} == {"face_albedo.1001.png", "face_albedo.1002.png"}
+    albedos = {path.name for path in (folder / "textures").glob("*albedo*")}
+    assert albedos == {"face_albedo.1001.png", "face_albedo.1002.png"}
 
 
 def test_a_read_only_capture_is_delivered_to_another_folder_and_nothing_in_it_changes(

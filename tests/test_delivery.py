@@ -287,8 +287,8 @@ def test_the_terminal_delivers_without_blender(capture, capsys):
     assert main(["deliver", str(capture.root), "--preset", "unreal", "--pictures", "png16"]) == 0
     target = folder(capture, preset="unreal")
     assert capsys.readouterr().out.splitlines()[-1] == str(target)
-    assert {"Zoe_et_moi.obj", "Zoe_et_moi.mtl", "provenance.json",
-            "textures"} == {path.name for path in target.iterdir()}
+    written = {path.name for path in target.iterdir()}
+    assert written == {"Zoe_et_moi.obj", "Zoe_et_moi.mtl", "provenance.json", "textures"}
 
 
 def test_the_guide_has_the_tables_as_they_are(capsys):

@@ -116,8 +116,8 @@ def test_an_environment_whose_files_are_gone_is_repaired(local, tmp_path):
     assert isinstance(install(folder, local)[-1], Done)
     module, = folder.rglob("tinytorch.py")
     module.unlink()
-    assert verify(python_of(folder), local,
-                  importing=True) == ["tinytorch does not load: ModuleNotFoundError: No module named 'tinytorch'."]
+    told = verify(python_of(folder), local, importing=True)
+    assert told == ["tinytorch does not load: ModuleNotFoundError: No module named 'tinytorch'."]
     assert isinstance(install(folder, local)[-1], Done)
     assert verify(python_of(folder), local, importing=True) == []
 

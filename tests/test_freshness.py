@@ -177,8 +177,8 @@ def test_paths_in_a_capture_are_relative_where_both_may_be_moved_together(tmp_pa
         assert read_portable(text, root) == inside
         assert read_portable(text, Path("/elsewhere/project/anna.wildcap")) != inside
     assert write_portable("/film.mp4", root) == str(Path("/film.mp4").absolute())
-    assert write_portable(Path.home() / "Videos" / "film.mp4",
-                          Path.home() / "Documents" / "anna.wildcap") == str(Path.home() / "Videos" / "film.mp4")
+    film = Path.home() / "Videos" / "film.mp4"
+    assert write_portable(film, Path.home() / "Documents" / "anna.wildcap") == str(film)
     assert read_portable("/film.mp4", root) == Path("/film.mp4").absolute()
 
 

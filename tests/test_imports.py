@@ -184,8 +184,8 @@ def test_import_targets_are_read_right():
         return _targets(file, ast.parse(source).body[0])
 
     assert targets("core/frames/video.py", "from ..imaging import images") == ["core.imaging.images"]
-    assert targets("core/frames/video.py",
-                   "from ..contract.messages import Problem, Reporter") == ["core.contract.messages"]
+    source = "from ..contract.messages import Problem, Reporter"
+    assert targets("core/frames/video.py", source) == ["core.contract.messages"]
     assert targets("core/contract/report.py", "from .. import __version__") == ["core"]
     assert targets("wildcap_addon/paint/panel.py", "from ...core.contract import stages") == ["core.contract.stages"]
     assert targets("benchmarks/demo.py", "from core.contract import report") == ["core.contract.report"]

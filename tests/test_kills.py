@@ -119,8 +119,8 @@ def test_a_process_is_struck_at_its_moment(tmp_path, moment):
     assert forked.strike() and forked.code == -signal.SIGKILL
     written = len(list(tmp_path.glob("*.txt")))
     assert written == 2 if moment.write and not moment.late_s else 2 < written < 100
-    assert kills_worker.Forked(lambda: None, tmp_path, tmp_path / "told",
-                               kills_worker.Moment(write=1)).strike() is False
+    never = kills_worker.Forked(lambda: None, tmp_path, tmp_path / "told", kills_worker.Moment(write=1))
+    assert never.strike() is False
 
 
 def test_a_camera_model_that_did_not_fit_on_the_disk_gets_no_name(tmp_path):
@@ -152,8 +152,8 @@ def test_a_checkpoint_that_did_not_fit_on_the_disk_is_told_by_name(tmp_path, mon
         "solve.safetensors could not be written" in with_limit(4096, lambda: checkpoint.write(path, state, "key"))
         and os.listdir(tmp_path) == []
     )
-    assert with_limit(1 << 20,
-                      lambda: checkpoint.write(path, state, "key")) == "" and checkpoint.read(path, "key").step == 1
+    assert with_limit(1 << 20, lambda: checkpoint.write(path, state, "key")) == ""
+    assert checkpoint.read(path, "key").step == 1
 
     def full(*_, **__):
         raise SafetensorError("Error while serializing: I/O error: No space left on device (os error 28)")

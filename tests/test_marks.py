@@ -126,8 +126,8 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
     start = initial.start(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
-    result = maps.finished(Sampler(prior.of_tone(start.tone), start.recipe,
-                                   seeded(0)).sample(start.observations, start.state), evidence, start)
+    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seeded(0))
+    result = maps.finished(sampler.sample(start.observations, start.state), evidence, start)
     solved = result.diffuse
 
     def contrast(image):

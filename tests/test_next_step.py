@@ -44,8 +44,8 @@ def test_the_chain_from_nothing_to_a_picture(step):
         "install_solver", "choose_video", "make_my_head", "bring_in_head", "paint_mask", "solve", "assemble_material",
         "render"]
     assert all(s.state and s.label for s in chain)
-    assert {s.operator.split(".")[1]: s.other[1].split(".")[1] for s in chain
-            if s.other} == {"make_my_head": "reconstruct", "paint_mask": "accept_proposal"}
+    others = {s.operator.split(".")[1]: s.other[1].split(".")[1] for s in chain if s.other}
+    assert others == {"make_my_head": "reconstruct", "paint_mask": "accept_proposal"}
 
 
 def test_a_cancelled_reconstruction_continues(step):

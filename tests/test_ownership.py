@@ -142,9 +142,10 @@ def test_killed_at_any_rename_nothing_is_lost_and_the_next_run_clears_up(capture
 def test_killed_while_it_writes_the_captures_own_books_leaves_nothing_either(tmp_path, at):
     """capture.json when the folder becomes a capture (at 0: its first rename), and job.json."""
     root = tmp_path / "anna.wildcap"
-    code = KILLED.replace("with replacing_folder",
-                          "Capture({capture!r}).claim()\nwith replacing").replace(".frames)", ".job)").replace(
-        '(folder / "00000.jpg")', "folder").replace("import replacing_folder", "import replacing")
+    code = KILLED
+    for old, new in (("with replacing_folder", "Capture({capture!r}).claim()\nwith replacing"), (".frames)", ".job)"),
+                     ('(folder / "00000.jpg")', "folder"), ("import replacing_folder", "import replacing")):
+        code = code.replace(old, new)
     subprocess.run([sys.executable, "-c", code.format(root=str(ROOT), at=at, capture=str(root))], check=False)
     assert len(list(root.glob(".*.tmp.json"))) == 1
     with Capture(root).locked():

@@ -225,8 +225,8 @@ def test_the_newer_mask_of_file_and_capture_wins_and_the_other_goes_to_the_histo
     os.utime(blend, (2e9, 2e9) if newer == "file" else (1e9, 1e9))
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     winner, loser = (mask_image.grey_png(mine), other) if newer == "file" else (other, mask_image.grey_png(mine))
-    assert (capture
-            / "shadow_mask.png").read_bytes() == winner == mask_image.grey_png(mask_image.mask_values(session.mask()))
+    saved = (capture / "shadow_mask.png").read_bytes()
+    assert saved == winner == mask_image.grey_png(mask_image.mask_values(session.mask()))
     assert loser in [p.read_bytes() for p in (capture / "mask_history").iterdir()]
     bpy.ops.wildcap.finish_mask()
     assert (capture / "shadow_mask.png").read_bytes() == winner

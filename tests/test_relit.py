@@ -100,8 +100,8 @@ def test_a_row_is_a_capture_that_holds_its_maps(maps, tmp_path):
     images.write_data(source.texture_confidence, np.ones((SIZE, SIZE, 3), np.float32))
     write_row(tmp_path / "row.wildcap", source, maps[1])
     assert (tmp_path / "row.wildcap" / "head.obj").read_text() == "v 0 0 0\n"
-    assert Capture(tmp_path
-                   / "row.wildcap").read()["stages"]["upscale"]["figures"]["specular_mean"] == pytest.approx(0.3)
+    upscaled = Capture(tmp_path / "row.wildcap").read()["stages"]["upscale"]
+    assert upscaled["figures"]["specular_mean"] == pytest.approx(0.3)
     back = read_worn(tmp_path / "row.wildcap" / "maps", SIZE)
     for name in ("albedo", "normal", "specular"):
         np.testing.assert_allclose(getattr(back, name), getattr(maps[1], name), atol=1e-4)

@@ -23,8 +23,8 @@ POLE = np.array([0.0, -RADIUS, 0.0])
 def patch(radius: float, columns: int, reach: float) -> Mesh:
     """The front of a ball, a grid over `reach` radians to each side."""
     across, up = np.meshgrid(np.linspace(-reach, reach, columns), np.linspace(-reach, reach, columns))
-    points = radius * np.stack([np.sin(across) * np.cos(up), -np.cos(across) * np.cos(up), np.sin(up)],
-                               -1).reshape(-1, 3)
+    points = np.stack([np.sin(across) * np.cos(up), -np.cos(across) * np.cos(up), np.sin(up)], -1)
+    points = radius * points.reshape(-1, 3)
     index = np.arange(columns**2).reshape(columns, columns)
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
     return Mesh(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))

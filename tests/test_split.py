@@ -113,8 +113,10 @@ def test_the_probability_is_the_gaussians():
     seen, values = seen_together([cells])
     together = skin_or_light.model(seen, seen)
     scales = skin_or_light.TYPICAL
-    by_scipy = sum(multivariate_normal(cov=together.covariance(scales, axis),
-                                       allow_singular=True).logpdf(values[:, axis]) for axis in range(3))
+    by_scipy = 0
+    for axis in range(3):
+        normal = multivariate_normal(cov=together.covariance(scales, axis), allow_singular=True)
+        by_scipy += normal.logpdf(values[:, axis])
     constant = -1.5 * len(values) * np.log(2 * np.pi)
     assert log_probability(together, values, scales) + constant == pytest.approx(by_scipy, rel=1e-6)
 

@@ -134,9 +134,8 @@ def test_pictures_are_judged_as_the_maps_are_seen():
         and found[TRUE]["detail"] == pytest.approx(1, abs=1e-3)
         and found[TRUE]["overshoot"] < 0.01
     )
-    assert found[NOTHING]["shadow_step"] == pytest.approx(-np.log(0.4), abs=0.02) and found[NOTHING][
-        "edge_step"
-    ] == pytest.approx(-np.log(0.4), abs=0.05)
+    assert found[NOTHING]["shadow_step"] == pytest.approx(-np.log(0.4), abs=0.02)
+    assert found[NOTHING]["edge_step"] == pytest.approx(-np.log(0.4), abs=0.05)
     assert found[FLAT]["detail"] == 0 and found[FLAT]["psnr"] < found[TRUE]["psnr"]
 
 
@@ -154,8 +153,8 @@ def test_captures_of_one_true_head_are_one_person(tmp_path):
         filled(tmp_path, name, head)
     Capture(tmp_path / "new.wildcap").claim()
     found = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
-    assert [(filmed.name, filmed.person)
-            for filmed in found] == [("anna", "anna"), ("anna_flash", "anna"), ("ben", "ben"), ("scan", "scan")]
+    people = [(filmed.name, filmed.person) for filmed in found]
+    assert people == [("anna", "anna"), ("anna_flash", "anna"), ("ben", "ben"), ("scan", "scan")]
 
 
 def test_a_subjects_own_parts_come_before_the_built_in_heads(tmp_path):

@@ -167,8 +167,8 @@ def _plys() -> Iterator:
                       "element face 2\nproperty list uchar int vertex_indices\nend_header\n").encode()
             rest = [0] * len(more)
             if order is None:
-                body = "".join(" ".join(map(str, [*corner, *rest])) + "\n"
-                               for corner in CORNERS.tolist()).encode() + b"3 0 1 2\n3 0 2 3\n"
+                lines = "".join(" ".join(map(str, [*corner, *rest])) + "\n" for corner in CORNERS.tolist())
+                body = lines.encode() + b"3 0 1 2\n3 0 2 3\n"
             else:
                 body = b"".join(struct.pack(order + ("fff" if kind == "float" else "ddd") + more, *corner, *rest)
                                 for corner in CORNERS.tolist())

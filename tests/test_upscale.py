@@ -65,8 +65,8 @@ def test_every_map_is_met_at_the_new_size(capture):
     ):
         got = read(capture.maps_4k / name)
         assert got.shape == expected.shape and np.abs(got - expected)[inner].max() < tolerance, name
-    assert report.figures["method"] == "lanczos" and (report.figures["size_from_px"],
-                                                      report.figures["size_px"]) == (SMALL, LARGE)
+    assert report.figures["method"] == "lanczos"
+    assert (report.figures["size_from_px"], report.figures["size_px"]) == (SMALL, LARGE)
 
 
 def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capture):
@@ -216,8 +216,8 @@ def test_a_map_of_many_strips_is_whole(tmp_path):
         truth = np.linspace(0, 1, 3 * rows * 5, dtype=np.float32).reshape(rows, 5, 3)
         images.write_data(tmp_path / "a.png", truth, bits=16)
         images.write_data(tmp_path / "a.exr", truth)
-        assert np.abs(images.read_data(tmp_path / "a.png")
-                      - truth).max() < 1e-5 and np.abs(images.read_data(tmp_path / "a.exr") - truth).max() < 1e-3
+        for name, tolerance in (("a.png", 1e-5), ("a.exr", 1e-3)):
+            assert np.abs(images.read_data(tmp_path / name) - truth).max() < tolerance
 
 
 def test_missing_weights_are_told(tmp_path):

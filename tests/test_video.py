@@ -167,8 +167,8 @@ def test_a_pause_in_the_recording_takes_no_frames():
     assert len(evenly_in_time(times, 20)) > 13 and np.diff(evenly_in_time(times, 20)).max() < 10, (
         "of 20, as many as the pause's 30 frames leave"
     )
-    assert evenly_in_time(np.arange(1000) * 512,
-                          300).tolist() == np.round(np.linspace(0, 999, 300)).astype(int).tolist()
+    evenly = np.round(np.linspace(0, 999, 300)).astype(int)
+    assert evenly_in_time(np.arange(1000) * 512, 300).tolist() == evenly.tolist()
 
 
 def test_what_lies_between_wanted_frames_is_jumped_over(tmp_path, monkeypatch):

@@ -35,8 +35,8 @@ def index(tmp_path, monkeypatch) -> Path:
                            "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
             wheel.writestr(f"{info}/RECORD",
                            f"{name}/__init__.py,,\n{info}/METADATA,,\n{info}/WHEEL,,\n{info}/RECORD,,\n")
-        (requirements / "locks"
-         / f"{lock}.txt").write_text(f"{name}==1.0 --hash=sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}\n")
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        (requirements / "locks" / f"{lock}.txt").write_text(f"{name}==1.0 --hash=sha256:{digest}\n")
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(found))
     monkeypatch.setattr(setup_commands, "REQUIREMENTS", requirements)

@@ -15,8 +15,8 @@ bpy = pytest.importorskip("bpy")
 def item(addon, capture):
     """The standin capture with one frame, upper half grey card, lower half burnt out."""
     (capture / "frames").mkdir(exist_ok=True)
-    (capture / "frames"
-     / "00000.jpg").write_bytes(standin.png([[(118, 110, 100)] * 32] * 16 + [[(255, 255, 255)] * 32] * 16))
+    frame = standin.png([[(118, 110, 100)] * 32] * 16 + [[(255, 255, 255)] * 32] * 16)
+    (capture / "frames" / "00000.jpg").write_bytes(frame)
     return addon("captures").active(bpy.context)
 
 

@@ -134,8 +134,8 @@ def _interrupted(capture: Capture) -> bool:
     """Whether a stopped solve left a checkpoint, and no mask was painted since it began: it goes on from there only
     with the masks it began with."""
     began = _time(capture.job) or float("inf")
-    return (capture.checkpoints
-            / "solve.safetensors").is_file() and max(map(_time, (capture.shadow_mask, capture.protect_mask))) <= began
+    checkpoint = capture.checkpoints / "solve.safetensors"
+    return checkpoint.is_file() and max(map(_time, (capture.shadow_mask, capture.protect_mask))) <= began
 
 
 def _time(path: Path) -> float:

@@ -113,8 +113,8 @@ def _shaded(caster, normals, colours, origin, direction_of, size: int = 512):
     key = np.array([0.35, -0.75, 0.55]) / np.linalg.norm([0.35, -0.75, 0.55])
     light = 0.75 * np.clip(normal @ key, 0, 1) + 0.2 + 0.15 * np.clip(-(normal * directions).sum(1), 0, 1)
     colour = (colours[corners] * bary[..., None]).sum(1)
-    return images.linear_to_srgb(np.where((triangle >= 0)[:, None], colour * light[:, None],
-                                          0.2).reshape(size, size, 3))
+    shaded = np.where((triangle >= 0)[:, None], colour * light[:, None], 0.2)
+    return images.linear_to_srgb(shaded.reshape(size, size, 3))
 
 
 def _partners(points):

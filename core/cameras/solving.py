@@ -88,8 +88,8 @@ def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, setti
     while the head turned."""
     records = frames.records
     few = len(records) <= FEW_PHOTOGRAPHS
-    ways = {"auto": ("plain", "face", "skin", "face") if few
-            else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
+    usual = ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")
+    ways = usual if settings.cameras.features == "auto" else (settings.cameras.features,)
     if len(records) < LEAST_VIEWS:  # a draft
         ways = ("face",)
     matches, faults, moved, partial = Matches(), [], stood, None

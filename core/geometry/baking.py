@@ -140,8 +140,8 @@ def bled(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     weight = images.resize(known.astype(np.float32), small, small)
     mean = images.resize(np.where(known[..., None], image.reshape(*known.shape, -1), 0).astype(np.float32), small,
                          small).reshape(small, small, -1)
-    smooth = cv2.resize(_continued(mean, weight), known.shape[::-1],
-                        interpolation=cv2.INTER_LINEAR).reshape(image.shape)
+    smooth = cv2.resize(_continued(mean, weight), known.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    smooth = smooth.reshape(image.shape)
     nearest = raster.bleed(image, known)
     return np.where(near.reshape(near.shape + (1,) * (image.ndim - 2)), nearest, smooth)
 

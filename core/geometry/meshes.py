@@ -64,8 +64,8 @@ def read_obj(path: Path) -> Mesh:
     """Triangles and triangulated polygons with their UVs. Raises Problem for a file without faces, and for one that is
     damaged: a line without its numbers, positions that are no numbers, faces with vertices that are not there."""
     vertices, uvs, faces, face_uvs, polygons = [], [], [], [], []
-    text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig",
-                                                        "replace").replace("\r\n", "\n").replace("\r", "\n")
+    text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
     for number, line in enumerate(text.replace("\\\n", " ").split("\n"), 1):
         key, *words = line.split() or [""]
         try:

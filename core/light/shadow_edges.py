@@ -77,8 +77,8 @@ def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray,
     sure = sure * np.clip((INWARD + BAND - np.abs(depth + INWARD / 2)) / BAND, 0, 1)
     fitted = penumbra(distance - shift, np.maximum(width, 0.7 * texel))
     alpha = painted + sure * (fitted - painted)
-    return np.where(depth < -INWARD - BAND, painted,
-                    alpha).astype(np.float32), (sure * (np.abs(distance) < BAND)).astype(np.float32), colour
+    alpha = np.where(depth < -INWARD - BAND, painted, alpha)
+    return alpha.astype(np.float32), (sure * (np.abs(distance) < BAND)).astype(np.float32), colour
 
 
 def penumbra(distance: np.ndarray, width: np.ndarray) -> np.ndarray:

@@ -185,8 +185,8 @@ def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, 
                         COVER_ITERATIONS,
                         lambda share: report.progress(0.5 * share, 0.5, "fitting the head to the scan"))
     known = np.flatnonzero(follow > 0.1)
-    face, bary = surfaces.Surface(ours.model.mesh.moved(over),
-                                  SOURCE_SPACING_M).nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
+    source = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M)
+    face, bary = source.nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
     known, face, bary = known[face >= 0], face[face >= 0], bary[face >= 0]
     shift = ((head.vertices - over)[head.faces[face]] * bary[..., None]).sum(1)
     return start + carried.field(start[known], shift, start, report)

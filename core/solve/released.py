@@ -48,8 +48,8 @@ def read_config(folder: Path) -> dict:
             raise Problem(f"The prior in {folder} needs a second input through cross attention, which is not known "
                           "here.", CHOOSE)
         levels = len(model["depths"])
-        if not len(model["channels"]) == len(model.get("self_attn_depths")
-                                             or model["depths"]) == levels > model["skip_stages"] >= 0:
+        attention = model.get("self_attn_depths") or model["depths"]
+        if not len(model["channels"]) == len(attention) == levels > model["skip_stages"] >= 0:
             raise ValueError("depths, channels and self_attn_depths are not of one length")
         kind = cond.setdefault("type", "coord")
         if kind not in COND_KINDS:

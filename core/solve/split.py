@@ -98,8 +98,8 @@ class Split:
 
     def light(self, normal: torch.Tensor) -> torch.Tensor:
         """The global light [3, S, S] at normals [3, S, S], linear: a factor of the albedo."""
-        return torch.from_numpy(np.exp(np.tensordot(self.coefficients,
-                                                    sh_basis(normal.numpy().astype(np.float64), axis=0), 1))).float()
+        basis = sh_basis(normal.numpy().astype(np.float64), axis=0)
+        return torch.from_numpy(np.exp(np.tensordot(self.coefficients, basis, 1))).float()
 
 
 @dataclass(frozen=True)

@@ -194,8 +194,8 @@ def _background(environment: Environment, sight: Sight, light: float, rng: np.ra
     else:
         ground = np.broadcast_to(rng.uniform(0.02, 0.7, 3), (sight.size, sight.size, 3)).astype(np.float32)
     for scale in (4, 9, 24):
-        blobs = np.exp(rng.normal(0, 0.35, (scale, scale, 1))
-                       + rng.normal(0, 0.12, (scale, scale, 3))).astype(np.float32)
+        bright = rng.normal(0, 0.35, (scale, scale, 1))
+        blobs = np.exp(bright + rng.normal(0, 0.12, (scale, scale, 3))).astype(np.float32)
         blobs = cv2.resize(blobs, (sight.size,) * 2,
                            interpolation=int(rng.choice([cv2.INTER_CUBIC, cv2.INTER_NEAREST])))
         ground = ground * np.clip(blobs, 0.1, 5)

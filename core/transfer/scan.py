@@ -80,8 +80,8 @@ def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float]
     size = len(at.covered)
     face, bary = raster.rasterize_uv(scan, size)
     points = raster.interpolate(scan.vertices, scan.faces, face[at.covered], bary[at.covered]).astype(np.float32)
-    normals = raster.interpolate(vertex_normals(scan), scan.faces, face[at.covered],
-                                 bary[at.covered]).astype(np.float32)
+    normals = raster.interpolate(vertex_normals(scan), scan.faces, face[at.covered], bary[at.covered])
+    normals = normals.astype(np.float32)
     del face, bary
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     caster = raster.RayCaster(scan)

@@ -93,9 +93,8 @@ def _by_hand(folder: Path, base: Path) -> None:
             (folder / "lib" / f"python{short}" / "site-packages").mkdir(parents=True, exist_ok=True)
             for name in ("python", "python3", f"python{short}"):
                 (python.parent / name).symlink_to(real)
-        (folder
-         / "pyvenv.cfg").write_text(f"home = {real.parent}\ninclude-system-site-packages = false\nversion = "
-                                    f"{version}\nexecutable = {real}\n",
-                                    encoding="utf-8")
+        text = (f"home = {real.parent}\ninclude-system-site-packages = false\nversion = {version}\n"
+                f"executable = {real}\n")
+        (folder / "pyvenv.cfg").write_text(text, encoding="utf-8")
     except OSError as error:
         raise storage_problem(error, folder) from error

@@ -33,8 +33,8 @@ def add_commands(commands) -> None:
     about.add_argument("capture", metavar="CAPTURE", type=Path, nargs="?")
     about.add_argument("--to", metavar="ZIP", type=Path, required=True)
     about.set_defaults(command=_report_problem)
-    mask = commands.add_parser("mask",
-                               help="bring a painted shadow mask in").add_subparsers(required=True, metavar="import")
+    mask = commands.add_parser("mask", help="bring a painted shadow mask in")
+    mask = mask.add_subparsers(required=True, metavar="import")
     bring = mask.add_parser("import", help="make a picture the capture's shadow mask: white is shadow")
     bring.add_argument("capture", metavar="CAPTURE", type=Path)
     bring.add_argument("picture", metavar="PNG", type=Path)

@@ -27,8 +27,8 @@ def backdrop(directions: np.ndarray, environment: Environment, light: float, rng
         ground = background_radiance(environment, directions) * np.float32(np.exp(rng.normal(0, 0.3)))
         ground = cv2.resize(ground, (size, size))
     else:
-        ground = np.broadcast_to(rng.uniform(0.02, 0.8) * np.exp(rng.normal(0, 0.3, 3)),
-                                 (size, size, 3)).astype(np.float32) * light
+        wall = rng.uniform(0.02, 0.8) * np.exp(rng.normal(0, 0.3, 3))
+        ground = np.broadcast_to(wall, (size, size, 3)).astype(np.float32) * light
         for scale in (2, 5, 12, 40):
             bright = rng.normal(0, 0.3 * rng.random(), (scale, scale, 1))
             blobs = bright + rng.normal(0, 0.12 * rng.random() / scale**0.4, (scale, scale, 3))

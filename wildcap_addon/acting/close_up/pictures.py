@@ -64,8 +64,8 @@ def white_pattern() -> np.ndarray:
         at_corner = number % 4 != 0
         around = (rng.integers(2) * np.pi + rng.normal(0, CORNER / 2)) if at_corner else rng.uniform(0, 2 * np.pi)
         width = rng.uniform(0.7, 1.9) if at_corner else rng.uniform(0.5, 1.0)
-        dots[number % 3
-             == 0].extend(_vessel(rng, around, rows * rng.uniform(0.75, 1.0), width, rng.uniform(0.06, 0.45) * rows))
+        vessel = _vessel(rng, around, rows * rng.uniform(0.75, 1.0), width, rng.uniform(0.06, 0.45) * rows)
+        dots[number % 3 == 0].extend(vessel)
     vessels, deep = _drawn(dots[0]), _blur(_drawn(dots[1]), 3.0)
     out, turn = (np.arange(rows) + 0.5)[:, None] / rows, np.arange(columns)[None] * 2 * np.pi / columns
     mottled = 0.5 + 0.25 * _noise(rng, WHITE_SIZE, 5, 14)
