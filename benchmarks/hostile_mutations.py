@@ -187,8 +187,8 @@ def spoil_counts(path: Path, rng: random.Random) -> str:
     return f"{'no finite number' if value is None else value} at {at}"
 
 
-ANY: tuple[Callable[[Path, random.Random], str], ...] = (truncate, truncate, flip, overwrite, replace_whole, append,
-                                                         other_kind, remove)
+ANY: tuple[Callable[[Path, random.Random], str], ...] = (
+    truncate, truncate, flip, overwrite, replace_whole, append, other_kind, remove)
 SPECIAL = {".png": (forge_png, spoil_pixels, spoil_pixels), ".exr": (forge_exr, spoil_pixels, spoil_pixels),
            ".jpg": (spoil_pixels, forge_png),
            ".json": (spoil_json,) * 8, ".obj": (spoil_lines,) * 5, ".ply": (spoil_lines, spoil_counts),

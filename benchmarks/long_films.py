@@ -80,12 +80,8 @@ def film(folder: Path, count: int) -> Path:
     out = folder / str(count)
     if (out / "film.mp4").is_file():
         return out
-    cameras, numbers, work, taken = (
-        scene.camera_path(SEED, FRAMES, DEGREES),
-        chosen_frames(count),
-        folder / "rendered",
-        phone.sample_phone(SEED),
-    )
+    cameras, numbers = scene.camera_path(SEED, FRAMES, DEGREES), chosen_frames(count)
+    work, taken = folder / "rendered", phone.sample_phone(SEED)
     if not all((work / f"{number:05d}.exr").is_file() for number in numbers):
         from core.synthetic.people.figure import make_figure
 

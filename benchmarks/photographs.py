@@ -124,8 +124,8 @@ def answers_to(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, delighter:
     something. A picture that the delighter refuses is taken as it is, as an artist would."""
     linear = images.srgb_to_linear(srgb)
     try:
-        ours = images.srgb_to_linear(np.asarray(delight.PHOTOGRAPHERS[delighter](srgb, Settings().delight)[0],
-                                                np.float32))
+        answer = delight.PHOTOGRAPHERS[delighter](srgb, Settings().delight)[0]
+        ours = images.srgb_to_linear(np.asarray(answer, np.float32))
     except Problem as problem:
         print(problem, file=sys.stderr)
         ours = linear

@@ -84,10 +84,9 @@ def photograph(data: Path, folder: Path, name: str) -> Capture:
         faces[frame] = _write_truth(target, frame, views[frame],
                                     LitScan(caster, opaque, albedo, facial, light.sun.direction if light.sun else None))
     write_obj(target / "head.obj", head)  # by it the five are known to be one person
+    placed = [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]
     write_json(target / "cameras.json", {"name": name, "light": LIGHTS[name], "focal_px": scene.FOCAL * SCALE,
-                                         "width": views[0].width, "height": views[0].height,
-                                         "cameras": [{"frame": k, "matrix_world": matrix.tolist()}
-                                                     for k, matrix in enumerate(cameras)]})
+                                         "width": views[0].width, "height": views[0].height, "cameras": placed})
     write_views(capture, views, _developed(work, faces), min(Settings().frames.views, FRAMES))
     total = sum(true[face].sum(0, dtype=np.float64) for true, face in faces.values())
     tone = total / sum(int(face.sum()) for _, face in faces.values())

@@ -62,8 +62,9 @@ class Filmed:
         cameras changed."""
         copy = Capture(self.work / f"{self.name}.wildcap")
         same = ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
-        if copy.texture_confidence.is_file() and any(hash_file(copy.root / name) != hash_file(self.capture.root / name)
-                                                     for name in same):
+        changed = copy.texture_confidence.is_file() and any(
+            hash_file(copy.root / name) != hash_file(self.capture.root / name) for name in same)
+        if changed:
             copy.texture_confidence.unlink()
         return true_frames(self.capture, self.truth, copy, Settings())
 

@@ -103,10 +103,10 @@ def of_person(captures: list[Filmed],
         everywhere = np.logical_and.reduce(places)
         if len(chosen) > 1 and everywhere.any():
             tone = np.mean([maps[i][TRUE][everywhere].mean(0) for i in chosen], axis=0)
+            slopes = [slope((maps[i][method], maps[j][method]), (maps[i][NOTHING], maps[j][NOTHING]), everywhere)
+                      for i, j in combinations(chosen, 2)]
             figures |= {"agreement": agreement([maps[i][method][everywhere] for i in chosen], tone),
-                        "light_slope": _mean([slope((maps[i][method], maps[j][method]),
-                                                    (maps[i][NOTHING], maps[j][NOTHING]), everywhere)
-                                              for i, j in combinations(chosen, 2)])}
+                        "light_slope": _mean(slopes)}
         figures |= joint(*([_kept(captures[i], maps[i], name) for i in chosen] for name in (method, NOTHING)))
         found[method] = figures
     return found, each_alone

@@ -65,8 +65,8 @@ def main() -> int:
 def pictures(jaw: float):
     """The film's frames, sRGB [512, 384, 3]; jaw: how far it opens while the person talks."""
     view = camera(0, 0.03, scale=SCALE)
-    shirt = images.linear_to_srgb(images.resize(np.random.default_rng(2).random((40, 40, 3), np.float32) ** 2,
-                                                view.width, view.width))
+    checks = np.random.default_rng(2).random((40, 40, 3), np.float32) ** 2
+    shirt = images.linear_to_srgb(images.resize(checks, view.width, view.width))
     y, x = np.mgrid[:view.height, :view.width]
     chest = np.sqrt(np.maximum((0.5 * view.width) ** 2 - (x - view.width / 2) ** 2, 0))
     worn = y > view.height - 0.16 * view.width - 0.25 * chest + 0.1 * view.width

@@ -118,10 +118,8 @@ def _chosen_light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.n
     """The first usable one of the random lights; kept in CACHE under a name that changes with the sources it comes
     from."""
     sources = b"".join(Path(module).read_bytes() for module in (__file__, light.__file__))
-    stored = (
-        CACHE
-        / f"light_{hashlib.blake2b(repr((shadows, seeds, size)).encode() + sources, digest_size=12).hexdigest()}.npz"
-    )
+    key = hashlib.blake2b(repr((shadows, seeds, size)).encode() + sources, digest_size=12).hexdigest()
+    stored = CACHE / f"light_{key}.npz"
     if not stored.is_file():
         drawn = next(i for i in range(1000) if _usable(*_light(shadows, (*seeds, i), 48)))
         CACHE.mkdir(parents=True, exist_ok=True)

@@ -123,9 +123,11 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     tones = {}
     if subject is not None:
         truth, hidden = _painted(surface, subject), maps.confidence < 0.02
-        tones = {"tone": {region: {name: _error(*(_tone(m, surface) for m in (shown, truth)),
-                                                hidden & (template.mask(region, surface.size) > 0.9))
-                                   for name, shown in (("fill", maps), ("completed", done))}
+        def error(shown, region: str):
+            where = hidden & (template.mask(region, surface.size) > 0.9)
+            return _error(*(_tone(m, surface) for m in (shown, truth)), where)
+
+        tones = {"tone": {region: {"fill": error(maps, region), "completed": error(done, region)}
                           for region in ("neck", "ears", "scalp")}}
     return {**tones, "completed_share_percent": report.figures["completed_share_percent"],
             "border": {"fill": _step(maps, rings[0], rings[1], surface),

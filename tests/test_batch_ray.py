@@ -150,8 +150,8 @@ def test_the_gate_waits(code, tmp_path, monkeypatch, own_environment):
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     with pytest.raises(Problem, match="No node of the cluster has 1000 cores and 5 GB"):
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1000)
-    with monkeypatch.context() as busy, pytest.raises(Problem,
-                                                      match="could not be started on this machine: It took too long."):
+    late = "could not be started on this machine: It took too long."
+    with monkeypatch.context() as busy, pytest.raises(Problem, match=late):
         busy.setattr("ray.init", busy_machine)
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     assert states(batch) == dict.fromkeys("ab", TO_DO) and not heard

@@ -40,8 +40,8 @@ def test_the_active_mesh_is_kept_as_it_is_with_its_uvs_and_without_modifiers(add
     path = Path(item.registration.template)
     assert path.parent == capture / "template" and path.suffix == ".obj"
     found = obj_rows(path, "v")
-    assert len(found) == len(expected) and all(row[:3] == pytest.approx(place, abs=1e-5)
-                                               for row, place in zip(found, expected, strict=True))
+    assert len(found) == len(expected)
+    assert all(row[:3] == pytest.approx(place, abs=1e-5) for row, place in zip(found, expected, strict=True))
     assert len(obj_rows(path, "vt")) > 0
     assert head.select_get() and mine.select_get() and bpy.context.view_layer.objects.active == mine
     assert addon("properties").job_settings(item)["registration"]["template"] == str(path)

@@ -110,8 +110,8 @@ def test_it_looks_where_the_empty_is_and_a_bone_can_hold_that(close_up, addon):
 
 def test_lids_and_tears_keep_to_an_eye_however_it_is_opened_and_turned(close_up, addon):
     asset, rims_of = addon("acting.asset").load(), addon("acting.close_up.ball").rims
-    poses = [(opened, {}) for opened in OPENINGS] + [(1.0, {f"eyeLook{way}{side}": 1.2 for side in ("Left", "Right")})
-                                                     for way in LOOKS]
+    looks = [(1.0, {f"eyeLook{way}{side}": 1.2 for side in ("Left", "Right")}) for way in LOOKS]
+    poses = [(opened, {}) for opened in OPENINGS] + looks
     for way in LOOKS:
         for side in ("Left", "Right"):
             close_up.data.shape_keys.key_blocks[f"eyeLook{way}{side}"].slider_max = 1.2

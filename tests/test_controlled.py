@@ -40,9 +40,9 @@ def dark_room(tmp_path_factory):
     azimuths = (-36, -12, 12, 36)
     names = [f"{i:05d}.jpg" for i in range(len(azimuths))]
     capture.frames.mkdir(parents=True)
-    capture.frames_json.write_text(json.dumps({"frames": [{"name": n, "video_frame": i, "time_s": i, "sharpness": 1.0,
-                                                           "selected": True}
-                                                          for i, n in enumerate(names)]}))
+    records = [{"name": n, "video_frame": i, "time_s": i, "sharpness": 1.0, "selected": True}
+               for i, n in enumerate(names)]
+    capture.frames_json.write_text(json.dumps({"frames": records}))
     painted_egg.write_cameras(capture.cameras, names, azimuths, 0.42, 0.05)
     meshes.write_obj(capture.head, mesh)
     caster, true = raster.RayCaster(mesh), []

@@ -243,10 +243,8 @@ def test_a_cancel_ends_what_the_command_has_started(tmp_path):
     late = tmp_path / "late"
     child = (f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(1); "
              f"pathlib.Path({str(late)!r}).touch()")
-    task = BackgroundTask("venv",
-                          lambda task: task.run([sys.executable, "-c",
-                                                 f"import subprocess, sys; subprocess.run([sys.executable, '-c', "
-                                                 f"{child!r}])"]))
+    starter = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
+    task = BackgroundTask("venv", lambda task: task.run([sys.executable, "-c", starter]))
     task.start()
     while not (tmp_path / "begun").exists():
         time.sleep(0.02)

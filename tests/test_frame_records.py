@@ -113,9 +113,8 @@ def test_records_are_values():
 
 
 def test_older_and_newer_files_are_read(tmp_path):
-    frames = read_frames(capture_with(tmp_path,
-                                      json.dumps({"frames": [OLDEST, {**OLDEST, "name": "00002.jpg", "mood": "bright"}],
-                                                  "camera": "of tomorrow"})))
+    newer = {"frames": [OLDEST, {**OLDEST, "name": "00002.jpg", "mood": "bright"}], "camera": "of tomorrow"}
+    frames = read_frames(capture_with(tmp_path, json.dumps(newer)))
     assert frames.kind is None
     assert frames.records == (FrameRecord(**OLDEST), FrameRecord(**{**OLDEST, "name": "00002.jpg"}))
     first = frames.records[0]

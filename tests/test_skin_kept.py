@@ -124,9 +124,8 @@ def version_1():
                        ("Subsurface Scale", 'NodeSocketFloat')):
         group.interface.new_socket(name, in_out='INPUT', socket_type=kind)
     group.interface.new_socket("BSDF", in_out='OUTPUT', socket_type='NodeSocketShader')
-    source, amount, shader, result = (group.nodes.new(kind)
-                                      for kind in ('NodeGroupInput', 'ShaderNodeMath', 'ShaderNodeBsdfPrincipled',
-                                                   'NodeGroupOutput'))
+    source, amount, shader, result = (group.nodes.new(kind) for kind in (
+        'NodeGroupInput', 'ShaderNodeMath', 'ShaderNodeBsdfPrincipled', 'NodeGroupOutput'))
     amount.operation, amount.use_clamp, shader.subsurface_method = 'MULTIPLY', True, 'RANDOM_WALK'
     shader.inputs["Subsurface Radius"].default_value = (1.0, 0.37, 0.19)
     for output, target in ((source.outputs["Specular"], amount.inputs[0]),

@@ -46,8 +46,8 @@ def _masks() -> Iterator:
             picture = (Image.fromarray(BARS.astype(np.uint16) * 257) if mode == "I;16"
                        else grey.convert("RGB").convert(mode))
             picture.save(path, **options)
-            return path.name + f" as {mode}", lambda: bool(np.abs(images.read_mask(path) - BARS / 255).max()
-                                                           < (0.1 if "jp" in suffix.lower() else 0.01))
+            tolerance = 0.1 if "jp" in suffix.lower() else 0.01
+            return f"{path.name} as {mode}", lambda: bool(np.abs(images.read_mask(path) - BARS / 255).max() < tolerance)
 
         return "masks", make
 

@@ -96,8 +96,8 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
         name="Skin Tone", subtype='COLOR_GAMMA', size=3, min=0, max=1, default=(0.69, 0.54, 0.45),
         description="Mean colour of the facial skin without lips, brows and stubble, as the eye sees it (sRGB)",
     )
-    estimated_tone: bpy.props.FloatVectorProperty(name="Estimated Tone", size=3, options={'HIDDEN'},
-                                                  description="What the last estimate was")
+    estimated_tone: bpy.props.FloatVectorProperty(
+        name="Estimated Tone", size=3, options={'HIDDEN'}, description="What the last estimate was")
     tone_group: bpy.props.StringProperty(name="Tone Group", options={'HIDDEN'},
                                          description="What such a tone is called")
     tone_source: bpy.props.StringProperty(name="Tone Source", options={'HIDDEN'},

@@ -72,9 +72,9 @@ def refresh(context) -> None:
 def look(capture: Capture, settings) -> Status:
     """Reads the folder; hashes only files that changed since they were last hashed."""
     if not capture.root.is_dir():
-        return Status(missing=True, problem=Problem(f"The capture folder {capture.root} is not there any more.",
-                                                    "Connect its disk, or click Locate Capture and show where it is "
-                                                    "now."))
+        return Status(missing=True, problem=Problem(
+            f"The capture folder {capture.root} is not there any more.",
+            "Connect its disk, or click Locate Capture and show where it is now."))
     try:
         record = capture.read()
         verdicts = {stage.name: _verdict(capture, stage, record, settings) for stage in stages.STAGES}

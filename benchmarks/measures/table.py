@@ -54,9 +54,9 @@ def summarise(scores: Scores, columns: dict[str, Column], against: str | None = 
             pairs = [value - theirs for person, value in known.items()
                      if _is_known(theirs := other.get(person, {}).get(measure))]
             values = list(known.values())
-            found.setdefault(method, {})[measure] = Cell(float(np.mean(values)), _deviation(values),
-                                                         float(np.mean(pairs)) if pairs else None,
-                                                         standard_error(pairs), len(values))
+            found.setdefault(method, {})[measure] = Cell(
+                float(np.mean(values)), _deviation(values), float(np.mean(pairs)) if pairs else None,
+                standard_error(pairs), len(values))
     return found
 
 
@@ -105,8 +105,8 @@ def _difference_text(cell: Cell | None, column: Column) -> str | None:
     worse by as much."""
     if cell is None or cell.difference is None:
         return None
-    text = f"{cell.difference:+.{column.digits}f}" + ("" if cell.error is None
-                                                      else f" ± {cell.error:.{column.digits}f}")
+    error = "" if cell.error is None else f" ± {cell.error:.{column.digits}f}"
+    text = f"{cell.difference:+.{column.digits}f}" + error
     if cell.error is None or not column.better or abs(cell.difference) <= 2 * cell.error:
         return text
     return f"**{text}**" if cell.difference * column.better > 0 else f"*{text}*"

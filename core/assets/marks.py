@@ -57,8 +57,8 @@ def _onto_surface(points, vertices, triangles):
     chosen, bary = np.zeros(len(points), int), np.zeros((len(points), 3))
     for k, point in enumerate(points):
         candidates = np.flatnonzero(np.isin(triangles, near[k]).any(1))
-        closest = trimesh.triangles.closest_point(vertices[triangles[candidates]],
-                                                  np.repeat(point[None], len(candidates), 0))
+        points = np.repeat(point[None], len(candidates), 0)
+        closest = trimesh.triangles.closest_point(vertices[triangles[candidates]], points)
         best = np.argmin(np.linalg.norm(closest - point, axis=1))
         chosen[k] = candidates[best]
         bary[k] = trimesh.triangles.points_to_barycentric(vertices[triangles[chosen[k]]][None], closest[best][None])[0]

@@ -74,9 +74,8 @@ def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, r
     for step, share in enumerate(AGREE_WIDTH_SHARES, 1):
         report.progress(step, 5, "refining cameras by what matches")
         added, used, bundle = agreeing(bundle, names, matches, share * width)
-        seen = Observations(*(np.concatenate([a, b])
-                              for a, b in zip((landmarks.camera, landmarks.point, landmarks.pixel), added,
-                                              strict=True)))
+        parts = zip((landmarks.camera, landmarks.point, landmarks.pixel), added, strict=True)
+        seen = Observations(*(np.concatenate([a, b]) for a, b in parts))
         bundle = adjust(bundle, seen, 10)
     late = place_by_matches(bundle, groups, group_of, names, used, matches)
     miss = np.linalg.norm(bundle.project(landmarks.camera, landmarks.point) - landmarks.pixel, axis=1)

@@ -158,11 +158,8 @@ def on_head(model: pycolmap.Reconstruction, registered: list, matches: Matches) 
     """The matches between keypoints on the head; model: in the head's world."""
     inside = {}
     for image in registered:
-        camera, outline, keypoints = (
-            model.cameras[image.camera_id],
-            _outline(model, image),
-            matches.keypoints.get(image.name, np.zeros((0, 2))),
-        )
+        camera, outline = model.cameras[image.camera_id], _outline(model, image)
+        keypoints = matches.keypoints.get(image.name, np.zeros((0, 2)))
         if outline is None or not len(keypoints):
             inside[image.name] = np.zeros(len(keypoints), bool)
             continue

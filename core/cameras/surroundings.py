@@ -68,8 +68,8 @@ def _share_that_stays(one: tuple, other: tuple, face: faces.Face, turned: faces.
     back, again, _ = cv2.calcOpticalFlowPyrLK(second, first, there, None)
     moved = np.linalg.norm((there - corners[off]).reshape(-1, 2), axis=1)
     still = moved < STILL_DIAGONAL_SHARE * np.hypot(*first.shape)
-    sure = (found.ravel() > 0) & (again.ravel() > 0) & (np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1)
-                                                        < 1)
+    returned = np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1)
+    sure = (found.ravel() > 0) & (again.ravel() > 0) & (returned < 1)
     return float((still & sure).mean())
 
 

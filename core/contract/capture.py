@@ -207,8 +207,9 @@ class Capture:
     def keep_hashes(self, trees: dict[str, dict]) -> None:
         """Records what is about to be slimmed away: stage -> {name it writes: what `hash_tree` gives for it}."""
         record = self.read()
-        write_json(self.json, {**record, "stages": {name: {**entry, "slimmed": trees[name]} if name in trees else entry
-                                                    for name, entry in record["stages"].items()}})
+        entries = {name: {**entry, "slimmed": trees[name]} if name in trees else entry
+                   for name, entry in record["stages"].items()}
+        write_json(self.json, {**record, "stages": entries})
 
     def drop_hashes(self, stage: stages.Stage) -> None:
         """Records that what was slimmed away of a stage is back, as it was."""

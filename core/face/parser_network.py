@@ -64,8 +64,8 @@ class ParseNet(nn.Module):
                 kept.append(x)
                 x = self.halve[level](x)
         for level in reversed(range(len(self.halve))):
-            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear",
-                                                     align_corners=False)
+            x = functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear", align_corners=False)
+            x = kept[level] + x
             x = self.up[level](x)
         x = torch.cat([fine, functional.pixel_shuffle(self.leave(x), 2)], 1)
         return functional.pixel_shuffle(self.out(functional.gelu(self.last(x))), 2).float()

@@ -221,8 +221,8 @@ def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
                 > 0).all():
                 faces[own] = corners
                 if face_uvs is not None:
-                    face_uvs[own] = np.concatenate([mesh.face_uvs[start, :1], mesh.face_uvs[own, 1],
-                                                    mesh.face_uvs[start + count - 1, 2:]])[fan]
+                    around = [mesh.face_uvs[start, :1], mesh.face_uvs[own, 1], mesh.face_uvs[start + count - 1, 2:]]
+                    face_uvs[own] = np.concatenate(around)[fan]
                 break
     return replace(mesh, faces=faces, face_uvs=face_uvs)
 

@@ -92,12 +92,8 @@ class UNet(nn.Module):
         super().__init__()
         patch_size, skip_stages, mapping_out = layout.patch_size, layout.skip_stages, layout.mapping_out
         depths, channels, attention = layout.depths, layout.channels, layout.attention or [False] * len(layout.depths)
-        self.patch_size, self.sigma_data, self.skip_stages, self.has_variance = (
-            patch_size,
-            layout.sigma_data,
-            skip_stages,
-            layout.has_variance,
-        )
+        self.patch_size, self.skip_stages = patch_size, skip_stages
+        self.sigma_data, self.has_variance = layout.sigma_data, layout.has_variance
         self.low_memory = False  # keeps a fifth of what the gradient needs, and computes the rest again
         self.multiple = patch_size * 2 ** (len(depths) - 1 - skip_stages)
         self.timestep_embed = Fourier(mapping_out)

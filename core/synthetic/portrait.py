@@ -113,9 +113,8 @@ def _under(environment: Environment, sight: Sight, stage: LightStage,
 
 def _brightest(environment: Environment) -> np.ndarray:
     """The environment's dipole [3]: where its light comes from, of length 1 where all of it comes from there."""
-    return (DIRECTIONS * environment.radiance.mean(1, keepdims=True)).mean(0).astype(np.float32) / max(
-        float(environment.radiance.mean()), 1e-6
-    )
+    dipole = (DIRECTIONS * environment.radiance.mean(1, keepdims=True)).mean(0).astype(np.float32)
+    return dipole / max(float(environment.radiance.mean()), 1e-6)
 
 
 def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> tuple[list, list, list]:

@@ -127,8 +127,8 @@ def _vgg(state: dict[str, Tensor], linear: list[Tensor] | None) -> Features:
             if layer is None:
                 x = functional.max_pool2d(x, 2)
                 continue
-            x = functional.relu(functional.conv2d(x, state[name.format(layer, "weight")],
-                                                  state[name.format(layer, "bias")], padding=1))
+            weight, bias = (state[name.format(layer, kind)] for kind in ("weight", "bias"))
+            x = functional.relu(functional.conv2d(x, weight, bias, padding=1))
             if layer in VGG_TAPS:
                 found.append(x)
         return found

@@ -190,9 +190,8 @@ def _deform_group() -> bpy.types.NodeTree:
         group.is_modifier = True
         for side in ('INPUT', 'OUTPUT'):
             group.interface.new_socket("Geometry", in_out=side, socket_type='NodeSocketGeometry')
-        source, deform, target = (group.nodes.new(kind)
-                                  for kind in ('NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface',
-                                               'NodeGroupOutput'))
+        source, deform, target = (group.nodes.new(kind) for kind in (
+            'NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface', 'NodeGroupOutput'))
         deform.location, target.location = (200, 0), (420, 0)
         group.links.new(source.outputs[0], deform.inputs["Curves"])
         group.links.new(deform.outputs["Curves"], target.inputs[0])

@@ -31,8 +31,8 @@ class WILDCAP_OT_pick_skin_tone(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         item = captures.active(context)
-        return cls.with_capture(context) and cls.allowed(captures.head(context, item) is not None,
-                                                         "The head is not in this scene: click Bring In Head")
+        return cls.with_capture(context) and cls.allowed(
+            captures.head(context, item) is not None, "The head is not in this scene: click Bring In Head")
 
     def invoke(self, context, event):
         context.window.cursor_modal_set('EYEDROPPER')

@@ -115,8 +115,8 @@ def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) ->
     picture[hit, :-1], picture[hit, -1] = layers, 1
     size = view.height
     picture = picture.reshape(size, over, size, over, -1).mean((1, 3))
-    albedo, shares, normal, reach, free = np.split(picture[..., :-1] / np.maximum(picture[..., -1:], 1e-6),
-                                                   np.cumsum([3, len(PARTS), 3, LAMPS]), 2)
+    mean = picture[..., :-1] / np.maximum(picture[..., -1:], 1e-6)
+    albedo, shares, normal, reach, free = np.split(mean, np.cumsum([3, len(PARTS), 3, LAMPS]), 2)
     shares = shares * picture[..., -1:]
     shares[..., -1] = 1 - picture[..., -1]
     length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
