@@ -123,6 +123,7 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     tones = {}
     if subject is not None:
         truth, hidden = _painted(surface, subject), maps.confidence < 0.02
+
         def error(shown, region: str):
             where = hidden & (template.mask(region, surface.size) > 0.9)
             return _error(*(_tone(m, surface) for m in (shown, truth)), where)

@@ -25,6 +25,7 @@ def archive(tmp_path, monkeypatch):
     """A finished capture on a disk that is read-only to all who ask."""
     capture = delivered.make(tmp_path / "Zoë et moi.wildcap")
     access = os.access
+
     def read_only(path, mode):
         return access(path, mode) and not (mode == os.W_OK and Path(path) == capture.root)
 

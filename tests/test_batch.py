@@ -269,6 +269,7 @@ def test_a_second_look_reads_only_what_has_changed(code, tmp_path, monkeypatch):
     core(code, "batch", "run", batch.root)
     core(code, "batch", "status", batch.root)
     read = []
+
     def hash_whole(file, size):
         read.append(Path(file.name))
         return hashlib.file_digest(file, hashes._hasher).hexdigest()

@@ -117,6 +117,7 @@ def test_sixteen_bits_are_read_as_the_eye_sees_them(addon, tmp_path):
 
 def test_the_chain_can_begin_at_any_stage(addon, capture, item, monkeypatch):
     started = []
+
     def start(item, goal, **span):
         started.append((goal, span["first"], span["last"]))
 

@@ -30,6 +30,7 @@ print(sys.version_info[:2], {{s.name: code_key.code_key(s.module) for s in stage
 def copy(tmp_path) -> Path:
     """core/ with its sources to be edited; its data are links."""
     copied = tmp_path / "core"
+
     def data(folder, names):
         return [name for name in names if not (name.endswith(".py") or (Path(folder) / name).is_dir())]
 

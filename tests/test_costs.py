@@ -122,6 +122,7 @@ def test_what_was_disturbed_is_measured_once_more_and_the_better_one_kept(tmp_pa
     busy = {"frames": [0.1], "cameras": [0.9, 1.5, 0.3, 0.0], "scan": [0.0]}
     capture = tmp_path / "standard.wildcap"
     monkeypatch.setitem(costs.ROWS, "standard", costs.StageRun(("frames", "cameras", "scan")))
+
     def measure(capture, stage, *given):
         capture.mkdir(exist_ok=True)
         return {**DONE, "others": busy[stage].pop(0)}

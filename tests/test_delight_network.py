@@ -225,6 +225,7 @@ def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
                           "held_out": 1, "seed": 0, "workers": 0}}
     monkeypatch.setitem(delighter.CONFIGS, "cpu", small)
     monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
+
     def prepare(seeds, views, work, *rest):
         return people.prepare_people(seeds, views, work, QUIET, processes=2)
 

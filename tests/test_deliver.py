@@ -227,6 +227,7 @@ def test_the_artists_own_mesh_has_a_material_per_tile(capture):
 def test_a_read_only_capture_is_delivered_to_another_folder_and_nothing_in_it_changes(
         addon, capture, tmp_path, monkeypatch):
     access = os.access
+
     def read_only(path, mode):
         return access(path, mode) and not (mode == os.W_OK and Path(path) == capture.root)
 

@@ -84,6 +84,7 @@ def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, behind, expo
     contents = []
     for i in range(24):
         picture, inside = turning_head(0.035 * i, skin, wall)
+
         def segment(small, inside=inside):
             return cv2.resize(inside.astype(np.float32), small.shape[1::-1])
 

@@ -126,6 +126,7 @@ def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, mo
 
             monkeypatch.setattr("core.solve.network_blocks.Shaped.of", plain)
         x, kept = torch.linspace(-1, 1, 5 * 32 * 32).reshape(1, 5, 32, 32).requires_grad_(), {}
+
         def pack(saved, kept=kept):
             kept[saved.data_ptr()] = saved.nbytes
             return saved

@@ -192,6 +192,7 @@ def test_a_run_tells_what_it_kept_aside_also_where_it_fails(capture, monkeypatch
     from core.worker import runner
 
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
+
     def run(capture, *_):
         make_frames(capture, "00000.jpg")
         if fails:

@@ -15,6 +15,7 @@ from .painted_skin import brief_confidence, make, settings  # noqa: F401
 def test_a_solve_shows_pictures_that_change_and_how_its_loss_falls(tmp_path, monkeypatch):
     capture, seen, drawn = make(tmp_path / "a.wildcap"), [], []
     curve = drawing.loss_curve
+
     def loss_curve(losses, steps):
         drawn.append((list(losses), steps))
         return curve(losses, steps)

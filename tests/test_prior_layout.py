@@ -218,6 +218,7 @@ def test_without_the_other_head_or_with_other_uvs_it_says_what_to_do(capture, au
 
 def test_another_checkpoint_or_head_makes_the_stage_stale_but_only_with_that_prior(capture, authors):
     stage = stages.by_name("solve")
+
     def change(prior, edit) -> tuple[str, ...]:
         record(capture, stage, settings(prior))
         edit()

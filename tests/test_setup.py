@@ -141,6 +141,7 @@ def test_the_set_up_offers_a_test_once_a_solver_answers_and_no_longer_when_it_do
     assert "torch" in setup("problems").of("").problem and setup("problems").of("").remedy
     monkeypatch.setattr(checking.environment, "judge", lambda found, requirements: [])
     found = {"device": "cuda", "reason": "cuda takes 0.1 s."}
+
     def survey(python, requirements, importing):
         return found if importing else {"device": "", "reason": ""}
 

@@ -61,6 +61,7 @@ def _masks() -> Iterator:
             output.open(str(path), spec)
             output.write_image(np.repeat(BARS[..., None] / np.float32(255), channels, -1).astype(np.float32))
             output.close()
+
             def reads_right() -> bool:
                 return bool(np.abs(images.read_mask(path) - BARS / 255).max() < 0.06)
 
@@ -198,6 +199,7 @@ def _jsons() -> Iterator:
             path.write_bytes(encode(points if of_points else chosen))
             if of_points:
                 found = lambda: artist_landmarks.read(path)  # noqa: E731 - read only when it is asked for
+
                 def reads_right() -> bool:
                     return np.allclose(found()[152], points["points"]["152"]) and len(found()) == 2
 

@@ -55,6 +55,7 @@ def test_the_chart_that_the_solver_finds_reaches_the_settings(addon, item, monke
         figures = {"white_point": [0.9, 0.8, 0.6]}
 
     started = []
+
     def start_tool(item, tool, **options):
         started.append((tool, options))
         return Job()

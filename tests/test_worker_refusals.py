@@ -93,6 +93,7 @@ def test_an_installation_that_stops_says_why(tmp_path, monkeypatch, said, words)
     monkeypatch.setattr(installation, "lock_of", lambda *_: Lock("manylinux_x86_64-3.11", {}))
     monkeypatch.setattr(installation.bare_environment, "make", lambda *_, **__: None)
     monkeypatch.setattr(installation, "steps", lambda *_: [PipStep((said,))])
+
     def run(task, command, hear):
         hear(said)
         return 1, said if "ERROR" in said else ""

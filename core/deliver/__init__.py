@@ -120,6 +120,7 @@ def _newest(capture: Capture) -> Path:
     """The 4K maps where they are complete and not older than the solved ones, else those."""
     solved, enlarged = ([folder / name for name in stages.MAPS if name.endswith(".png")]
                         for folder in (capture.maps, capture.maps_4k))
+
     def time_of(path: Path) -> float:
         return path.stat().st_mtime
 

@@ -147,6 +147,7 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     pose, coefficients = alignment.fit_scan(model, pose, coefficients, found.points, trust, scan, shaped)
     start = pose.apply(model.shape(coefficients))
     targets = nonrigid.LandmarkTargets(found.points, trust, subject.hold, found.put)
+
     def tell(share: float) -> None:
         report.progress(20 + (0.9 * STEPS - 20) * share, 0.9 * STEPS, "fitting the head to the scan")
 

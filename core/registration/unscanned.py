@@ -132,6 +132,7 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
             rows.append((part.at(mesh.vertices), basis, part.direction, part.distance, weight))
         pose, coefficients = stepped(pose, coefficients, rows)
     vertices = pose.apply(model.shape(coefficients))
+
     def tell(step: int) -> None:
         report.progress(first + (steps - first) * (0.7 + 0.3 * step / STEPS), steps, "fitting the head to the views")
 

@@ -61,6 +61,7 @@ def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, 
         seen = _match(views, plan, now.scale, box, guide, mask, tick)
         if guide:  # the nearer pairs of the round before fill what the wide ones cannot match; they weigh little
             seen = maps + seen
+
         def fusing(k: int, plan=plan, tick=tick) -> None:
             tick(len(plan) + min(k, len(plan)), "fusing depth")
 

@@ -77,6 +77,7 @@ def measure(start: Mesh, views: list[View], voxel: float, box: np.ndarray, devic
     """The surface within the box [2, 3] that surfels trained on all views show, and its depth maps; `start` as in
     train, voxel in metres."""
     photographs = [_photograph(view) for view in views]
+
     def tell(step: int, loss: float) -> None:
         report.progress(step, STEPS, f"training surfels, loss {loss:.4f}")
 

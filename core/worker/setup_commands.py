@@ -63,6 +63,7 @@ def _wheels(options: argparse.Namespace) -> int:
     compute = "cpu" if options.compute == "auto" else options.compute
     if compute == ("cuda" if name.startswith("macosx") else "apple"):
         raise Problem(f"There is no solver for {compute} on {name}.", "Leave --compute out, or choose another.")
+
     def work(task: BackgroundTask):
         return wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder,
                                lambda command: task.run(command, lambda line: _hear(task, line)))
