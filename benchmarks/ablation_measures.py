@@ -29,8 +29,8 @@ def measure(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray,
     after the gain per channel (linear) that is best for the whole face. albedo, truth linear [S, S, 3]; face and
     regions bool [S, S]."""
     gain = (albedo[face] * truth[face]).sum(0) / (albedo[face] ** 2).sum(0)
-    ours, theirs = images.linear_to_srgb(albedo
-                                         * gain).astype(np.float32), images.linear_to_srgb(truth).astype(np.float32)
+    ours = images.linear_to_srgb(albedo * gain).astype(np.float32)
+    theirs = images.linear_to_srgb(truth).astype(np.float32)
     _, ssim = structural_similarity(theirs, ours, channel_axis=2, data_range=1.0, full=True)
     flip, _, _ = flip_evaluate(theirs, ours, "LDR", applyMagma=False, computeMeanError=False)
     pictures = {"ssim": ssim.mean(-1), "flip": np.squeeze(flip),
@@ -50,9 +50,10 @@ def feature_distance(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
     with torch.no_grad():
         layers = [network.layers(torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1)))[None])
                   for image in (one, other)]
-        total = sum(functional.interpolate(((functional.normalize(a, dim=1)
-                                             - functional.normalize(b, dim=1)) ** 2).sum(1, keepdim=True),
-                                           one.shape[:2], mode="bilinear") for a, b in zip(*layers, strict=True))
+        total = 0
+        for a, b in zip(*layers, strict=True):
+            apart = (functional.normalize(a, dim=1) - functional.normalize(b, dim=1)) ** 2
+            total = total + functional.interpolate(apart.sum(1, keepdim=True), one.shape[:2], mode="bilinear")
     return total[0, 0].numpy()
 
 

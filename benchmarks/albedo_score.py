@@ -185,8 +185,8 @@ def main() -> None:
     parser.add_argument("--pictures", type=Path, help="folder for truth and result side by side")
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/scan_albedo.json")
     arguments = parser.parse_args()
-    scores = {"WildCap": score_capture(Capture(arguments.capture), arguments.truth, arguments.pictures,
-                                       arguments.texture), **score_floors(arguments.truth)}
+    ours = score_capture(Capture(arguments.capture), arguments.truth, arguments.pictures, arguments.texture)
+    scores = {"WildCap": ours, **score_floors(arguments.truth)}
     print(json.dumps(scores, indent=1))
     if arguments.json:
         ours = scores["WildCap"]

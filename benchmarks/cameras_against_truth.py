@@ -40,9 +40,9 @@ def compare(capture: Capture, truth: Path) -> dict:
     target = _looked_at(true_centres, -matrices[:, :3, 2])
     distance = np.linalg.norm(true_centres - target, axis=1).mean()
     errors = np.linalg.norm(scale * centres @ rotation.T + translation - true_centres, axis=1) / distance
-    turned = [np.degrees(np.arccos(np.clip((np.trace(m[:3, :3] @ BLENDER_TO_COLMAP @ v.rotation @ rotation.T) - 1) / 2,
-                                           -1, 1)))
-              for v, m in zip(views, matrices, strict=True)]
+    cosines = [(np.trace(m[:3, :3] @ BLENDER_TO_COLMAP @ v.rotation @ rotation.T) - 1) / 2
+               for v, m in zip(views, matrices, strict=True)]
+    turned = [np.degrees(np.arccos(np.clip(cosine, -1, 1))) for cosine in cosines]
     off = place_truth(capture, truth)[1]
     up = rotation @ [0, 0, 1]
     forward = rotation @ [0, -1, 0]

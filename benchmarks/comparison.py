@@ -114,8 +114,8 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
                 if not (row / "score.json").is_file():
                     seen = seen or looks(capture, truth)[0]
                     _keep(row, *solved(capture, settings, method, seed), seen)
-                found[given].setdefault(method,
-                                        {})[str(seed)] = json.loads((row / "score.json").read_text(encoding="utf-8"))
+                score = json.loads((row / "score.json").read_text(encoding="utf-8"))
+                found[given].setdefault(method, {})[str(seed)] = score
     return found
 
 
@@ -177,10 +177,9 @@ def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
     copy = Capture(folder)
     if not copy.shadow_mask_auto.is_file():
         shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(source.root, folder,
-                        ignore=shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "delivery", "delit",
-                                                      "lock",
-                                                                          "shadow_mask*", "mask_history", "texture*"))
+        later = shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "delivery", "delit", "lock",
+                                       "shadow_mask*", "mask_history", "texture*")
+        shutil.copytree(source.root, folder, ignore=later)
         for stage in ("delight", "texture", "shadow_mask"):
             import_module(f"core.{stage}").run(copy, settings, Reporter(stage))
     return copy

@@ -79,9 +79,8 @@ def solved(subject: int, shadows: str, size: int, steps: int) -> tuple[np.ndarra
         images.write_data(capture.shadow_mask_auto, mask)
         meshes.write_obj(capture.head, template.load())
         solve.run(capture, settings, Reporter("solve"))
-        albedo, confidence = images.read_linear(capture.maps
-                                                / "diffuse_albedo.exr"), images.read_mask(capture.maps
-                                                                                          / "confidence.png")
+        albedo = images.read_linear(capture.maps / "diffuse_albedo.exr")
+        confidence = images.read_mask(capture.maps / "confidence.png")
     face = template.mask("face", size) > 0.5
     gain = (albedo[face] * truth[face]).sum(0) / (albedo[face] ** 2).sum(0)
     return np.abs(images.linear_to_srgb(albedo * gain) - images.linear_to_srgb(truth)).mean(-1), confidence, face
@@ -92,8 +91,8 @@ def judged(error: np.ndarray, confidence: np.ndarray) -> tuple[float, float, flo
     other."""
     order = np.argsort(-confidence, kind="stable")
     half = len(order) // 2
-    return float(spearmanr(1 - confidence,
-                           error)[0]), float(error[order[:half]].mean()), float(error[order[half:]].mean())
+    correlation = spearmanr(1 - confidence, error)[0]
+    return float(correlation), float(error[order[:half]].mean()), float(error[order[half:]].mean())
 
 
 if __name__ == "__main__":

@@ -55,10 +55,10 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
     start = initial.start(prior, evidence, parse_skin_tone(settings.solve.skin_tone),
                           evidence.cell_side(settings.solve.grid_cells), recipe)
-    state = Sampler(prior.of_tone(start.tone), start.recipe,
-                    seeded(settings.seed)).sample(start.observations, start.state)
-    return images.linear_to_srgb(maps.finished(state, evidence,
-                                               start).diffuse), {"seconds": round(time.monotonic() - began, 1)}
+    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seeded(settings.seed))
+    state = sampler.sample(start.observations, start.state)
+    diffuse = maps.finished(state, evidence, start).diffuse
+    return images.linear_to_srgb(diffuse), {"seconds": round(time.monotonic() - began, 1)}
 
 
 def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
@@ -92,8 +92,8 @@ def true_frames(source: Capture, truth: Path, work: Capture, settings: Settings)
 
 def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
     """The texture whose confident facial skin has been brought to the skin tone, sRGB [S, S, 3]."""
-    texture, tone = images.read_linear(capture.texture), np.array(parse_skin_tone(settings.solve.skin_tone).linear,
-                                                                  np.float32)
+    texture = images.read_linear(capture.texture)
+    tone = np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
     return images.linear_to_srgb(toned(texture, tone, skin))
 

@@ -166,8 +166,8 @@ def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[t
     elif row.endswith(", one photograph"):
         for photograph in chosen.photographs:
             try:
-                predicted = delight.PHOTOGRAPHERS[row.removesuffix(", one photograph")](photograph.srgb,
-                                                                                        settings.delight)[0]
+                photographer = delight.PHOTOGRAPHERS[row.removesuffix(", one photograph")]
+                predicted = photographer(photograph.srgb, settings.delight)[0]
             except Problem as problem:
                 predicted = problem
             yield photograph, predicted

@@ -129,6 +129,5 @@ def sheet(photographs: list[list[np.ndarray]], side: int = 192) -> np.ndarray:
 
 def _line(name: str, row: str, pictures: int, figures: dict) -> str:
     digits = {"psnr": 2, "detail": 2, "shadow_step": 2}
-    return f"| {name} | {row} | {pictures} | " + " | ".join("-" if figures[f] is None
-                                                            else f"{figures[f]:.{digits.get(f, 3)}f}"
-                                                            for f in FIGURES) + " |"
+    cells = ["-" if figures[f] is None else f"{figures[f]:.{digits.get(f, 3)}f}" for f in FIGURES]
+    return f"| {name} | {row} | {pictures} | " + " | ".join(cells) + " |"

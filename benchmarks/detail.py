@@ -57,8 +57,8 @@ def look(caster: raster.RayCaster, view: View, true: AlbedoTruth, margin: int = 
     pixels = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) / RAYS * [view.width / width, view.height / height]
     face, bary, _ = caster.first_hits(np.repeat(view.centre[None], len(pixels), 0), view.rays(pixels))
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
-    at, hit = np.stack([uv[:, 0], 1 - uv[:, 1]],
-                       1).astype(np.float32).reshape(*x.shape, 2), (face >= 0).reshape(x.shape)
+    at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1).astype(np.float32).reshape(*x.shape, 2)
+    hit = (face >= 0).reshape(x.shape)
     covers = np.maximum.reduce([template.mask(name, 512) for name in ("brows", "lips", "eyes", "nostrils")])
     bare = _shrunk(raster.sample(covers, at.reshape(-1, 2) * 512).reshape(x.shape) * hit) < 0.1
     return FaceRays(AlbedoTruth(true.frame, true.albedo[box], true.face[box],
@@ -79,8 +79,8 @@ def marks(seen: FaceRays, texture: np.ndarray) -> dict | None:
     moles: how many; pore_contrast: ratio of deviations in the band; pore_correlation. None where nothing is left to
     judge.
     """
-    linear = raster.sample(images.srgb_to_linear(texture),
-                           seen.at.reshape(-1, 2) * len(texture)).reshape(*seen.hit.shape, 3) * seen.hit[..., None]
+    colours = raster.sample(images.srgb_to_linear(texture), seen.at.reshape(-1, 2) * len(texture))
+    linear = colours.reshape(*seen.hit.shape, 3) * seen.hit[..., None]
     whole = _shrunk(seen.hit.astype(np.float32))
     known = seen.true.face & (whole > 0.99)
     inner = cv2.erode((known & seen.bare).astype(np.uint8), np.ones((17, 17))) > 0

@@ -46,8 +46,9 @@ def places(head: meshes.Mesh, points: dict[str, list[float]]) -> dict[str, np.nd
         near = np.linalg.norm(rest.vertices - point, axis=1).argsort()[:3]
         faces = rest.faces[np.isin(rest.faces, near).any(1)]
         a, b, c = (rest.vertices[faces[:, i]] for i in range(3))
-        bary = np.clip(trimesh.triangles.points_to_barycentric(np.stack([a, b, c], 1), np.tile(point, (len(faces), 1)),
-                                                               method="cramer"), 0, 1)
+        points = np.tile(point, (len(faces), 1))
+        bary = trimesh.triangles.points_to_barycentric(np.stack([a, b, c], 1), points, method="cramer")
+        bary = np.clip(bary, 0, 1)
         bary /= bary.sum(1, keepdims=True)
         best = np.linalg.norm((rest.vertices[faces] * bary[..., None]).sum(1) - point, axis=1).argmin()
         found[name] = bary[best] @ head.vertices[faces[best]]

@@ -149,13 +149,8 @@ class FarmTrial:
     def _follow(self, nodes: dict[str, Node]) -> None:
         """Runs the batch from the head node, and kills meanwhile."""
         chance = random.Random(f"{self.state['seed']}.{self.state['sessions']}")
-        tasks, next_kill, moments, back, done = (
-            0,
-            chance.uniform(0.2, 1.0) * EVERY_TASKS,
-            [],
-            {},
-            self.captures - self._left(),
-        )
+        tasks, moments, back = 0, [], {}
+        next_kill, done = chance.uniform(0.2, 1.0) * EVERY_TASKS, self.captures - self._left()
         turns = [self.captures * (turn + chance.uniform(0.2, 0.6)) / self._nodes_to_kill()
                  for turn in range(self._nodes_to_kill())]
         driver = [*nodes[HEAD].enter(farm_batch.code(self.folder)), *farm_batch.core(), "run",

@@ -68,9 +68,8 @@ def write_delit(capture: Capture, folder: Path) -> Highlight:
     frames = [lit(view, images.read_linear(view.path), head) for view in read_views(capture)]
     found = highlight(frames, head.unfold(SIZE))
     pictures = [matte(frame, found) for frame in frames]
-    gain = BRIGHT[1] / np.percentile(np.concatenate([picture[frame.hit].max(1)
-                                                     for picture, frame in zip(pictures, frames, strict=True)]),
-                                     BRIGHT[0])
+    brightest = np.concatenate([picture[frame.hit].max(1) for picture, frame in zip(pictures, frames, strict=True)])
+    gain = BRIGHT[1] / np.percentile(brightest, BRIGHT[0])
     for frame, picture in zip(frames, pictures, strict=True):
         images.write_srgb(folder / Path(frame.view.name).with_suffix(".png").name,
                           images.linear_to_srgb(picture * gain), bits=16)

@@ -63,7 +63,6 @@ def _wires(mesh: meshes.Mesh, caster: raster.RayCaster, view: View, frame: np.nd
 def _painted(caster: raster.RayCaster, view: View, texture: np.ndarray, scale: float) -> np.ndarray:
     face, bary, _ = raster.render_view(caster, view, scale)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
-    colour = raster.sample(texture,
-                           np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2)
-                           * len(texture)).reshape(*face.shape, 3)
+    at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)
+    colour = raster.sample(texture, at).reshape(*face.shape, 3)
     return np.where((face >= 0)[..., None], colour, 0.95).astype(np.float32)

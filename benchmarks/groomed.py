@@ -24,33 +24,23 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from core.contract.files import replacing
-from core.contract.messages import Reporter
 from core.face import template
-from core.face.head import Head
 from core.face.parts import GROWTHS
 from core.face.strands import Strands, prisms
 from core.geometry import raster
 from core.geometry.meshes import joined, vertex_normals
 from core.geometry.views import View
 from core.imaging import images
-from core.synthetic import sample, scene
-from core.synthetic.people import phone
 from core.synthetic.people.figure import Figure, make_figure
-from core.synthetic.people.truth import Scene
-from core.texture.parts_shown import PartsShown, tell_parts
-from core.texture.projection import observe
+from core.texture.parts_shown import PartsShown
 from core.upscale import grooming, hair, strokes, ways
-from core.upscale.maps import HeadMaps
 from core.upscale.surface import lay_out
 
 from . import figures
+from .haired_people import OVER, SCALE, SIZE, VIEWS, photograph, read_maps, shrink
 from .likenesses import LIKENESSES
 from .pages import write_page
 
-VIEWS, SCALE, OVER = 9, 2.0, 2
-"""Pictures of 1,440 x 1,920, as a phone's video has them: four pixels per millimetre."""
-SIZE = 1024
 NAMES = {person.seed: person.name for person in LIKENESSES}
 JUDGED = (3, 5)
 """Views in which coverage is compared: either side of the front."""
@@ -127,7 +117,7 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     figure = make_figure(seed)
     views, seen = photograph(folder / str(seed), figure)
     surface = lay_out(figure.head, SIZE)
-    maps, shown = _maps(figure, views, seen)
+    maps, shown = read_maps(figure, views, seen)
     found = hair.find(maps, surface, shown.shares[..., :len(GROWTHS)])
     cleaned, _ = hair.clean(maps, found, surface, seed)
     grown = grooming.groom(maps, found, cleaned, surface, seed)
@@ -137,7 +127,7 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     for part in ("brows", "beard"):
         if part in true or part in grown:
             row[part] = {"true_hairs": _count(true.get(part)), "grown_hairs": _count(grown.get(part)),
-                                  "iou": _overlap(figure, views, true.get(part), grown.get(part)),
+                         "iou": _overlap(figure, views, true.get(part), grown.get(part)),
                          "parser_iou": _told(figure, shown, part)}
             if part in true and part in grown:
                 row[part] |= {"degrees": _off(true[part], grown[part], figure),
@@ -150,9 +140,9 @@ def try_trusts(folder: Path, seed: int) -> list[list]:
     of TRUSTS, the mean over TURNS."""
     figure = make_figure(seed, SIZE)
     views, seen = photograph(folder / str(seed), figure)
-    surface, (maps, shown) = lay_out(figure.head, SIZE), _maps(figure, views, seen)
-    found, landmarks, rows = hair.find(maps, surface,
-                                       shown.shares[..., :len(GROWTHS)]), template.landmark_points(surface.mesh), []
+    surface, (maps, shown) = lay_out(figure.head, SIZE), read_maps(figure, views, seen)
+    found = hair.find(maps, surface, shown.shares[..., :len(GROWTHS)])
+    landmarks, rows = template.landmark_points(surface.mesh), []
     for true in (hairs for hairs in figure.strands if hairs.part in ("brows", "beard")):
         where = (getattr(found, true.part) > grooming.LEAST_COVER) & surface.covered
         if where.sum() < grooming.FEWEST:
@@ -169,61 +159,6 @@ def try_trusts(folder: Path, seed: int) -> list[list]:
             off.append(round(float(np.mean([_median_angle(way, hairs, normal) for way in chosen])), 1))
         rows.append([str(seed), true.part, *off])
     return rows
-
-
-def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarray]]:
-    """The views, with pictures in `folder`, and the albedo as each of them sees it, linear [H, W, 3]."""
-    world, seed = None, figure.person.seed
-    rng, taken = np.random.default_rng([seed, 91]), phone.sample_phone(seed)
-    lamp = np.array([rng.uniform(-1, 1), -1, rng.uniform(0.2, 1)])
-    lamp /= np.linalg.norm(lamp)
-    views, seen = [], []
-    for k, matrix in enumerate(scene.camera_path(seed, VIEWS)):
-        path, albedo = folder / f"{k:05d}.png", folder / f"albedo_{k:05d}.npz"
-        view = sample.view_of(matrix, SCALE)
-        views.append(View(path.name, path, view.camera, view.rotation, view.translation, True))
-        if not albedo.is_file():
-            folder.mkdir(parents=True, exist_ok=True)
-            world = world or Scene(figure)
-            colour, normal = _look(world, view)
-            lit = colour * (0.5 + 0.7 * np.clip(normal @ lamp, 0, None))[..., None]
-            gain = np.full(3, 0.6 / max(np.percentile(lit[normal.any(-1)], 95), 1e-6))
-            images.write_srgb(path,
-                              phone.develop(lit.astype(np.float32), taken, gain, np.random.default_rng([seed, 92, k])))
-            with replacing(albedo) as temporary, open(temporary, "wb") as file:
-                np.savez_compressed(file, colour=colour.astype(np.float16))
-        with np.load(albedo) as stored:
-            seen.append(stored["colour"].astype(np.float32))
-    return views, seen
-
-
-def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Linear albedo and unit normals (of hair: the head's behind it) [H, W, 3]; 0 beside the person."""
-    face, bary, _ = raster.render_view(world.whole, view, OVER)
-    hit = face >= 0
-    colour = np.zeros((*hit.shape, 3), np.float32)
-    colour[hit] = world.albedo(face[hit], bary[hit], world.figure.seen)
-    below, at, _ = raster.render_view(world.body, view, 1)
-    normal = np.zeros((*below.shape, 3), np.float32)
-    normal[below >= 0] = raster.interpolate(world.normals, world.body.mesh.faces, below[below >= 0], at[below >= 0])
-    return _shrunk(colour), normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-
-
-def _maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> tuple[HeadMaps, PartsShown]:
-    """The texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's), and
-    what the parser says of the views."""
-    surface = Head(figure.head).unfold(SIZE)
-    total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
-    looks = [observe(view, colour, surface, 1.0) for view, colour in zip(views, seen, strict=True)]
-    for look in looks:
-        weight = look.weight[..., None] ** 2
-        total, weights = total + weight * look.log_colour, weights + weight
-    bare = images.resize(figure.skin.diffuse, SIZE, SIZE)
-    diffuse = np.where(weights > 1e-4, np.exp(total / np.maximum(weights, 1e-9)), bare).astype(np.float32)
-    one = np.ones((SIZE, SIZE), np.float32)
-    maps = HeadMaps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, np.clip(weights[..., 0], 0, 1).astype(np.float32),
-                    np.repeat(one[..., None], 3, 2))
-    return maps, tell_parts(looks, surface, Reporter("texture"))
 
 
 def _count(hairs: Strands | None) -> int:
@@ -270,12 +205,7 @@ def _cover(figure: Figure, view: View, hairs: Strands | None) -> np.ndarray:
     skin = figure.opened.skin
     whole = joined([skin, prisms(hairs)]) if hairs is not None else skin
     face, _, _ = raster.render_view(raster.RayCaster(whole), view, OVER)
-    return cv2.GaussianBlur(_shrunk((face >= len(skin.faces)).astype(np.float32)[..., None])[..., 0], (0, 0), 2 * SCALE)
-
-
-def _shrunk(image: np.ndarray) -> np.ndarray:
-    h, w = image.shape[0] // OVER, image.shape[1] // OVER
-    return image[:h * OVER, :w * OVER].reshape(h, OVER, w, OVER, -1).mean((1, 3))
+    return cv2.GaussianBlur(shrink((face >= len(skin.faces)).astype(np.float32)[..., None])[..., 0], (0, 0), 2 * SCALE)
 
 
 def _picture(figure: Figure, view: View, true: dict, grown: dict) -> np.ndarray:
@@ -294,12 +224,11 @@ def _picture(figure: Figure, view: View, true: dict, grown: dict) -> np.ndarray:
         normal = raster.interpolate(vertex_normals(whole), whole.faces, face[hit], bary[hit])
         skin = face[hit] < len(meshes[0].faces)
         colour = flat[face[hit]]
-        colour[skin] = 0.35 * (0.4 + 0.6
-                               * np.clip(-normal[skin, 1:2] / np.linalg.norm(normal[skin], axis=1, keepdims=True), 0,
-                                         1))
+        facing = -normal[skin, 1:2] / np.linalg.norm(normal[skin], axis=1, keepdims=True)
+        colour[skin] = 0.35 * (0.4 + 0.6 * np.clip(facing, 0, 1))
         picture = np.ones((*hit.shape, 3), np.float32)
         picture[hit] = colour
-        shown.append(images.linear_to_srgb(_shrunk(picture))[crop])
+        shown.append(images.linear_to_srgb(shrink(picture))[crop])
     return cv2.resize(np.concatenate(shown, 1).astype(np.float32), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
 
 

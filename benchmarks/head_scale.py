@@ -41,8 +41,8 @@ def measure(seed: int) -> tuple[float, float]:
     origins, directions = np.array(origins), np.array(directions)
     scale, rotation, _, coefficients = fit_rays(origins, directions, intersect_rays(origins, directions)[0])
     right, left = pupils(coefficients)
-    return 100 * (scale * np.linalg.norm(left - right) / true
-                  - 1), float(np.degrees(np.arctan2(rotation[1, 2], rotation[2, 2])))
+    larger = scale * np.linalg.norm(left - right) / true - 1
+    return 100 * larger, float(np.degrees(np.arctan2(rotation[1, 2], rotation[2, 2])))
 
 
 def main() -> None:

@@ -67,8 +67,8 @@ def _run(arguments: argparse.Namespace, work: Path) -> int:
 
     began = time.monotonic()
     kills_worker.warm_up()
-    undisturbed = kills_capture.run_undisturbed(work / "undisturbed", arguments.until, arguments.delighter,
-                                                tell=lambda text: None)
+    undisturbed = kills_capture.run_undisturbed(
+        work / "undisturbed", arguments.until, arguments.delighter, tell=lambda text: None)
     stock = hostile_cases.Stock(undisturbed, work / "stock")
     print(f"A capture was made in {time.monotonic() - began:.0f} s.", flush=True)
     kinds = hostile_cases.kinds(undisturbed.names)

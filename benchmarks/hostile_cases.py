@@ -60,8 +60,8 @@ class Stock:
         shutil.copytree(end.frames, folder / "photographs", ignore=shutil.ignore_patterns("*.json", "*.psd", ".*"))
         shutil.copytree(end.cameras, folder / "model", ignore=shutil.ignore_patterns("*.txt"))
         shutil.copy(SAMPLE / "cameras.json", folder / "cameras.json")
-        (folder
-         / "landmarks.json").write_text(json.dumps({"points": {"152": [0.0, -0.1, -0.1], "1": [0.0, -0.13, -0.03]}}))
+        points = {"152": [0.0, -0.1, -0.1], "1": [0.0, -0.13, -0.03]}
+        (folder / "landmarks.json").write_text(json.dumps({"points": points}))
         (folder / "settings.json").write_text(json.dumps({"frames": {"views": 3}, "scan": {"pairs": 4}, "seed": 7}))
         if end.head.is_file():
             shutil.copy(end.head, folder / "mesh.obj")
@@ -166,15 +166,15 @@ def _photographs(case: Case, stock: Stock, rng: random.Random) -> None:
 
 def _mask(case: Case, stock: Stock, rng: random.Random) -> None:
     picture = stock.bring(rng.choice(["mask.png", "mask.exr", "mask.jpg"]), case)
-    case.command, case.outputs = ["mask", "import", str(capture_at(case.place).root),
-                                  str(picture)], ("shadow_mask.png",)
+    case.command = ["mask", "import", str(capture_at(case.place).root), str(picture)]
+    case.outputs = ("shadow_mask.png",)
     _spoil(case, picture, rng)
 
 
 def _landmarks(case: Case, stock: Stock, rng: random.Random) -> None:
     marks = stock.bring("landmarks.json", case)
-    case.command, case.outputs = ["landmarks", "import", str(capture_at(case.place).root),
-                                  str(marks)], ("landmarks_artist.json",)
+    case.command = ["landmarks", "import", str(capture_at(case.place).root), str(marks)]
+    case.outputs = ("landmarks_artist.json",)
     _spoil(case, marks, rng)
 
 
@@ -195,8 +195,8 @@ def _settings(case: Case, stock: Stock, rng: random.Random) -> None:
             .replace("\0", "")
         )
         case.command = ["run", "-", root, "--until", "frames", f"--set={name}={value[:500]}"]
-        case.said, case.named = f"--set {name}={value[:60]!r}", (name or "''", "--set",
-                                                                 name.rpartition(".")[2] or "--set")
+        case.said = f"--set {name}={value[:60]!r}"
+        case.named = (name or "''", "--set", name.rpartition(".")[2] or "--set")
 
 
 def _cameras(case: Case, stock: Stock, rng: random.Random) -> None:
@@ -232,8 +232,8 @@ def _names(case: Case, stock: Stock, rng: random.Random) -> None:
     name, which = rng.choice(NAMES), rng.choice(["capture", "photographs", "photograph"])
     folder = stock.bring("photographs", case)
     shutil.rmtree(capture_at(case.place).root)
-    case.said, case.named = f"the {which} is named {name!r}", (name, ascii(name)[1:-1],
-                                                               ascii(name)[1:-1].replace("\\", "\\\\"))
+    escaped = ascii(name)[1:-1]
+    case.said, case.named = f"the {which} is named {name!r}", (name, escaped, escaped.replace("\\", "\\\\"))
     if which == "photograph":
         first = sorted(folder.iterdir())[0]
         first.rename(first.with_name(f"{name[:200]}.jpg"))

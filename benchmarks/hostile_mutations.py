@@ -48,8 +48,8 @@ def overwrite(path: Path, rng: random.Random) -> str:
     content = bytearray(path.read_bytes())
     start, size = rng.randrange(max(1, len(content))), rng.choice([4, 8, 512, 4096])
     what = rng.choice(["zeros", "ones", "noise"])
-    content[start:start + size] = {"zeros": bytes(size), "ones": b"\xff" * size,
-                                   "noise": rng.randbytes(size)}[what][:max(0, len(content) - start)]
+    spoilt = {"zeros": bytes(size), "ones": b"\xff" * size, "noise": rng.randbytes(size)}[what]
+    content[start:start + size] = spoilt[:max(0, len(content) - start)]
     _put(path, bytes(content))
     return f"{what} of {size} bytes at {start}"
 
@@ -187,8 +187,8 @@ def spoil_counts(path: Path, rng: random.Random) -> str:
     return f"{'no finite number' if value is None else value} at {at}"
 
 
-ANY: tuple[Callable[[Path, random.Random], str], ...] = (truncate, truncate, flip, overwrite, replace_whole, append,
-                                                         other_kind, remove)
+ANY: tuple[Callable[[Path, random.Random], str], ...] = (
+    truncate, truncate, flip, overwrite, replace_whole, append, other_kind, remove)
 SPECIAL = {".png": (forge_png, spoil_pixels, spoil_pixels), ".exr": (forge_exr, spoil_pixels, spoil_pixels),
            ".jpg": (spoil_pixels, forge_png),
            ".json": (spoil_json,) * 8, ".obj": (spoil_lines,) * 5, ".ply": (spoil_lines, spoil_counts),
@@ -210,10 +210,8 @@ def png(width: int, height: int, rows: bytes, depth: int = 8, colour: int = 2, c
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     header = struct.pack(">IIBBBBB", width & 0xffffffff, height & 0xffffffff, depth, colour, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR",
-                                        header) + chunk(b"IDAT",
-                                                        rows if compressed
-                                                        else zlib.compress(rows)) + chunk(b"IEND", b"")
+    data = rows if compressed else zlib.compress(rows)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
 
 
 def _put(path: Path, content: bytes) -> None:

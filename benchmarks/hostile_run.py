@@ -187,6 +187,7 @@ def _lost(case: Case) -> list[str]:
         places = [case.spoiled, *((root / ownership.KEPT).rglob(f"{case.spoiled.stem}*") if inside else ())]
         if not any(path.is_file() and path.read_bytes() == case.content for path in places):
             found.append(f"{case.spoiled.relative_to(case.place)}, as it was spoiled, is nowhere any more")
-    elsewhere = {path.name for path in case.place.iterdir()} - {root.name, BESIDE, "brought", "out", "chosen.json",
-                                                                *(Path(word).name for word in case.command)}
+    words = {Path(word).name for word in case.command}
+    expected = {root.name, BESIDE, "brought", "out", "chosen.json", *words}
+    elsewhere = {path.name for path in case.place.iterdir()} - expected
     return found + [f"{name} lies beside the capture" for name in sorted(elsewhere)]

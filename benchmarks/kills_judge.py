@@ -36,8 +36,8 @@ def after_kill(place: Path, known: Mapping[str, Collection[str]], masks: Mapping
         if not (root / name).is_file() or (root / name).read_bytes() not in contents:
             found.append(f"{name} is neither the old mask nor a new one")
     for path, name in _named(root):
-        if name in (*STRANGERS, *(masks or {}), ownership.RECORD,
-                    "lock") or name.startswith(("lock.", "logs/", "mask_history/", *within)):
+        kept = name in (*STRANGERS, *(masks or {}), ownership.RECORD, "lock")
+        if kept or name.startswith(("lock.", "logs/", "mask_history/", *within)):
             continue
         if name in TOLD:
             fault = _told(path)

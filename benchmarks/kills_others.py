@@ -148,8 +148,8 @@ def colmap(trial: KillTrial) -> None:
         for pid in {"COLMAP": running, "worker": [worker.pid], "both": [*running, worker.pid]}[victim]:
             os.kill(pid, signal.SIGKILL)
     ended = worker.wait()
-    if running and victim == "COLMAP" and not (isinstance(ended, Failed) and "camera solver stopped" in ended.problem
-                                               or isinstance(ended, Done)):
+    told = isinstance(ended, Done) or isinstance(ended, Failed) and "camera solver stopped" in ended.problem
+    if running and victim == "COLMAP" and not told:
         trial.fault(f"the worker without its COLMAP ended with {ended}")
     wait_until(lambda: not running_at(trial.place), PARTING_S)
     trial.faults += [f"process {pid} outlived its worker" for pid in running_at(trial.place)]

@@ -137,10 +137,10 @@ def full(trial: KillTrial) -> None:
     trial.where = f"{stage}{' again' if again else ''}, {room} bytes {'free' if trial.private else 'in a file'}"
     ended = fork_worker(job, told, most_bytes=None if trial.private else room).wait()
     trial.struck += isinstance(ended, Failed)
+    words = "disk is full" if trial.private else "could not be written"
     if not isinstance(ended, Failed | Done):
         trial.fault("the worker ended without a word")
-    elif isinstance(ended,
-                    Failed) and ("disk is full" if trial.private else "could not be written") not in ended.problem:
+    elif isinstance(ended, Failed) and words not in ended.problem:
         trial.fault(f"a full disk is told as {ended.problem!r}")
     trial.judge_kill()
     if trial.private:

@@ -51,8 +51,8 @@ class RegionShader:
 
     def own(self, lights: Lights) -> torch.Tensor:
         """Shading by what the regions add [3, H, W]."""
-        share = functional.interpolate(lights.chroma[None], self.basis.shape[1:], mode="bilinear",
-                                       align_corners=False)[0].softmax(0)
+        chroma = functional.interpolate(lights.chroma[None], self.basis.shape[1:], mode="bilinear", align_corners=False)
+        share = chroma[0].softmax(0)
         return sum(weight * torch.einsum("ck,khw->chw", gamma, self.basis)
                    for weight, gamma in zip(share, lights.grid, strict=True))
 
@@ -114,8 +114,8 @@ class EnvironmentShader:
     def main(self, lights: Lights) -> torch.Tensor:
         """Shading [3, H, W]."""
         irradiance = self.lobe @ lights.glob.exp()
-        return functional.embedding_bag(self.which, irradiance, per_sample_weights=self.weight,
-                                        mode="sum").T.reshape(3, *self.shape)
+        summed = functional.embedding_bag(self.which, irradiance, per_sample_weights=self.weight, mode="sum")
+        return summed.T.reshape(3, *self.shape)
 
     total = main
 
@@ -127,9 +127,9 @@ def environment(start: Start, recipe: Recipe):
     o = start.observations[1]
     shade = (o.texture * o.weight).sum((1, 2)) / (albedo(start.reference) * o.weight).sum((1, 2)).clamp_min(1e-6)
     lights = EnvironmentLights(shade.log().repeat(6 * FACE**2, 1), torch.zeros(1), torch.zeros(1))
-    return _under(start, observations, lights), replace(recipe, rate=RATE,
-                                                        phases=tuple(("main", *when) for _, *when in recipe.phases)), \
-        partial(update_lights, loss=_environment_loss)
+    phases = tuple(("main", *when) for _, *when in recipe.phases)
+    return (_under(start, observations, lights), replace(recipe, rate=RATE, phases=phases),
+            partial(update_lights, loss=_environment_loss))
 
 
 def _environment_loss(lights: EnvironmentLights, denoised: torch.Tensor, o: Observation,
@@ -138,8 +138,8 @@ def _environment_loss(lights: EnvironmentLights, denoised: torch.Tensor, o: Obse
     one, other = o.shader.neighbours.T
     rough = ((lights.glob[one] - lights.glob[other]) ** 2).mean()
     brightness = (o.weight * albedo(denoised) ** 2).mean()
-    return photometric(denoised, o.shader.main(lights), o,
-                       o.weight * o.trust) + ROUGH * brightness * o.weight.sum() * rough
+    fit = photometric(denoised, o.shader.main(lights), o, o.weight * o.trust)
+    return fit + ROUGH * brightness * o.weight.sum() * rough
 
 
 @cache

@@ -45,9 +45,8 @@ def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, said:
         return capture
     began, spent, seed = time.monotonic(), _spent(), figure.person.seed
     taken = phone.sample_phone(seed)
-    cameras, poses = scene.camera_path(seed,
-                                       frames), motion.sway(frames, taken.sway_mm, taken.sway_degrees,
-                                                            np.random.default_rng([seed, 71]))
+    cameras = scene.camera_path(seed, frames)
+    poses = motion.sway(frames, taken.sway_mm, taken.sway_degrees, np.random.default_rng([seed, 71]))
     work = folder / "rendered" / name
     filmed.render(work, figure, light, scene.Shot(cameras, range(frames), SAMPLES, SCALE, poses, room))
     rendered = time.monotonic()
@@ -61,8 +60,8 @@ def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, said:
         write_views(capture, views, _developed(work, frames, faces, flows, taken, seed),
                     min(Settings().frames.views, frames))
         meshes.write_obj(capture.head, registered(figure.head, seed))
-    total, count = sum(albedo[face].sum(0, dtype=np.float64)
-                       for albedo, face in faces.values()), sum(int(face.sum()) for _, face in faces.values())
+    total = sum(albedo[face].sum(0, dtype=np.float64) for albedo, face in faces.values())
+    count = sum(int(face.sum()) for _, face in faces.values())
     with replacing(target / "skin_tone.txt") as temporary:
         temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n",
                              encoding="ascii")

@@ -84,8 +84,8 @@ def installed_paths(file: str, name: str) -> list[str]:
                        else (f"lib/python{python}/site-packages", "bin"))
     path = PurePosixPath(file)
     if path.parts[0].endswith(".data"):  # PEP 427: PACKAGE.data/purelib/... and the like
-        inside, path = {"purelib": inside,
-                        "platlib": inside}.get(path.parts[1], scripts), PurePosixPath(*path.parts[2:])
+        inside = {"purelib": inside, "platlib": inside}.get(path.parts[1], scripts)
+        path = PurePosixPath(*path.parts[2:])
     path = PurePosixPath(inside) / path
     compiled = path.parent / "__pycache__" / f"{path.stem}.cpython-{python.replace('.', '')}.pyc{TEMPORARY}"
     return [str(path), *([str(compiled)] if path.suffix == ".py" else [])]

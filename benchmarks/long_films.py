@@ -80,12 +80,8 @@ def film(folder: Path, count: int) -> Path:
     out = folder / str(count)
     if (out / "film.mp4").is_file():
         return out
-    cameras, numbers, work, taken = (
-        scene.camera_path(SEED, FRAMES, DEGREES),
-        chosen_frames(count),
-        folder / "rendered",
-        phone.sample_phone(SEED),
-    )
+    cameras, numbers = scene.camera_path(SEED, FRAMES, DEGREES), chosen_frames(count)
+    work, taken = folder / "rendered", phone.sample_phone(SEED)
     if not all((work / f"{number:05d}.exr").is_file() for number in numbers):
         from core.synthetic.people.figure import make_figure
 
@@ -113,8 +109,8 @@ def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: 
     camera."""
     views, still = [sample.view_of(matrix) for matrix in cameras], np.tile(np.eye(4), (3, 1, 1))
     first = images.read_linear(work / f"{numbers[0]:05d}.exr")
-    gain = TO / np.percentile(first[first.shape[0] // 4:-first.shape[0] // 4,
-                                    first.shape[1] // 4:-first.shape[1] // 4].max(-1), METERED)
+    rows, columns = first.shape[0] // 4, first.shape[1] // 4
+    gain = TO / np.percentile(first[rows:-rows, columns:-columns].max(-1), METERED)
     for k in numbers:
         around = max(k - 1, 0), k, min(k + 1, len(views) - 1)
         flow = motion.image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])
@@ -133,8 +129,8 @@ def row(folder: Path, count: int, plain_times: float) -> dict:
             raise SystemExit(f"{cost['problem']} {cost['remedy']}")
     ours = stage_cost.measure(capture.root, "cameras", settings=settings)
     if "problem" not in ours:
-        ours |= _against_truth(capture, truth,
-                               count) | {"found_by": capture.read()["stages"]["cameras"]["figures"]["features"]}
+        features = capture.read()["stages"]["cameras"]["figures"]["features"]
+        ours |= _against_truth(capture, truth, count) | {"found_by": features}
     print(count, ours, flush=True)
     found = {"ours": ours, "plain": None, "times": None, "processor_times": None}
     if plain_times and "problem" not in ours:

@@ -37,10 +37,8 @@ def main() -> None:
     parts = {name: scene.objects[name] for name in PERSON if name in scene.objects}
     lights = traced(parts, job["sun"], images.read_linear(Path(job["sky"])))
     for name, thing in parts.items():
-        thing.data.color_attributes.new("light", 'FLOAT_COLOR',
-                                        'POINT').data.foreach_set("color",
-                                                                  np.insert(lights[name], 3, 1,
-                                                                            1).astype(np.float32).ravel())
+        attribute = thing.data.color_attributes.new("light", 'FLOAT_COLOR', 'POINT')
+        attribute.data.foreach_set("color", np.insert(lights[name], 3, 1, 1).astype(np.float32).ravel())
         tree = thing.data.materials[0].node_tree
         light = tree.nodes.new("ShaderNodeAttribute")
         light.attribute_name = "light"
@@ -66,8 +64,8 @@ def traced(parts: dict[str, bpy.types.Object], sun: dict, sky: np.ndarray) -> di
         towards = _unit(normals + 0.999 * _unit(rng.normal(size=points.shape)))
         free = ~caster.blocked(start, towards)
         row = (np.arccos(np.clip(towards[:, 2], -1, 1)) / np.pi * len(sky)).astype(int).clip(0, len(sky) - 1)
-        column = ((0.5 - np.arctan2(towards[:, 1], towards[:, 0]) / (2 * np.pi))
-                  * sky.shape[1]).astype(int) % sky.shape[1]
+        turn = 0.5 - np.arctan2(towards[:, 1], towards[:, 0]) / (2 * np.pi)
+        column = (turn * sky.shape[1]).astype(int) % sky.shape[1]
         light += free[:, None] * sky[row, column] / RAYS
     middle = np.array(sun["direction"])
     for _ in range(SUN_RAYS):

@@ -65,8 +65,8 @@ def look(paths: list[Path], root: Path = ROOT) -> dict[str, list[str] | int]:
 
 def count_parameters(node: ast.FunctionDef) -> int:
     named = [each.arg for each in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
-    return len([name for name in named
-                if name not in ("self", "cls")]) + (node.args.vararg is not None) + (node.args.kwarg is not None)
+    count = len([name for name in named if name not in ("self", "cls")])
+    return count + (node.args.vararg is not None) + (node.args.kwarg is not None)
 
 
 def count_lines(text: str, tree: ast.Module) -> int:
@@ -74,8 +74,8 @@ def count_lines(text: str, tree: ast.Module) -> int:
     docs = set()
     for node in ast.walk(tree):
         for each in getattr(node, "body", ()) if isinstance(getattr(node, "body", None), list) else ():
-            if isinstance(each, ast.Expr) and isinstance(each.value,
-                                                         ast.Constant) and isinstance(each.value.value, str):
+            constant = isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant)
+            if constant and isinstance(each.value.value, str):
                 docs |= set(range(each.lineno, each.end_lineno + 1))
     skipped = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
     code = {line for token in tokenize.generate_tokens(io.StringIO(text).readline) if token.type not in skipped

@@ -95,10 +95,11 @@ def enhancer(width: int = 64) -> dict[str, tuple[int, ...]]:
                       | {f"{name}.num_batches_tracked": ()})
 
     at = "inc_1.res_conv."
-    put(at + "0", 3, width, 6), put_norm(at + "1", width), put(at + "3", 3, width,
-                                                               width), put_norm(at + "4",
-                                                                                width), put("inc_1.addtion_layer", 1,
-                                                                                            width, 6)
+    put(at + "0", 3, width, 6)
+    put_norm(at + "1", width)
+    put(at + "3", 3, width, width)
+    put_norm(at + "4", width)
+    put("inc_1.addtion_layer", 1, width, 6)
     for name, into, out in (("down1_1.resdown_conv.1", 1, 2), ("down2_1.resdown_conv.1", 2, 4),
                             ("down3_1.resdown_conv.1", 4, 8),
                             ("down4_1.resdown_conv.1", 8, 8), ("up1_1.conv", 16, 4), ("up2_1.conv", 8, 2),

@@ -50,8 +50,8 @@ def pairs(subjects: dict[str, list[int]], size: int = 384) -> Iterator[Pair]:
             stage, sight = portrait_parts(seed, size)
             first = relit(sight, stage, np.random.default_rng([seed, 41, 0]))
             other = relit(sight, stage, np.random.default_rng([seed, 41, 1]))
-            blotched = np.clip(sight.albedo * blotches(sight, np.random.default_rng([seed, 45])), 0.003,
-                               0.9).astype(np.float32)
+            blotched = sight.albedo * blotches(sight, np.random.default_rng([seed, 45]))
+            blotched = np.clip(blotched, 0.003, 0.9).astype(np.float32)
             painted = relit(sight, stage, np.random.default_rng([seed, 41, 0]), albedo=blotched)
             yield _pair(seed, "pigment", group, first, painted)
             yield _pair(seed, "light", group, first, other)

@@ -69,10 +69,11 @@ def main() -> None:
         if (asked.frames / person.name / "parts").is_dir():
             frames = list(filmed(asked.frames / person.name))
             rows[f"{person.name}, filmed"] = row(list(_crops(frames, network)), len(frames))
-    print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"],
-                   [[name, f"{r['found']} of {r['pictures']}",
-                     *(None if v is None else f"{v:.2f}" for v in (*r["iou"].values(), r["hair_as_skin"],
-                                                                   r["skin_as_hair"]))] for name, r in rows.items()]))
+    lines = []
+    for name, r in rows.items():
+        shares = (*r["iou"].values(), r["hair_as_skin"], r["skin_as_hair"])
+        lines.append([name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in shares)])
+    print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
     if asked.json:
         write(asked.json, "parts", "python -m benchmarks.parts" + (" --frames FOLDER" if asked.frames else ""),
               {"rows": rows}, keep=True)

@@ -124,8 +124,8 @@ def answers_to(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, delighter:
     something. A picture that the delighter refuses is taken as it is, as an artist would."""
     linear = images.srgb_to_linear(srgb)
     try:
-        ours = images.srgb_to_linear(np.asarray(delight.PHOTOGRAPHERS[delighter](srgb, Settings().delight)[0],
-                                                np.float32))
+        answer = delight.PHOTOGRAPHERS[delighter](srgb, Settings().delight)[0]
+        ours = images.srgb_to_linear(np.asarray(answer, np.float32))
     except Problem as problem:
         print(problem, file=sys.stderr)
         ours = linear
@@ -181,8 +181,8 @@ def of_pairs(subjects: int, delighter: str) -> Scores:
         for answer in given[0]:
             value = slope((given[0][answer], given[1][answer]), causes, pair.where)
             if value is not None:
-                found.setdefault(answer, {}).setdefault(pair.group,
-                                                        {}).setdefault(f"{pair.kind}_slope", []).append(value)
+                of_group = found.setdefault(answer, {}).setdefault(pair.group, {})
+                of_group.setdefault(f"{pair.kind}_slope", []).append(value)
         print(pair.name, file=sys.stderr, flush=True)
     return {answer: {group: {name: float(np.mean(values)) for name, values in row.items()}
                      for group, row in groups.items()}
@@ -233,10 +233,14 @@ def sheet(sitter: LightSeries, given: list[dict[str, np.ndarray]], side: int = 2
     """Three of a sitter's lights, a row per answer at the truth's tone; sRGB."""
     rows, columns = (np.flatnonzero(sitter.face.any(axis)) for axis in (1, 0))
     box, tone = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1], sitter.albedo[sitter.face].mean(0)
-    shown = [[images.resize(images.linear_to_srgb(np.clip(answer * tone / np.maximum(answer[lit].mean(0), 1e-6), 0,
-                                                          1))[box], side, side)
-              for answer, lit in ((given[i][name], sitter.lit[i])
-                                  for i in range(0, len(given), max(1, len(given) // 3)))] for name in given[0]]
+    shown = []
+    for name in given[0]:
+        row = []
+        for i in range(0, len(given), max(1, len(given) // 3)):
+            answer, lit = given[i][name], sitter.lit[i]
+            toned = np.clip(answer * tone / np.maximum(answer[lit].mean(0), 1e-6), 0, 1)
+            row.append(images.resize(images.linear_to_srgb(toned)[box], side, side))
+        shown.append(row)
     return np.vstack([np.hstack(row) for row in shown])
 
 

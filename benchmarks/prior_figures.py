@@ -164,8 +164,8 @@ def measure_response(options: argparse.Namespace) -> None:
 def reflectance(seed: int, size: int) -> torch.Tensor:
     """A synthetic subject's map [7, S, S]."""
     made = make_skin(seed, size)
-    return torch.from_numpy(np.concatenate([2 * made.diffuse - 1, made.normal, 2 * made.specular[..., None] - 1],
-                                           -1).transpose(2, 0, 1).copy())
+    channels = [2 * made.diffuse - 1, made.normal, 2 * made.specular[..., None] - 1]
+    return torch.from_numpy(np.concatenate(channels, -1).transpose(2, 0, 1).copy())
 
 
 def of_subject(prior: Prior, truth: torch.Tensor) -> ConditionedPrior:
@@ -199,8 +199,9 @@ def errors(maps: torch.Tensor, truth: torch.Tensor, face: torch.Tensor) -> tuple
     """RMS angle of normals in degrees, and RMSE of specular, over the face."""
     unit = torch.nn.functional.normalize(maps[3:6], dim=0)
     cosine = (unit * torch.nn.functional.normalize(truth[3:6], dim=0)).sum(0)[face].clamp(-1, 1)
-    return float(torch.rad2deg(torch.arccos(cosine)).pow(2).mean().sqrt()), float(((maps[6] - truth[6])[face]
-                                                                                   / 2).pow(2).mean().sqrt())
+    degrees = torch.rad2deg(torch.arccos(cosine))
+    specular = (maps[6] - truth[6])[face] / 2
+    return float(degrees.pow(2).mean().sqrt()), float(specular.pow(2).mean().sqrt())
 
 
 if __name__ == "__main__":

@@ -113,9 +113,8 @@ def deliver(item, preset: str, kind: str) -> Path:
     from core.worker.job import write_job
     from core.worker.runner import run_job
 
-    operators, waiting, captures, properties = (import_module(f"{ADDON}.{name}")
-                                                for name in ("deliver.operators", "deliver.waiting", "captures",
-                                                             "properties"))
+    operators, waiting, captures, properties = (
+        import_module(f"{ADDON}.{name}") for name in ("deliver.operators", "deliver.waiting", "captures", "properties"))
     item.deliver.preset, item.deliver.format = preset, kind
     capture = Capture(Path(captures.root(item)))
     settings = {**properties.job_settings(item)["deliver"],

@@ -105,9 +105,8 @@ def write_row(folder: Path, capture: Capture, worn: Worn) -> None:
     how glossy these maps are."""
     row, record = Capture(folder), capture.read()
     seen = _sized(images.read_data(capture.texture_confidence)[..., 0], len(worn.specular))
-    record["stages"].setdefault("upscale", {"key": "", "seconds": 0.0}).setdefault("figures", {})["specular_mean"] = (
-        on_cheeks_and_forehead(worn.specular, seen)
-    )
+    upscaled = record["stages"].setdefault("upscale", {"key": "", "seconds": 0.0})
+    upscaled.setdefault("figures", {})["specular_mean"] = on_cheeks_and_forehead(worn.specular, seen)
     shutil.rmtree(folder, ignore_errors=True)
     row.maps.mkdir(parents=True)
     shutil.copyfile(capture.head, row.head)

@@ -73,8 +73,8 @@ def _about_face(scene, mask: Path) -> None:
     rows, columns = np.flatnonzero(red.any(1)), np.flatnonzero(red.any(0))
     render, margin = scene.render, MARGIN * len(red)
     render.use_border, render.use_crop_to_border = True, False
-    render.border_min_x, render.border_max_x = (columns[0]
-                                                - margin) / red.shape[1], (columns[-1] + margin) / red.shape[1]
+    render.border_min_x = (columns[0] - margin) / red.shape[1]
+    render.border_max_x = (columns[-1] + margin) / red.shape[1]
     render.border_min_y, render.border_max_y = (rows[0] - margin) / red.shape[0], (rows[-1] + margin) / red.shape[0]
 
 

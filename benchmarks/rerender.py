@@ -87,8 +87,8 @@ def delit_views(capture: Capture) -> list[DelitFrame]:
         uv = raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])
         towards = view.centre - raster.interpolate(head.vertices, head.faces, face[hit], bary[hit])
         normal = raster.interpolate(normals, head.faces, face[hit], bary[hit])
-        cosine = (towards * normal).sum(1) / np.maximum(np.linalg.norm(towards, axis=1)
-                                                        * np.linalg.norm(normal, axis=1), 1e-9)
+        lengths = np.linalg.norm(towards, axis=1) * np.linalg.norm(normal, axis=1)
+        cosine = (towards * normal).sum(1) / np.maximum(lengths, 1e-9)
         judged = np.zeros(hit.shape, bool)
         judged[hit] = (raster.sample(skin, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512) > 0.5) & (cosine > GRAZING)
         picture = images.read_srgb(path)
@@ -110,8 +110,8 @@ def score(rendered: np.ndarray, views: list[DelitFrame]) -> dict[str, float]:
     for view in views:
         mask = view.look.true.face
         box = face_box(mask)
-        picture, mask, seen = view.picture[box], mask[box], images.linear_to_srgb(np.clip(view.look.picture(rendered),
-                                                                                          0, 1))[box]
+        seen = images.linear_to_srgb(np.clip(view.look.picture(rendered), 0, 1))[box]
+        picture, mask = view.picture[box], mask[box]
         seen = with_gain(seen, picture, mask)
         distance = feature_distance(seen * mask[..., None], picture * mask[..., None])
         found.append({**differences(seen, picture, mask),

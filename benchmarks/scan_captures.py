@@ -84,13 +84,12 @@ def photograph(data: Path, folder: Path, name: str) -> Capture:
         faces[frame] = _write_truth(target, frame, views[frame],
                                     LitScan(caster, opaque, albedo, facial, light.sun.direction if light.sun else None))
     write_obj(target / "head.obj", head)  # by it the five are known to be one person
+    placed = [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]
     write_json(target / "cameras.json", {"name": name, "light": LIGHTS[name], "focal_px": scene.FOCAL * SCALE,
-                                         "width": views[0].width, "height": views[0].height,
-                                         "cameras": [{"frame": k, "matrix_world": matrix.tolist()}
-                                                     for k, matrix in enumerate(cameras)]})
+                                         "width": views[0].width, "height": views[0].height, "cameras": placed})
     write_views(capture, views, _developed(work, faces), min(Settings().frames.views, FRAMES))
-    tone = sum(true[face].sum(0, dtype=np.float64)
-               for true, face in faces.values()) / sum(int(face.sum()) for _, face in faces.values())
+    total = sum(true[face].sum(0, dtype=np.float64) for true, face in faces.values())
+    tone = total / sum(int(face.sum()) for _, face in faces.values())
     with replacing(target / "skin_tone.txt") as temporary:
         temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(tone)) + "\n", encoding="ascii")
     print(f"{name}: {(time.monotonic() - began) / 60:.1f} min", flush=True)
@@ -144,15 +143,15 @@ def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int 
     face, bary, _ = raster.render_view(scan.caster, view, over)
     hit = face >= 0
     uv = raster.interpolate(head.uvs, head.face_uvs, face, bary)[hit]
-    colour, skin, dark = np.zeros((*hit.shape, 3),
-                                  np.float32), np.zeros(hit.shape, np.float32), np.zeros(hit.shape, np.float32)
+    colour = np.zeros((*hit.shape, 3), np.float32)
+    skin, dark = np.zeros(hit.shape, np.float32), np.zeros(hit.shape, np.float32)
     colour[hit] = raster.sample(albedo, np.stack([uv[:, 0] * albedo.shape[1], (1 - uv[:, 1]) * albedo.shape[0]], -1))
     skin[hit] = (scan.facial[head.faces[face[hit]]] * bary[hit]).sum(1)
     if sun is not None:
         points = raster.interpolate(head.vertices, head.faces, face, bary)[hit]
         normals = raster.interpolate(vertex_normals(head), head.faces, face, bary)[hit]
-        dark[hit] = (normals @ sun <= 0) | scan.opaque.blocked(points + 5e-4 * normals,
-                                                               np.repeat(sun[None], len(points), 0))
+        towards_sun = np.repeat(sun[None], len(points), 0)
+        dark[hit] = (normals @ sun <= 0) | scan.opaque.blocked(points + 5e-4 * normals, towards_sun)
     cover, colour, skin, dark = (images.resize(values, view.width, view.height)
                                  for values in (hit.astype(np.float32), colour, skin, dark))
     colour, face, name = colour / np.maximum(cover, 1e-6)[..., None], (skin > 0.5) & (cover > 0.99), f"{frame:04d}.png"
@@ -167,8 +166,8 @@ def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int 
 
 def _developed(work: Path, faces: dict[int, tuple[np.ndarray, np.ndarray]]) -> Iterator[np.ndarray]:
     """The frames as a phone shows them that stands still, sRGB [H, W, 3]."""
-    gain, taken = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces},
-                           faces), phone.sample_phone(SEED)
+    filmed = {frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}
+    gain, taken = exposure(filmed, faces), phone.sample_phone(SEED)
     for frame in range(FRAMES):
         yield phone.develop(images.read_linear(work / f"{frame:05d}.exr").astype(np.float32), taken, gain,
                             np.random.default_rng([SEED, 72, frame]))

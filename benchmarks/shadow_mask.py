@@ -90,8 +90,8 @@ def _row(capture: Capture, true: np.ndarray, name: str, delighter: str, asked: a
     found = (*scores(mask > 0.5, true, skin & (confidence > 0.1)), seconds)
     _print(name, delighter, found)
     if asked.pictures:
-        filmed = images.resize(images.read_srgb(capture.texture_filmed if capture.texture_filmed.is_file()
-                                                else capture.texture_png), SIZE, SIZE)
+        path = capture.texture_filmed if capture.texture_filmed.is_file() else capture.texture_png
+        filmed = images.resize(images.read_srgb(path), SIZE, SIZE)
         grey = [np.repeat(m.astype(np.float32)[..., None], 3, -1) for m in (true, mask)]
         images.write_srgb(asked.work / f"{capture.root.stem}_{delighter}.png", np.hstack([filmed, *grey]))
     return found

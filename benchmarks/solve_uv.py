@@ -73,8 +73,8 @@ def _solve_one(capture: Capture, seed: int, options: argparse.Namespace):
     began = time.monotonic()
     solve.run(capture, settings, Reporter("solve"))
     seconds = time.monotonic() - began
-    solved, shading = images.read_linear(capture.maps
-                                         / "diffuse_albedo.exr"), images.read_linear(capture.maps / "shading.exr")
+    solved = images.read_linear(capture.maps / "diffuse_albedo.exr")
+    shading = images.read_linear(capture.maps / "shading.exr")
     face = template.mask("face", size) > 0.5
     edge = cv2.morphologyEx((shadow > 0.5).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     band = cv2.dilate(edge, np.ones((25 * size // 1024 | 1,) * 2, np.uint8)) > 0
@@ -90,8 +90,8 @@ def problem(seed: int, size: int, shadows: str) -> tuple[np.ndarray, np.ndarray,
     sun and ambient occlusion."""
     p = uv_problem(seed, size, shadows)
     noisy = p.texture + np.random.default_rng(seed).normal(0, 0.004, p.texture.shape)
-    mask = cv2.dilate((p.shadow > 0.08).astype(np.uint8),
-                      np.ones((9 * size // 1024 | 1,) * 2, np.uint8)).astype(np.float32)
+    around = np.ones((9 * size // 1024 | 1,) * 2, np.uint8)
+    mask = cv2.dilate((p.shadow > 0.08).astype(np.uint8), around).astype(np.float32)
     return p.albedo, np.maximum(noisy, 0).astype(np.float32), p.shadow, mask
 
 

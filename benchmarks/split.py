@@ -157,8 +157,8 @@ def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, di
         together, alone = of_person(own, maps)
         for method, of_all in together.items():
             if method not in (NOTHING, TRUE):
-                scores.setdefault(method, {})[person] = {**mean_of([row[method] for row in each if method in row]),
-                                                         **of_all}
+                mean = mean_of([row[method] for row in each if method in row])
+                scores.setdefault(method, {})[person] = {**mean, **of_all}
                 for name, psnr in alone[method].items():
                     by_capture.setdefault(name, {})[method] = round(psnr, 3)
     return scores, by_capture, scales
@@ -219,8 +219,8 @@ def reach_of_traits(folder: Path) -> dict:
                     for name in ("brows", "lips", "eyes", "nostrils", "scalp", "ears")], 0)
     where = (face >= 0) & (images.resize(template.mask("face", SIZE), count, count) * bare > 0.7)
     chosen = [cluster[0] for cluster in clusters(folder, names)]
-    logs = np.stack([np.log(np.maximum(images.resize(images.read_linear(folder / f"{name}.png"), count, count),
-                                       1e-3)).mean(-1)[where] for name in chosen])
+    skins = [images.resize(images.read_linear(folder / f"{name}.png"), count, count) for name in chosen]
+    logs = np.stack([np.log(np.maximum(skin, 1e-3)).mean(-1)[where] for skin in skins])
     logs -= np.median(logs, 1, keepdims=True)
     logs = np.clip(logs - np.median(logs, 0), -PLAIN, PLAIN)
     logs -= logs.mean(1, keepdims=True)

@@ -166,8 +166,8 @@ def measure(captures: list[Filmed]) -> tuple[Scores, dict[str, dict[str, Figures
         for method, figures_of_person in together.items():
             for name, psnr in alone[method].items():
                 by_capture[name][method]["psnr_shared"] = psnr
-            scores[method][person] = {**mean_of([by_capture[f.name][method] for f in own
-                                                 if method in by_capture[f.name]]), **figures_of_person}
+            measured = [by_capture[f.name][method] for f in own if method in by_capture[f.name]]
+            scores[method][person] = {**mean_of(measured), **figures_of_person}
     return {method: rows for method, rows in scores.items() if rows}, by_capture
 
 
@@ -193,8 +193,8 @@ def with_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, F
         print("The record's figures were made by other code, and are replaced.", file=sys.stderr)
         return scores, by_capture
     everybody = figures.merged(record["people"], scores)
-    return {method: everybody[method] for method in METHODS
-            if method in everybody}, {**record["captures"], **by_capture}
+    shown = {method: everybody[method] for method in METHODS if method in everybody}
+    return shown, {**record["captures"], **by_capture}
 
 
 def seen_in_pictures(filmed: Filmed, answers: dict[str, np.ndarray]) -> dict[str, Figures]:

@@ -60,10 +60,11 @@ class Filmed:
     def true_capture(self) -> Capture:
         """A copy whose delit frames are the true albedo, up to its texture; made once, and again where the head or the
         cameras changed."""
-        copy, same = Capture(self.work
-                             / f"{self.name}.wildcap"), ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
-        if copy.texture_confidence.is_file() and any(hash_file(copy.root / name) != hash_file(self.capture.root / name)
-                                                     for name in same):
+        copy = Capture(self.work / f"{self.name}.wildcap")
+        same = ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
+        changed = copy.texture_confidence.is_file() and any(
+            hash_file(copy.root / name) != hash_file(self.capture.root / name) for name in same)
+        if changed:
             copy.texture_confidence.unlink()
         return true_frames(self.capture, self.truth, copy, Settings())
 
@@ -92,8 +93,8 @@ class Filmed:
         """What a method takes for the albedo, linear [S, S, 3]; None where the capture was not taken so far."""
         if method == TRUE:
             return self.truth_map
-        path = {DELIT: self.capture.texture,
-                SOLVED: self.capture.maps / "diffuse_albedo.png"}.get(method, self.capture.texture_filmed)
+        paths = {DELIT: self.capture.texture, SOLVED: self.capture.maps / "diffuse_albedo.png"}
+        path = paths.get(method, self.capture.texture_filmed)
         if not path.is_file():
             return None
         answer = images.read_linear(path)

@@ -62,16 +62,15 @@ def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
     them."""
     where, points = filmed.where, landmarks_in_uv()
     truth, normals = maps[TRUE], filmed.normals[where]
-    true_contrasts, parts = contrasts(images.linear_to_srgb(truth), points,
-                                      where), {name: mask[where] for name, mask in filmed.parts().items()}
+    true_contrasts = contrasts(images.linear_to_srgb(truth), points, where)
+    parts = {name: mask[where] for name, mask in filmed.parts().items()}
     found = {}
     for method, answer in maps.items():
         alone = fit_light([log_ratio(answer[where], truth[where])], [normals])
         figures: Figures = {"psnr_uv": psnr_after_gain(answer[where], truth[where]), "light_alone": alone.deviation,
                             "psnr_alone": psnr_after_gain(without_light(answer[where], normals, alone), truth[where])}
-        figures |= {f"kept_{name}": value
-                    for name, value in contrast_kept(contrasts(images.linear_to_srgb(answer), points, where),
-                                                     true_contrasts).items()}
+        kept = contrast_kept(contrasts(images.linear_to_srgb(answer), points, where), true_contrasts)
+        figures |= {f"kept_{name}": value for name, value in kept.items()}
         for name, part in score_parts(answer[where], truth[where], parts).items():
             figures |= {f"psnr_{name}": part.psnr, f"bias_{name}": part.bias}
         found[method] = figures
@@ -104,10 +103,10 @@ def of_person(captures: list[Filmed],
         everywhere = np.logical_and.reduce(places)
         if len(chosen) > 1 and everywhere.any():
             tone = np.mean([maps[i][TRUE][everywhere].mean(0) for i in chosen], axis=0)
+            slopes = [slope((maps[i][method], maps[j][method]), (maps[i][NOTHING], maps[j][NOTHING]), everywhere)
+                      for i, j in combinations(chosen, 2)]
             figures |= {"agreement": agreement([maps[i][method][everywhere] for i in chosen], tone),
-                        "light_slope": _mean([slope((maps[i][method], maps[j][method]),
-                                                    (maps[i][NOTHING], maps[j][NOTHING]), everywhere)
-                                              for i, j in combinations(chosen, 2)])}
+                        "light_slope": _mean(slopes)}
         figures |= joint(*([_kept(captures[i], maps[i], name) for i in chosen] for name in (method, NOTHING)))
         found[method] = figures
     return found, each_alone

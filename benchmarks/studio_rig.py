@@ -62,9 +62,8 @@ def photograph(views: list, folder: Path, seed: int) -> None:
         matrix[:3, :3], matrix[:3, 3] = view.rotation.T @ np.diag([1, -1, -1]), view.centre
         cameras.append({"name": f"cam_{i:02d}", "matrix_world": matrix.tolist()})
     camera = views[0].camera
-    (folder
-     / "rig.json").write_text(json.dumps({"width": camera.width, "height": camera.height,
-                                          "focal_px": camera.mean_focal_length(), "cameras": cameras}))
+    rig = {"width": camera.width, "height": camera.height, "focal_px": camera.mean_focal_length(), "cameras": cameras}
+    (folder / "rig.json").write_text(json.dumps(rig))
 
 
 def judge(capture: Capture, views: list, seed: int) -> dict:
@@ -76,8 +75,8 @@ def judge(capture: Capture, views: list, seed: int) -> dict:
                                         np.array([view.centre for view in views]))
     true = painted_head.person(seed, 2048)[0].mesh
     head = scale * meshes.read_obj(capture.head).vertices @ rotation.T + shift
-    face = (true.vertices[:, 1] < 0.0) & (np.abs(true.vertices[:, 0])
-                                          < 0.06) & (true.vertices[:, 2] > -0.12) & (true.vertices[:, 2] < 0.05)
+    x, y, z = true.vertices.T
+    face = (y < 0.0) & (np.abs(x) < 0.06) & (z > -0.12) & (z < 0.05)
     off = 1000 * cKDTree(head).query(true.vertices[face])[0]
     return {"metres_per_metre": round(scale, 4), "face_to_nearest_vertex_median_mm": round(float(np.median(off)), 2),
             "face_to_nearest_vertex_p90_mm": round(float(np.percentile(off, 90)), 2),

@@ -100,8 +100,8 @@ def _texture(row: str, observations: list, surface, steps: int) -> np.ndarray:
     """A row's map, sRGB [S, S, 3]. The observations are used up."""
     if row == "average":
         linear = weighted_mean([np.exp(o.log_colour) for o in observations], [o.weight for o in observations])
-        confidence = np.where(surface.covered, 1 - np.prod([1 - o.quality for o in observations], axis=0),
-                              0).astype(np.float32)
+        seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
+        confidence = np.where(surface.covered, seen, 0).astype(np.float32)
     else:
         settings = from_json({"texture": {"perceptual": steps if row == "perceptual" else 0}})
         built = texture.build(observations, surface, settings, Reporter("texture"), aligned=row != "blend")

@@ -52,9 +52,8 @@ def main() -> int:
     stages = {stage: round(done["seconds"], 1) for stage, done in record["stages"].items()}
     findings = [finding["problem"] for done in record["stages"].values() for finding in done.get("findings", [])]
     row = {"seconds": round(sum(stages.values()), 1), "stages": stages, "cost": cost, "exit": said.returncode,
-           "findings": {str(k): said for k, said in
-           enumerate(findings)}, "cameras": record["stages"].get("cameras", {}).get("figures", {}),
-           "stopped": record.get("stopped")}
+           "findings": {str(k): finding for k, finding in enumerate(findings)},
+           "cameras": record["stages"].get("cameras", {}).get("figures", {}), "stopped": record.get("stopped")}
     print(said.stdout[-2000:], *findings, row, sep="\n")
     if arguments.json:
         figures.write(arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row},
@@ -66,12 +65,11 @@ def main() -> int:
 def pictures(jaw: float):
     """The film's frames, sRGB [512, 384, 3]; jaw: how far it opens while the person talks."""
     view = camera(0, 0.03, scale=SCALE)
-    shirt = images.linear_to_srgb(images.resize(np.random.default_rng(2).random((40, 40, 3), np.float32) ** 2,
-                                                view.width, view.width))
+    checks = np.random.default_rng(2).random((40, 40, 3), np.float32) ** 2
+    shirt = images.linear_to_srgb(images.resize(checks, view.width, view.width))
     y, x = np.mgrid[:view.height, :view.width]
-    worn = y > view.height - 0.16 * view.width - 0.25 * np.sqrt(np.maximum((0.5 * view.width) ** 2
-                                                                           - (x - view.width / 2) ** 2,
-                                                                           0)) + 0.1 * view.width
+    chest = np.sqrt(np.maximum((0.5 * view.width) ** 2 - (x - view.width / 2) ** 2, 0))
+    worn = y > view.height - 0.16 * view.width - 0.25 * chest + 0.1 * view.width
     for i in range(FRAMES):
         opened = jaw * np.sin(np.pi * i / SYLLABLE) ** 2 * (i % SENTENCE < 2 * SENTENCE / 3)
         picture = photograph(view, WIDEST_DEG * np.sin(2 * np.pi * i / FRAMES), wall=False, jaw=opened)

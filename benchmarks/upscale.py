@@ -82,10 +82,11 @@ def main() -> None:
             found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
     print("\n\n".join(_table(name, rows) for name, rows in found.items()))
     if arguments.json:
-        keyed = {part: {row.replace("lanczos",
-                                    "Lanczos"): {figure.lower().replace(" ", "_"): value
-                                                 for figure, value in values.items()}
-                        for row, values in rows.items()} for part, rows in found.items()}
+        def keys(values: dict[str, float]) -> dict[str, float]:
+            return {figure.lower().replace(" ", "_"): value for figure, value in values.items()}
+
+        keyed = {part: {row.replace("lanczos", "Lanczos"): keys(values) for row, values in rows.items()}
+                 for part, rows in found.items()}
         write(arguments.json, "upscale", "python -m benchmarks.upscale", keyed, keep=True)
 
 
@@ -126,9 +127,9 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
     figures["diffuse FLIP"] = float(np.mean(flip))
     if (distance := feature_distance(diffuse, true_diffuse)) is not None:
         figures["diffuse features"] = float(distance.mean())
-    cosine = (result[..., 3:6]
-              * true[..., 3:6]).sum(-1) / np.maximum(np.linalg.norm(result[..., 3:6], axis=-1)
-                                                     * np.linalg.norm(true[..., 3:6], axis=-1), 1e-6)
+    ours, theirs = result[..., 3:6], true[..., 3:6]
+    lengths = np.linalg.norm(ours, axis=-1) * np.linalg.norm(theirs, axis=-1)
+    cosine = (ours * theirs).sum(-1) / np.maximum(lengths, 1e-6)
     figures["normal degrees"] = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
     return figures
 
@@ -187,8 +188,8 @@ def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
     Made once."""
     capture = Capture(folder)
     if not (capture.root / "truth.png").is_file():
-        mesh, true, rng = subject_mesh(seed), make_skin(sample_parameters(seed),
-                                                        2048).diffuse, np.random.default_rng([seed, 50])
+        mesh, rng = subject_mesh(seed), np.random.default_rng([seed, 50])
+        true = make_skin(sample_parameters(seed), 2048).diffuse
         views = [camera(azimuth, 0.0, scale=CLOSE) for azimuth in (-45, -25, -8, 8, 25, 45)]
         caster = raster.RayCaster(mesh)
         write_views(capture, views, (picture(caster, view, 0.8 * true, rng, rays=1) for view in views))

@@ -118,10 +118,8 @@ def _chosen_light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.n
     """The first usable one of the random lights; kept in CACHE under a name that changes with the sources it comes
     from."""
     sources = b"".join(Path(module).read_bytes() for module in (__file__, light.__file__))
-    stored = (
-        CACHE
-        / f"light_{hashlib.blake2b(repr((shadows, seeds, size)).encode() + sources, digest_size=12).hexdigest()}.npz"
-    )
+    key = hashlib.blake2b(repr((shadows, seeds, size)).encode() + sources, digest_size=12).hexdigest()
+    stored = CACHE / f"light_{key}.npz"
     if not stored.is_file():
         drawn = next(i for i in range(1000) if _usable(*_light(shadows, (*seeds, i), 48)))
         CACHE.mkdir(parents=True, exist_ok=True)
@@ -143,8 +141,8 @@ def _light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray,
     even = _sh_part(open_light, normal, face)
     rest = open_light - even
     rest *= UNEXPLAINED * even[face].mean() / np.sqrt((rest[face] ** 2).mean())
-    return np.maximum(even + rest,
-                      0.05 * even[face].mean()), np.clip(lit / np.maximum(open_light, 1e-4), 0.05, 1), shadow
+    opened = np.clip(lit / np.maximum(open_light, 1e-4), 0.05, 1)
+    return np.maximum(even + rest, 0.05 * even[face].mean()), opened, shadow
 
 
 def _usable(shading: np.ndarray, kept: np.ndarray, shadow: np.ndarray) -> bool:

@@ -79,10 +79,10 @@ def whole(seed: int, surface: HeadSurface) -> dict:
     tone = torch.from_numpy((truth.diffuse * skin.numpy()[..., None]).sum((0, 1)) / float(skin.sum())).float()
     mean = face_of_tone(load().mean_face, tone, skin)[0].numpy().transpose(1, 2, 0)
     shown = np.clip(2 * face, 0, 1)[..., None]
-    cut = replace(truth, confidence=(0.7 * face).astype(np.float32),
-                  diffuse=(truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)).astype(np.float32),
-                  specular=(truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2
-                            * (1 - shown[..., 0])).astype(np.float32))
+    diffuse = truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)
+    specular = truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2 * (1 - shown[..., 0])
+    cut = replace(truth, confidence=(0.7 * face).astype(np.float32), diffuse=diffuse.astype(np.float32),
+                  specular=specular.astype(np.float32))
     done, hidden = complete(cut, surface, Reporter("upscale"), seed), face < 0.02
     row: dict = {}
     for region in ("neck", "ears", "scalp"):
@@ -123,9 +123,12 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     tones = {}
     if subject is not None:
         truth, hidden = _painted(surface, subject), maps.confidence < 0.02
-        tones = {"tone": {region: {name: _error(*(_tone(m, surface) for m in (shown, truth)),
-                                                hidden & (template.mask(region, surface.size) > 0.9))
-                                   for name, shown in (("fill", maps), ("completed", done))}
+
+        def error(shown, region: str):
+            where = hidden & (template.mask(region, surface.size) > 0.9)
+            return _error(*(_tone(m, surface) for m in (shown, truth)), where)
+
+        tones = {"tone": {region: {"fill": error(maps, region), "completed": error(done, region)}
                           for region in ("neck", "ears", "scalp")}}
     return {**tones, "completed_share_percent": report.figures["completed_share_percent"],
             "border": {"fill": _step(maps, rings[0], rings[1], surface),

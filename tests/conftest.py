@@ -69,8 +69,8 @@ def pytest_collection_modifyitems(config, items):
     """The judgement of the messages comes last; it counts where no file was left out and no test deselected."""
     items.sort(key=lambda item: item.path.name == LAST)
     files = {path.name for path in Path(__file__).parent.glob("test_*.py")}
-    config.stash[WHOLE] = files <= {item.path.name
-                                    for item in items} and not config.option.keyword and not config.option.markexpr
+    collected = {item.path.name for item in items}
+    config.stash[WHOLE] = files <= collected and not config.option.keyword and not config.option.markexpr
 
 
 @pytest.fixture

@@ -26,8 +26,8 @@ def make(root):
 
 
 def paint(root, name, pixels):
-    (root / "maps"
-     / name).write_bytes(standin.png([[tuple(int(round(255 * c)) for c in pixel) for pixel in row] for row in pixels]))
+    bytes_of = [[tuple(int(round(255 * c)) for c in pixel) for pixel in row] for row in pixels]
+    (root / "maps" / name).write_bytes(standin.png(bytes_of))
 
 
 def assembled():

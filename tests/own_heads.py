@@ -33,7 +33,6 @@ def lay_over(template: Path, folder: Path, steps: tuple[int, int] = (6, 3), **op
         for name, value in zip(("ITERATIONS", "COVER_ITERATIONS"), steps, strict=True):
             patched.setattr(own_template, name, value)
         patched.setattr(render_landmarks, "VIEWS_DEG", render_landmarks.VIEWS_DEG[:5])
-        own_template.run(capture,
-                         from_json({"registration": {"template": str(template), **options},
-                                    "transfer": {"size": 1024}}), *person(), report)
+        settings = from_json({"registration": {"template": str(template), **options}, "transfer": {"size": 1024}})
+        own_template.run(capture, settings, *person(), report)
     return capture, report

@@ -27,8 +27,9 @@ def rasterization_2dgs(means, quats, scales, opacities, colors, viewmats, Ks, wi
     facing = -torch.sign((axes[:, :, 2] * centres).sum(-1, keepdim=True))
     normals = axes[:, :, 2] * facing
     # [P, N]
-    along = (centres * normals).sum(-1) / torch.where((across := rays @ normals.T).abs() > 1e-6, across,
-                                                      torch.full_like(across, 1e-6))
+    across = rays @ normals.T
+    across = torch.where(across.abs() > 1e-6, across, torch.full_like(across, 1e-6))
+    along = (centres * normals).sum(-1) / across
     offset = along[..., None] * rays[:, None] - centres  # [P, N, 3]
     u, v = ((offset * axes[:, :, k]).sum(-1) / scales[order, k] for k in range(2))
     weight = torch.exp(-0.5 * (u**2 + v**2)) * opacities[order] * ((along > near_plane) & (centres[:, 2] > near_plane))
@@ -44,9 +45,8 @@ def rasterization_2dgs(means, quats, scales, opacities, colors, viewmats, Ks, wi
     shaped = [part.reshape(1, height, width, -1) for part in parts]
     points = (rays * expected).reshape(height, width, 3)
     slopes = torch.zeros_like(points)
-    slopes[1:-1,
-           1:-1] = torch.nn.functional.normalize(torch.cross(points[2:, 1:-1] - points[:-2, 1:-1],
-                                                             points[1:-1, 2:] - points[1:-1, :-2], dim=-1), dim=-1)
+    down, right = points[2:, 1:-1] - points[:-2, 1:-1], points[1:-1, 2:] - points[1:-1, :-2]
+    slopes[1:-1, 1:-1] = torch.nn.functional.normalize(torch.cross(down, right, dim=-1), dim=-1)
     return (*shaped[:3], slopes @ rotation, shaped[3], shaped[0][..., 3:], {})
 
 

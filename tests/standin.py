@@ -86,17 +86,17 @@ def add_evidence(root: Path) -> None:
         (root / name).mkdir()
     for i, name in enumerate(POSES):
         (root / "frames" / name).write_bytes(png([[(150 + 40 * i, 100, 80)] * (SIDE * 3 // 4)] * SIDE))
-        (root / "delit"
-         / name.replace(".jpg", ".png")).write_bytes(png([[(200, 150 + 20 * i, 130)] * (SIDE * 3 // 4)] * SIDE))
+        delit = png([[(200, 150 + 20 * i, 130)] * (SIDE * 3 // 4)] * SIDE)
+        (root / "delit" / name.replace(".jpg", ".png")).write_bytes(delit)
     frames = [{"name": name, "selected": name != "00001.jpg", "sharpness": 0.2 + 0.01 * i}
               for i, name in enumerate(POSES)]
     (root / "frames" / "frames.json").write_text(json.dumps({"kind": "video", "frames": frames}), encoding="utf-8")
-    (root / "cameras"
-     / "cameras.bin").write_bytes(struct.pack("<QiiQQ4d", 1, 7, 2, WIDTH, HEIGHT, FOCAL, *CENTRE, -0.004))
+    camera = struct.pack("<QiiQQ4d", 1, 7, 2, WIDTH, HEIGHT, FOCAL, *CENTRE, -0.004)
+    (root / "cameras" / "cameras.bin").write_bytes(camera)
     images = struct.pack("<Q", len(POSES))
     for number, (name, (turn, move)) in enumerate(POSES.items(), 1):
-        images += struct.pack("<I7dI", number, *turn, *move,
-                              7) + name.encode() + b"\0" + struct.pack("<Q2dQ2dQ", 2, 1, 2, 3, 4, 5, 6)
+        images += struct.pack("<I7dI", number, *turn, *move, 7) + name.encode() + b"\0"
+        images += struct.pack("<Q2dQ2dQ", 2, 1, 2, 3, 4, 5, 6)
     (root / "cameras" / "images.bin").write_bytes(images)
     header = ("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
               "element face 2\nproperty list uchar int vertex_indices\nend_header\n")

@@ -22,8 +22,8 @@ class Service:
     `charged` counts by picture the calls that were answered with status 200."""
 
     def __init__(self, plan=(), answer: bytes = b"", credits: float | None = 100.0, seconds: float = 0.0):
-        self.plan, self.answer, self.credits, self.seconds = list(plan), answer or standin.png([[(200, 150, 120)] * 30]
-                                                                                               * 40), credits, seconds
+        self.plan, self.credits, self.seconds = list(plan), credits, seconds
+        self.answer = answer or standin.png([[(200, 150, 120)] * 30] * 40)
         self.charged: Counter[str] = Counter()
         self.calls: list[dict] = []
         self.times: list[float] = []
@@ -85,12 +85,11 @@ class Service:
                     return self._json(422, {"detail": [{"msg": "field required"}]})
                 picture = fields["source_image"].get_payload(decode=True)
                 with service._lock:
+                    source = fields["source_image"]
+                    others = {name: part.get_payload() for name, part in fields.items() if name != "source_image"}
                     service.calls.append({"path": self.path, "key": self.headers["x-api-key"], "picture": picture,
-                                          "agent": self.headers["User-Agent"],
-                                          "file": fields["source_image"].get_filename(),
-                                          "type": fields["source_image"].get_content_type(),
-                                          **{name: part.get_payload() for name, part in fields.items()
-                                             if name != "source_image"}})
+                                          "agent": self.headers["User-Agent"], "file": source.get_filename(),
+                                          "type": source.get_content_type(), **others})
                     what = service.plan.pop(0) if service.plan else "fine"
                 time.sleep(service.seconds)
                 if isinstance(what, tuple):

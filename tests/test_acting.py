@@ -79,9 +79,8 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     skin = corners[:3 * 24356]
     assert skin.max() == HEAD + COPIES - 1  # the seams' lower side, and nothing from inside, became part of the skin
     assert np.abs(rest[skin].reshape(-1, 3, 3) - solved[_triangles()]).max() < 1e-6  # the cut moved no triangle
-    assert head.data.materials[0].get("wildcap_skin") and [m.name.split()[-1]
-                                                           for m in head.data.materials[1:]] == ["Eyes", "Mouth",
-                                                                                                 "Teeth"]
+    assert head.data.materials[0].get("wildcap_skin")
+    assert [m.name.split()[-1] for m in head.data.materials[1:]] == ["Eyes", "Mouth", "Teeth"]
     _uvs_apart(head)
     rough = np.empty(len(head.data.vertices), np.float32)
     head.data.attributes["wildcap_roughness"].data.foreach_get("value", rough)
@@ -97,8 +96,8 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     assert np.abs(wide - rest)[:HEAD, 2].max() > 0.005
     blocks["eyeBlinkLeft"].value = 1
     shut = shown(head)
-    assert np.abs(shut - rest)[rest[:, 0]
-                               > 0.005].max() < 1e-6 and np.abs(shut - wide)[rest[:, 0] < -0.005].max() < 1e-6
+    assert np.abs(shut - rest)[rest[:, 0] > 0.005].max() < 1e-6
+    assert np.abs(shut - wide)[rest[:, 0] < -0.005].max() < 1e-6
     bpy.ops.wildcap.rest_face()
     assert np.abs(shown(head) - rest).max() < 1e-6
     blocks["eyeLookUpRight"].value = 1
@@ -175,8 +174,8 @@ def test_a_damaged_record_of_the_eyes_is_named_and_the_skin_is_there(capture, ad
     assert bpy.ops.wildcap.assemble_material() == {'FINISHED'}
 
 
-def test_values_animation_and_materials_stay_when_another_shape_comes_in_and_over_a_reload(head, capture, addon,
-                                                                                           tmp_path):
+def test_values_animation_and_materials_stay_when_another_shape_comes_in_and_over_a_reload(
+        head, capture, addon, tmp_path):
     keys, slots = head.data.shape_keys, list(head.data.materials)
     keys.key_blocks["jawOpen"].value = 0.4
     keys.key_blocks["browInnerUp"].keyframe_insert("value", frame=3)
@@ -220,8 +219,8 @@ def test_lids_that_were_filmed_open_are_warned_of(addon, tmp_path):
 
     for seen, word in ((0.31, "open while filming"), (0.12, ""), (None, "")):
         record = {"stages": {"registration": {"figures": {"eye_opening": seen}}}}
-        told = addon("acting.operators").filmed_open(SimpleNamespace(read=lambda record=record: record,
-                                                                     eyes=tmp_path / "eyes.json"))
+        stored = SimpleNamespace(read=lambda record=record: record, eyes=tmp_path / "eyes.json")
+        told = addon("acting.operators").filmed_open(stored)
         assert word in told and bool(told) == bool(word)
 
 

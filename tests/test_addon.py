@@ -22,9 +22,8 @@ def registered() -> set[str]:
              for kind in (bpy.types.Operator, bpy.types.Panel, bpy.types.UIList, bpy.types.PropertyGroup,
                           bpy.types.AddonPreferences)
              for name in (c.__name__ for c in kind.__subclasses__()) if name.startswith("WILDCAP")}
-    return {name for name in names
-            if hasattr(bpy.types, name)} | {"Scene.wildcap"} & {"Scene.wildcap" if hasattr(bpy.types.Scene, "wildcap")
-                                                                else ""}
+    kinds = {name for name in names if hasattr(bpy.types, name)}
+    return kinds | ({"Scene.wildcap"} if hasattr(bpy.types.Scene, "wildcap") else set())
 
 
 def handlers() -> int:
@@ -235,16 +234,15 @@ def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, ca
     head = bpy.context.view_layer.objects.active
     with pytest.raises(RuntimeError, match="no landmarks"):
         bpy.ops.wildcap.show_landmarks()
-    (capture
-     / "landmarks.json").write_text(json.dumps({"points": {"1": [0.0, -0.1, 0.0], "152": [0.0, -0.08, -0.1],
-                                                           "7": [0, 0, 0]}}), encoding="utf-8")
+    points = {"1": [0.0, -0.1, 0.0], "152": [0.0, -0.08, -0.1], "7": [0, 0, 0]}
+    (capture / "landmarks.json").write_text(json.dumps({"points": points}), encoding="utf-8")
     bpy.ops.wildcap.show_landmarks()
     empties = {o["wildcap_landmark"]: o for o in bpy.data.collections["WildCap Landmarks"].objects}
     assert set(empties) == {1, 152} and "Chin" in empties[152].name
     head.location = (3, 2, 1)
     bpy.context.view_layer.update()
-    assert tuple(empties[152].matrix_world.translation) == pytest.approx((3, 1.92, 0.9),
-                                                                         abs=1e-6), "they stay on the head"
+    kept = tuple(empties[152].matrix_world.translation)
+    assert kept == pytest.approx((3, 1.92, 0.9), abs=1e-6), "they stay on the head"
     with pytest.raises(RuntimeError, match="No landmark was moved"):
         bpy.ops.wildcap.fit_landmarks()
     started = []
@@ -256,8 +254,8 @@ def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, ca
     assert list(kept) == ["152"] and kept["152"] == pytest.approx([0, -0.08, -0.104], abs=1e-6)
     assert "WildCap Landmarks" not in bpy.data.collections
     bpy.ops.wildcap.show_landmarks()
-    assert bpy.data.collections["WildCap Landmarks"].objects["Chin Landmark"].location.z == pytest.approx(-0.104,
-                                                                                                          abs=1e-6)
+    chin = bpy.data.collections["WildCap Landmarks"].objects["Chin Landmark"]
+    assert chin.location.z == pytest.approx(-0.104, abs=1e-6)
     bpy.ops.wildcap.hide_landmarks()
 
 

@@ -46,6 +46,7 @@ def test_points_of_a_file_are_taken(capture, tmp_path):
     other.write_text('{"points": {"4": [0, -0.05, -0.04], "152": [0, -0.02, -0.11]}}')
     assert cli.main(["landmarks", "import", str(capture.root), str(other)]) == 0
     assert set(json.loads(capture.landmarks_artist.read_text())["points"]) == {"4", "152"}
+    assert cli.main(["landmarks", "import", str(capture.root), str(tmp_path / "none.json")]) == 2
 
 
 @pytest.mark.parametrize("text",
@@ -83,8 +84,8 @@ def test_a_moved_landmark_takes_the_surface_along(tmp_path, monkeypatch, known):
     artist_landmarks.put(capture, {MOUTH_CORNER: wish})
     registration.run(capture, from_json({"registration": {"iterations": 8}}), report)
     at = model.at_landmarks(meshes.read_obj(capture.head).vertices)
-    assert np.linalg.norm(at[MOUTH_CORNER]
-                          - wish) < 0.0007, "it is where the artist put it, not where the frames and the scan have it"
+    off = np.linalg.norm(at[MOUTH_CORNER] - wish)
+    assert off < 0.0007, "it is where the artist put it, not where the frames and the scan have it"
     assert report.figures["landmarks_put_by_hand"] == 1 and report.figures["put_landmark_residual_mm"] < 0.7
     far = np.linalg.norm(points - points[MOUTH_CORNER], axis=1) > 0.05
     assert np.median(np.linalg.norm(at - points, axis=1)[far]) < 0.001, "the rest of the face stays"

@@ -77,8 +77,8 @@ def test_split_seams_are_sewn_and_what_only_touches_is_not():
 def test_hollow_polygons_are_cut_inside(tmp_path):
     corners = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 0.4 0\n"  # an arrow head, hollow at its last corner
     for order in ("1 2 3 4", "2 3 4 1", "3 4 1 2", "4 1 2 3"):
-        (tmp_path / "arrow.obj").write_text(corners + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.2\nf "
-                                            + " ".join(f"{i}/{i}" for i in order.split()) + "\n")
+        around = " ".join(f"{i}/{i}" for i in order.split())
+        (tmp_path / "arrow.obj").write_text(f"{corners}vt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.2\nf {around}\n")
         mesh = meshes.read_obj(tmp_path / "arrow.obj")
         a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
         assert (np.cross(b - a, c - a)[:, 2] > 0).all() and np.array_equal(mesh.faces, mesh.face_uvs)

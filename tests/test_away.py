@@ -25,8 +25,11 @@ def archive(tmp_path, monkeypatch):
     """A finished capture on a disk that is read-only to all who ask."""
     capture = delivered.make(tmp_path / "Zoë et moi.wildcap")
     access = os.access
-    monkeypatch.setattr(os, "access", lambda path,
-                        mode: access(path, mode) and not (mode == os.W_OK and Path(path) == capture.root))
+
+    def read_only(path, mode):
+        return access(path, mode) and not (mode == os.W_OK and Path(path) == capture.root)
+
+    monkeypatch.setattr(os, "access", read_only)
     return capture
 
 
@@ -36,8 +39,8 @@ def test_a_read_only_capture_is_delivered_elsewhere_and_looked_at_and_nothing_in
     assert main(["status", str(archive.root)]) == 0
     assert contents(archive.root) == before
     folder, = (tmp_path / "out").iterdir()
-    assert folder.name.startswith("Zoe_et_moi_head") and list(folder.glob("*.obj")) and not list((tmp_path
-                                                                                                  / "out").glob(".*"))
+    assert folder.name.startswith("Zoe_et_moi_head") and list(folder.glob("*.obj"))
+    assert not list((tmp_path / "out").glob(".*"))
     assert not any(path.is_symlink() for path in folder.rglob("*"))
 
 

@@ -65,8 +65,8 @@ def refused(source, capture: Capture, *words: str) -> None:
     """Two lines, code 2, no traceback, no frames, and the capture can be used again."""
     result = run(source, capture)
     lines = result.stderr.strip().splitlines()
-    assert result.returncode == 2 and len(lines) == 2 and all(line.endswith(".")
-                                                              for line in lines), (result.returncode, result.stderr)
+    assert result.returncode == 2, result.stderr
+    assert len(lines) == 2 and all(line.endswith(".") for line in lines), result.stderr
     assert "Traceback" not in result.stdout + result.stderr
     assert any(word in lines[0] for word in words), lines[0]
     assert not capture.frames.exists() and not capture.lock.exists() and not list(capture.root.glob(".*"))
@@ -125,8 +125,9 @@ def test_accents_and_spaces_in_every_path(face, tmp_path):
 # -- disks
 
 def private_mounts() -> bool:
-    return shutil.which("unshare") is not None and subprocess.run(["unshare", "-rm", "true"],
-                                                                  capture_output=True).returncode == 0
+    if shutil.which("unshare") is None:
+        return False
+    return subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode == 0
 
 
 needs_mounts = pytest.mark.skipif(not private_mounts(), reason="needs a mount namespace of its own (Linux, unshare)")

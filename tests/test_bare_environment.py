@@ -29,9 +29,12 @@ def run(command) -> tuple[int, str]:
 
 def without(*modules: str):
     """`run` where commands that need one of these modules fail, as on a Python that was stripped of them."""
-    return lambda command: (1,
-                            f"No module named {modules[0]}") if any(module in map(str, command)
-                                                                    for module in modules) else run(command)
+    def run_without(command):
+        if any(module in map(str, command) for module in modules):
+            return 1, f"No module named {modules[0]}"
+        return run(command)
+
+    return run_without
 
 
 @pytest.fixture
@@ -45,8 +48,8 @@ def wheels(tmp_path) -> Path:
         wheel.writestr("pip-0.1.dist-info/METADATA", "Metadata-Version: 2.1\nName: pip\nVersion: 0.1\n")
     (folder / PIP).write_bytes(content.getvalue())
     (tmp_path / "requirements" / "locks").mkdir(parents=True)
-    (tmp_path / "requirements" / "locks"
-     / "pip.txt").write_text(f"pip==0.1 \\\n    --hash=sha256:{hashlib.sha256(content.getvalue()).hexdigest()}\n")
+    digest = hashlib.sha256(content.getvalue()).hexdigest()
+    (tmp_path / "requirements" / "locks" / "pip.txt").write_text(f"pip==0.1 \\\n    --hash=sha256:{digest}\n")
     return folder
 
 
@@ -86,13 +89,12 @@ def test_a_python_that_nothing_can_be_made_from_is_named(tmp_path, wheels):
     with pytest.raises(Problem, match="does not answer"):
         bare_environment.unpack_pip(tmp_path / "env", b"")
     (wheels / PIP).write_bytes(b"")
-    (tmp_path / "requirements" / "locks"
-     / "pip.txt").write_text(f"pip==0.1 --hash=sha256:{hashlib.sha256(b'').hexdigest()}\n")
+    pip_lock = tmp_path / "requirements" / "locks" / "pip.txt"
+    pip_lock.write_text(f"pip==0.1 --hash=sha256:{hashlib.sha256(b'').hexdigest()}\n")
     broken = io.BytesIO()
     zipfile.ZipFile(broken, "w").close()
     (wheels / PIP).write_bytes(broken.getvalue())
-    (tmp_path / "requirements" / "locks"
-     / "pip.txt").write_text(f"pip==0.1 --hash=sha256:{hashlib.sha256(broken.getvalue()).hexdigest()}\n")
+    pip_lock.write_text(f"pip==0.1 --hash=sha256:{hashlib.sha256(broken.getvalue()).hexdigest()}\n")
     with pytest.raises(Problem, match="pip does not work in"):
         bare_environment.make(tmp_path / "env", Path(sys.executable), tmp_path / "requirements", run, wheels,
                               wheel_only=True)

@@ -38,8 +38,8 @@ def test_a_batch_goes_on_without_blender_is_found_again_and_stops_within_two_sec
     folder = batches.current()
     assert folder.parent == tmp_path / "captures" / "batches"
     asked = record.read_batch(folder)
-    assert asked.gate == "artist" and [(face.name, face.root)
-                                       for face in asked.faces] == [("anna", first.root), ("bert", second.root)]
+    assert asked.gate == "artist"
+    assert [(face.name, face.root) for face in asked.faces] == [("anna", first.root), ("bert", second.root)]
     assert asked.faces[1].chosen().seed == 7 and asked.faces[0].source == first.source
     bpy.context.scene.wildcap.active_index = 0
     batch_faces.wait(addon, lambda: batches.line(batches.view()).startswith("anna: Cameras"))
@@ -137,7 +137,7 @@ def test_a_result_comes_in_when_the_batch_lets_go_of_the_face(addon, batches, mo
     capture = batch_faces.filmed(tmp_path / "films", "anna", {"cameras": "slow"})
     open_captures(batch_faces.filmed(tmp_path / "films", "bert"), capture)
     came = []
-    monkeypatch.setattr(addon("jobs"), "bring_in_results", came.append)
+    monkeypatch.setattr(addon("incoming"), "bring_in", came.append)
     bpy.ops.wildcap.reconstruct_all()
     batch_faces.wait(addon, lambda: batches.works_on(str(capture.root)))
     assert not came

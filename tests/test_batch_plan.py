@@ -41,14 +41,13 @@ def test_a_table_as_spreadsheets_write_it(folder, separator, start):
     assert faults == [] and [(face.name, face.source, face.root.name, face.quality) for face in faces] == [
         ("Anna", folder / "anna.mp4", "Anna.wildcap", "standard"),
         ("zoë b", folder / "zoë b.mov", "zoë b.wildcap", "draft")]
-    assert faces[0].settings == {"solve": {"skin_tone": "0.8,0.6,0.5",
-                                           "white_point": "auto"}} and faces[1].settings == {}
+    assert faces[0].settings == {"solve": {"skin_tone": "0.8,0.6,0.5", "white_point": "auto"}}
+    assert faces[1].settings == {}
 
 
 def test_a_rows_settings_lie_over_the_files_and_those_over_the_shared_ones(folder):
-    (folder
-     / "own.json").write_text('{"solve": {"steps": 30, "skin_tone": "0.1,0.1,0.1"}, "registration": {"template": '
-                              '"head.obj"}}')
+    (folder / "own.json").write_text(
+        '{"solve": {"steps": 30, "skin_tone": "0.1,0.1,0.1"}, "registration": {"template": "head.obj"}}')
     (folder / "head.obj").write_text("v 0 0 0")
     faces, _ = plan(folder, 'video,settings,tone\nanna.mp4,own.json,"0.7,0.6,0.5"\ncarl,,\n',
                     solve={"steps": 9, "size": 256}, seed=4)
@@ -105,8 +104,8 @@ def test_a_folder_of_films(folder, capsys):
                  "solve.steps=9"]) == 0
     assert "4 faces planned" in capsys.readouterr().out
     batch = read_batch(folder / "batch")
-    assert [face.name for face in batch.faces] == ["anna.avi", "anna.mp4", "carl",
-                                                   "zoë b"] and batch.faces[0].settings == {"solve": {"steps": 9}}
+    assert [face.name for face in batch.faces] == ["anna.avi", "anna.mp4", "carl", "zoë b"]
+    assert batch.faces[0].settings == {"solve": {"steps": 9}}
     assert batch.faces[0].chosen().solve.steps == 9 and batch.faces[0].chosen().solve.size == 512
 
 
@@ -120,8 +119,8 @@ def test_planned_again_it_takes_in_what_is_new(folder, capsys):
     said = capsys.readouterr()
     assert "Line 4: There is no video" in said.err and "2 faces planned" in said.out and "1 left out" in said.out
     batch = read_batch(folder / "batch")
-    assert [(face.name, face.quality)
-            for face in batch.faces] == [("Anna", "draft"), ("carl", "standard")] and batch.gate == "artist"
+    assert [(face.name, face.quality) for face in batch.faces] == [("Anna", "draft"), ("carl", "standard")]
+    assert batch.gate == "artist"
     assert (folder / "batch" / "batch.json").read_bytes() != before
 
 
@@ -134,8 +133,8 @@ def test_planned_again_it_keeps_the_options_that_are_left_out(folder):
     out = str(folder / "out")
     assert plan() == ("automatic", None, "")
     wanted = ("artist", {"preset": "unreal", "folder": out}, "/opt/blender")
-    assert plan("--gate", "artist", "--deliver", "unreal", "--to", out, "--blender",
-                "/opt/blender") == wanted and plan() == wanted
+    words = "--gate", "artist", "--deliver", "unreal", "--to", out, "--blender", "/opt/blender"
+    assert plan(*words) == wanted and plan() == wanted
     assert plan("--deliver", "unity_hdrp") == ("artist", {"preset": "unity_hdrp", "folder": out}, "/opt/blender")
     assert plan("--to", str(folder / "in"))[1] == {"preset": "unity_hdrp", "folder": str(folder / "in")}
     assert plan("--gate", "automatic", "--deliver", "none", "--blender", "none") == ("automatic", None, "")

@@ -82,8 +82,8 @@ def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, tmp_path):
     assert core(code, "batch", "run", batch.root, "h").returncode == 0
     once = finished(batch)["h"]
     (tmp_path / "films" / "c.mp4").unlink()
-    with batch.face("d").capture.locked(), tiny_batch.start(code, "batch", "run", batch.root, "--on", "ray", "--cores",
-                                                            1) as process:
+    words = "batch", "run", batch.root, "--on", "ray", "--cores", 1
+    with batch.face("d").capture.locked(), tiny_batch.start(code, *words) as process:
         wait_for(lambda: at_stage(batch, "a", "scan"), process)
         tiny_batch.set_mood(capture, {})
         os.kill(at_stage(batch, "a", "scan")[0]["pid"], signal.SIGKILL)
@@ -93,13 +93,13 @@ def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, tmp_path):
     assert set(said) == {*"abcdefgh", "8 faces"}, "nothing of Ray's own"
     assert "head stopped: The face is not there. Film it." in said["b"] and "There is no video" in said["c"]
     assert f"Another worker (process {os.getpid()}" in said["d"]
-    assert states(batch) == dict.fromkeys("aefgh", DONE) | {"b": STOPPED, "c": TO_DO,
-                                                            "d": TO_DO} and finished(batch)["h"] == once
+    assert states(batch) == dict.fromkeys("aefgh", DONE) | {"b": STOPPED, "c": TO_DO, "d": TO_DO}
+    assert finished(batch)["h"] == once
     begun, done = (collections.Counter((line["face"], line["stage"]) for line in account(batch)
                                        if line["finished"] is whether) for whether in (False, True))
     assert set(done.values()) == {1} and len(done) == 4 * 10 + 2, "each stage once"
-    assert {stage: count for stage, count in begun.items()
-            if count > done[stage]} == {("a", "scan"): 2, ("b", "scan"): 1}, "but for what was killed"
+    again = {stage: count for stage, count in begun.items() if count > done[stage]}
+    assert again == {("a", "scan"): 2, ("b", "scan"): 1}, "but for what was killed"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no other process can press Ctrl-C there")
@@ -123,8 +123,8 @@ def test_it_is_cancelled_within_two_seconds_and_goes_on(code, tmp_path, way):
     once = finished(batch)["a"]["cameras"]
     for capture in captures:
         tiny_batch.set_mood(capture, {})
-    assert core(code, "batch", "run", batch.root, "--until",
-                "head").returncode == 0 and finished(batch)["a"]["cameras"] == once
+    assert core(code, "batch", "run", batch.root, "--until", "head").returncode == 0
+    assert finished(batch)["a"]["cameras"] == once
 
 
 def working(batch) -> dict:
@@ -144,15 +144,14 @@ def test_the_gate_waits(code, tmp_path, monkeypatch, own_environment):
     batch = make(code, tmp_path, "ab", None, "--gate", "artist")
     monkeypatch.setattr(ray_cluster, "ROOT", code)
     heard = []
-    with monkeypatch.context() as elsewhere, pytest.raises(Problem,
-                                                           match=f"has no WildCap at {tmp_path / 'none'}. Set "
-                                                                 "WILDCAP_CODE there"):
+    nowhere = f"has no WildCap at {tmp_path / 'none'}. Set WILDCAP_CODE there"
+    with monkeypatch.context() as elsewhere, pytest.raises(Problem, match=nowhere):
         elsewhere.setattr(ray_cluster, "ROOT", tmp_path / "none")
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     with pytest.raises(Problem, match="No node of the cluster has 1000 cores and 5 GB"):
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1000)
-    with monkeypatch.context() as busy, pytest.raises(Problem,
-                                                      match="could not be started on this machine: It took too long."):
+    late = "could not be started on this machine: It took too long."
+    with monkeypatch.context() as busy, pytest.raises(Problem, match=late):
         busy.setattr("ray.init", busy_machine)
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     assert states(batch) == dict.fromkeys("ab", TO_DO) and not heard
@@ -168,8 +167,8 @@ def test_what_a_node_lacks(code, tmp_path, monkeypatch):
     assert "another batch" in ray_task.examine(str(batch.root), __version__, "0" * 64)
     assert "There is no batch at" in ray_task.examine(str(tmp_path / "none"), __version__, record)
     monkeypatch.setenv(ray_task.BATCHES, str(tmp_path))
-    assert ray_task.examine(f"/seen/elsewhere/{batch.root.name}", __version__,
-                            record) == "", "the node's own name of the folder"
+    told = ray_task.examine(f"/seen/elsewhere/{batch.root.name}", __version__, record)
+    assert told == "", "the node's own name of the folder"
     monkeypatch.setattr(ray_task.importlib.util, "find_spec", lambda name: None)
     assert "has no torch" in ray_task.examine(str(batch.root), __version__, record)
     assert ray_task.do_task(str(tmp_path / "none"), "a", "head", 1, "", print)["state"] == STOPPED
@@ -199,8 +198,8 @@ def test_a_task_of_ours_that_died_is_waited_for(code, tmp_path, monkeypatch):
         assert "is working on this capture" in refused["words"] and time.monotonic() - began < lease.TERM_S
         with monkeypatch.context() as short:
             short.setattr(lease, "TERM_S", 0.3)
-            assert "is working on this capture" in ray_task.do_task(*words, "",
-                                                                    print)["words"], "it is alive, after all"
+            told = ray_task.do_task(*words, "", print)
+            assert "is working on this capture" in told["words"], "it is alive, after all"
         threading.Timer(1, process.kill).start()
         assert ray_task.do_task(*words, "", lambda line: None)["state"] == DONE
 
@@ -227,8 +226,8 @@ def test_an_address_that_cannot_be_reached_is_told_in_seconds(code, tmp_path, ca
         assert main(["batch", "run", str(batch.root), "--on", "ray", *words]) == 2
         assert said in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "ray", None)
-    assert main(["batch", "run", str(batch.root), "--on",
-                 "ray"]) == 2 and "requirements/farm.txt" in capsys.readouterr().err
+    assert main(["batch", "run", str(batch.root), "--on", "ray"]) == 2
+    assert "requirements/farm.txt" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links to folders take rights there")

@@ -73,8 +73,8 @@ def test_the_walk_goes_through_the_masks_that_wait(addon, batches, tmp_path):
     bpy.ops.wildcap.solve_all()
     assert batches.current() == folder and len(list(folder.glob("batches"))) == 0
     batch_faces.ended(addon, done=3)
-    assert {face.root.name: face.read()["stages"]["solve"]["seed"]
-            for face in faces} == dict.fromkeys(("anna.wildcap", "bert.wildcap", "carl.wildcap"), 3)
+    seeds = {face.root.name: face.read()["stages"]["solve"]["seed"] for face in faces}
+    assert seeds == dict.fromkeys(("anna.wildcap", "bert.wildcap", "carl.wildcap"), 3)
     icons = [batches.ICONS[batches.state_of(str(face.root)).state] for face in faces]
     assert icons == ['CHECKMARK'] * 3
 
@@ -137,9 +137,8 @@ def test_a_folder_that_goes_away_while_it_is_looked_at(addon, batches, monkeypat
     (folder / "progress.json").write_text('{"ended": 1, "of": 2, "left_s": "soon", "working": {}}')
     batch_faces.wait(addon, lambda: batches.view().runner == socket.gethostname())
     assert batches.view().progress == {}, "a figure that makes no sense is none"
-    (folder
-     / "progress.json").write_text('{"ended": 1, "of": 4, "left_s": 1230.0, "working": {"anna": {"stage": "Cameras", '
-                                   '"share": 0.4, "eta_s": 1}}}')
+    (folder / "progress.json").write_text(
+        '{"ended": 1, "of": 4, "left_s": 1230.0, "working": {"anna": {"stage": "Cameras", "share": 0.4, "eta_s": 1}}}')
     batch_faces.wait(addon, lambda: bool(batches.view().progress))
     assert (
         batches.line(batches.view()) == "anna: Cameras 40%, about 20 min left" and batches.share(batches.view()) == 0.25

@@ -32,10 +32,8 @@ def test_a_hole_at_the_border_and_no_hole_at_all():
     hole[:6, :6] = True
     found = completed(np.where(hole[..., None], 9.0, np.float64(0.4) + 0 * slope()), hole)
     assert found == pytest.approx(0.4, abs=1e-9)
-    assert completed(slope(),
-                     np.zeros((40, 40),
-                              bool)) is not None and np.array_equal(completed(slope(), np.ones((40, 40), bool)),
-                                                                    slope())
+    assert completed(slope(), np.zeros((40, 40), bool)) is not None
+    assert np.array_equal(completed(slope(), np.ones((40, 40), bool)), slope())
 
 
 def test_the_cells_of_a_brow_and_those_beside_it_take_the_skins_shading():
@@ -54,9 +52,9 @@ def test_a_photograph_keeps_a_brow_where_the_parser_sees_one(monkeypatch):
     brow, shadow = (slice(90, 102), slice(80, 120)), (slice(160, 172), slice(80, 120))
     picture[brow] = picture[shadow] = 0.25
     landmarks = np.array([[x, y, 0] for x in (60, 200) for y in (60, 200)] * 117, np.float32)
-    parts = SimpleNamespace(of=lambda
-                            *names: np.where(np.indices(picture.shape[:2])[0] < 128, picture[..., 0] < 0.4,
-                                             False).astype(np.float32))
+    upper = np.indices(picture.shape[:2])[0] < 128
+    dark = np.where(upper, picture[..., 0] < 0.4, False).astype(np.float32)
+    parts = SimpleNamespace(of=lambda *names: dark)
     monkeypatch.setattr(network.faces, "detect", lambda srgb: SimpleNamespace(landmarks=landmarks))
     monkeypatch.setattr(network, "parser", SimpleNamespace(parse=lambda srgb, found: parts))
     monkeypatch.setattr(network, "load", lambda device: None)
@@ -67,7 +65,6 @@ def test_a_photograph_keeps_a_brow_where_the_parser_sees_one(monkeypatch):
     monkeypatch.setattr(network, "_look", look)
     albedo = images.srgb_to_linear(network.delight_photograph(picture, None)[0])
     skin = albedo[130, 100].mean()
-    assert albedo[96,
-                  100].mean() / skin == pytest.approx(float(images.srgb_to_linear(0.25) / images.srgb_to_linear(0.5)),
-                                                      rel=0.1)
+    hair = images.srgb_to_linear(0.25) / images.srgb_to_linear(0.5)
+    assert albedo[96, 100].mean() / skin == pytest.approx(float(hair), rel=0.1)
     assert albedo[166, 100].mean() / skin == pytest.approx(1, rel=0.1)

@@ -59,8 +59,8 @@ def around(surface, capture, side):
     from core.contract.eyes_record import read_eyes
 
     ball = read_eyes(capture)[side]
-    return surface.spread((np.linalg.norm(surface.points - ball.centre, axis=1) < 1.4
-                           * ball.radius).astype(np.float32)) > 0
+    near = np.linalg.norm(surface.points - ball.centre, axis=1) < 1.4 * ball.radius
+    return surface.spread(near.astype(np.float32)) > 0
 
 
 def test_a_blink_is_left_out_around_its_eye_alone(filmed):
@@ -73,8 +73,8 @@ def test_a_blink_is_left_out_around_its_eye_alone(filmed):
         and observations[1].weight[left].max() == 0
         and observations[1].quality[left].max() == 0
     )
-    assert (observations[1].weight[right]
-            == before[1][right]).all() and (observations[1].weight > 0).sum() > 0.8 * (before[1] > 0).sum()
+    assert (observations[1].weight[right] == before[1][right]).all()
+    assert (observations[1].weight > 0).sum() > 0.8 * (before[1] > 0).sum()
     for i in (0, 2, 3, 4):
         assert (observations[i].weight == before[i]).all()
 

@@ -26,8 +26,8 @@ def light_and_mask(taken: float) -> tuple[torch.Tensor, torch.Tensor]:
     blotches = 1 + 0.08 * np.sin(X / 37 + 1) * np.sin(Y / 29) + 0.01 * np.random.default_rng(0).standard_normal(X.shape)
     inside = np.abs(X - 500) < 90
     shadow = 1 / (1 + np.exp((np.abs(X - 500) - 90) / 1.5))
-    return torch.from_numpy(np.repeat((blotches * (1 - taken * shadow))[None], 3,
-                                      0).astype(np.float32)), torch.from_numpy(inside.astype(np.float32))
+    skin = np.repeat((blotches * (1 - taken * shadow))[None], 3, 0)
+    return torch.from_numpy(skin.astype(np.float32)), torch.from_numpy(inside.astype(np.float32))
 
 
 @pytest.mark.parametrize("taken", [0.05, 0.2, 0.5])
@@ -61,9 +61,8 @@ def test_a_beard_says_little_of_the_light(tmp_path):
     """Dark strokes on jaw and chin of a texture that is large enough to show them; without them, or on a small one,
     there is no beard."""
     size = beard.SIZE
-    tone = np.array([0.42, 0.26, 0.18],
-                    np.float32) * (1 + 0.01
-                                   * np.random.default_rng(1).standard_normal((size, size, 1)).astype(np.float32))
+    noise = np.random.default_rng(1).standard_normal((size, size, 1)).astype(np.float32)
+    tone = np.array([0.42, 0.26, 0.18], np.float32) * (1 + 0.01 * noise)
     grows = beard._on_template()[0] > 0.9
     strokes = (np.random.default_rng(2).random((size, size)) < 0.04) & grows
     stubbly = np.where(strokes[..., None], 0.5 * tone, tone)

@@ -147,9 +147,8 @@ def test_frames_without_common_structure_are_refused(tmp_path):
     folder.mkdir()
     for i in range(4):
         noise = cv2.resize(rng.random((40, 30, 3), dtype=np.float32), (240, 320))
-        noise[60:260,
-              20:220] = (np.ascontiguousarray(astronaut()[30:230, 120:320]).astype(np.float32) / 255 if i == 0
-                         else noise[60:260, 20:220])
+        if i == 0:
+            noise[60:260, 20:220] = np.ascontiguousarray(astronaut()[30:230, 120:320]).astype(np.float32) / 255
         images.write_srgb(folder / f"{i}.png", np.clip(noise, 0, 1))
     capture = Capture(tmp_path / "face.wildcap")
     with pytest.raises(Problem, match="do not fit together") as caught:

@@ -83,11 +83,10 @@ def test_drops_are_taken_where_the_tab_is_shown(addon):
     assert set(source.PHOTOGRAPHS) == {*known["SUFFIXES"], *known["RAW"]}
 
     def taken(tab: str) -> bool:
-        space, sidebar = SimpleNamespace(show_region_ui=bool(tab)), SimpleNamespace(type='UI',
-                                                                                    active_panel_category=tab)
-        return handler.poll_drop(SimpleNamespace(area=SimpleNamespace(type='VIEW_3D',
-                                                                      spaces=SimpleNamespace(active=space),
-                                                                      regions=[sidebar])))
+        space = SimpleNamespace(show_region_ui=bool(tab))
+        sidebar = SimpleNamespace(type='UI', active_panel_category=tab)
+        area = SimpleNamespace(type='VIEW_3D', spaces=SimpleNamespace(active=space), regions=[sidebar])
+        return handler.poll_drop(SimpleNamespace(area=area))
 
     handler = source.WILDCAP_FH_source
     assert taken("WildCap") and not taken("Item") and not taken("")
@@ -125,8 +124,8 @@ def test_a_project_that_was_moved_or_copied_works_on_its_own_captures(addon, pro
     (shutil.copytree if kept else shutil.move)(project, there)
     bpy.ops.wm.open_mainfile(filepath=str(there / "face.blend"))
     assert [Path(item.path) for item in items()] == [there / "anna.wildcap", there / "berta.wildcap"]
-    assert {o.name: Path(o["wildcap_capture"]).parent
-            for o in bpy.context.scene.objects} == {"anna": there, "berta": there}
+    found = {o.name: Path(o["wildcap_capture"]).parent for o in bpy.context.scene.objects}
+    assert found == {"anna": there, "berta": there}
     pictures = [Path(bpy.path.abspath(image.filepath)) for image in bpy.data.images if image.source == 'FILE'
                 and image.filepath]
     assert pictures and all(path.is_relative_to(there) and path.is_file() for path in pictures)

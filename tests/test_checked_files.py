@@ -94,9 +94,8 @@ def test_what_a_stage_writes_is_named_by_its_stage(tmp_path):
     for name, stage in (("texture.exr", "texture"), ("maps/normal.png", "solve"), ("frames/00001.jpg", "frames"),
                         ("delit/shadow/00001.png", "delight")):
         assert checks.advise_remaking(tmp_path / name, "") == f"Run the stage {stage} again."
-    assert checks.advise_remaking(tmp_path / "shadow_mask.png",
-                                  "Mine.") == checks.advise_remaking(tmp_path / "a" / "frames" / "1.jpg",
-                                                                     "Mine.") == "Mine."
+    for theirs in (tmp_path / "shadow_mask.png", tmp_path / "a" / "frames" / "1.jpg"):
+        assert checks.advise_remaking(theirs, "Mine.") == "Mine."
 
 
 @pytest.mark.parametrize("mode", ["RGB", "L", "P", "CMYK", "LA", "RGBA", "I;16", "1"])
@@ -187,9 +186,8 @@ def test_unusual_objs_are_read(tmp_path):
     for text in written:
         path.write_bytes(text.encode())
         mesh = meshes.read_obj(path)
-        assert mesh.faces.tolist() == mesh.face_uvs.tolist() == [[0, 1, 2],
-                                                                 [0, 2, 3]] and np.array_equal(mesh.vertices[:4, :2],
-                                                                                               mesh.uvs[:4])
+        assert mesh.faces.tolist() == mesh.face_uvs.tolist() == [[0, 1, 2], [0, 2, 3]]
+        assert np.array_equal(mesh.vertices[:4, :2], mesh.uvs[:4])
     two = SQUARE + "f -4 -3 -2\n" + SQUARE + "f -4 -3 -2\n"  # negative numbers count from where they stand
     path.write_text(two)
     assert meshes.read_obj(path).faces.tolist() == [[0, 1, 2], [4, 5, 6]]
@@ -202,8 +200,8 @@ BODY = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
 
 
 def binary(order: str, last: float = 0.0, index: int = 3) -> bytes:
-    return struct.pack(f"{order}12f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1,
-                       last) + struct.pack(f"{order}BiiiBiii", 3, 0, 1, 2, 3, 0, 2, index)
+    vertices = struct.pack(f"{order}12f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, last)
+    return vertices + struct.pack(f"{order}BiiiBiii", 3, 0, 1, 2, 3, 0, 2, index)
 
 
 @pytest.mark.parametrize(("form", "body"),
@@ -222,9 +220,8 @@ def test_plys_of_every_kind_are_read(tmp_path, form, body):
     (4, 2, binary("<", np.nan)), (4, 2, binary("<", np.inf)), (4, 2, binary("<", index=9)),
     (4, 2, binary("<", index=-1)), (4, 0, binary("<")[:48])])
 def test_damaged_plys(tmp_path, vertices, faces, body):
-    (tmp_path
-     / "scan.ply").write_bytes(HEADER.format(form="binary_little_endian", vertices=vertices, faces=faces).encode()
-                               + body)
+    header = HEADER.format(form="binary_little_endian", vertices=vertices, faces=faces)
+    (tmp_path / "scan.ply").write_bytes(header.encode() + body)
     refused(lambda: meshes.read_ply(tmp_path / "scan.ply"), "scan.ply is damaged")
     (tmp_path / "scan.ply").write_bytes(b"no mesh at all")
     refused(lambda: meshes.read_ply(tmp_path / "scan.ply"), "header")

@@ -56,8 +56,8 @@ def write_model(capture: Capture, name: str, text: bool = False) -> None:
 
 
 def test_sound_models_are_read(capture):
-    assert [view.name
-            for view in read_views(capture)] == ["00000.jpg"] and len(read_model(capture.cameras).points3D) == 1
+    assert [view.name for view in read_views(capture)] == ["00000.jpg"]
+    assert len(read_model(capture.cameras).points3D) == 1
     shutil.rmtree(capture.cameras)
     capture.cameras.mkdir()
     write_model(capture, "00000.jpg", text=True)
@@ -166,8 +166,8 @@ def test_names_that_are_no_text(tmp_path, capsys):
     for source, root in ((photographs, "a.wildcap"), (tmp_path / "film\udcff.mp4", "a.wildcap"),
                          ("", "a\udcff.wildcap")):
         refused(lambda source=source, root=root: write_job(Capture(tmp_path / root), source=source), "udcff", "Rename")
-    assert main(["run", str(photographs),
-                 str(tmp_path / "b.wildcap")]) == 2 and "not in UTF-8" in capsys.readouterr().err
+    assert main(["run", str(photographs), str(tmp_path / "b.wildcap")]) == 2
+    assert "not in UTF-8" in capsys.readouterr().err
 
 
 # -- what is delivered

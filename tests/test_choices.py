@@ -40,8 +40,8 @@ def test_the_active_mesh_is_kept_as_it_is_with_its_uvs_and_without_modifiers(add
     path = Path(item.registration.template)
     assert path.parent == capture / "template" and path.suffix == ".obj"
     found = obj_rows(path, "v")
-    assert len(found) == len(expected) and all(row[:3] == pytest.approx(place, abs=1e-5)
-                                               for row, place in zip(found, expected, strict=True))
+    assert len(found) == len(expected)
+    assert all(row[:3] == pytest.approx(place, abs=1e-5) for row, place in zip(found, expected, strict=True))
     assert len(obj_rows(path, "vt")) > 0
     assert head.select_get() and mine.select_get() and bpy.context.view_layer.objects.active == mine
     assert addon("properties").job_settings(item)["registration"]["template"] == str(path)
@@ -87,8 +87,8 @@ def test_the_wipe_shows_a_frame_before_and_after_and_leaves_no_image_behind(addo
     bpy.ops.wildcap.compare_delit(which=0)
     capture_of = addon("captures").folder(item)
     assert delighters.shown_frame(capture_of) == "00003" and len(bpy.data.images) == images
-    assert at(0.3) == [200, 100, 50, 255] and at(0.7) == [100, 50, 25,
-                                                          255] and at(0.5)[:3] == [255, 255, 255] and at(0.1)[3] == 0
+    assert at(0.3) == [200, 100, 50, 255] and at(0.7) == [100, 50, 25, 255]
+    assert at(0.5)[:3] == [255, 255, 255] and at(0.1)[3] == 0
     manager.wildcap_wipe = 0.8
     assert at(0.7) == [200, 100, 50, 255]
     manager.wildcap_wipe = 0.0
@@ -117,8 +117,11 @@ def test_sixteen_bits_are_read_as_the_eye_sees_them(addon, tmp_path):
 
 def test_the_chain_can_begin_at_any_stage(addon, capture, item, monkeypatch):
     started = []
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal,
-                        **span: started.append((goal, span["first"], span["last"])))
+
+    def start(item, goal, **span):
+        started.append((goal, span["first"], span["last"]))
+
+    monkeypatch.setattr(addon("jobs"), "start", start)
     bpy.ops.wildcap.reconstruct(first="upscale")
     bpy.ops.wildcap.reconstruct(first="transfer")
     with pytest.raises(RuntimeError, match="no video"):

@@ -44,9 +44,8 @@ def test_a_capture_whose_record_was_deleted_to_start_anew_is_one_still_and_loses
     assert contents(capture.root) == before
     first = Capture(tmp_path / "by 0.1.0.wildcap")  # which kept no record of what it wrote
     first.root.mkdir()
-    (first.root
-     / "job.json").write_text('{"capture": "/x", "source": "", "from": null, "until": null, "settings": {}, "quality": '
-                              '"draft"}')
+    (first.root / "job.json").write_text(
+        '{"capture": "/x", "source": "", "from": null, "until": null, "settings": {}, "quality": "draft"}')
     first.shadow_mask.write_text("painted")
     first.claim()
     assert first.read()["stages"] == {} and first.shadow_mask.read_text() == "painted"

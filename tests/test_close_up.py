@@ -69,9 +69,8 @@ def test_an_eye_is_as_deep_as_lifes_and_inside_of_the_heads_own_ball(close_up, a
         shell, inner = seen(things(close_up)[f"{side} Cornea"]) - centre, things(close_up)[f"{side} Eye"]
         apex = (shell @ gaze).max()
         assert 0.0008 < apex - ball.radius < 0.0013, "the cornea stands out by a millimetre"
-        own = coordinates(close_up.data.shape_keys.reference_key.data)[HEAD + COPIES
-                                                                       + np.flatnonzero(asset.kind == 1
-                                                                                        + number)] - centre
+        rows = HEAD + COPIES + np.flatnonzero(asset.kind == 1 + number)
+        own = coordinates(close_up.data.shape_keys.reference_key.data)[rows] - centre
         assert apex < (own @ gaze).max() + 1e-4, "no farther than the ball to which the lids were fitted"
         slots, places = np.array([p.material_index for p in inner.data.polygons]), seen(inner) - centre
         iris = np.unique([v for p in inner.data.polygons if p.material_index == 1 for v in p.vertices])
@@ -111,8 +110,8 @@ def test_it_looks_where_the_empty_is_and_a_bone_can_hold_that(close_up, addon):
 
 def test_lids_and_tears_keep_to_an_eye_however_it_is_opened_and_turned(close_up, addon):
     asset, rims_of = addon("acting.asset").load(), addon("acting.close_up.ball").rims
-    poses = [(opened, {}) for opened in OPENINGS] + [(1.0, {f"eyeLook{way}{side}": 1.2 for side in ("Left", "Right")})
-                                                     for way in LOOKS]
+    looks = [(1.0, {f"eyeLook{way}{side}": 1.2 for side in ("Left", "Right")}) for way in LOOKS]
+    poses = [(opened, {}) for opened in OPENINGS] + looks
     for way in LOOKS:
         for side in ("Left", "Right"):
             close_up.data.shape_keys.key_blocks[f"eyeLook{way}{side}"].slider_max = 1.2
@@ -178,9 +177,8 @@ def test_it_follows_another_shape_and_another_colour_and_what_was_set_stays(clos
     bpy.ops.wildcap.assemble_material()
     assert set(things(close_up).values()) == objects and shader.inputs["Roughness"].default_value == pytest.approx(0.77)
     for number, side in enumerate(("Left", "Right")):
-        assert ball_and_gaze(close_up,
-                             side)[0] == pytest.approx(addon("acting.close_up.ball").of(close_up, number).centre,
-                                                       abs=1e-5)
+        centre = addon("acting.close_up.ball").of(close_up, number).centre
+        assert ball_and_gaze(close_up, side)[0] == pytest.approx(centre, abs=1e-5)
     scene = addon("relight.picture").set_up(close_up, "three_point", 64, 1)
     assert objects <= set(scene.collection.objects)
 
@@ -198,8 +196,8 @@ def test_both_engines_have_an_output_that_shows_something(close_up):
 def test_solid_shading_shows_no_relief_for_a_colour(close_up):
     for slot in things(close_up)["Left Eye"].material_slots:
         pictures = [node for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE']
-        assert [node.image for node in pictures
-                if node.show_texture] == [None] * bool(pictures), "the picture holds no colour"
+        shown = [node.image for node in pictures if node.show_texture]
+        assert shown == [None] * bool(pictures), "the picture holds no colour"
 
 
 def test_nothing_of_the_mouth_comes_through_the_skin_at_rest_and_in_any_unit(close_up, addon):

@@ -30,8 +30,11 @@ print(sys.version_info[:2], {{s.name: code_key.code_key(s.module) for s in stage
 def copy(tmp_path) -> Path:
     """core/ with its sources to be edited; its data are links."""
     copied = tmp_path / "core"
-    shutil.copytree(CORE, copied, ignore=lambda folder,
-                    names: [name for name in names if not (name.endswith(".py") or (Path(folder) / name).is_dir())])
+
+    def data(folder, names):
+        return [name for name in names if not (name.endswith(".py") or (Path(folder) / name).is_dir())]
+
+    shutil.copytree(CORE, copied, ignore=data)
     for name in ("weights", "assets"):
         shutil.rmtree(copied / name)
         (copied / name).symlink_to(CORE / name)
@@ -65,8 +68,8 @@ def dependent_stages() -> dict[str, set[str]]:
     edges: dict[str, set[str]] = {}
     for found in house.CORE:
         if found.level and found.target != "core":
-            edges.setdefault(found.file.removesuffix(".py").removesuffix("/__init__").replace("/", "."),
-                             set()).add(found.target)
+            name = found.file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+            edges.setdefault(name, set()).add(found.target)
     reached: dict[str, set[str]] = {}
     for stage in stages.STAGES:
         known, waiting = set(), [stage.module]
@@ -136,9 +139,8 @@ def test_modules_that_read_shipped_files_name_them():
             assert bool(paths) == bool(named), f"{file} speaks of {paths} and names {named}"
             assert all((CORE / name).exists() for name in named), file
             seen |= set(named)
-    assert {name for name in seen
-            if name.endswith(".safetensors")} == {f"weights/{path.name}"
-                                                  for path in (CORE / "weights").glob("*.safetensors")}
+    weights = {f"weights/{path.name}" for path in (CORE / "weights").glob("*.safetensors")}
+    assert {name for name in seen if name.endswith(".safetensors")} == weights
 
 
 WORDS = ('"""Another docstring."""', "# a comment",
@@ -169,8 +171,8 @@ def test_only_a_plain_name_after_the_package_means_a_module_that_is_run(copy):
         source.write('\nname = "x"\nNAMES = (f"{__package__}{name}", f"{__package__}", f"{name}.colmap", '
                      'f"{__package__}.pairs")\n')
     forget()
-    assert "cameras/colmap.py" not in code_key.modules("core.scan",
-                                                       copy) and "scan/pairs.py" in code_key.modules("core.scan", copy)
+    of_scan = code_key.modules("core.scan", copy)
+    assert "cameras/colmap.py" not in of_scan and "scan/pairs.py" in of_scan
 
 
 def test_every_python_gives_the_same_keys():

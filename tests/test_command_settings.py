@@ -60,8 +60,8 @@ def test_every_setting_can_be_set(capture, name, tmp_path, capsys):
     command = "deliver" if name in DELIVER else "run"
     if name == "deliver.whole":  # the command's own choice, and its only one
         assert job(capture, "--set", "deliver.whole=yes", command=command).deliver.whole
-        assert main(["deliver", str(capture.root), "--set",
-                     "deliver.whole=no"]) == 2 and "ended by Blender" in capsys.readouterr().err
+        assert main(["deliver", str(capture.root), "--set", "deliver.whole=no"]) == 2
+        assert "ended by Blender" in capsys.readouterr().err
         return
     settings = job(capture, "--set", f"{name}={text}", command=command)
     assert value(settings, name) == (str(tmp_path / "mine" / "é") if "path" in find_setting(name).metadata else kept)
@@ -80,8 +80,8 @@ def test_a_flag_says_the_same_as_set(capture, name):
               "registration.new_atlas": ["--template", "mine.obj"]}.get(name, [])
     words = [field.metadata["flag"]] if isinstance(field.default, bool) else [field.metadata["flag"], text]
     command = "deliver" if name in DELIVER else "run"
-    assert job(capture, *needed, *words,
-               command=command) == job(capture, *needed, "--set", f"{name}={text}", command=command)
+    by_set = job(capture, *needed, "--set", f"{name}={text}", command=command)
+    assert job(capture, *needed, *words, command=command) == by_set
 
 
 @pytest.mark.parametrize("name",
@@ -93,10 +93,9 @@ def test_a_switch_has_many_words(capture, name):
 
 
 def test_a_file_lies_over_the_quality_and_set_and_flags_over_the_file(capture, tmp_path):
-    (tmp_path
-     / "mine.json").write_text('\ufeff{"seed": 3, "solve": {"steps": 7, "size": 256, "skin_tone": "0.5,0.4,0.3"}, '
-                               '"deliver": {"preset": "unreal"}}',
-                               encoding="utf-8")
+    (tmp_path / "mine.json").write_text(
+        '\ufeff{"seed": 3, "solve": {"steps": 7, "size": 256, "skin_tone": "0.5,0.4,0.3"}, '
+        '"deliver": {"preset": "unreal"}}', encoding="utf-8")
     settings = job(capture, "--quality", "draft", "--settings", "mine.json", "--set", "solve.size=128", "--set",
                    "solve.grid_cells=8", "--skin-tone", "auto")
     assert (settings.seed, settings.solve.steps, settings.solve.size, settings.solve.grid_cells,
@@ -105,8 +104,8 @@ def test_a_file_lies_over_the_quality_and_set_and_flags_over_the_file(capture, t
     assert json.loads(capture.job.read_text(encoding="utf-8"))["quality"] == "draft"
     assert job(capture, "--settings", "mine.json", command="deliver").deliver.preset == "unreal"
     kept = job(capture, "--settings", "mine.json", "--pictures", "png8", command="deliver")
-    assert (kept.deliver.pictures, kept.deliver.whole,
-            kept.deliver.format) == ("png8", True, "obj") and kept.seed == settings.seed, "the last run's stay"
+    assert kept.deliver.pictures == "png8" and kept.deliver.whole and kept.deliver.format == "obj"
+    assert kept.seed == settings.seed, "the last run's stay"
 
 
 def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
@@ -117,15 +116,13 @@ def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
     (tmp_path / "studio" / "mine.json").write_text(json.dumps(places), encoding="utf-8")
     settings = job(capture, "--settings", "studio/mine.json", "--set", "texture.perceptual_network=vgg", "--softened",
                    "~/soft")
-    assert settings.delight.folder == str(tmp_path / "studio"
-                                          / "delit") and settings.solve.prior == str(tmp_path / "home" / "authors")
+    assert settings.delight.folder == str(tmp_path / "studio" / "delit")
+    assert settings.solve.prior == str(tmp_path / "home" / "authors")
     assert settings.registration.template == "" and settings.cameras.import_from == str(tmp_path / "rig.json")
-    assert settings.texture.perceptual_network == str(tmp_path
-                                                      / "vgg") and settings.shadow_mask.softened == str(tmp_path
-                                                                                                        / "home"
-                                                                                                        / "soft")
-    assert job(capture, "--settings", "studio/mine.json", "--folder",
-               "mine").delight.folder == str(tmp_path / "mine"), "the file says that it is for folder"
+    assert settings.texture.perceptual_network == str(tmp_path / "vgg")
+    assert settings.shadow_mask.softened == str(tmp_path / "home" / "soft")
+    chosen = job(capture, "--settings", "studio/mine.json", "--folder", "mine")
+    assert chosen.delight.folder == str(tmp_path / "mine"), "the file says that it is for folder"
     assert job(capture, "--settings", "studio/mine.json", "--set", "delight.folder=").delight.folder == ""
 
 

@@ -40,9 +40,9 @@ def dark_room(tmp_path_factory):
     azimuths = (-36, -12, 12, 36)
     names = [f"{i:05d}.jpg" for i in range(len(azimuths))]
     capture.frames.mkdir(parents=True)
-    capture.frames_json.write_text(json.dumps({"frames": [{"name": n, "video_frame": i, "time_s": i, "sharpness": 1.0,
-                                                           "selected": True}
-                                                          for i, n in enumerate(names)]}))
+    records = [{"name": n, "video_frame": i, "time_s": i, "sharpness": 1.0, "selected": True}
+               for i, n in enumerate(names)]
+    capture.frames_json.write_text(json.dumps({"frames": records}))
     painted_egg.write_cameras(capture.cameras, names, azimuths, 0.42, 0.05)
     meshes.write_obj(capture.head, mesh)
     caster, true = raster.RayCaster(mesh), []
@@ -54,11 +54,9 @@ def dark_room(tmp_path_factory):
         towards = view.centre - raster.interpolate(mesh.vertices, mesh.faces, face, bary)
         towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
         cosine = np.clip((normal * towards).sum(-1), 0, 1)
-        seen = (albedo + F0
-                * microfacets(normal, towards, towards)[..., None]) * cosine[...,
-                                                                             None] * (0.12
-                                                                                      / np.where(hit, distance,
-                                                                                                 1)[..., None] ** 2)
+        light = 0.12 / np.where(hit, distance, 1)[..., None] ** 2
+        reflected = albedo + F0 * microfacets(normal, towards, towards)[..., None]
+        seen = reflected * cosine[..., None] * light
         images.write_srgb(view.path, images.linear_to_srgb(np.where(hit[..., None], seen, 0)), quality=98)
         true.append((albedo, hit & (cosine > 0.35)))
     return capture, true

@@ -95,8 +95,8 @@ def deviation(capture: Capture, share: float) -> float:
     for view in read_views(capture, selected_only=True):
         face, bary, _ = raster.render_view(caster, view)
         normal = raster.interpolate(meshes.vertex_normals(mesh), mesh.faces, face, bary)
-        values.append(images.read_linear(capture.delit
-                                         / f"{view.name[:5]}.png")[(face >= 0) & (normal @ -view.axis > 0.5)])
+        delit = images.read_linear(capture.delit / f"{view.name[:5]}.png")
+        values.append(delit[(face >= 0) & (normal @ -view.axis > 0.5)])
     log = np.log(np.concatenate(values))
     return float(np.quantile(np.abs(log - np.median(log, 0)).max(1), share))
 

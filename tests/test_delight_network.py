@@ -95,8 +95,8 @@ def test_geometry_is_told_as_what_it_leaves_unexplained():
     head = np.zeros((64, 64), np.float32)
     head[:, :32] = 1
     layers, _ = network_input(srgb, light, light, np.zeros((64, 64, 3), np.float32), head)
-    assert layers[6:12, :, :32] == pytest.approx(1,
-                                                 abs=1e-3) and not layers[6:12, :, 32:].any() and layers[15, 0, 0] == 1
+    assert layers[6:12, :, :32] == pytest.approx(1, abs=1e-3)
+    assert not layers[6:12, :, 32:].any() and layers[15, 0, 0] == 1
 
 
 def test_an_untrained_network_says_nothing_and_sees_any_size():
@@ -140,8 +140,8 @@ def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():
     rng = np.random.default_rng(0)
     shadow = np.zeros((64, 64), np.float32)
     shadow[:, 30:] = 1
-    light = shadow[...,
-                   None] * np.float32([-1.5, -1.3, -1.1]) + 0.02 * rng.standard_normal((64, 64, 3)).astype(np.float32)
+    noise = 0.02 * rng.standard_normal((64, 64, 3)).astype(np.float32)
+    light = shadow[..., None] * np.float32([-1.5, -1.3, -1.1]) + noise
     albedo = np.log(np.float32([0.5, 0.35, 0.27])) + np.zeros((64, 64, 3), np.float32)
     albedo[40:44, 10:50] += np.float32([0.1, -0.4, -0.3])
     said = light - shadow[..., None] * np.float32([-0.07, 0, 0.07])
@@ -188,8 +188,8 @@ def test_the_shipped_network_is_the_one_its_card_tells_of():
     card = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))
     net = load("cpu")
     assert sum(v.numel() for v in net.parameters()) == card["parameters"] and WEIGHTS.stat().st_size < 15e6
-    assert not set(card["seeds"]) & (set(card["held_out_seeds"])
-                                     | set(reserved_seeds())) and not set(card["skins"]) & set(card["held_out_skins"])
+    assert not set(card["seeds"]) & (set(card["held_out_seeds"]) | set(reserved_seeds()))
+    assert not set(card["skins"]) & set(card["held_out_skins"])
     assert card["held_out"]["geometry"] < card["held_out"]["picture"] < 0.5 * card["held_out"]["none"]
 
 
@@ -245,8 +245,11 @@ def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
                           "held_out": 1, "seed": 0, "workers": 0}}
     monkeypatch.setitem(delighter.CONFIGS, "cpu", small)
     monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
-    monkeypatch.setattr(delighter, "prepare_people", lambda seeds, views, work,
-                        *rest: people.prepare_people(seeds, views, work, QUIET, processes=2))
+
+    def prepare(seeds, views, work, *rest):
+        return people.prepare_people(seeds, views, work, QUIET, processes=2)
+
+    monkeypatch.setattr(delighter, "prepare_people", prepare)
     with pytest.raises(Problem, match="There are no people in"):
         delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET,
                                   TrainingRun(growing=True, work=tmp_path / "work"))

@@ -33,8 +33,8 @@ def test_usd_holds_the_hairs_in_their_place_and_thickness(hairy):
     folder = deliver(hairy, format="usd")
     read = by_another_reader(folder / "face.usdc")
     (name, (points, widths)), = read["hairs"].items()
-    assert "brows" in name and np.allclose(points, POINTS.reshape(-1, 3),
-                                           atol=1e-6) and np.allclose(widths, 8e-5, rtol=1e-3)
+    assert "brows" in name and np.allclose(points, POINTS.reshape(-1, 3), atol=1e-6)
+    assert np.allclose(widths, 8e-5, rtol=1e-3)
     assert len(bpy.data.hair_curves) == 1, "the artist's own"
 
 

@@ -55,8 +55,8 @@ def four_channels(path: Path) -> np.ndarray:
 
 def test_directx_flips_the_green_of_every_texel_and_nothing_else(capture):
     assert isinstance(delivered.deliver(capture, preset="unreal", pictures="png16", **OBJ), Done)
-    before, after = stored(capture.maps / "normal.png"), stored(folder(capture, preset="unreal") / "textures"
-                                                                / "T_Zoe_et_moi_N.png")
+    before = stored(capture.maps / "normal.png")
+    after = stored(folder(capture, preset="unreal") / "textures" / "T_Zoe_et_moi_N.png")
     assert (before[..., 1] == np.round(NORMALS[..., 1] * 65535)).all() and len(np.unique(before[..., 1])) == SIDE
     assert (after[..., 1] == 65535 - before[..., 1]).all() and (after[..., [0, 2]] == before[..., [0, 2]]).all()
 
@@ -111,12 +111,12 @@ def test_exr_is_linear_half_float_and_numbered_by_tile(capture):
     names = {"base_color", "bump_input", "refl_weight", "refl_roughness", "displacement"}
     assert {path.name for path in made.iterdir()} == {f"Zoe_et_moi_{name}.1001.exr" for name in names}
     spec = oiio.ImageInput.open(str(made / "Zoe_et_moi_base_color.1001.exr")).spec()
-    assert str(spec.format) == "half" and spec.getattribute("oiio:ColorSpace") in ("lin_srgb", "Linear", "lin_rec709",
-                                                                                   "lin_rec709_scene")
+    linear = ("lin_srgb", "Linear", "lin_rec709", "lin_rec709_scene")
+    assert str(spec.format) == "half" and spec.getattribute("oiio:ColorSpace") in linear
     assert np.allclose(images.read_data(made / "Zoe_et_moi_base_color.1001.exr"),
                        images.read_data(capture.maps / "diffuse_albedo.exr"), atol=3e-4)
-    assert np.allclose(images.read_data(made / "Zoe_et_moi_displacement.1001.exr"), -0.2,
-                       atol=1e-4), "centimetres, as the mesh"
+    displacement = images.read_data(made / "Zoe_et_moi_displacement.1001.exr")
+    assert np.allclose(displacement, -0.2, atol=1e-4), "centimetres, as the mesh"
 
 
 def test_roughness_follows_the_regions_of_the_built_in_head_alone(capture):
@@ -195,17 +195,15 @@ def test_a_mesh_of_several_tiles_gets_a_material_for_each(capture):
     delivered.in_tiles(capture)
     assert isinstance(delivered.deliver(capture, what="own_mesh", preset="unreal", **OBJ), Done)
     target = folder(capture, "own_mesh", "unreal")
-    assert {path.name
-            for path in (target / "textures").glob("*_BaseColor*")} == {f"T_Zoe_et_moi_BaseColor.{tile}.png"
-                                                                        for tile in (1001, 1002)}
+    albedos = {path.name for path in (target / "textures").glob("*_BaseColor*")}
+    assert albedos == {f"T_Zoe_et_moi_BaseColor.{tile}.png" for tile in (1001, 1002)}
     parts = trimesh.load_scene(target / "Zoe_et_moi.obj", process=False).geometry.values()
     shades = sorted((round(np.array(part.visual.material.image)[0, 0, 0] / 255, 2), part.visual.uv[:, 0].min() >= 1)
                     for part in parts)
     assert shades == [(0.25, False), (0.5, True)]
     assert isinstance(delivered.deliver(capture, what="scan", **OBJ), Done)
-    assert {path.name
-            for path in (folder(capture, "scan") / "textures").iterdir()} == {"Zoe_et_moi_albedo.png",
-                                                                              "Zoe_et_moi_lit.png"}
+    textures = {path.name for path in (folder(capture, "scan") / "textures").iterdir()}
+    assert textures == {"Zoe_et_moi_albedo.png", "Zoe_et_moi_lit.png"}
 
 
 def test_provenance_tells_all_and_no_folder(capture):
@@ -214,8 +212,8 @@ def test_provenance_tells_all_and_no_folder(capture):
     told = json.loads(text)
     assert "anna" not in text and str(capture.root.parent) not in text and "/home" not in text and str(ROOT) not in text
     assert told["capture"]["sources"] == [{"name": "film.mp4", "bytes": 7, "sha256": "not there any more"}]
-    assert told["stages"]["solve"]["seed"] == 0 and told["stages"]["solve"]["settings"] == {"steps": 20,
-                                                                                            "prior": "prior"}
+    solve = told["stages"]["solve"]
+    assert solve["seed"] == 0 and solve["settings"] == {"steps": 20, "prior": "prior"}
     assert told["versions"]["packages"]["numpy"] == np.__version__ and told["versions"]["Python"]
     prior = next(entry for entry in told["weights"] if entry["name"] == "prior.safetensors")
     assert len(prior["sha256"]) == 64 and prior["licence"] == "GPL-3.0-or-later" and prior["notices"]
@@ -276,9 +274,8 @@ def test_every_preset_has_an_albedo_that_is_linked_and_names_of_its_own():
             and preset.maps[0].slot == "base_color"
             and preset.maps[0].kind == delivery_presets.COLOUR
         )
-        assert len({picture.name
-                    for picture in (*preset.maps,
-                                    *delivery_presets.HAIR)}) == len(preset.maps) + len(delivery_presets.HAIR)
+        pictures = (*preset.maps, *delivery_presets.HAIR)
+        assert len({picture.name for picture in pictures}) == len(pictures)
     with pytest.raises(Problem):
         delivery_plan.needs(Capture("/none"), "head")
     assert delivery_plan.safe_name("山田") == "head" and delivery_plan.safe_name("Zoë & moi") == "Zoe_moi"
@@ -290,8 +287,8 @@ def test_the_terminal_delivers_without_blender(capture, capsys):
     assert main(["deliver", str(capture.root), "--preset", "unreal", "--pictures", "png16"]) == 0
     target = folder(capture, preset="unreal")
     assert capsys.readouterr().out.splitlines()[-1] == str(target)
-    assert {"Zoe_et_moi.obj", "Zoe_et_moi.mtl", "provenance.json",
-            "textures"} == {path.name for path in target.iterdir()}
+    written = {path.name for path in target.iterdir()}
+    assert written == {"Zoe_et_moi.obj", "Zoe_et_moi.mtl", "provenance.json", "textures"}
 
 
 def test_the_guide_has_the_tables_as_they_are(capsys):

@@ -31,10 +31,10 @@ def test_files_that_others_added_stay_and_the_delivery_goes_on(capture):
     (place / "look" / "shader.ma").write_text("and mine")
     first = (place / delivery_plan.PROVENANCE).stat().st_ino
     assert isinstance(delivered.deliver(capture, **{**OBJ, "hair": False}), Done)
-    assert (place / "my notes.txt").read_text() == "mine" and (place / "textures"
-                                                               / "painted.psd").read_text() == "mine too"
-    assert (place / "look"
-            / "shader.ma").read_text() == "and mine" and (place / delivery_plan.PROVENANCE).stat().st_ino != first
+    assert (place / "my notes.txt").read_text() == "mine"
+    assert (place / "textures" / "painted.psd").read_text() == "mine too"
+    assert (place / "look" / "shader.ma").read_text() == "and mine"
+    assert (place / delivery_plan.PROVENANCE).stat().st_ino != first
     assert [path.name for path in capture.exports.iterdir()] == [place.name], "nothing is left beside it"
 
 
@@ -71,8 +71,8 @@ def test_what_others_put_into_both_an_older_delivery_and_the_new_one_is_kept_twi
     (old / "notes.txt").write_text("older")
     (place / "notes.txt").write_text("newer")
     assert isinstance(delivered.deliver(capture, **OBJ), Done)
-    assert {path.name: path.read_text()
-            for path in place.glob("notes*")} == {"notes.txt": "newer", "notes_2.txt": "older"} and not old.exists()
+    notes = {path.name: path.read_text() for path in place.glob("notes*")}
+    assert notes == {"notes.txt": "newer", "notes_2.txt": "older"} and not old.exists()
 
 
 @pytest.mark.parametrize("at", range(6))
@@ -99,6 +99,6 @@ def test_killed_at_any_rename_a_delivery_loses_nothing_of_others(capture, at, mo
     monkeypatch.setattr(delivery_plan.os, "replace", rename)
     delivery_plan.discard(plan)
     assert isinstance(delivered.deliver(capture, **OBJ), Done), "the next delivery ends what was begun"
-    assert {path.name: path.read_text()
-            for path in place.glob("* notes.txt")} == {name: name for name in ("a notes.txt", "b notes.txt")}
+    notes = {path.name: path.read_text() for path in place.glob("* notes.txt")}
+    assert notes == {name: name for name in ("a notes.txt", "b notes.txt")}
     assert [path.name for path in capture.exports.iterdir()] == [place.name]

@@ -34,6 +34,6 @@ def test_only_our_own_deprecations_fail_a_run(tmp_path, folder, category, messag
     test.write_text(TEST.format(folder=str(checkout / folder)), encoding="utf-8")
     ran = subprocess.run([sys.executable, "-c", RUN, checkout, "-p", "no:cacheprovider", "--rootdir", checkout, test],
                          capture_output=True, text=True, cwd=ROOT)
-    assert (ran.returncode, "1 passed" in ran.stdout,
-            message in ran.stdout) == (code, True, True), ran.stdout + ran.stderr
+    told = ran.stdout + ran.stderr
+    assert ran.returncode == code and "1 passed" in ran.stdout and message in ran.stdout, told
     assert (f"old_ways.py:4: {message}" in ran.stdout) == bool(code), ran.stdout

@@ -60,9 +60,8 @@ def test_the_second_card_is_tried_after_the_first_and_all_of_it_once(monkeypatch
 
 
 def test_without_a_card_nothing_is_computed(monkeypatch):
-    assert machine(monkeypatch) == [] and device.prove() == device.Proof("cpu",
-                                                                         "PyTorch finds no graphics card that it can "
-                                                                         "use.")
+    assert machine(monkeypatch) == []
+    assert device.prove() == device.Proof("cpu", "PyTorch finds no graphics card that it can use.")
 
 
 def test_the_pass_is_one_of_the_shipped_network_there_and_back():

@@ -84,8 +84,11 @@ def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, behind, expo
     contents = []
     for i in range(24):
         picture, inside = turning_head(0.035 * i, skin, wall)
-        monkeypatch.setattr(faces, "segment_person", lambda small,
-                            inside=inside: cv2.resize(inside.astype(np.float32), small.shape[1::-1]))
+
+        def segment(small, inside=inside):
+            return cv2.resize(inside.astype(np.float32), small.shape[1::-1])
+
+        monkeypatch.setattr(faces, "segment_person", segment)
         contents.append(content_of(exposed(picture, true[i])))
     assert np.mean([c.person.mean() for c in contents]) > (0.2 if behind == "a textured wall" else 0.8)
     gains = gains_of(contents)

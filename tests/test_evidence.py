@@ -61,8 +61,8 @@ def test_cameras_and_scan_come_in_again_in_place_and_go_with_the_head(addon, rec
     for _ in range(2):
         bpy.ops.wildcap.bring_in_cameras()
         bpy.ops.wildcap.bring_in_scan()
-    assert sorted(name.split()[-1] for name in cameras()) == ["00000.jpg",
-                                                              "00002.jpg"], "those the texture is made from"
+    filmed = sorted(name.split()[-1] for name in cameras())
+    assert filmed == ["00000.jpg", "00002.jpg"], "those the texture is made from"
     assert len(bpy.data.cameras) == 2 and [c.name for c in bpy.data.collections] == ["head Cameras"]
     scans = [o for o in bpy.context.scene.objects if o.name.endswith("Scan")]
     assert (

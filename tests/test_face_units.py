@@ -82,9 +82,8 @@ def test_on_the_template_itself_units_are_makehumans_to_the_files_precision(asse
     pupils = [body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
     away = np.min(np.linalg.norm(asset.template[:, None] - asset.template[asset.copies][None], axis=2), 1) > 0.012
     for name in ("jawOpen", "mouthSmileRight", "browInnerUp"):
-        offset = builder.subdivision @ base.target(f"faceunits/{name}")[builder.used] * (0.063
-                                                                                         / np.linalg.norm(pupils[0]
-                                                                                                          - pupils[1]))
+        scale = 0.063 / np.linalg.norm(pupils[0] - pupils[1])
+        offset = builder.subdivision @ base.target(f"faceunits/{name}")[builder.used] * scale
         truth = np.stack([offset[:, 0], -offset[:, 2], offset[:, 1]], 1)[away]
         rows, moves = asset.units[name]
         found = np.zeros_like(asset.template)

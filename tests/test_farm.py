@@ -19,8 +19,8 @@ def test_a_farm_is_laid_out_with_twins_and_again(tmp_path):
     farm, serial = read_batch(tmp_path / "farm"), read_batch(tmp_path / "serial")
     assert [face.name for face in serial.faces] == ["kind0", "kind1", "kind2", "kind3"] and len(farm.faces) == 6
     assert farm.faces[5].source == serial.faces[1].source and farm.faces[5].settings == serial.faces[1].settings
-    assert {(face.source, face.settings["seed"])
-            for face in serial.faces} == {(farm_batch.film(tmp_path, kind), kind) for kind in range(4)}
+    filmed = {(farm_batch.film(tmp_path, kind), kind) for kind in range(4)}
+    assert {(face.source, face.settings["seed"]) for face in serial.faces} == filmed
     assert derive_state(farm, farm.faces[0]).state == TO_DO
     with av.open(str(serial.faces[2].source)) as film:
         assert sum(1 for _ in film.decode(video=0)) == farm_batch.FRAMES
@@ -49,10 +49,8 @@ def test_what_was_done_twice_or_lost_for_no_reason_is_found():
     fine = [Begun("a", 7, "f", "scan", 3, None), Begun("b", 8, "f", "scan", 5, 6)]
     kill = {"at": 4, "host": "a", "pid": 7}
     assert judge_account(fine, [kill]) == {"stages": 1, "twice": 0, "interrupted": 1, "unexplained": 0}
-    assert judge_account(fine,
-                         [{**kill, "pid": None}])["unexplained"] == judge_account(fine,
-                                                                                  [{**kill, "host": None,
-                                                                                    "pid": None}])["unexplained"] == 0
+    for account in ({**kill, "pid": None}, {**kill, "host": None, "pid": None}):
+        assert judge_account(fine, [account])["unexplained"] == 0
     for other in ({**kill, "pid": 8}, {**kill, "host": "b"}, {**kill, "at": 2}):
         assert judge_account(fine, [other])["unexplained"] == 1
     assert judge_account([*fine, Begun("a", 9, "f", "scan", 7, 8)], [kill])["twice"] == 1

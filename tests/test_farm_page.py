@@ -65,8 +65,8 @@ def test_the_loop_for_slurm_submits_and_chains_every_task(tmp_path):
     sbatch.parent.mkdir()
     sbatch.write_text(SBATCH.format(python=sys.executable), encoding="utf-8")
     sbatch.chmod(0o755)
-    loop = re.search(r"```bash\n(.*?)```", PAGE,
-                     re.DOTALL)[1].replace("python /opt/wildcap/code", f"'{sys.executable}' '{program}'")
+    loop = re.search(r"```bash\n(.*?)```", PAGE, re.DOTALL)[1]
+    loop = loop.replace("python /opt/wildcap/code", f"'{sys.executable}' '{program}'")
     ended = subprocess.run(["bash", "-euo", "pipefail", "-c", loop], capture_output=True, text=True, cwd="/", env={
         **os.environ, "PATH": f"{sbatch.parent}:{os.environ['PATH']}", "BATCH": str(batch), "SBATCH_LOG": str(log)})
     assert ended.returncode == 0, ended.stderr

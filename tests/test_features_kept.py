@@ -69,8 +69,8 @@ def test_jointly_a_bleached_face_loses_all_and_the_pictures_themselves_keep_thei
     assert joint([{"brows": 0.0, "eyes": 0.0}] * 2, filmed) == pytest.approx({"lost": 1.0, "between_lights": 0.0})
     halved = [{"brows": 1.1, "eyes": 1.0}, {"brows": 0.9, "eyes": 1.0}]
     assert joint(halved, filmed) == pytest.approx({"lost": 0.05, "between_lights": 0.5})
-    assert joint(filmed[:1],
-                 filmed[:1])["between_lights"] is None and joint([{}], [{}]) == {"lost": None, "between_lights": None}
+    assert joint(filmed[:1], filmed[:1])["between_lights"] is None
+    assert joint([{}], [{}]) == {"lost": None, "between_lights": None}
 
 
 def test_a_face_that_was_measured_elsewhere_has_the_same_contrasts():
@@ -85,9 +85,8 @@ def test_a_face_that_was_measured_elsewhere_has_the_same_contrasts():
         for path in (FACEOLAT / "align_diffuse" / f"{name}.png",
                      next(iter(sorted((FACEOLAT / "align_image" / person / camera).glob("*.png"))))):
             srgb = images.read_srgb(path)
-            assert contrasts(srgb, landmarks,
-                             face) == pytest.approx(theirs.contrasts(srgb.astype(np.float64), landmarks, face),
-                                                    abs=1e-4)
+            wanted = theirs.contrasts(srgb.astype(np.float64), landmarks, face)
+            assert contrasts(srgb, landmarks, face) == pytest.approx(wanted, abs=1e-4)
 
 
 RNG = np.random.default_rng(2)
@@ -102,13 +101,13 @@ def test_doing_nothing_follows_both_and_a_flat_colour_neither():
     albedo, light = 0.3 * field(0.2), field(0.3)
     other_albedo, other_light = albedo * field(0.2), light * field(0.3)
     pigment, lights = (albedo * light, other_albedo * light), (albedo * light, albedo * other_light)
-    assert slope(pigment, (albedo, other_albedo),
-                 HERE) == pytest.approx(1) and slope(lights, lights, HERE) == pytest.approx(1)
+    assert slope(pigment, (albedo, other_albedo), HERE) == pytest.approx(1)
+    assert slope(lights, lights, HERE) == pytest.approx(1)
     flat = (np.full((60, 50, 3), 0.3), np.full((60, 50, 3), 0.2))
-    assert slope(flat, (albedo, other_albedo),
-                 HERE) == pytest.approx(0) and slope(flat, lights, HERE) == pytest.approx(0)
-    assert slope((albedo, other_albedo), (albedo, other_albedo),
-                 HERE) == 1 and slope((albedo, albedo), lights, HERE) == 0, "the true light"
+    assert slope(flat, (albedo, other_albedo), HERE) == pytest.approx(0)
+    assert slope(flat, lights, HERE) == pytest.approx(0)
+    assert slope((albedo, other_albedo), (albedo, other_albedo), HERE) == 1, "the true light"
+    assert slope((albedo, albedo), lights, HERE) == 0
 
 
 def test_an_answer_that_mixes_both_by_half_has_slopes_of_a_half():

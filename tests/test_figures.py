@@ -43,6 +43,5 @@ def test_a_file_that_is_no_record_is_a_problem(tmp_path, text):
 
 
 def test_a_table_has_a_dash_where_nothing_was_measured():
-    assert figures.markdown(["row", "PSNR"],
-                            [["ours", "30.1 dB"],
-                             ["theirs", None]]) == "| row | PSNR |\n| --- | --- |\n| ours | 30.1 dB |\n| theirs | - |"
+    table = figures.markdown(["row", "PSNR"], [["ours", "30.1 dB"], ["theirs", None]])
+    assert table == "| row | PSNR |\n| --- | --- |\n| ours | 30.1 dB |\n| theirs | - |"

@@ -182,13 +182,13 @@ def test_the_commands_do_the_work_on_a_machine_that_sees_the_storage_elsewhere(f
         return ended
 
     to_masks = jobs_of(program, tmp_path, storage / "batch")
-    assert [job["settings"]["part"]
-            for job in to_masks] == ["to the masks"] * 2 and {job["type"] for job in to_masks} == {"wildcap"}
+    assert [job["settings"]["part"] for job in to_masks] == ["to the masks"] * 2
+    assert {job["type"] for job in to_masks} == {"wildcap"}
     assert len(work(to_masks)) == 4 and not jobs_of(program, tmp_path, storage / "batch")
     accept_mask(Capture(storage / "batch" / "Zoë d'Arc.wildcap"))
     from_masks = jobs_of(program, tmp_path, storage / "batch")
-    assert [(job["settings"]["faces"], job["settings"]["part"])
-            for job in from_masks] == [("Zoë d'Arc", "from the masks")]
+    parts = [(job["settings"]["faces"], job["settings"]["part"]) for job in from_masks]
+    assert parts == [("Zoë d'Arc", "from the masks")]
     assert work(from_masks) == ["Zoë d'Arc.solve", "Zoë d'Arc.deliver"]
     assert "Zoë d'Arc            done" in call(program, tmp_path, "batch", "status", storage / "batch").stdout
     assert work(from_masks), "submitted again, what is done ends well"
@@ -199,8 +199,8 @@ def test_a_film_that_stops_fails_its_own_job_alone(farm, tmp_path):
     call(program, tmp_path, "batch", "plan", storage / "films", storage / "batch")
     moods(storage / "batch", Anna={"frames": "finding"})
     jobs = jobs_of(program, tmp_path, storage / "batch")
-    assert [(job["settings"]["faces"], job["settings"]["part"])
-            for job in jobs] == [(name, "all") for name in ("Anna", "Zoë d'Arc")]
+    parts = [(job["settings"]["faces"], job["settings"]["part"]) for job in jobs]
+    assert parts == [(name, "all") for name in ("Anna", "Zoë d'Arc")]
     values = {"wildcap_python": sys.executable, "wildcap": str(program)}
     task = submitted(jobs[0], {})[0]["commands"][0]["parameters"]
     stopped = subprocess.run([sent(word, values) for word in (task["exe"], *task["args"])], cwd=tmp_path,
@@ -214,9 +214,8 @@ def test_the_lines_of_commands_run_in_any_folder_and_end_the_batch(farm, tmp_pat
     moods(storage / "batch")
     lines = [line.split("\t")
              for line in call(program, tmp_path, "batch", "commands", storage / "batch").stdout.splitlines()]
-    assert len(lines) == 2 * len(GROUPS) and [after
-                                              for _, after, _ in lines][:4] == ["", "Anna.head", "Anna.mask",
-                                                                                "Anna.solve"]
+    assert len(lines) == 2 * len(GROUPS)
+    assert [after for _, after, _ in lines][:4] == ["", "Anna.head", "Anna.mask", "Anna.solve"]
     for _, _, command in lines[:4]:
         assert subprocess.run(command, shell=True, cwd="/", capture_output=True).returncode == 0
     assert "Anna                 done" in call(program, tmp_path, "batch", "status", storage / "batch").stdout

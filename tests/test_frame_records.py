@@ -101,8 +101,8 @@ def test_what_is_read_is_written_byte_for_byte(tmp_path):
     assert (tmp_path / "again" / "frames.json").read_bytes() == WRITTEN.encode()
     changed = dataclasses.replace(frames.records[1], selected=True)
     write_frames(tmp_path / "again", dataclasses.replace(frames, records=(frames.records[0], changed)))
-    assert (tmp_path / "again"
-            / "frames.json").read_text(encoding="utf-8") == WRITTEN.replace('"selected": false', '"selected": true')
+    again = (tmp_path / "again" / "frames.json").read_text(encoding="utf-8")
+    assert again == WRITTEN.replace('"selected": false', '"selected": true')
 
 
 def test_records_are_values():
@@ -113,14 +113,13 @@ def test_records_are_values():
 
 
 def test_older_and_newer_files_are_read(tmp_path):
-    frames = read_frames(capture_with(tmp_path,
-                                      json.dumps({"frames": [OLDEST, {**OLDEST, "name": "00002.jpg", "mood": "bright"}],
-                                                  "camera": "of tomorrow"})))
+    newer = {"frames": [OLDEST, {**OLDEST, "name": "00002.jpg", "mood": "bright"}], "camera": "of tomorrow"}
+    frames = read_frames(capture_with(tmp_path, json.dumps(newer)))
     assert frames.kind is None
     assert frames.records == (FrameRecord(**OLDEST), FrameRecord(**{**OLDEST, "name": "00002.jpg"}))
     first = frames.records[0]
-    assert (first.video_frame, first.yaw_deg, first.focal_px, first.source,
-            first.gain) == (None, None, None, "", (1.0, 1.0, 1.0))
+    assert (first.video_frame, first.yaw_deg, first.focal_px) == (None, None, None)
+    assert first.source == "" and first.gain == (1.0, 1.0, 1.0)
     write_frames(tmp_path / "again", frames)
     assert "kind" not in json.loads((tmp_path / "again" / "frames.json").read_text(encoding="utf-8"))
 

@@ -32,8 +32,8 @@ def test_what_is_kept_stays_and_is_what_was_there(captures):
     assert sorted(path.name for path in out.iterdir()) == ["anna.wildcap", "ben.wildcap", "frozen.json"]
     assert (out / "anna.wildcap" / "delit" / "shadow" / "00000.png").read_text() == "anna delit/shadow/00000.png"
     assert not (out / "anna.wildcap" / "checkpoints").exists()
-    assert freeze.read_record(out)["anna"]["stages"] == {"texture": {"version": "0.1.0", "code": "abc",
-                                                                     "finished": None, "seed": None, "settings": None}}
+    recorded = {"version": "0.1.0", "code": "abc", "finished": None, "seed": None, "settings": None}
+    assert freeze.read_record(out)["anna"]["stages"] == {"texture": recorded}
     (captures / "in" / "ben.wildcap" / "texture.exr").write_text("another delighter's")
     assert freeze.freeze(captures / "in", out) == ["ben"]
     assert (out / "ben.wildcap" / "texture.exr").read_text() == "ben texture.exr" and freeze.differences(out) == []

@@ -177,8 +177,8 @@ def test_paths_in_a_capture_are_relative_where_both_may_be_moved_together(tmp_pa
         assert read_portable(text, root) == inside
         assert read_portable(text, Path("/elsewhere/project/anna.wildcap")) != inside
     assert write_portable("/film.mp4", root) == str(Path("/film.mp4").absolute())
-    assert write_portable(Path.home() / "Videos" / "film.mp4",
-                          Path.home() / "Documents" / "anna.wildcap") == str(Path.home() / "Videos" / "film.mp4")
+    film = Path.home() / "Videos" / "film.mp4"
+    assert write_portable(film, Path.home() / "Documents" / "anna.wildcap") == str(film)
     assert read_portable("/film.mp4", root) == Path("/film.mp4").absolute()
 
 
@@ -258,8 +258,8 @@ def test_a_run_keeps_what_older_code_made_says_so_and_forced_makes_it_again(capt
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
     runner.run_job(write_job(capture, last="cameras"), said.append)
     assert ran == [] and states(capture) == ["older", "older"]
-    assert [line.text for line in said
-            if isinstance(line, Log)][-1].startswith("Made by older code and kept: Frames, Cameras. Run a stage again")
+    told = [line.text for line in said if isinstance(line, Log)]
+    assert told[-1].startswith("Made by older code and kept: Frames, Cameras. Run a stage again")
     runner.run_job(write_job(capture, first="cameras", last="cameras"), said.append)
     assert ran == ["cameras"] and states(capture) == ["older", "done"]
 

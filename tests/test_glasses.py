@@ -70,8 +70,8 @@ def test_a_capture_with_glasses_is_refused_and_the_artist_can_overrule_it(tmp_pa
     overruled = tmp_path / "overruled"
     overruled.mkdir()
     report = take(overruled, pictures, no_glasses=True)
-    assert report.figures["frames_with_glasses_percent"] == 100 and not any("glasses" in finding["problem"]
-                                                                            for finding in report.findings)
+    assert report.figures["frames_with_glasses_percent"] == 100
+    assert not any("glasses" in finding["problem"] for finding in report.findings)
 
 
 def test_doubt_is_a_warning_and_few_photographs_refuse_nothing():
@@ -93,8 +93,8 @@ def test_a_drawn_pair_stands_before_the_eyes_and_rests_on_the_ears(kind):
         eyes = [landmarks[list(corners)].mean(0) for corners in glasses.EYES]
         for rim, eye in zip(pair.rims, eyes, strict=True):
             low, high = rim.min(0), rim.max(0)
-            assert (low[[0, 2]] < eye[[0, 2]]).all() and (eye[[0, 2]]
-                                                          < high[[0, 2]]).all(), "the pupil lies within its rim"
+            within = (low[[0, 2]] < eye[[0, 2]]) & (eye[[0, 2]] < high[[0, 2]])
+            assert within.all(), "the pupil lies within its rim"
             assert 0.008 < eye[1] - rim[:, 1].mean() < 0.03, "and behind it"
         for temple, ear in zip(pair.bars[-2:], glasses.SIDES, strict=True):
             assert np.linalg.norm(temple[-1] - landmarks[ear]) < 0.05

@@ -69,8 +69,8 @@ def test_hair_lies_where_the_worker_grew_it_and_in_its_thickness(strands, addon)
         assert hair.parent == head() and hair.data.surface == head()
         assert np.abs(places(hair) - strands[part].reshape(-1, 3)).max() < 1e-5, "at rest nothing bends it"
         assert hair.data.attributes["radius"].data[0].value == pytest.approx(4e-5)
-    assert tuple(hairs["brows"].data.attributes["wildcap_colour"].data[0].color)[:3] == pytest.approx((0.03, 0.03,
-                                                                                                       0.03))
+    colour = hairs["brows"].data.attributes["wildcap_colour"].data[0].color
+    assert tuple(colour)[:3] == pytest.approx((0.03, 0.03, 0.03))
 
 
 def test_hair_goes_along_when_the_face_moves(strands, addon):
@@ -101,8 +101,8 @@ def test_what_was_combed_stays_and_the_rest_grows_anew(strands, addon):
     assert np.abs(places(brows) - combed).max() < 1e-5
     assert len(lashes.data.curves) == 20
     shorter = places(lashes).reshape(20, 5, 3)
-    assert np.linalg.norm(shorter[:, -1] - shorter[:, 0],
-                          axis=1) == pytest.approx(0.5 * 0.006 * np.hypot(1, 0.2), rel=1e-3)
+    lengths = np.linalg.norm(shorter[:, -1] - shorter[:, 0], axis=1)
+    assert lengths == pytest.approx(0.5 * 0.006 * np.hypot(1, 0.2), rel=1e-3)
 
 
 def test_what_was_thickened_stays_and_data_in_another_use_is_kept(strands, addon):
@@ -189,11 +189,15 @@ def test_hair_goes_out_and_comes_back_by_blenders_own_exporters(strands, addon, 
     bpy.ops.wildcap.grow_hair()
     brows, lashes = addon("groom.curves").of(head())
     path = str(tmp_path / f"hair{suffix}")
-    bpy.ops.wm.usd_export(filepath=path) if suffix == ".usdc" else bpy.ops.wm.alembic_export(filepath=path,
-                                                                                             as_background_job=False)
+    if suffix == ".usdc":
+        bpy.ops.wm.usd_export(filepath=path)
+    else:
+        bpy.ops.wm.alembic_export(filepath=path, as_background_job=False)
     bpy.ops.wm.read_homefile(use_empty=True)
-    bpy.ops.wm.usd_import(filepath=path) if suffix == ".usdc" else bpy.ops.wm.alembic_import(filepath=path,
-                                                                                             as_background_job=False)
+    if suffix == ".usdc":
+        bpy.ops.wm.usd_import(filepath=path)
+    else:
+        bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)
     back = [obj for obj in bpy.data.objects if obj.type in ('CURVES', 'CURVE')]
     counts = sorted(len(obj.data.curves if obj.type == 'CURVES' else obj.data.splines) for obj in back)
     assert counts == [40, 40]

@@ -93,8 +93,8 @@ def test_brows_behind_a_fringe_are_like_the_other_one_or_as_usual(both):
     parts[forehead] = [0, 0, 0.95]
     seen = found(LIGHT, [(brows, BLACK), (fringe, BLACK)], parts)
     hidden = where & forehead
-    assert seen.brows[hidden].mean() == pytest.approx(hair.USUAL["brows"] if both else brows[where & ~forehead].mean(),
-                                                      abs=0.1)
+    usual = hair.USUAL["brows"] if both else brows[where & ~forehead].mean()
+    assert seen.brows[hidden].mean() == pytest.approx(usual, abs=0.1)
     assert seen.brows[forehead & ~where].mean() < 0.02 and seen.hidden[hidden].min() > 0.99
 
 

@@ -46,9 +46,8 @@ def sees(monkeypatch, module, views, head, mask, otherwise=None):
     for i, view in enumerate(views):
         face, bary, _ = raster.render_view(head.caster, view)
         uv = raster.interpolate(head.mesh.uvs, head.mesh.face_uvs, face, bary)
-        share = raster.sample(mask,
-                              np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2)
-                              * len(mask)).reshape(face.shape) * (face >= 0)
+        at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(mask)
+        share = raster.sample(mask, at).reshape(face.shape) * (face >= 0)
         shown[i] = share.astype(np.float32) if otherwise is None or i not in otherwise else otherwise[i](share)
 
     def parse(srgb, landmarks):

@@ -98,10 +98,10 @@ def _eyes_opened(truth, points, lids):
     changed, marks = truth.copy(), points.copy()
     for inner, outer in ((133, 33), (362, 263)):
         middle = (points[inner] + points[outer]) / 2
-        across = (truth - middle) @ ((points[outer] - points[inner])
-                                     / np.linalg.norm(points[outer] - points[inner])) / 0.013
-        inside = (across**2 + ((truth - middle)[:, 2] / 0.007) ** 2
-                  < 1) & (lids > 0.3) & (np.linalg.norm(truth - middle, axis=1) < 0.02)
+        axis = points[outer] - points[inner]
+        across = (truth - middle) @ (axis / np.linalg.norm(axis)) / 0.013
+        near = (lids > 0.3) & (np.linalg.norm(truth - middle, axis=1) < 0.02)
+        inside = (across**2 + ((truth - middle)[:, 2] / 0.007) ** 2 < 1) & near
         changed[inside, 1] += 0.004
     rims = np.array(eyes.LID_MARKS)
     middles = np.where((marks[rims, 0] < points[[33, 263], 0].mean())[:, None], points[[33, 133]].mean(0),

@@ -221,8 +221,8 @@ def test_an_interrupted_solve_is_offered_to_go_on_when_the_file_is_opened_again(
     # painted since: a checkpoint of another mask is of no use
     capture.shadow_mask.write_bytes((capture.root / "shadow_mask_auto.png").read_bytes())
     addon("status").refresh(bpy.context)
-    assert addon("next_step").next_step(addon("panel").gather(bpy.context,
-                                                              addon("captures").active(bpy.context))).label == "Solve"
+    facts = addon("panel").gather(bpy.context, addon("captures").active(bpy.context))
+    assert addon("next_step").next_step(facts).label == "Solve"
 
 
 def test_how_long_a_quality_takes_is_learned_from_the_last_solve(addon, jobs, tmp_path):
@@ -270,8 +270,8 @@ def test_the_running_solve_is_shown_on_the_head_and_leaves_no_trace(addon, jobs,
     bpy.ops.wildcap.paint_mask()
     (capture.preview / "albedo.png").write_bytes(standin.plain((0, 255, 0)))
     live.update(root)
-    assert tuple(round(v)
-                 for v in nodes[head_name].image.pixels[:3]) == (0, 0, 1), "nothing is touched while somebody paints"
+    kept = tuple(round(v) for v in nodes[head_name].image.pixels[:3])
+    assert kept == (0, 0, 1), "nothing is touched while somebody paints"
     bpy.ops.wildcap.finish_mask()
     jobs.cancel(root)
     finish(jobs)
@@ -282,22 +282,3 @@ def test_the_running_solve_is_shown_on_the_head_and_leaves_no_trace(addon, jobs,
     bpy.ops.wildcap.assemble_material()
     assert head_name not in bpy.context.object.active_material.node_tree.nodes
     assert not any(head_name in image.name for image in bpy.data.images)
-
-
-def test_a_look_at_a_capture_holds_nobody_up(addon, capture, monkeypatch):
-    import threading
-
-    status, captures = addon("status"), addon("captures")
-    item = captures.active(bpy.context)
-    status._known.clear()
-    assert status.of(item) is None
-    look, threads = status.look, []
-    monkeypatch.setattr(status, "look", lambda *given: threads.append(threading.current_thread()) or look(*given))
-    for _ in range(500):
-        status._tick()
-        if status.of(item) is not None:
-            break
-        time.sleep(0.01)
-    assert status.of(item).has_head and len(threads) == 1 and threads[0] is not threading.main_thread()
-    status._tick()
-    assert len(threads) == 1, "nothing changed, nothing is looked at"

@@ -80,10 +80,8 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
         (root / name).write_bytes(content)
         assert [told for told in kills_judge.after_kill(place, known) if fault in told], name
         (root / name).unlink() if before is None else (root / name).write_bytes(before)
-    assert kills_judge.after_kill(place, known,
-                                  {"shadow_mask.png": (b"old",
-                                                       b"new")}) == ["shadow_mask.png is neither the old mask nor a "
-                                                                     "new one"]
+    told = kills_judge.after_kill(place, known, {"shadow_mask.png": (b"old", b"new")})
+    assert told == ["shadow_mask.png is neither the old mask nor a new one"]
     (root / "notes" / "list.txt").rename(root / "list.txt")
     assert "the user's notes/list.txt is gone" in kills_judge.after_kill(place, known)
     (root / "list.txt").rename(root / "notes" / "list.txt")
@@ -121,8 +119,8 @@ def test_a_process_is_struck_at_its_moment(tmp_path, moment):
     assert forked.strike() and forked.code == -signal.SIGKILL
     written = len(list(tmp_path.glob("*.txt")))
     assert written == 2 if moment.write and not moment.late_s else 2 < written < 100
-    assert kills_worker.Forked(lambda: None, tmp_path, tmp_path / "told",
-                               kills_worker.Moment(write=1)).strike() is False
+    never = kills_worker.Forked(lambda: None, tmp_path, tmp_path / "told", kills_worker.Moment(write=1))
+    assert never.strike() is False
 
 
 def test_a_camera_model_that_did_not_fit_on_the_disk_gets_no_name(tmp_path):
@@ -148,14 +146,14 @@ def test_a_camera_model_that_did_not_fit_on_the_disk_gets_no_name(tmp_path):
 
 def test_a_checkpoint_that_did_not_fit_on_the_disk_is_told_by_name(tmp_path, monkeypatch):
     """safetensors has an error of its own, with the system's in words."""
-    state, path = State(1, None, torch.ones(1, 7, 32, 32), Lights(*torch.ones(3, 4)),
-                        []), tmp_path / "solve.safetensors"
+    state = State(1, None, torch.ones(1, 7, 32, 32), Lights(*torch.ones(3, 4)), [])
+    path = tmp_path / "solve.safetensors"
     assert (
         "solve.safetensors could not be written" in with_limit(4096, lambda: checkpoint.write(path, state, "key"))
         and os.listdir(tmp_path) == []
     )
-    assert with_limit(1 << 20,
-                      lambda: checkpoint.write(path, state, "key")) == "" and checkpoint.read(path, "key").step == 1
+    assert with_limit(1 << 20, lambda: checkpoint.write(path, state, "key")) == ""
+    assert checkpoint.read(path, "key").step == 1
 
     def full(*_, **__):
         raise SafetensorError("Error while serializing: I/O error: No space left on device (os error 28)")

@@ -128,8 +128,8 @@ def test_who_was_replaced_writes_nothing_more(capture):
                         lambda: capture.forget(["frames"]) or capture.stop("x", Problem("a", "b"))):
             with pytest.raises(Problem, match="taken this capture over"):
                 attempt()
-        with pytest.raises(Problem,
-                           match="taken this capture over"), replacing(capture.root / "deep" / "new.txt") as temporary:
+        taken = pytest.raises(Problem, match="taken this capture over")
+        with taken, replacing(capture.root / "deep" / "new.txt") as temporary:
             temporary.write_text("x")
         after = {path: path.read_bytes() for path in capture.root.iterdir() if path.is_file()
                  and path.name != "written.jsonl"}
@@ -218,10 +218,10 @@ def test_never_two_inside(capture, beginning):
     assert failures == 0
 
 
-@pytest.mark.parametrize("kind", ["dangling link", "link to itself", "folder",
-                                  pytest.param("pipe",
-                                               marks=pytest.mark.skipif(not hasattr(os, "mkfifo"),
-                                                                        reason="there are no named pipes here"))])
+NO_PIPES = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes here")
+
+
+@pytest.mark.parametrize("kind", ["dangling link", "link to itself", "folder", pytest.param("pipe", marks=NO_PIPES)])
 def test_what_is_no_lock_is_refused_by_name_and_not_waited_for(tmp_path, kind):
     capture = kept_capture.make(tmp_path / "a.wildcap")
     if kind == "folder":

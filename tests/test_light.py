@@ -76,8 +76,8 @@ def test_a_problem_holds_its_own_answer_and_repeats():
     assert np.array_equal(problem.texture, again.texture)
     assert np.allclose(problem.texture, problem.albedo * problem.shading)
     inside = problem.covered
-    assert 0.02 < (problem.shadow[inside]
-                   > 0.5).mean() < 0.9 and 0 <= problem.shadow.min() and problem.shadow.max() <= 1
+    assert 0.02 < (problem.shadow[inside] > 0.5).mean() < 0.9
+    assert 0 <= problem.shadow.min() and problem.shadow.max() <= 1
     # where nothing blocks the sun, shading is the sky's and the whole sun's; where all is blocked, it is darker than
     # that by the sun's share
     cosine = np.maximum(problem.world_normal @ problem.sun, 0)[..., None] * problem.sun_colour

@@ -22,8 +22,8 @@ def sphere(rows: int = 200, columns: int = 400):
     phi = (np.arange(columns) + 0.5) * 2 * np.pi / columns
     r = np.sqrt(1 - z**2)[:, None]
     direction = np.stack([r * np.cos(phi), r * np.sin(phi), np.broadcast_to(z[:, None], (rows, columns))])
-    return torch.from_numpy(direction), torch.from_numpy(np.broadcast_to(weight[:, None] * 2 * np.pi / columns,
-                                                                         (rows, columns)).copy())
+    solid_angle = np.broadcast_to(weight[:, None] * 2 * np.pi / columns, (rows, columns))
+    return torch.from_numpy(direction), torch.from_numpy(solid_angle.copy())
 
 
 def test_basis_is_orthogonal_with_the_stated_band_scales():

@@ -190,8 +190,8 @@ def test_every_lock_is_what_the_index_has(name):
         for need in map(lock_resolver.Requirement, wheel.needs):
             if need.marker is None or need.marker.evaluate(environment) and not lock_resolver.is_cuda(wheel, need):
                 other = found.get(locks.normal(need.name))
-                assert other is not None and need.specifier.contains(other.version,
-                                                                     prereleases=True), f"{wheel.name} needs {need}"
+                fits = other is not None and need.specifier.contains(other.version, prereleases=True)
+                assert fits, f"{wheel.name} needs {need}"
 
 
 def test_the_longest_path_and_the_download_are_what_the_wheels_say():

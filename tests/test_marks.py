@@ -53,8 +53,8 @@ def skin(strength=0.05):
 def test_a_mole_is_found_where_and_as_large_as_it_is(diameter):
     marks = find(skin() * np.exp(-spot(200, 300, diameter) * MELANIN), SKIN, TEXEL)
     assert len(marks) == 1
-    assert np.hypot(marks[0].row - 200,
-                    marks[0].column - 300) < 1.5 and 0.6 < marks[0].radius * TEXEL / (diameter / 2) < 1.6
+    assert np.hypot(marks[0].row - 200, marks[0].column - 300) < 1.5
+    assert 0.6 < marks[0].radius * TEXEL / (diameter / 2) < 1.6
     assert 0.6 * MELANIN.mean() < marks[0].contrast < 1.2 * MELANIN.mean()
     assert unlike_shadow(marks[0], TAKEN / TAKEN.mean())
 
@@ -126,8 +126,8 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
     start = initial.start(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
-    result = maps.finished(Sampler(prior.of_tone(start.tone), start.recipe,
-                                   seeded(0)).sample(start.observations, start.state), evidence, start)
+    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seeded(0))
+    result = maps.finished(sampler.sample(start.observations, start.state), evidence, start)
     solved = result.diffuse
 
     def contrast(image):

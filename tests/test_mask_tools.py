@@ -103,8 +103,8 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     mine[5:9] = 1
     mask_image.set_values(session.mask(), mine)
     bpy.ops.wildcap.snap_mask()
-    assert started[0]["tool"] == "mask_edges" and (capture
-                                                   / "shadow_mask.png").read_bytes() == mask_image.grey_png(mine)
+    assert started[0]["tool"] == "mask_edges"
+    assert (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(mine)
     theirs = np.zeros((64, 64), np.float32)
     theirs[6:8] = 1
     (capture / "shadow_mask_edges.png").write_bytes(mask_image.grey_png(theirs))

@@ -31,8 +31,8 @@ def test_means_spreads_and_paired_differences():
 
 
 def test_a_standard_error_needs_two():
-    assert standard_error([]) is None and standard_error([1.0]) is None and standard_error([1.0,
-                                                                                            3.0]) == pytest.approx(1.0)
+    assert standard_error([]) is None and standard_error([1.0]) is None
+    assert standard_error([1.0, 3.0]) == pytest.approx(1.0)
 
 
 def test_sure_differences_are_marked_though_people_differ_by_more():

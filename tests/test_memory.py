@@ -51,8 +51,8 @@ def problem():
     """Observations of a shadow at two sizes, and their denoisers: the map becomes finer within the run."""
     prior, _, texture, mask, _ = shadow_problem(32)
     half = observation(torch.nn.functional.avg_pool2d(texture, 2), torch.nn.functional.avg_pool2d(mask[None], 2)[0])
-    return {32: prior, 16: SmoothPrior(16)}, {1: observation(texture, mask),
-                                              2: half}, Recipe(steps=6, coarse=((2, 0.5),))
+    recipe = Recipe(steps=6, coarse=((2, 0.5),))
+    return {32: prior, 16: SmoothPrior(16)}, {1: observation(texture, mask), 2: half}, recipe
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +70,8 @@ def unbroken():
 def test_a_step_that_did_not_fit_is_done_again_to_the_same_bytes(unbroken, at, backward):
     priors, seen, recipe = problem()
     prior, said, steps = Refusing(priors, at, REFUSALS[at % len(REFUSALS)], backward), [], []
-    out = sample_within_memory(Sampler(prior, recipe, seeded(1)), seen, start(-0.2), lambda state,
-                               of: steps.append(state.step), said.append)
+    out = sample_within_memory(Sampler(prior, recipe, seeded(1)), seen, start(-0.2),
+                               lambda state, of: steps.append(state.step), said.append)
     assert torch.equal(out.denoised, unbroken.denoised) and torch.equal(out.x, unbroken.x)
     assert all(torch.equal(a, b) for a, b in zip(out.lights.parameters(), unbroken.lights.parameters(), strict=True))
     assert prior.network.low_memory and len(said) == 1 and f"step {at} of 6" in said[0]
@@ -121,17 +121,22 @@ def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, mo
     found = []
     for sparing in (True, False):
         if not sparing:
-            monkeypatch.setattr("core.solve.network._Shaped.of", lambda norm, convolution, x,
-                                mapped: convolution(torch.nn.functional.gelu(norm(x, mapped))))
+            def plain(norm, convolution, x, mapped):
+                return convolution(torch.nn.functional.gelu(norm(x, mapped)))
+
+            monkeypatch.setattr("core.solve.network_blocks.Shaped.of", plain)
         x, kept = torch.linspace(-1, 1, 5 * 32 * 32).reshape(1, 5, 32, 32).requires_grad_(), {}
-        with torch.autograd.graph.saved_tensors_hooks(lambda saved,
-                                                      kept=kept: (kept.update({saved.data_ptr(): saved.nbytes}),
-                                                                  saved)[1], lambda saved: saved):
+
+        def pack(saved, kept=kept):
+            kept[saved.data_ptr()] = saved.nbytes
+            return saved
+
+        with torch.autograd.graph.saved_tensors_hooks(pack, lambda saved: saved):
             out = network(x, torch.tensor([0.5]))
         maps = sum(size for size in kept.values() if size >= 32 * 16 * 16 * 4)
         found.append((out.detach(), torch.autograd.grad(out.square().sum(), x)[0], maps))
-    assert torch.equal(found[0][0],
-                       found[1][0]) and torch.equal(found[0][1], found[1][1]) and found[0][1].abs().max() > 0
+    assert torch.equal(found[0][0], found[1][0])
+    assert torch.equal(found[0][1], found[1][1]) and found[0][1].abs().max() > 0
     assert found[0][2] < 0.6 * found[1][2]
 
 

@@ -84,5 +84,5 @@ def test_what_a_file_takes_of_another_is_there():
 def test_a_name_that_moved_is_seen():
     text = ("from ..geometry import meshes\nfrom ..geometry.meshes import Mesh, "
             "together\nmeshes.joined\nmeshes.together\n")
-    assert missing_names(ROOT / "core" / "synthetic" / "beside.py",
-                         text) == ["2: together of core/geometry/meshes.py", "4: meshes.together"]
+    found = missing_names(ROOT / "core" / "synthetic" / "beside.py", text)
+    assert found == ["2: together of core/geometry/meshes.py", "4: meshes.together"]

@@ -44,8 +44,8 @@ def test_the_chain_from_nothing_to_a_picture(step):
         "install_solver", "choose_video", "make_my_head", "bring_in_head", "paint_mask", "solve", "assemble_material",
         "render"]
     assert all(s.state and s.label for s in chain)
-    assert {s.operator.split(".")[1]: s.other[1].split(".")[1] for s in chain
-            if s.other} == {"make_my_head": "reconstruct", "paint_mask": "accept_proposal"}
+    others = {s.operator.split(".")[1]: s.other[1].split(".")[1] for s in chain if s.other}
+    assert others == {"make_my_head": "reconstruct", "paint_mask": "accept_proposal"}
 
 
 def test_a_cancelled_reconstruction_continues(step):
@@ -81,5 +81,5 @@ def test_the_sample_head_needs_no_solver(step):
 
 def test_without_a_solver_whatever_needs_one_leads_to_its_set_up(step):
     assert step(python=False).operator == "wildcap.install_solver"
-    assert step(python=False, done=BEFORE, has_head=True, head_time=5.0, head=5.0,
-                has_mask=True).operator == "wildcap.install_solver"
+    offered = step(python=False, done=BEFORE, has_head=True, head_time=5.0, head=5.0, has_mask=True)
+    assert offered.operator == "wildcap.install_solver"

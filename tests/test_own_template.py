@@ -78,8 +78,8 @@ def test_a_made_mesh_goes_where_its_vertices_belong(tmp_path):
     error = np.linalg.norm(mesh.vertices[:len(chosen)] - truth.vertices[chosen], axis=1)
     face = registration.weights_of(registration.load_model())[0][chosen] > 0.5
     by_scale = alignment.similarity(neutral, truth.vertices, np.ones(len(neutral))).apply(neutral)
-    assert np.median(np.linalg.norm(by_scale - truth.vertices,
-                                    axis=1)[chosen][face]) > 0.002, "the person differs from the neutral head"
+    apart = np.linalg.norm(by_scale - truth.vertices, axis=1)[chosen][face]
+    assert np.median(apart) > 0.002, "the person differs from the neutral head"
     assert np.median(error[face]) < 0.001 and np.percentile(error[face], 95) < 0.002
     assert report.figures["own_to_head_median_mm"] < 0.15 and report.figures["own_flipped_triangles"] <= 5
     for eye, middle in zip(np.split(mesh.vertices[len(chosen):], 2), EYES, strict=True):
@@ -141,9 +141,8 @@ def test_uvs_that_cannot_be_baked_into_are_refused_until_an_atlas_is_allowed(tmp
     assert uvs == "a new atlas" and atlas.overlap_share(unwrapped.mesh) < 0.01
     own_mesh.write(tmp_path / "out.obj", unwrapped, mesh.vertices)
     back = meshes.read_obj(tmp_path / "out.obj")
-    assert np.array_equal(back.faces,
-                          mesh.faces) and np.allclose(back.uvs[back.face_uvs],
-                                                      unwrapped.mesh.uvs[unwrapped.mesh.face_uvs], atol=1e-6)
+    assert np.array_equal(back.faces, mesh.faces)
+    assert np.allclose(back.uvs[back.face_uvs], unwrapped.mesh.uvs[unwrapped.mesh.face_uvs], atol=1e-6)
 
 
 def test_parts_without_a_counterpart_follow_the_skin_around_them():
@@ -179,8 +178,8 @@ def test_a_folder_needs_one_neutral_and_shapes_of_it(tmp_path):
     meshes.write_obj(tmp_path / "identity000.obj", mesh.moved(mesh.vertices + [0, 0, 0.01]))
     meshes.write_obj(tmp_path / "smile.obj", mesh.moved(mesh.vertices + [0, 0, 0.01]))
     own = own_mesh.read(str(tmp_path), Reporter("x"))
-    assert np.allclose(own.shapes[0, :, 2], 0.01,
-                       atol=1e-5) and np.allclose(own.shapes[1, :, 2], 0.01 * own_mesh.EXPRESSION_SIGMA, atol=1e-5)
+    assert np.allclose(own.shapes[0, :, 2], 0.01, atol=1e-5)
+    assert np.allclose(own.shapes[1, :, 2], 0.01 * own_mesh.EXPRESSION_SIGMA, atol=1e-5)
     (tmp_path / "smile.obj").write_text("v 0 0 0\n")
     with pytest.raises(Problem, match="1 vertices"):
         own_mesh.read(str(tmp_path), Reporter("x"))

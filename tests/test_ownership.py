@@ -3,19 +3,15 @@
 """What WildCap did not write it never deletes or overwrites; what it wrote and somebody changed is kept aside; what a
 killed writer left goes."""
 
-import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from core.contract import ownership
 from core.contract.capture import Capture
 from core.contract.files import remove_file, replacing, replacing_folder
-from core.contract.hashes import read_hash
 from core.contract.messages import Log, Problem
 from core.worker.job import write_job
 from core.worker.runner import run_job
@@ -47,9 +43,8 @@ def test_a_file_of_ours_is_replaced_and_one_that_was_changed_is_kept_aside(captu
     with replacing(path) as temporary:
         temporary.write_text("five")
     assert path.read_text() == "five"
-    assert (capture.root / "kept"
-            / "texture.txt").read_text() == "by hand" and (capture.root / "kept"
-                                                           / "texture_2.txt").read_text() == "by hand again"
+    kept = capture.root / "kept"
+    assert (kept / "texture.txt").read_text() == "by hand" and (kept / "texture_2.txt").read_text() == "by hand again"
 
 
 def test_a_stranger_under_a_name_of_ours_is_kept_aside(capture):
@@ -147,9 +142,10 @@ def test_killed_at_any_rename_nothing_is_lost_and_the_next_run_clears_up(capture
 def test_killed_while_it_writes_the_captures_own_books_leaves_nothing_either(tmp_path, at):
     """capture.json when the folder becomes a capture (at 0: its first rename), and job.json."""
     root = tmp_path / "anna.wildcap"
-    code = KILLED.replace("with replacing_folder",
-                          "Capture({capture!r}).claim()\nwith replacing").replace(".frames)", ".job)").replace(
-        '(folder / "00000.jpg")', "folder").replace("import replacing_folder", "import replacing")
+    code = KILLED
+    for old, new in (("with replacing_folder", "Capture({capture!r}).claim()\nwith replacing"), (".frames)", ".job)"),
+                     ('(folder / "00000.jpg")', "folder"), ("import replacing_folder", "import replacing")):
+        code = code.replace(old, new)
     subprocess.run([sys.executable, "-c", code.format(root=str(ROOT), at=at, capture=str(root))], check=False)
     assert len(list(root.glob(".*.tmp.json"))) == 1
     with Capture(root).locked():
@@ -188,104 +184,7 @@ with Capture({str(capture.root)!r}).workspace() as work:
         assert not left.exists()
 
 
-# -- captures of 0.1.0, and what runs tell
-
-
-def test_a_capture_of_0_1_0_gets_a_record_of_what_it_wrote_and_of_nothing_else(tmp_path):
-    root = tmp_path / "old.wildcap"
-    (root / "frames").mkdir(parents=True)
-    for name, text in (("frames/00000.jpg", "frame"), ("frames/frames.json", "{}"),
-                       ("frames/2026 holiday.jpg", "a picture"), ("head.obj", "head"),
-                       ("notes.txt", "mine"), (".scan.99999999.tmp.ply", "half"),
-                       ("frames/.00001.99999999.tmp.jpg", "half"),
-                       ("frames/.mine.1.tmp.jpg", "mine"), (".notes.old", "mine")):
-        (root / name).write_text(text)
-    (root / ".maps.99999999.tmp").mkdir()
-    (root / "capture.json").write_text(json.dumps({"format": 1, "source": "", "stages": {"frames": {}}}))
-    capture = Capture(root)
-    with capture.locked():
-        pass
-    assert not any((root / name).exists()
-                   for name in (".scan.99999999.tmp.ply", "frames/.00001.99999999.tmp.jpg", ".maps.99999999.tmp"))
-    assert (root / "frames" / ".mine.1.tmp.jpg").read_text() == (root / ".notes.old").read_text() == "mine", (
-        "such names are not 0.1.0's alone"
-    )
-    make_frames(capture, "00000.jpg", text="new")
-    with replacing(capture.head) as temporary:
-        temporary.write_text("new")
-    assert contents(root).keys() == {"capture.json", "frames/00000.jpg", "frames/2026 holiday.jpg", "head.obj",
-                                     "notes.txt", ".notes.old", "frames/.mine.1.tmp.jpg"}
-
-
-def test_the_first_thing_written_into_a_capture_of_0_1_0_does_not_hide_what_it_wrote(tmp_path):
-    root = tmp_path / "old.wildcap"
-    root.mkdir()
-    (root / "capture.json").write_text(json.dumps({"format": 1, "source": "", "stages": {"solve": {}}}))
-    capture = Capture(root)
-    for path in (capture.shadow_mask, capture.head):
-        path.write_text("by 0.1.0")
-    for path in (capture.shadow_mask, capture.head):  # a mask painted in Blender, before any worker
-        with replacing(path) as temporary:
-            temporary.write_text("new")
-    assert not (root / "kept").exists()
-
-
-def test_a_capture_of_today_whose_record_was_lost_is_not_taken_for_one_of_0_1_0(capture):
-    make_frames(capture, "00000.jpg")
-    capture.json.write_text(json.dumps({"format": 2, "source": "", "stages": {"frames": {}}}))
-    (capture.root / ownership.RECORD).unlink()
-    left = capture.frames / ".00001.99999999.tmp.jpg"
-    left.write_text("anybody's")
-    with capture.locked():
-        pass
-    assert left.exists() and not ownership.is_ours(capture.root, capture.frames / "00000.jpg")
-    make_frames(capture, "00000.jpg", text="new")
-    assert (capture.root / "kept" / "frames" / "00000.jpg").exists() and left.exists()
-
-
-def test_a_record_with_a_line_cut_off_is_read_and_a_lost_one_loses_no_file(capture):
-    make_frames(capture, "00000.jpg")
-    record = capture.root / ownership.RECORD
-    with open(record, "ab") as file:
-        file.write(b'{"path": "frames/000')
-    make_frames(capture, "00000.jpg", text="new")
-    make_frames(capture, "00000.jpg", text="newer")
-    assert contents(capture.root).keys() == {"capture.json",
-                                             "frames/00000.jpg"}, "the line after it is a line of its own"
-    with open(record, "ab") as file:
-        file.write(b'{"path": "frames/000')
-    (capture.root / "a.txt").write_text("ours")
-    ownership.note_written(capture.root, {"a.txt": read_hash(capture.root / "a.txt")})
-    assert ownership.is_ours(capture.root, capture.root / "a.txt")
-    (capture.root / "a.txt").unlink()
-    record.unlink()
-    make_frames(capture, "00000.jpg", text="newest")
-    assert contents(capture.root / "kept") == {"frames/00000.jpg": b"newer"}
-
-
-def test_a_long_record_is_shortened_to_what_is_there(capture, monkeypatch):
-    monkeypatch.setattr(ownership, "LONG_BYTES", 2000)
-    make_frames(capture, "00000.jpg", "00001.jpg")
-    for number in range(40):
-        with replacing(capture.shadow_mask) as temporary:
-            temporary.write_text(str(number))
-    (capture.frames / "00001.jpg").write_text("retouched")
-    with capture.locked():
-        pass
-    lines = [json.loads(line) for line in (capture.root / ownership.RECORD).read_text().splitlines()]
-    assert [line["path"] for line in lines] == ["frames/00000.jpg", "shadow_mask.png"], "what was changed is not ours"
-    make_frames(capture, "00000.jpg", text="new")
-    assert contents(capture.root
-                    / "kept") == {"frames/00001.jpg": b"retouched"} or (capture.frames
-                                                                        / "00001.jpg").read_text() == "retouched"
-
-
-def test_a_copy_of_a_capture_knows_what_is_ours_by_content(capture, tmp_path):
-    make_frames(capture, "00000.jpg")
-    copied = Capture(tmp_path / "copy.wildcap")
-    shutil.copytree(capture.root, copied.root, copy_function=shutil.copyfile)
-    make_frames(copied, "00000.jpg", text="new")
-    assert not (copied.root / "kept").exists()
+# -- what runs tell
 
 
 @pytest.mark.parametrize("fails", [False, True])
@@ -293,6 +192,7 @@ def test_a_run_tells_what_it_kept_aside_also_where_it_fails(capture, monkeypatch
     from core.worker import runner
 
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
+
     def run(capture, *_):
         make_frames(capture, "00000.jpg")
         if fails:

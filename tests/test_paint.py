@@ -95,9 +95,8 @@ def test_strokes_reach_the_capture_while_the_artist_paints_on(addon, capture, mo
         session.wait()
         assert file() == mask_image.grey_png(mask_image.mask_values(image)) != before
         before = file()
-    assert [p.read_bytes()
-            for p in (capture
-                      / "mask_history").iterdir()] == [standin.plain((77,))], "one session is one step of the history"
+    steps = [p.read_bytes() for p in (capture / "mask_history").iterdir()]
+    assert steps == [standin.plain((77,))], "one session is one step of the history"
     bpy.ops.wildcap.finish_mask()
     assert file() == before
 
@@ -145,8 +144,8 @@ def test_what_is_protected_is_a_mask_of_its_own(addon, capture):
     spot[10:14, 20:24] = 1
     mask_image.set_values(paint.stencil_image, spot)
     bpy.ops.wildcap.paint_mask(mask='SHADOW', on='SHEET')
-    assert (capture
-            / "protect_mask.png").read_bytes() == mask_image.grey_png(spot), "turning to the other mask saves this one"
+    saved = (capture / "protect_mask.png").read_bytes()
+    assert saved == mask_image.grey_png(spot), "turning to the other mask saves this one"
     assert (
         session.painted_kind() == 'SHADOW' and session.on_sheet() and paint.stencil_image.name.endswith("Shadow Mask")
     )

@@ -59,8 +59,8 @@ def test_leaving_gives_back_what_the_artist_had(addon, capture, mode, shading):
     bpy.context.object.name = "Mine"
     paint = bpy.context.scene.tool_settings.image_paint
     paint.mode, paint.canvas = 'IMAGE', bpy.data.images.new("My Canvas", 8, 8)
-    paint.stencil_image, paint.use_stencil_layer, paint.stencil_color = bpy.data.images.new("My Stencil", 8,
-                                                                                            8), False, (0.25, 0.5, 0.75)
+    paint.stencil_image = bpy.data.images.new("My Stencil", 8, 8)
+    paint.use_stencil_layer, paint.stencil_color = False, (0.25, 0.5, 0.75)
     paint.invert_stencil = True
     if paint.brush is not None:
         paint.brush.color, paint.brush.size, paint.brush.strength = (0.125, 0.25, 0.5), 77, 0.5
@@ -100,8 +100,8 @@ def test_what_an_undo_brings_back_is_followed_and_nothing_of_the_painting_is_lef
     files.settle()
     assert session.on_sheet() and bpy.context.mode == 'PAINT_TEXTURE'
     bpy.ops.wildcap.finish_mask()
-    assert "WildCap Mask Sheet" not in bpy.data.objects and {o.name for o in bpy.context.view_layer.objects
-                                                             if o.visible_get()} == visible
+    assert "WildCap Mask Sheet" not in bpy.data.objects
+    assert {o.name for o in bpy.context.view_layer.objects if o.visible_get()} == visible
     bpy.ops.ed.undo_push(message="left")
     bpy.ops.ed.undo()  # into the painting that has ended
     files.settle()
@@ -225,8 +225,8 @@ def test_the_newer_mask_of_file_and_capture_wins_and_the_other_goes_to_the_histo
     os.utime(blend, (2e9, 2e9) if newer == "file" else (1e9, 1e9))
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     winner, loser = (mask_image.grey_png(mine), other) if newer == "file" else (other, mask_image.grey_png(mine))
-    assert (capture
-            / "shadow_mask.png").read_bytes() == winner == mask_image.grey_png(mask_image.mask_values(session.mask()))
+    saved = (capture / "shadow_mask.png").read_bytes()
+    assert saved == winner == mask_image.grey_png(mask_image.mask_values(session.mask()))
     assert loser in [p.read_bytes() for p in (capture / "mask_history").iterdir()]
     bpy.ops.wildcap.finish_mask()
     assert (capture / "shadow_mask.png").read_bytes() == winner

@@ -53,8 +53,8 @@ def test_local_contrast_raises_what_is_small_and_leaves_what_is_large(wavelength
 
 def test_sharpening_leaves_a_halo_of_half_the_amount():
     out = phone.sharpened(STEP.astype(np.float32), 0.5, 3.0)[24, :, 0]
-    assert out.max() - 0.5 == pytest.approx(0.5 * 0.2 / 2,
-                                            rel=0.15) and 0.3 - out.min() == pytest.approx(0.5 * 0.2 / 2, rel=0.15)
+    halo = pytest.approx(0.5 * 0.2 / 2, rel=0.15)
+    assert out.max() - 0.5 == halo and 0.3 - out.min() == halo
     assert out[:10] == pytest.approx(0.3, abs=1e-4)
 
 

@@ -36,11 +36,10 @@ def test_a_telephones_heic_is_read_upright_with_its_focal_length_and_colours(cap
     folder = tmp_path / "photos"
     folder.mkdir()
     rationals = 26 + 2 + 3 * 12 + 4  # behind the two folders of tags
-    tags = struct.pack(">HHII", 0x920A, 5, 1,
-                       rationals) + struct.pack(">HHII", 0xA20E, 5, 1,
-                                                rationals + 8) + struct.pack(">HHIHH", 0xA210, 3, 1, 3, 0)
-    exif = b"Exif\0\0MM\0*" + struct.pack(">IHHHIII", 8, 1, 0x8769, 4, 1, 26,
-                                          0) + struct.pack(">H", 3) + tags + bytes(4)
+    tags = (struct.pack(">HHII", 0x920A, 5, 1, rationals) + struct.pack(">HHII", 0xA20E, 5, 1, rationals + 8)
+            + struct.pack(">HHIHH", 0xA210, 3, 1, 3, 0))
+    header = b"Exif\0\0MM\0*" + struct.pack(">IHHHIII", 8, 1, 0x8769, 4, 1, 26, 0)
+    exif = header + struct.pack(">H", 3) + tags + bytes(4)
     # a lens of 6.8 mm, and 300 pixels a centimetre: a sensor of SIZE pixels is 8 mm wide
     exif += struct.pack(">4I", 68, 10, 300, 1)
     for i in range(3):

@@ -15,8 +15,12 @@ from .painted_skin import brief_confidence, make, settings  # noqa: F401
 def test_a_solve_shows_pictures_that_change_and_how_its_loss_falls(tmp_path, monkeypatch):
     capture, seen, drawn = make(tmp_path / "a.wildcap"), [], []
     curve = drawing.loss_curve
-    monkeypatch.setattr(drawing, "loss_curve", lambda losses,
-                        steps: drawn.append((list(losses), steps)) or curve(losses, steps))
+
+    def loss_curve(losses, steps):
+        drawn.append((list(losses), steps))
+        return curve(losses, steps)
+
+    monkeypatch.setattr(drawing, "loss_curve", loss_curve)
 
     def hear(message) -> None:
         if isinstance(message, Preview):

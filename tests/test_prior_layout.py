@@ -172,10 +172,8 @@ def test_the_prior_is_asked_in_its_own_window_and_coordinates(carried):
     head = template.load()
     wanted = (head.vertices[head.faces[face[[6, 197]]]] * bary[[6, 197], :, None]).sum(1).mean(0)
     assert np.linalg.norm(at.numpy() - wanted) < 0.006
-    assert layout.whole_size(1024,
-                             8) == 1024 and layout.whole_size(500,
-                                                              8) == 480 and layout.whole_size(1024,
-                                                                                              64) * 3 / 4 % 64 == 0
+    assert layout.whole_size(1024, 8) == 1024 and layout.whole_size(500, 8) == 480
+    assert layout.whole_size(1024, 64) * 3 / 4 % 64 == 0
 
 
 @pytest.mark.parametrize("recipe", ["wildcap", "released"])
@@ -198,8 +196,8 @@ def test_the_stage_solves_with_it_and_answers_in_the_built_in_uvs(capture, autho
         assert box.sum() > 20
         assert np.abs((albedo[box] ** (1 / 2.2)).mean(0) / TONE ** (1 / 2.2) - 1).max() < 0.03
     else:
-        assert np.abs(albedo * shading
-                      - texture)[face].mean() < 0.05 * texture[face].mean(), "the texture is explained where it was"
+        off = np.abs(albedo * shading - texture)[face].mean()
+        assert off < 0.05 * texture[face].mean(), "the texture is explained where it was"
         brows, cheeks = template.mask("brows", SIZE) > 0.7, (template.mask("skin", SIZE) > 0.9) & face
         assert albedo[brows].mean() < 0.9 * albedo[cheeks].mean(), "brows are where brows are"
         skin = template.mask("skin", SIZE) * template.mask("face", SIZE) * (1 - template.mask("eyes", SIZE))
@@ -220,6 +218,7 @@ def test_without_the_other_head_or_with_other_uvs_it_says_what_to_do(capture, au
 
 def test_another_checkpoint_or_head_makes_the_stage_stale_but_only_with_that_prior(capture, authors):
     stage = stages.by_name("solve")
+
     def change(prior, edit) -> tuple[str, ...]:
         record(capture, stage, settings(prior))
         edit()

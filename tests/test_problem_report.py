@@ -63,14 +63,13 @@ def test_what_helps_stays(capture):
 
 
 def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(problem_report.doctor, "examine", lambda *_,
-                        **__: problem_report.doctor.Findings(("device cpu",), (), ()))
+    findings = problem_report.doctor.Findings(("device cpu",), (), ())
+    monkeypatch.setattr(problem_report.doctor, "examine", lambda *_, **__: findings)
     (capture.logs / "scan.log").write_text("\n".join(LINES), encoding="utf-8")
     (capture.logs / "mine.log").write_text("somebody else's")
-    (capture.root
-     / "job.json").write_text(json.dumps({"capture": ".", "source": "", "from": None, "until": None,
-                                          "quality": "standard", "settings": {
-        "registration": {"template": "/home/zoeann/geheim.obj"}, "solve": {"steps": 31}}}))
+    settings = {"registration": {"template": "/home/zoeann/geheim.obj"}, "solve": {"steps": 31}}
+    (capture.root / "job.json").write_text(json.dumps({"capture": ".", "source": "", "from": None, "until": None,
+                                                       "quality": "standard", "settings": settings}))
     try:
         raise ValueError("/home/zoeann/geheim")
     except ValueError as error:
@@ -85,12 +84,12 @@ def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture,
     assert not any(secret.lower() in whole.lower() for secret in SECRETS), whole
     told = json.loads(texts["report.json"])
     assert told["versions"]["WildCap"] and told["capture"]["settings"]["solve"]["steps"] == 31
-    assert told["capture"]["settings"]["registration"]["template"] == REMOVED and told["capture"]["stages"]["cameras"][
-        "figures"
-    ] == {"count": 3}
+    assert told["capture"]["settings"]["registration"]["template"] == REMOVED
+    assert told["capture"]["stages"]["cameras"]["figures"] == {"count": 3}
     assert "WC-" in texts["unforeseen.txt"] and "device cpu" in texts["doctor.txt"]
     assert main(["report-problem", "--to", str(target)]) == 2 and "is there already" in capsys.readouterr().err
     assert main(["report-problem", str(tmp_path / "none"), "--to", str(tmp_path / "b.zip")]) == 2
+    assert main(["status", str(tmp_path / "none")]) == 2 and "no capture at" in capsys.readouterr().err
 
 
 def test_a_capture_that_cannot_be_read_is_reported_on_all_the_same(capture, tmp_path):

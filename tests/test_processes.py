@@ -11,6 +11,5 @@ def test_processes_are_told_apart():
     assert processes.is_gone({**me, "began": "another time"}) and processes.is_gone({**me, "pid": 2**22 + 1})
     container = {**me, "pid": 2**22 + 1, "host": processes.name_host() + "0"}
     assert not processes.is_gone(container) and not processes.is_at_work(container), "a number there means nothing here"
-    assert not processes.is_gone({**me,
-                                  "host": "another machine"}) and not processes.is_at_work({**me,
-                                                                                            "host": "another machine"})
+    elsewhere = {**me, "host": "another machine"}
+    assert not processes.is_gone(elsewhere) and not processes.is_at_work(elsewhere)

@@ -37,9 +37,8 @@ def test_it_says_at_its_top_that_it_is_not_run_by_us():
 def test_every_platform_and_python_that_has_a_lock_is_tested():
     served = {tuple(name.rsplit("-", 1)) for name in locks.names()}
     assert {platform for platform, _ in served} == set(SYSTEMS)
-    assert sorted(runner.split("-")[0]
-                  for runner in named("system")) == sorted(SYSTEMS[platform]
-                                                           for platform in {platform for platform, _ in served})
+    systems = sorted(SYSTEMS[platform] for platform in {platform for platform, _ in served})
+    assert sorted(runner.split("-")[0] for runner in named("system")) == systems
     assert sorted(named("python")) == sorted({python for _, python in served})
 
 

@@ -94,9 +94,8 @@ def test_an_importer_reads_cameras_where_they_are_and_refuses_a_damaged_file(cod
     place = np.eye(4)
     place[:3, 3] = 0.1, -0.5, 0.2  # in OpenGL's axes, which look along -z: COLMAP's rotation is a half turn about x
     frames = [{"file_path": f"frames/{k:05d}.png", "transform_matrix": place.tolist()} for k in range(3)]
-    (tmp_path
-     / "face.transforms").write_text(json.dumps({"fl_x": 900, "fl_y": 900, "cx": 320, "cy": 240, "w": 640, "h": 480,
-                                                 "frames": frames}))
+    film = {"fl_x": 900, "fl_y": 900, "cx": 320, "cy": 240, "w": 640, "h": 480, "frames": frames}
+    (tmp_path / "face.transforms").write_text(json.dumps(film))
     (tmp_path / "damaged.transforms").write_text("{}")
     told = run(
         code,

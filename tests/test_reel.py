@@ -32,8 +32,8 @@ def test_the_contact_sheet_shows_each_preset_as_it_is_alone(addon, capture):
     shown = {name: pixels(capture / "renders" / f"{name}.exr") for name in ("window", "rim")}
     headless.render_relit(capture, shown, resolution=32, samples=2)
     for name, before in shown.items():
-        assert np.abs(pixels(capture / "renders" / f"{name}.exr")
-                      - before).mean() < 0.1 * before.mean(), "the same light as in a render of its own"
+        off = np.abs(pixels(capture / "renders" / f"{name}.exr") - before).mean()
+        assert off < 0.1 * before.mean(), "the same light as in a render of its own"
     assert not [p for p in (capture / "renders").iterdir() if p.name.startswith(".")]
     assert not [d for d in (*bpy.data.curves, *bpy.data.actions) if d.users == 0]
 
@@ -47,9 +47,8 @@ def test_a_turntable_goes_once_around(addon, capture, turns):
     views = [pixels(folder / f"{i:04d}.png")[8:24].mean((0, 2)) for i in range(1, 5)]
     balance = [view[18:].sum() / view[:14].sum() for view in views]
     if turns == 'LIGHT':
-        assert balance[0] < 0.8 and balance[2] > 1.2 and views[1].sum() > 1.2 * views[3].sum(), (balance,
-                                                                                                 [v.sum()
-                                                                                                  for v in views])
+        lit = [v.sum() for v in views]
+        assert balance[0] < 0.8 and balance[2] > 1.2 and lit[1] > 1.2 * lit[3], (balance, lit)
     else:
         head, scene = bpy.data.objects[capture.stem], bpy.data.scenes["WildCap Relight"]
         assert head.animation_data is None and head.matrix_world.is_identity
@@ -67,8 +66,8 @@ def test_a_turntable_goes_once_around(addon, capture, turns):
 def test_a_film_replaces_the_frames_and_one_that_is_stopped_leaves_the_last(addon, capture, monkeypatch):
     headless, output = addon("relight.headless"), addon("relight.output")
     folder = headless.render_turntable(capture, "sun", frames=2, film=True, resolution=32, samples=1)
-    assert [p.name
-            for p in folder.iterdir()] == ["turntable.mp4"] and b"ftyp" in (folder / "turntable.mp4").read_bytes()[:12]
+    assert [p.name for p in folder.iterdir()] == ["turntable.mp4"]
+    assert b"ftyp" in (folder / "turntable.mp4").read_bytes()[:12]
     output._running = output.Running(folder=folder)
     (folder.parent / ".turntable").mkdir()
     output.drop()
@@ -109,8 +108,8 @@ def test_the_buttons_render_what_the_panel_says_and_wait_for_each_other(addon, c
     assert b"View transform: AgX" in (capture / "renders" / "overcast.png").read_bytes()
     bpy.ops.wildcap.turntable()
     bpy.ops.wildcap.contact_sheet()
-    assert len(list((capture / "renders" / "turntable").iterdir())) == 2 and (capture / "renders"
-                                                                              / "contact_sheet.png").is_file()
+    renders = capture / "renders"
+    assert len(list((renders / "turntable").iterdir())) == 2 and (renders / "contact_sheet.png").is_file()
     monkeypatch.setattr(addon("relight.output"), "busy", lambda: True)
     for name in ("render", "turntable", "contact_sheet"):
         with pytest.raises(RuntimeError, match="Blender is rendering"):

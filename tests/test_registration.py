@@ -55,16 +55,15 @@ def test_similarity_is_found_exactly():
     source = rng.normal(size=(20, 3))
     rotation = alignment._rotation(np.array([0.3, -1.1, 0.7]))
     found = alignment.similarity(source, 2.5 * source @ rotation.T + [1, 2, 3], rng.uniform(0.1, 1, 20))
-    assert np.allclose(found.rotation, rotation) and np.isclose(found.scale,
-                                                                2.5) and np.allclose(found.translation, [1, 2, 3])
+    assert np.allclose(found.rotation, rotation) and np.isclose(found.scale, 2.5)
+    assert np.allclose(found.translation, [1, 2, 3])
 
 
 def test_landmarks_are_lifted_although_one_view_is_wrong(tmp_path, known):
     points = known[2]
     views = _views(tmp_path, points.mean(0))
-    pixels = np.stack([view.project(points)[0] for view in views]) + np.random.default_rng(0).normal(0, 0.3,
-                                                                                                     (len(views),
-                                                                                                      len(points), 2))
+    noise = np.random.default_rng(0).normal(0, 0.3, (len(views), len(points), 2))
+    pixels = np.stack([view.project(points)[0] for view in views]) + noise
     pixels[1] += [25, -10]
     found = landmarks.triangulate(views, pixels)
     error = np.linalg.norm(found.points - points, axis=1)
@@ -103,8 +102,8 @@ def test_a_known_head_is_recovered(known):
 
 def test_the_stage_writes_a_head_of_the_frozen_topology(tmp_path, monkeypatch, known):
     model, truth, points, _ = known
-    capture, report = _capture(tmp_path / "Café Müller.wildcap", truth, model, points,
-                               monkeypatch), Reporter("registration")
+    capture = _capture(tmp_path / "Café Müller.wildcap", truth, model, points, monkeypatch)
+    report = Reporter("registration")
     registration.run(capture, from_json({"registration": {"iterations": 8}}), report)
     head = meshes.read_obj(capture.head)
     assert template.template_hash(head) == template.template_hash(template.load())

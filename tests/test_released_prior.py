@@ -68,8 +68,8 @@ def weights_of(model: dict, cond_channels: int, wrapped: bool) -> dict[str, torc
     put("mapping.2", mapping, mapping)
     put("proj_in", widths[max(0, skip - 1)], (7 + cond_channels) * p2, 1, 1)
     put("proj_out", 7 * p2 + model.get("has_variance", False), widths[max(0, skip - 1)], 1, 1)
-    for level, (depth, width,
-                attention) in enumerate(zip(model["depths"], widths, model["self_attn_depths"], strict=True)):
+    levels = zip(model["depths"], widths, model["self_attn_depths"], strict=True)
+    for level, (depth, width, attention) in enumerate(levels):
         above, up = widths[max(0, level - 1)], f"u_net.u_blocks.{levels - 1 - level}"
         put_blocks(f"u_net.d_blocks.{level}", 1, [above] + [width] * (depth - 1), width, width, attention)
         put_blocks(up, 0, [width if level == levels - 1 else 2 * width] + [width] * (depth - 1), width, above,
@@ -95,16 +95,16 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
     def norm(name, value):
         count = value.shape[1]
         grouped = value.reshape(len(value), max(1, count // 32), -1)
-        grouped = (grouped - grouped.mean(-1, keepdim=True)) / (grouped.var(-1, unbiased=False, keepdim=True)
-                                                                + 1e-5).sqrt()
+        deviation = (grouped.var(-1, unbiased=False, keepdim=True) + 1e-5).sqrt()
+        grouped = (grouped - grouped.mean(-1, keepdim=True)) / deviation
         weight, bias = affine(f"{name}.mapper", mapped)[:, :count], affine(f"{name}.mapper", mapped)[:, count:]
         return grouped.reshape(value.shape) * (1 + weight[:, :, None, None]) + bias[:, :, None, None]
 
     def attention(name, value):
         n, c, h, w = value.shape
         heads = max(1, c // 64)
-        q, k, v = conv(f"{name}.qkv_proj",
-                       norm(f"{name}.norm_in", value)).reshape(n, 3, heads, c // heads, h * w).unbind(1)
+        qkv = conv(f"{name}.qkv_proj", norm(f"{name}.norm_in", value))
+        q, k, v = qkv.reshape(n, 3, heads, c // heads, h * w).unbind(1)
         seen = torch.softmax(torch.einsum("nhci,nhcj->nhij", q, k) / math.sqrt(c // heads), -1)
         return value + conv(f"{name}.out_proj", torch.einsum("nhij,nhcj->nhci", seen, v).reshape(n, c, h, w))
 
@@ -133,8 +133,8 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
     mapped = mapped if extra is None else mapped + affine("mapping_cond", extra)
     mapped = functional.gelu(affine("mapping.2", functional.gelu(affine("mapping.0", mapped))))
     n, c, h, w = x.shape
-    x = x.reshape(n, c, h // patch, patch, w // patch,
-                  patch).permute(0, 1, 3, 5, 2, 4).reshape(n, c * patch**2, h // patch, w // patch)
+    x = x.reshape(n, c, h // patch, patch, w // patch, patch).permute(0, 1, 3, 5, 2, 4)
+    x = x.reshape(n, c * patch**2, h // patch, w // patch)
     x, kept, levels = conv("proj_in", x), [], len(model["depths"])
     for level in range(skip, levels):
         if level > skip:
@@ -157,9 +157,8 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
 
 def write(folder, model: dict, cond: dict, state, **around) -> None:
     folder.mkdir(exist_ok=True)
-    (folder
-     / "config.json").write_text(json.dumps({"model": {"type": "image_v1", "input_channels": 7, **model},
-                                             "cond": cond}))
+    config = {"model": {"type": "image_v1", "input_channels": 7, **model}, "cond": cond}
+    (folder / "config.json").write_text(json.dumps(config))
     torch.save({"model_ema": state, **around}, folder / "ckpt.pth")
 
 

@@ -80,8 +80,8 @@ def test_headless_renders_a_picture_and_its_linear_twin(addon, capture):
         assert b"tEXtNote\0View transform: Standard" in path.read_bytes()
         linear, shown = (pixels(file) for file in (path.with_suffix(".exr"), path))
         encoded = np.where(linear > 0.0031308, 1.055 * np.maximum(linear, 0) ** (1 / 2.4) - 0.055, 12.92 * linear)
-        assert np.abs(np.clip(encoded, 0, 1)
-                      - shown).max() < 2.5 / 255, "the same render: linear, and as sRGB without a look, dithered"
+        off = np.abs(np.clip(encoded, 0, 1) - shown).max()
+        assert off < 2.5 / 255, "the same render: linear, and as sRGB without a look, dithered"
     assert addon("relight.headless").light_of("sunset").path.is_file(), "one of Blender's worlds"
     with pytest.raises(addon("hdri").Problem, match="no light named"):
         addon("relight.headless").render_relit(capture, ("moon",))

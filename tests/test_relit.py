@@ -40,8 +40,8 @@ def test_the_people_are_six_tones_that_no_training_may_take():
         colour = pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope,
                                      p.chroma)[0]
         assert tone_group(images.linear_to_srgb(colour)).replace(" ", "_") == person.name
-    assert len({p.name for p in people.PEOPLE}) == len(TONES) and {p.light
-                                                                   for p in people.PEOPLE} == set(people_lights.KINDS)
+    assert len({p.name for p in people.PEOPLE}) == len(TONES)
+    assert {p.light for p in people.PEOPLE} == set(people_lights.KINDS)
 
 
 def test_a_panorama_is_bright_where_its_sky_and_window_are():
@@ -52,8 +52,8 @@ def test_a_panorama_is_bright_where_its_sky_and_window_are():
     # the window is on the sun's side, before the face and above
     assert np.sign(middle[0]) == side and middle[1] < 0 < middle[2]
     sky = people_lights.panorama((3, 3, 3), (1, 1, 1), (0.1, 0.1, 0.1))
-    assert sky[0, 0, 0] == pytest.approx(3, rel=0.01) and sky[people_lights.HEIGHT // 2 - 1, 0,
-                                                              0] == pytest.approx(1, rel=0.06)
+    assert sky[0, 0, 0] == pytest.approx(3, rel=0.01)
+    assert sky[people_lights.HEIGHT // 2 - 1, 0, 0] == pytest.approx(1, rel=0.06)
     assert sky[-1, 0, 0] == pytest.approx(0.1)
 
 
@@ -120,8 +120,8 @@ def test_a_row_is_a_capture_that_holds_its_maps(maps, tmp_path):
     images.write_data(source.texture_confidence, np.ones((SIZE, SIZE, 3), np.float32))
     write_row(tmp_path / "row.wildcap", source, maps[1])
     assert (tmp_path / "row.wildcap" / "head.obj").read_text() == "v 0 0 0\n"
-    assert Capture(tmp_path
-                   / "row.wildcap").read()["stages"]["upscale"]["figures"]["specular_mean"] == pytest.approx(0.3)
+    upscaled = Capture(tmp_path / "row.wildcap").read()["stages"]["upscale"]
+    assert upscaled["figures"]["specular_mean"] == pytest.approx(0.3)
     back = read_worn(tmp_path / "row.wildcap" / "maps", SIZE)
     for name in ("albedo", "normal", "specular"):
         np.testing.assert_allclose(getattr(back, name), getattr(maps[1], name), atol=1e-4)
@@ -192,8 +192,8 @@ def test_the_gallerys_close_up_lies_on_the_right_cheek():
     assert skin[int(row * 256), int(column * 256)] > 0.9
     nose, side = gallery.landmark_uv(4), gallery.CLOSE_UP
     # 423: the other side
-    assert side / 4 < abs(column
-                          - nose[0]) < 2 * side and column != pytest.approx(gallery.landmark_uv(423)[0], abs=side / 2)
+    assert side / 4 < abs(column - nose[0]) < 2 * side
+    assert column != pytest.approx(gallery.landmark_uv(423)[0], abs=side / 2)
 
 
 def test_a_gallery_row_is_two_lines_and_small_enough(tmp_path):

@@ -65,8 +65,8 @@ def test_the_page_shows_every_stage_with_state_pictures_and_figures(capture):
     page = Page(capture.report.read_text(encoding="utf-8"))
     assert [section["id"] for section in page.attributes("section") if "id" in section] == list(stages.NAMES)
     states = ["done", "stale"] + ["to-do"] * (len(stages.STAGES) - 2)
-    assert [a["class"]
-            for a in page.attributes("small")] == states, "features is auto again, so cameras are out of date"
+    shown = [a["class"] for a in page.attributes("small")]
+    assert shown == states, "features is auto again, so cameras are out of date"
     assert {"0.9688", "registered share", "a, 1.5, -", "0001: yes", "1 min 15 s, ", "skin", "around the head",
             "three lights"} <= {
         text if not text.startswith("1 min") else text[:12] for text in page.texts}
@@ -78,8 +78,8 @@ def test_the_page_loads_nothing(capture):
     report.write(capture, Settings())
     text = capture.report.read_text(encoding="utf-8")
     page = Page(text)
-    assert not {"script", "link",
-                "iframe"} & {tag for tag, _ in page.elements} and "http" not in text and "url(" not in text
+    tags = {tag for tag, _ in page.elements}
+    assert not {"script", "link", "iframe"} & tags and "http" not in text and "url(" not in text
     assert all(image["src"].startswith("data:") and image["alt"] for image in page.attributes("img"))
 
 
@@ -97,9 +97,8 @@ def test_findings_of_all_stages_and_what_stopped_it_come_first(capture):
     capture.finish(scan, capture.conditions(scan, Settings()), 1.0, Settings(), {}, "0.1.0", reporter.findings)
     capture.stop("cameras", Problem("The frames do not fit together.", "Film again."),
                  [{"problem": "Too few.", "remedy": "Take more.", "frames": []}])
-    assert [f["problem"]
-            for f in report.findings(capture.read())] == ["The frames do not fit together.", "Too few.",
-                                                          "The light <changed>."]
+    problems = [f["problem"] for f in report.findings(capture.read())]
+    assert problems == ["The frames do not fit together.", "Too few.", "The light <changed>."]
     text = _page_text(capture)
     assert (
         "The light &lt;changed&gt;." in text

@@ -151,9 +151,9 @@ def test_of_two_ways_the_one_that_places_more_frames_wins_unless_nothing_but_the
     def solved(way: str, frames: int, refined: bool = True) -> Solved:
         return Solved(SimpleNamespace(num_reg_images=lambda: frames), way, None, {}, refined=refined)
 
-    assert worth(solved("face", 5)) > worth(solved("skin",
-                                                   3)) > worth(solved("face", 3)) > worth(solved("face", 5,
-                                                                                                 refined=False))
+    worths = [worth(solved("face", 5)), worth(solved("skin", 3)), worth(solved("face", 3)),
+              worth(solved("face", 5, refined=False))]
+    assert all(better > worse for better, worse in zip(worths, worths[1:], strict=False))
 
 
 def test_tracks_hang_together_and_ambiguous_ones_go():

@@ -69,8 +69,8 @@ def test_the_worst_measure_decides_and_where_that_is_equal_their_mean(batch):
     assert order(batch) == ["half", "told", "bad chin", "good"], "means of 2/3, 7/12 and 1/2"
     lines = review.list_riskiest(review.write_review(batch)[1])
     assert [line.split("  ")[0] for line in lines] == ["half", "told", "bad chin", "good"]
-    assert lines[2].endswith("landmarks 9 mm, worse than all others") and lines[1].endswith("findings 2, worse than "
-                                                                                            "all others")
+    assert lines[2].endswith("landmarks 9 mm, worse than all others")
+    assert lines[1].endswith("findings 2, worse than all others")
     assert lines[3].endswith("nothing is worse than in the others")
 
 
@@ -95,11 +95,11 @@ def test_the_page_is_escaped_loads_nothing_and_links_where_the_reports_are(batch
     path, _ = review.write_review(Batch(batch.root, (*batch.faces, strange)))
     text = path.read_text(encoding="utf-8")
     page = Page(text)
-    assert not {"script", "link", "iframe",
-                "b>"} & {tag for tag, _ in page.elements} and "http" not in text and "url(" not in text
+    tags = {tag for tag, _ in page.elements}
+    assert not {"script", "link", "iframe", "b>"} & tags and "http" not in text and "url(" not in text
     assert {"R&D <batch> 100%", "<b>", "The light <changed>.", "Lock the exposure.", "2 findings"} <= set(page.texts)
-    assert sorted(a["href"] for a in page.attributes("a")) == ["a%20%231%20%3Ci%3E.wildcap/report.html",
-                                                               "half.wildcap/report.html"]
+    links = sorted(a["href"] for a in page.attributes("a"))
+    assert links == ["a%20%231%20%3Ci%3E.wildcap/report.html", "half.wildcap/report.html"]
 
 
 def test_pictures_are_small_and_in_the_page_and_a_damaged_one_is_left_out(batch):
@@ -112,8 +112,9 @@ def test_pictures_are_small_and_in_the_page_and_a_damaged_one_is_left_out(batch)
     images.write_srgb(batch.faces[1].capture.picture("frames", "selected"), wide[:60])
     review.write_review(batch)
     shown = Page((batch.root / review.NAME).read_text(encoding="utf-8")).attributes("img")
-    assert [image["title"] for image in shown] == ["Frames", *(words for _, _, words in review.PICTURES[::2]),
-                                                   "Render"], "the second face has no other yet"
+    titles = [image["title"] for image in shown]
+    told = ["Frames", *(words for _, _, words in review.PICTURES[::2]), "Render"]
+    assert titles == told, "the second face has no other yet"
     small = batch.root / "small.jpg"
     for image, size in zip(shown, [(1200, 60), *[(480, 160)] * 3], strict=True):
         small.write_bytes(base64.b64decode(image["src"].removeprefix("data:image/jpeg;base64,")))
@@ -131,8 +132,8 @@ def test_a_face_that_nothing_is_known_of_and_a_record_that_cannot_be_read_have_t
     torn = BatchFace("torn", batch.root / "film.mp4", batch.root / "torn.wildcap")
     torn.root.mkdir()
     torn.capture.json.write_text("{", encoding="utf-8")
-    assert order(Batch(batch.root, (new, *batch.faces, torn, odd))) == ["torn", "half", "told", "bad chin", "good",
-                                                                        "new", "odd"]
+    named = order(Batch(batch.root, (new, *batch.faces, torn, odd)))
+    assert named == ["torn", "half", "told", "bad chin", "good", "new", "odd"]
     assert order(Batch(batch.root, ())) == []
 
 

@@ -179,8 +179,8 @@ def test_any_mask_gives_finite_maps(kind, guidance):
     alpha = {"empty": torch.zeros(32, 32), "full": torch.ones(32, 32), "one texel": torch.zeros(32, 32)}[kind]
     if kind == "one texel":
         alpha[7, 9] = 1
-    out = Sampler(prior, Recipe(steps=20, coarse=(), guidance=guidance),
-                  seeded(0)).sample({1: observation(texture, alpha)}, start(-0.2))
+    sampler = Sampler(prior, Recipe(steps=20, coarse=(), guidance=guidance), seeded(0))
+    out = sampler.sample({1: observation(texture, alpha)}, start(-0.2))
     assert torch.isfinite(out.denoised).all()
     assert ((out.denoised - truth)[0, :3, 20:] / 2).abs().mean() < (0.1 if kind != "full" else 0.5)
 

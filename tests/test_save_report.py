@@ -65,17 +65,17 @@ def test_a_timer_that_fails_tells_it_and_goes_on(addon, monkeypatch):
     assert "An error inside WildCap stopped listening" in problems.of("").problem
     problems.clear("")
     monkeypatch.undo()
-    monkeypatch.setattr(jobs, "_wanted", lambda: True)
+    monkeypatch.setattr(addon("incoming"), "waits", lambda: True)
     for failure, said in ((ZeroDivisionError(), "An error inside WildCap stopped"),
                           (jobs.Problem("The head is damaged.", "Run it again."), "is damaged")):
-        monkeypatch.setattr(jobs, "bring_in_results", Mock(side_effect=failure))
+        monkeypatch.setattr(addon("incoming"), "bring_in", Mock(side_effect=failure))
         assert jobs._tick() == jobs.INTERVAL_S and said in problems.of("").problem
 
 
 def cameras(folder, name: bytes = b"00000.jpg", focal: float = 900.0, width: int = 720, count: int = 1) -> None:
     folder.mkdir(exist_ok=True)
-    (folder / "cameras.bin").write_bytes(struct.pack("<Q", count)
-                                         + struct.pack("<iiQQ3d", 1, 0, width, 960, focal, 360, 480))
+    camera = struct.pack("<iiQQ3d", 1, 0, width, 960, focal, 360, 480)
+    (folder / "cameras.bin").write_bytes(struct.pack("<Q", count) + camera)
     (folder / "images.bin").write_bytes(struct.pack("<Qi7dI", count, 1, 1, 0, 0, 0, 0, 0, 1, 1) + name + b"\0"
                                         + struct.pack("<Q", 0))
 

@@ -165,8 +165,8 @@ def test_where_no_surface_is_measured_the_chain_goes_on_with_what_matches(captur
     scan.run(capture, from_json({}), report)
     assert "No surface" in report.findings[0]["problem"] and report.figures["method"] == "none"
     kept = meshes.read_ply(capture.scan, or_points=True)
-    assert np.allclose(kept.vertices,
-                       places[:2]) and kept.faces.shape == (0, 3), "what lies far from the head is none of it"
+    assert np.allclose(kept.vertices, places[:2]), "what lies far from the head is none of it"
+    assert kept.faces.shape == (0, 3)
 
 
 def test_cancel_keeps_the_old_scan(capture):

@@ -42,8 +42,8 @@ def solved(noise: float):
 
 def test_the_sample_is_solved_with_its_own_tone_and_the_draft(capture):
     settings = read_job(capture.job).settings
-    assert settings.solve.skin_tone == (SAMPLE
-                                        / "skin_tone.txt").read_text(encoding="ascii").strip() == self_test.SKIN_TONE
+    stored = (SAMPLE / "skin_tone.txt").read_text(encoding="ascii").strip()
+    assert settings.solve.skin_tone == stored == self_test.SKIN_TONE
     assert settings.solve.size == 512 and settings.solve.guidance == "proximal" and settings.device == "auto"
     assert (
         read_job(capture.job).tool.name == "self_test"

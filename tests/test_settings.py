@@ -61,9 +61,8 @@ def test_the_content_of_a_place_counts_where_the_result_depends_on_it(name, tmp_
     if own not in result_settings(getattr(settings, stage)):
         assert name == "deliver.folder" and not result_paths(settings.deliver)
         return
-    assert result_paths(getattr(settings,
-                                stage)) == {own: str(tmp_path
-                                                     / "mine")} and not result_paths(getattr(Settings(), stage))
+    assert result_paths(getattr(settings, stage)) == {own: str(tmp_path / "mine")}
+    assert not result_paths(getattr(Settings(), stage))
     capture, step = Capture(tmp_path / "a.wildcap"), stages.by_name(stage)
     record(capture, step, Settings())
     assert changed(capture, step, settings) == (name,), "named since"

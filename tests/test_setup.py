@@ -56,9 +56,9 @@ def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypat
     assert install.WILDCAP_OT_install_solver.tell() is None
     assert jobs.of("").goal == "ask" and not bpy.ops.wildcap.install_solver.poll()
     follow(setup)
-    assert asked == [("cpu", "pytorch",
-                      None)] and asking.answer(("plan", "cpu", "pytorch",
-                                                None)) == plan_of(setup), "from now on the dialog opens at once"
+    assert asked == [("cpu", "pytorch", None)]
+    opened = asking.answer(("plan", "cpu", "pytorch", None))
+    assert opened == plan_of(setup), "from now on the dialog opens at once"
     assert "the CPU" in install.WILDCAP_OT_install_solver.tell()[0] and jobs.of("") is None
     lines = install.describe_plan(plan_of(setup), "cpu", tmp_path / "Löser", 23_400_000_000)
     for words in ("PyTorch 2.13.0 for the CPU and 2 more packages", "0.4 GB to download from files.pythonhosted.org",
@@ -141,8 +141,11 @@ def test_the_set_up_offers_a_test_once_a_solver_answers_and_no_longer_when_it_do
     assert "torch" in setup("problems").of("").problem and setup("problems").of("").remedy
     monkeypatch.setattr(checking.environment, "judge", lambda found, requirements: [])
     found = {"device": "cuda", "reason": "cuda takes 0.1 s."}
-    monkeypatch.setattr(checking.environment, "survey", lambda python, requirements,
-                        importing: found if importing else {"device": "", "reason": ""})
+
+    def survey(python, requirements, importing):
+        return found if importing else {"device": "", "reason": ""}
+
+    monkeypatch.setattr(checking.environment, "survey", survey)
     checking.accept(bare / "bin" / "python")
     assert "wildcap.self_test" in buttons(panel) and preferences.get().device == ""
     wait(checking)

@@ -179,8 +179,8 @@ def test_the_sun_s_shadow_is_told_by_the_filmed_texture_alone(monkeypatch):
     at = raster.interpolate(transfer, small.mesh.faces, small.face, small.bary)
     sun = np.array([0.45, -0.70, 0.55]) / np.linalg.norm([0.45, -0.70, 0.55])
     normals = small.spread(small.normals)
-    reached = small.spread(sunless._sees(small, np.arange(len(small.points)),
-                                         sun)) * (images.resize(SHADOWED.astype(np.float32), SMALL, SMALL) < 0.5)
+    lit = images.resize(SHADOWED.astype(np.float32), SMALL, SMALL) < 0.5
+    reached = small.spread(sunless._sees(small, np.arange(len(small.points)), sun)) * lit
     sky = np.maximum(at
                      @ (0.9 * sh_basis(np.array([0.0, -0.5, 0.87]))[:, None] * [0.8, 0.9, 1.0] + 1.2
                         * np.eye(9)[:, :1]), 0.01)
@@ -197,8 +197,9 @@ def test_the_sun_s_shadow_is_told_by_the_filmed_texture_alone(monkeypatch):
 def test_occlusion_is_masked_gently_where_shape_and_texture_agree():
     small = Head(template.load()).unfold(SMALL)
     transfer = radiance_transfer(small.caster, small.mesh.vertices, small.head.normals, 48)
-    visible = raster.bleed(raster.interpolate(ambient_occlusion(transfer)[:, None], small.mesh.faces, small.face,
-                                              small.bary)[..., 0], small.covered)
+    of_vertices = ambient_occlusion(transfer)[:, None]
+    of_texels = raster.interpolate(of_vertices, small.mesh.faces, small.face, small.bary)[..., 0]
+    visible = raster.bleed(of_texels, small.covered)
     skin = (
         template.mask("skin", SMALL)
         * template.mask("face", SMALL)

@@ -88,8 +88,8 @@ def test_the_listing_and_the_page_name_the_zip(sources, tmp_path):
         and entry["archive_hash"] == f"sha256:{hashlib.sha256(archive.read_bytes()).hexdigest()}"
     )
     page = (site / "index.html").read_text(encoding="utf-8")
-    assert re.search(rf'href="[^"]*{re.escape(archive.name)}\?repository=[^"]*index\.json',
-                     page), "the drag brings the repository along"
+    link = rf'href="[^"]*{re.escape(archive.name)}\?repository=[^"]*index\.json'
+    assert re.search(link, page), "the drag brings the repository along"
     assert "${" not in page
     assert "Why it is here and not on extensions.blender.org" in page
 
@@ -98,8 +98,8 @@ def test_the_manifest_names_every_licence_and_holder_of_what_ships():
     assert set(MANIFEST["license"]) == {"SPDX:GPL-3.0-or-later", "SPDX:MIT", "SPDX:Apache-2.0", "SPDX:CC0-1.0"}
     notices = (ROOT / "core" / "weights" / "prior.json").read_text(encoding="utf-8")
     year, holder = re.search(r"Copyright \(c\) (\d{4}) ([A-Z]\w+ [A-Z]\w+)", notices).groups()
-    assert f"{year} {holder}" in MANIFEST["copyright"] and any("MediaPipe Authors" in name
-                                                               for name in MANIFEST["copyright"])
+    assert f"{year} {holder}" in MANIFEST["copyright"]
+    assert any("MediaPipe Authors" in name for name in MANIFEST["copyright"])
     assert MANIFEST.get("website", "") == links.WEBSITE, "one constant says where WildCap is"
 
 

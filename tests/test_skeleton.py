@@ -64,8 +64,8 @@ def test_every_other_frame_is_matched_with_the_chosen_ones_around_it():
     for one, other in skeleton.pairs_between(frames, chosen):
         around.setdefault(other, []).append(one)
     assert set(around) == {name for name, _, _ in frames} - set(chosen)
-    assert around["00015.jpg"] == [chosen[0], chosen[1], chosen[2],
-                                   chosen[3]] and around["00035.jpg"] == [chosen[2], chosen[3]]
+    assert around["00015.jpg"] == [chosen[0], chosen[1], chosen[2], chosen[3]]
+    assert around["00035.jpg"] == [chosen[2], chosen[3]]
 
 
 @pytest.fixture(scope="module")
@@ -91,9 +91,8 @@ def test_frames_that_are_placed_by_the_others_lie_where_they_were(synthesized):
     for image in images:
         if image.name not in names:
             pixels = np.array([point.xy for point in image.points2D])
-            kept.add_image_with_trivial_frame(pycolmap.Image(name=image.name, camera_id=image.camera_id,
-                                                             image_id=image.image_id, keypoints=pixels),
-                                              true.images[image.image_id].cam_from_world())
+            seen = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image.image_id, keypoints=pixels)
+            kept.add_image_with_trivial_frame(seen, true.images[image.image_id].cam_from_world())
     for point in true.points3D.values():
         track = pycolmap.Track([pycolmap.TrackElement(e.image_id, e.point2D_idx) for e in point.track.elements
                                 if e.image_id in kept.images])
@@ -141,9 +140,8 @@ def solved(folder, work, sharpest_first=True):
            "masks": None, "seed": 0, "database": str(work / "database.db"), "output": str(work / "model")}
     assert colmap.reconstruct(job)
     model = pycolmap.Reconstruction(job["output"])
-    return {path.name: path.read_bytes()
-            for path in (work / "model").iterdir()}, sorted(image.name for image in model.images.values()
-                                                            if image.has_pose)
+    files = {path.name: path.read_bytes() for path in (work / "model").iterdir()}
+    return files, sorted(image.name for image in model.images.values() if image.has_pose)
 
 
 def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path, monkeypatch):

@@ -68,9 +68,12 @@ def test_every_subject_is_plausible():
         assert 0.01 < inside.mean() < 0.9 and inside.min() > 0 and inside.max() < 1
         assert 0.05 <= skin.specular.min() and skin.specular.max() <= 1 and np.abs(skin.height).max() < 3
         assert np.allclose(np.linalg.norm(skin.normal, axis=-1), 1, atol=1e-5) and skin.normal[..., 2].min() > 0
-    angles = [pigment.typology_angle(pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen,
-                                                         p.scattering, p.slope))[0]
-              for p in map(sample_parameters, range(200))]
+
+    def angle(p) -> float:
+        skin = pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope)
+        return pigment.typology_angle(skin)[0]
+
+    angles = [angle(sample_parameters(seed)) for seed in range(200)]
     counts, _ = np.histogram(angles, [-60, -30, 10, 28, 41, 55, 70])  # the six classes of skin colour
     assert (counts > 5).all(), counts
 

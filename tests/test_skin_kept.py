@@ -97,12 +97,11 @@ def test_a_file_of_version_1_is_rebuilt_inside_and_keeps_what_the_artist_did(pat
     assert values == pytest.approx([1.25, 0.31, 0.01, 0.0]), (
         "what was version 1's own is this capture's now, what was not is the artist's"
     )
-    assert note.name in material.node_tree.nodes and len([n for n in group.nodes
-                                                          if n.bl_idname == 'ShaderNodeBsdfPrincipled']) == 1
+    assert note.name in material.node_tree.nodes
+    assert len([n for n in group.nodes if n.bl_idname == 'ShaderNodeBsdfPrincipled']) == 1
     principled = group.nodes["WildCap Principled"]
-    assert principled.inputs["Base Color"].links[0].from_node == inside and principled.inputs[
-        "Coat Weight"
-    ].default_value == pytest.approx(0.2)
+    assert principled.inputs["Base Color"].links[0].from_node == inside
+    assert principled.inputs["Coat Weight"].default_value == pytest.approx(0.2)
     without = [line for line in node_text.lines(group) if "HueSat" not in line and "Hue/" not in line
                and "Principled BSDF" not in line]
     inside_expected = [line.split("WildCap Skin / ", 1)[1] for line in EXPECTED.splitlines()
@@ -125,9 +124,8 @@ def version_1():
                        ("Subsurface Scale", 'NodeSocketFloat')):
         group.interface.new_socket(name, in_out='INPUT', socket_type=kind)
     group.interface.new_socket("BSDF", in_out='OUTPUT', socket_type='NodeSocketShader')
-    source, amount, shader, result = (group.nodes.new(kind)
-                                      for kind in ('NodeGroupInput', 'ShaderNodeMath', 'ShaderNodeBsdfPrincipled',
-                                                   'NodeGroupOutput'))
+    source, amount, shader, result = (group.nodes.new(kind) for kind in (
+        'NodeGroupInput', 'ShaderNodeMath', 'ShaderNodeBsdfPrincipled', 'NodeGroupOutput'))
     amount.operation, amount.use_clamp, shader.subsurface_method = 'MULTIPLY', True, 'RANDOM_WALK'
     shader.inputs["Subsurface Radius"].default_value = (1.0, 0.37, 0.19)
     for output, target in ((source.outputs["Specular"], amount.inputs[0]),

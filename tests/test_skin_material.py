@@ -74,8 +74,8 @@ def test_a_bump_lit_from_above_is_bright_on_its_upper_slope(patch, tmp_path):
     sockets(assembled())["Subsurface"].default_value = 0.0
     lamp((0, -1, 1))
     picture = seen(tmp_path / "bump.exr", side=16, width=1.8)  # rows from the bottom
-    lower, upper, flat = picture[4:6, 6:10].mean(), picture[10:12,
-                                                            6:10].mean(), picture[[0, 0, -1, -1], [0, -1, 0, -1]].mean()
+    lower, upper = picture[4:6, 6:10].mean(), picture[10:12, 6:10].mean()
+    flat = picture[[0, 0, -1, -1], [0, -1, 0, -1]].mean()
     assert upper > 1.1 * flat and lower < 0.9 * flat, (upper, flat, lower)
 
 
@@ -113,8 +113,8 @@ def near(head, place) -> float:
     """The attribute at the vertex nearest to a place."""
     points = np.empty(3 * len(head.data.vertices), np.float32)
     head.data.vertices.foreach_get("co", points)
-    return head.data.attributes["wildcap_roughness"].data[int(np.linalg.norm(points.reshape(-1, 3) - place,
-                                                                             axis=1).argmin())].value
+    nearest = int(np.linalg.norm(points.reshape(-1, 3) - place, axis=1).argmin())
+    return head.data.attributes["wildcap_roughness"].data[nearest].value
 
 
 def test_light_from_behind_does_not_come_through_lids_and_nostrils(patch, addon, tmp_path):

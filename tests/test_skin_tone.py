@@ -53,8 +53,8 @@ def test_with_a_measured_white_a_tone_is_what_it_is(reflects):
     found = [population.estimate_skin_tone(look.Look(gain * shown, gain * shown), white=gain * BRIGHT)
              for gain in (0.2, 0.7)]
     assert np.allclose(found[0].linear, found[1].linear, rtol=1e-3)
-    assert abs(population.lab(np.array(found[0].linear))[0]
-               - population.lab(true)[0]) < 4 and 0 < found[0].deviation < 10
+    lightness = population.lab(np.array(found[0].linear))[0]
+    assert abs(lightness - population.lab(true)[0]) < 4 and 0 < found[0].deviation < 10
 
 
 def test_the_stated_deviation_holds_and_no_group_is_drawn_to_the_middle():

@@ -120,8 +120,8 @@ def test_a_shadow_that_the_artist_added_to_the_proposal_is_taken_away(capture):
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     distance = np.hypot(x - 0.66, y - 0.55)
     inside, around = distance < 0.07, (distance > 0.11) & (distance < 0.15)
-    truth = images.read_linear(capture.texture) / ((0.7 + 0.3 * x)
-                                                   * (1 - 0.5 / (1 + np.exp((distance - 0.09) / 0.006))))[..., None]
+    shadow = 1 - 0.5 / (1 + np.exp((distance - 0.09) / 0.006))
+    truth = images.read_linear(capture.texture) / ((0.7 + 0.3 * x) * shadow)[..., None]
     kept = []
     for proposal in (images.read_mask(capture.shadow_mask_auto), np.zeros((SIZE, SIZE), np.float32)):
         images.write_data(capture.shadow_mask_auto, proposal)

@@ -51,8 +51,8 @@ def test_killed_at_any_step_it_continues_to_the_same_bytes(tmp_path):
     took_up = [m.text for m in messages if isinstance(m, Log) and m.text.startswith("Going on after step")]
     assert took_up or step <= 2, f"killed at step {step}"  # the second step's checkpoint is written after its report
     for name in (*(f"maps/{name}" for name in MAPS), "preview/albedo.png", "preview/shading.png"):
-        assert (killed.root / name).read_bytes() == (unbroken.root
-                                                     / name).read_bytes(), f"{name}, killed at step {step}"
+        again, whole = (folder.root / name for folder in (killed, unbroken))
+        assert again.read_bytes() == whole.read_bytes(), f"{name}, killed at step {step}"
     ours, theirs = load_file(killed.solved), load_file(unbroken.solved)
     assert ours.keys() == theirs.keys() and all(torch.equal(ours[name], theirs[name]) for name in ours)
 
@@ -113,8 +113,8 @@ def test_holes_in_the_texture_are_filled_and_spoil_nothing_else(without_mask, tm
     images.write_data(capture.texture_confidence, confidence)
     maps, whole = solved(capture, without_mask), solved(without_mask)
     assert maps["confidence.png"][70:76, 40:46].max() == 0
-    assert np.abs(maps["diffuse_albedo.exr"][71:75, 41:45].mean((0, 1)) / TONE
-                  - 1).max() < 0.25, "what nobody saw is the mean face"
+    unseen = maps["diffuse_albedo.exr"][71:75, 41:45].mean((0, 1))
+    assert np.abs(unseen / TONE - 1).max() < 0.25, "what nobody saw is the mean face"
     near = np.zeros((SIZE, SIZE), bool)
     near[62:84, 32:54] = near[5:16, 5:16] = near[94:107, 58:71] = True
     assert np.abs(maps["diffuse_albedo.exr"] - whole["diffuse_albedo.exr"])[~near].max() < 0.02

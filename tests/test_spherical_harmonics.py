@@ -55,9 +55,8 @@ def test_order_and_signs():
     up, diagonal = sh_basis(np.array([0.0, 0, 1])), sh_basis(np.array([0.8, 0.36, 0.48]))
     assert np.flatnonzero(np.abs(up) > 1e-15).tolist() == [0, 2, 6]
     assert np.sign(diagonal).tolist() == [1, -1, 1, -1, 1, -1, -1, -1, 1]
-    assert diagonal[3] / diagonal[1] == pytest.approx(0.8 / 0.36) and sh_polynomials(np.array([0.8, 0.36, 0.48]))[
-        6
-    ] == pytest.approx(3 * 0.48**2 - 1)
+    assert diagonal[3] / diagonal[1] == pytest.approx(0.8 / 0.36)
+    assert sh_polynomials(np.array([0.8, 0.36, 0.48]))[6] == pytest.approx(3 * 0.48**2 - 1)
 
 
 @pytest.mark.parametrize("bands", [ORTHONORMAL, GAMMA_BANDS])

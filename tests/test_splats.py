@@ -23,8 +23,8 @@ POLE = np.array([0.0, -RADIUS, 0.0])
 def patch(radius: float, columns: int, reach: float) -> Mesh:
     """The front of a ball, a grid over `reach` radians to each side."""
     across, up = np.meshgrid(np.linspace(-reach, reach, columns), np.linspace(-reach, reach, columns))
-    points = radius * np.stack([np.sin(across) * np.cos(up), -np.cos(across) * np.cos(up), np.sin(up)],
-                               -1).reshape(-1, 3)
+    points = np.stack([np.sin(across) * np.cos(up), -np.cos(across) * np.cos(up), np.sin(up)], -1)
+    points = radius * points.reshape(-1, 3)
     index = np.arange(columns**2).reshape(columns, columns)
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
     return Mesh(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
@@ -84,8 +84,8 @@ def test_training_lowers_the_depth_error(seen):
     assert errors_of(after, seen) < 0.65 * errors_of(before, seen)
     assert np.mean(losses[-10:]) < 0.7 * np.mean(losses[:10])
     fused = fuse(after, np.array([[-0.05, -1.03, -0.05], [0.05, -0.96, 0.05]]), 0.003)
-    assert np.median(np.abs(np.linalg.norm(fused.mesh.vertices, axis=1)
-                            - RADIUS)) < 0.0015, "the same fusion makes a scan of them"
+    distance = np.linalg.norm(fused.mesh.vertices, axis=1)
+    assert np.median(np.abs(distance - RADIUS)) < 0.0015, "the same fusion makes a scan of them"
 
 
 def test_splats_without_a_gpu_are_a_problem_only_when_asked_for():

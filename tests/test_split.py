@@ -31,8 +31,8 @@ def face():
     small = raster.sample(skin[0] * skin[1],
                           np.stack(np.meshgrid(np.arange(SIZE), np.arange(SIZE)), -1).reshape(-1, 2) * 512 / SIZE
                           + 1).reshape(SIZE, SIZE)
-    return torch.from_numpy(normal.transpose(2, 0,
-                                             1).astype(np.float32)), torch.from_numpy((small > 0.9).astype(np.float32))
+    inside = torch.from_numpy((small > 0.9).astype(np.float32))
+    return torch.from_numpy(normal.transpose(2, 0, 1).astype(np.float32)), inside
 
 
 def lamp(seed, amount):
@@ -53,10 +53,8 @@ def drawn(seed, scales, parts=("traits",)):
     rng, values = np.random.default_rng(seed), np.zeros((3, len(cells.places)))
     for part in parts:
         lower = np.linalg.cholesky(getattr(model, part) + 1e-6 * np.eye(len(cells.places)))
-        values += getattr(scales, part) * skin_or_light.OF_AXES[:,
-                                                                None] * (lower
-                                                                         @ rng.standard_normal((len(cells.places),
-                                                                                                3))).T
+        drawn = (lower @ rng.standard_normal((len(cells.places), 3))).T
+        values += getattr(scales, part) * skin_or_light.OF_AXES[:, None] * drawn
     return enlarged(torch.from_numpy(skin_or_light._spread(AXES.T @ values, cells.covered)), SIZE)
 
 
@@ -115,8 +113,10 @@ def test_the_probability_is_the_gaussians():
     seen, values = seen_together([cells])
     together = skin_or_light.model(seen, seen)
     scales = skin_or_light.TYPICAL
-    by_scipy = sum(multivariate_normal(cov=together.covariance(scales, axis),
-                                       allow_singular=True).logpdf(values[:, axis]) for axis in range(3))
+    by_scipy = 0
+    for axis in range(3):
+        normal = multivariate_normal(cov=together.covariance(scales, axis), allow_singular=True)
+        by_scipy += normal.logpdf(values[:, axis])
     constant = -1.5 * len(values) * np.log(2 * np.pi)
     assert log_probability(together, values, scales) + constant == pytest.approx(by_scipy, rel=1e-6)
 

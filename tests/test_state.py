@@ -116,16 +116,16 @@ def test_confidence_that_knows_the_errors_gains_likelihood(person):
     images.write_data(capture.capture.maps / "confidence.png", np.where(poor, 0.02, 0.92).astype(np.float32))
     found = state_scores.in_uv(capture, {TRUE: maps[TRUE], SOLVED: solved.astype(np.float32)})[SOLVED]
     assert found["coverage"] == pytest.approx(0.68, abs=0.03)
-    assert found["likelihood_gained"] == pytest.approx(np.log(np.sqrt(0.3 * 0.01 + 0.7 * 0.0001)) - 0.3 * np.log(0.1)
-                                                       - 0.7 * np.log(0.01), abs=0.03)
+    gained = np.log(np.sqrt(0.3 * 0.01 + 0.7 * 0.0001)) - 0.3 * np.log(0.1) - 0.7 * np.log(0.01)
+    assert found["likelihood_gained"] == pytest.approx(gained, abs=0.03)
 
 
 def test_pictures_are_judged_as_the_maps_are_seen():
     side, rng = 160, np.random.default_rng(3)
     truth = (SKIN * np.exp(0.1 * rng.standard_normal((side, side, 1)))).astype(np.float32)
     y, x = (np.mgrid[0:side, 0:side] + 0.5) / side
-    uv, face, shadow = np.stack([x.ravel(), 1 - y.ravel()],
-                                1), (np.abs(x - 0.5) < 0.45) & (np.abs(y - 0.5) < 0.45), x > 0.5
+    uv = np.stack([x.ravel(), 1 - y.ravel()], 1)
+    face, shadow = (np.abs(x - 0.5) < 0.45) & (np.abs(y - 0.5) < 0.45), x > 0.5
     look = HeadInView(AlbedoTruth(0, images.linear_to_srgb(truth), face, shadow), np.ones((side, side), bool), uv)
     filmed = truth * np.where(shadow, 0.4, 1.0)[..., None]
     found = state_scores.in_pictures({NOTHING: filmed, TRUE: truth, FLAT: np.broadcast_to(SKIN, truth.shape)}, [look])
@@ -134,9 +134,8 @@ def test_pictures_are_judged_as_the_maps_are_seen():
         and found[TRUE]["detail"] == pytest.approx(1, abs=1e-3)
         and found[TRUE]["overshoot"] < 0.01
     )
-    assert found[NOTHING]["shadow_step"] == pytest.approx(-np.log(0.4), abs=0.02) and found[NOTHING][
-        "edge_step"
-    ] == pytest.approx(-np.log(0.4), abs=0.05)
+    assert found[NOTHING]["shadow_step"] == pytest.approx(-np.log(0.4), abs=0.02)
+    assert found[NOTHING]["edge_step"] == pytest.approx(-np.log(0.4), abs=0.05)
     assert found[FLAT]["detail"] == 0 and found[FLAT]["psnr"] < found[TRUE]["psnr"]
 
 
@@ -154,8 +153,8 @@ def test_captures_of_one_true_head_are_one_person(tmp_path):
         filled(tmp_path, name, head)
     Capture(tmp_path / "new.wildcap").claim()
     found = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
-    assert [(filmed.name, filmed.person)
-            for filmed in found] == [("anna", "anna"), ("anna_flash", "anna"), ("ben", "ben"), ("scan", "scan")]
+    people = [(filmed.name, filmed.person) for filmed in found]
+    assert people == [("anna", "anna"), ("anna_flash", "anna"), ("ben", "ben"), ("scan", "scan")]
 
 
 def test_a_subjects_own_parts_come_before_the_built_in_heads(tmp_path):
@@ -165,8 +164,8 @@ def test_a_subjects_own_parts_come_before_the_built_in_heads(tmp_path):
     for name, mask in (("beard", beard), ("brows", brows)):
         images.write_data(tmp_path / "anna" / "maps" / f"part_{name}.png", mask)
     parts = state_captures.find(tmp_path, tmp_path, tmp_path / "state")[0].parts()
-    assert parts["beard"][SIZE * 45 // 64,
-                          SIZE * 30 // 64] and parts["beard"].sum() == pytest.approx(200 * (SIZE / 64) ** 2, rel=0.15)
+    assert parts["beard"][SIZE * 45 // 64, SIZE * 30 // 64]
+    assert parts["beard"].sum() == pytest.approx(200 * (SIZE / 64) ** 2, rel=0.15)
     assert parts["brows"].sum() == pytest.approx(80 * (SIZE / 64) ** 2, rel=0.2) and parts["lips"].any()
     assert not (parts["skin"] & (parts["beard"] | parts["brows"] | parts["lips"])).any() and parts["skin"].any()
 
@@ -200,8 +199,8 @@ def test_people_measured_before_by_the_same_code_stay_in_the_record():
     record = {"people": {DELIT: {"anna": row}}, "captures": {"anna": {DELIT: row}}, "code": code}
     scores, by_capture = state.with_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}},
                                             code)
-    assert scores == {DELIT: {"anna": row, "ben": row},
-                      SOLVED: {"ben": row}} and list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
+    assert scores == {DELIT: {"anna": row, "ben": row}, SOLVED: {"ben": row}}
+    assert list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
     assert state.with_earlier(record, {}, {}, {**code, "solve": "c"}) == ({}, {})
 
 

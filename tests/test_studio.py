@@ -97,9 +97,8 @@ def test_cameras_that_are_some_pixels_off_are_refined_and_not_refused(tmp_path):
         turn = cv2.Rodrigues(np.radians(rng.normal(0, 0.6, 3)))[0]
         off.append(replace(view, rotation=turn @ view.rotation, translation=turn @ view.translation))
     (tmp_path / "rig.json").write_text(calibration(off))
-    capture, settings, told = Capture(tmp_path
-                                      / "face.wildcap"), from_json({"cameras": {"import_from": str(tmp_path
-                                                                                                   / "rig.json")}}), []
+    capture, told = Capture(tmp_path / "face.wildcap"), []
+    settings = from_json({"cameras": {"import_from": str(tmp_path / "rig.json")}})
     capture.root.mkdir()
     capture.set_source(tmp_path / "photos")
     frames.run(capture, settings, Reporter("frames"))

@@ -52,8 +52,8 @@ def test_the_frames_asked_are_spread_over_the_film_and_hold_those_of_the_texture
     asked = spread_over(records(400))
     numbers = [int(record.name[:5]) for record in asked]
     assert numbers == sorted(numbers) and numbers[0] == 0 and numbers[-1] == 399 and max(np.diff(numbers)) <= 6
-    assert {record for record in records(400)
-            if record.selected} <= set(asked) and MOST_FRAMES <= len(asked) <= MOST_FRAMES + 13
+    selected = {record for record in records(400) if record.selected}
+    assert selected <= set(asked) and MOST_FRAMES <= len(asked) <= MOST_FRAMES + 13
     assert spread_over(records(30)) == tuple(records(30))
 
 
@@ -75,6 +75,6 @@ def test_then_only_the_head_is_matched_and_in_fewer_frames(tmp_path, monkeypatch
     film = Frames(tuple(replace(record, yaw_deg=None) for record in records(count)), kind)
     with pytest.raises(Problem) as problem:
         solving.solve(film, Capture(tmp_path), Settings(), Reporter("cameras"))
-    assert [was for _, was in tried] == alone and {number
-                                                   for number, _ in tried} == {asked or len(spread_over(film.records))}
+    assert [was for _, was in tried] == alone
+    assert {number for number, _ in tried} == {asked or len(spread_over(film.records))}
     assert ("camera that stood still" in problem.value.problem) == (alone[0])

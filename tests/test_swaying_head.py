@@ -72,9 +72,11 @@ def missed_px(model, true, turns, shifts) -> np.ndarray:
         origin.append(-pose.rotation.matrix().T @ pose.translation)
     rows = np.stack(rows)
     place = np.linalg.solve(rows.sum(0), np.einsum("vnij,vj->ni", rows, np.array(origin))[..., None])[..., 0]
-    return np.array([np.linalg.norm(np.asarray(model.cameras[1].img_from_cam(place @ pose.rotation.matrix().T
-                                                                             + pose.translation)) - aim, axis=1).mean()
-                     for pose, aim in zip(poses, aims, strict=True)])
+    off = []
+    for pose, aim in zip(poses, aims, strict=True):
+        pixels = model.cameras[1].img_from_cam(place @ pose.rotation.matrix().T + pose.translation)
+        off.append(np.linalg.norm(np.asarray(pixels) - aim, axis=1).mean())
+    return np.array(off)
 
 
 def test_the_head_is_followed_where_it_swayed():

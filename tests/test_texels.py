@@ -77,8 +77,8 @@ def test_the_mirror_image_of_a_head_is_the_mirror_image_of_what_the_network_read
     known = head_in_light()
     turned = Texels(**{name: getattr(known, name)[:, ::-1].copy() for name in known.__dataclass_fields__})
     turned.normal[..., 0] *= -1
-    (layers, light, middle), (opposite, other_light, other) = (network_input(maps_of(each, "cpu"))
-                                                               for each in (known, turned))
+    (layers, light, middle), (opposite, other_light, other) = (
+        network_input(maps_of(each, "cpu")) for each in (known, turned))
     layers = layers.flip(-1)
     layers[:, 5] *= -1
     assert layers.shape == (1, CHANNELS, 64, 64) and (middle - other).abs().max() < 0.02
@@ -90,8 +90,8 @@ def test_the_network_begins_with_the_fitted_light_half_of_its_sun_blocked():
     light = torch.rand(2, 6, 128, 128) + 0.1
     shading, shadow, spread = TexelNet(**MODEL)(torch.randn(2, CHANNELS, 128, 128), light)
     assert shading.shape == (2, 3, 128, 128) and shadow.shape == (2, 1, 128, 128) and spread.shape == (2, 3, 32, 32)
-    assert torch.allclose(shading,
-                          torch.log(light[:, :3] + 0.5 * light[:, 3:])) and not shadow.any() and (spread == -2).all()
+    assert torch.allclose(shading, torch.log(light[:, :3] + 0.5 * light[:, 3:]))
+    assert not shadow.any() and (spread == -2).all()
 
 
 def test_missing_weights_of_the_whole_head_are_named(tmp_path):

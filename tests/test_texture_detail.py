@@ -71,9 +71,8 @@ def test_a_vgg_of_the_users_is_read_and_is_lpips_only_with_its_weights(tmp_path)
               tmp_path / "vgg16.safetensors")
     network = features.load_features(str(tmp_path / "vgg16.safetensors"))
     layers = network.layers(torch.rand(1, 3, 32, 32, generator=torch.Generator().manual_seed(0)))
-    assert network.name == "VGG16 features" and [layer.shape[1]
-                                                 for layer in layers] == [64, 128, 256, 512,
-                                                                          512] and layers[-1].shape[-1] == 2
+    assert network.name == "VGG16 features" and layers[-1].shape[-1] == 2
+    assert [layer.shape[1] for layer in layers] == [64, 128, 256, 512, 512]
     assert float(network.distance(layers, layers)) == 0
     torch.save({f"lin{i}.model.1.weight": torch.ones(1, n, 1, 1) for i, n in enumerate((64, 128, 256, 512, 512))},
                tmp_path / "vgg.pth")
@@ -127,10 +126,8 @@ def test_background_takes_a_views_weight_outside_the_face_only(head, tmp_path, m
     person[:, :8] = 0
     cut, weight = seen(person)
     face = template.mask("face", SIZE)
-    assert cut == 1 and weight[:,
-                               :20][face[:, :20]
-                                    < 0.01].max() < 0.01 and weight[:,
-                                                                    64:].min() == 1 and weight[face > 0.99].min() > 0.99
+    assert cut == 1 and weight[:, 64:].min() == 1 and weight[face > 0.99].min() > 0.99
+    assert weight[:, :20][face[:, :20] < 0.01].max() < 0.01
     assert seen(np.zeros((64, 64), np.float32))[0] == 0, "a segmentation that misses the face is not believed"
 
 
@@ -159,5 +156,5 @@ def test_a_texture_larger_than_its_views_maps_is_read_from_the_frames(tmp_path):
     apart, lost = (np.abs(fine(each) - fine(whole.log_texture))[inner].mean() for each in (large.log_texture, enlarged))
     assert large.log_texture.shape == whole.log_texture.shape and inner.sum() > 1000
     assert apart < 0.3 * lost and np.abs(large.confidence - whole.confidence)[inner].mean() < 0.05
-    assert (large.log_texture[large.confidence > 0]
-            < -0.01).all(), "what no view sees has no colour, and must not be trusted for one"
+    sure = large.log_texture[large.confidence > 0]
+    assert (sure < -0.01).all(), "what no view sees has no colour, and must not be trusted for one"

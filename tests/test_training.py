@@ -151,8 +151,8 @@ def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypat
     second = prior.train_prior("cpu", out, QUIET, TrainingRun(0.02, cache), carried, ["b"])
     assert 0 < first["steps"] < second["steps"]
     assert second["skins"] == ["a"] and second["held_out_skins"] == ["b"] and second["notices"] == ["Theirs."]
-    assert set(second["held_out"]["loss"]) == {"synthetic",
-                                               "carried"} and not set(second["seeds"]) & set(second["held_out_seeds"])
+    assert set(second["held_out"]["loss"]) == {"synthetic", "carried"}
+    assert not set(second["seeds"]) & set(second["held_out_seeds"])
     conditioned = load(out).of_tone(SkinTone((0.4, 0.3, 0.2), GIVEN))
     assert conditioned(torch.zeros(1, 7, 32, 32), 1.0,
                        torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32)).isfinite().all()

@@ -113,8 +113,8 @@ def test_normals_are_turned_into_the_other_tangent_frame(source, target):
         got = baked[:, :1] * t + baked[:, 1:2] * b + baked[:, 2:] * n
         off = np.degrees(np.arccos(np.clip((got * world(n)).sum(1) / np.linalg.norm(got, axis=1), -1, 1)))
         assert np.median(off) < 0.6 and np.percentile(off, 99) < 3
-        assert np.median(np.degrees(np.arccos(np.clip((n * world(n)).sum(1), -1,
-                                                      1)))) > 10, "there was something to carry"
+        turned = np.degrees(np.arccos(np.clip((n * world(n)).sum(1), -1, 1)))
+        assert np.median(turned) > 10, "there was something to carry"
 
 
 def test_strips_do_not_show(source, target, monkeypatch):
@@ -154,8 +154,8 @@ def test_the_displacement_is_the_known_one_in_metres():
     half = head.moved(head.vertices + 0.002 * vertex_normals(surfaces.welded(head)[0])[surfaces.welded(head)[1]])
     front = replace(half, faces=half.faces[half.vertices[half.faces].mean(1)[:, 1] < 0], uvs=None, face_uvs=None)
     height = scan.displacement(head, front, 128, lambda done: None)
-    assert np.isclose(np.median(height[40:90, 48:80]), 0.002,
-                      atol=1e-4) and (height[:, :20] == 0).all() and height.max() < 0.003
+    assert np.isclose(np.median(height[40:90, 48:80]), 0.002, atol=1e-4)
+    assert (height[:, :20] == 0).all() and height.max() < 0.003
 
 
 @pytest.fixture(scope="module")
@@ -193,8 +193,7 @@ def test_the_scan_is_delivered_with_its_colours(capture):
         "delivery.json", "scan.obj", "scan_lit.png", "scan_albedo.png", "scan_albedo_known.png", "displacement.exr"}
     mesh = meshes.read_obj(capture.delivery / "scan.obj")
     assert atlas.overlap_share(mesh, 256) < 0.01
-    lit, albedo = images.read_linear(capture.delivery
-                                     / "scan_lit.png"), images.read_linear(capture.delivery / "scan_albedo.png")
+    lit, albedo = (images.read_linear(capture.delivery / f"scan_{name}.png") for name in ("lit", "albedo"))
     face, bary = raster.rasterize_uv(mesh, 256)
     points = raster.interpolate(mesh.vertices, mesh.faces, face, bary)
     front = (face >= 0) & (points[..., 1] < -0.06)

@@ -32,10 +32,10 @@ def shot(root, azimuths=AZIMUTHS, points: int = 300) -> Capture:
     normals = meshes.vertex_normals(mesh)
     views = [painted_head.camera(azimuth, 0.03 * i, scale=SCALE) for i, azimuth in enumerate(azimuths)]
     names = [f"{i:05d}.jpg" for i in range(len(views))]
+    params = views[0].camera.params
+    pinhole = params if len(params) == 4 else [*params[:1], *params[:3]]
     model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="PINHOLE", width=views[0].width,
-                                                      height=views[0].height, params=views[0].camera.params
-                                                      if len(views[0].camera.params) == 4
-                                                      else [*views[0].camera.params[:1], *views[0].camera.params[:3]]))
+                                                      height=views[0].height, params=pinhole))
     front = rng.choice(np.flatnonzero((mesh.vertices[:, 1] < 0.02) & (mesh.vertices[:, 2] > -0.11)
                                       & (mesh.vertices[:, 2] < 0.06)), points)
     places, members = mesh.vertices[front] + rng.normal(0, 3e-4, (points, 3)), [[] for _ in front]
@@ -45,9 +45,8 @@ def shot(root, azimuths=AZIMUTHS, points: int = 300) -> Capture:
         image = pycolmap.Image(name=name, camera_id=1, image_id=number, keypoints=view.project(places[seen])[0])
         for k, i in enumerate(seen):
             members[i].append(pycolmap.TrackElement(number, k))
-        model.add_image_with_trivial_frame(image,
-                                           pycolmap.Rigid3d(np.concatenate([view.rotation, view.translation[:, None]],
-                                                                           1)))
+        pose = np.concatenate([view.rotation, view.translation[:, None]], 1)
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
     for place, elements in zip(places, members, strict=True):
         if len(elements) > 1:
             model.add_point3D(place, pycolmap.Track(elements), np.zeros(3, np.uint8))

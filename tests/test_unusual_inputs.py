@@ -46,8 +46,8 @@ def _masks() -> Iterator:
             picture = (Image.fromarray(BARS.astype(np.uint16) * 257) if mode == "I;16"
                        else grey.convert("RGB").convert(mode))
             picture.save(path, **options)
-            return path.name + f" as {mode}", lambda: bool(np.abs(images.read_mask(path) - BARS / 255).max()
-                                                           < (0.1 if "jp" in suffix.lower() else 0.01))
+            tolerance = 0.1 if "jp" in suffix.lower() else 0.01
+            return f"{path.name} as {mode}", lambda: bool(np.abs(images.read_mask(path) - BARS / 255).max() < tolerance)
 
         return "masks", make
 
@@ -61,8 +61,11 @@ def _masks() -> Iterator:
             output.open(str(path), spec)
             output.write_image(np.repeat(BARS[..., None] / np.float32(255), channels, -1).astype(np.float32))
             output.close()
-            return f"{path.name} of {kind} x {channels}, {attributes}", lambda: bool(np.abs(images.read_mask(path)
-                                                                                            - BARS / 255).max() < 0.06)
+
+            def reads_right() -> bool:
+                return bool(np.abs(images.read_mask(path) - BARS / 255).max() < 0.06)
+
+            return f"{path.name} of {kind} x {channels}, {attributes}", reads_right
 
         return "masks", make
 
@@ -165,8 +168,8 @@ def _plys() -> Iterator:
                       "element face 2\nproperty list uchar int vertex_indices\nend_header\n").encode()
             rest = [0] * len(more)
             if order is None:
-                body = "".join(" ".join(map(str, [*corner, *rest])) + "\n"
-                               for corner in CORNERS.tolist()).encode() + b"3 0 1 2\n3 0 2 3\n"
+                lines = "".join(" ".join(map(str, [*corner, *rest])) + "\n" for corner in CORNERS.tolist())
+                body = lines.encode() + b"3 0 1 2\n3 0 2 3\n"
             else:
                 body = b"".join(struct.pack(order + ("fff" if kind == "float" else "ddd") + more, *corner, *rest)
                                 for corner in CORNERS.tolist())
@@ -196,8 +199,11 @@ def _jsons() -> Iterator:
             path.write_bytes(encode(points if of_points else chosen))
             if of_points:
                 found = lambda: artist_landmarks.read(path)  # noqa: E731 - read only when it is asked for
-                return f"{path.name}: {what}", lambda: np.allclose(found()[152],
-                                                                   points["points"]["152"]) and len(found()) == 2
+
+                def reads_right() -> bool:
+                    return np.allclose(found()[152], points["points"]["152"]) and len(found()) == 2
+
+                return f"{path.name}: {what}", reads_right
             return (
                 f"{path.name}: {what}",
                 lambda: command_settings.read_file(path) == chosen and read_json(path) == chosen,

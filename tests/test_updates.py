@@ -31,8 +31,12 @@ def updated(addon, tmp_path, monkeypatch):
     for stage in stages.STAGES:
         for path in (root / name for name in (*stage.reads, *stage.writes) if not made.has(name)):
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.mkdir() if path.suffix == "" else path.write_bytes((root / "maps" / path.name).read_bytes()
-                                                                    if path.parent.name == "maps_4k" else b"stands in")
+            if path.suffix == "":
+                path.mkdir()
+            elif path.parent.name == "maps_4k":
+                path.write_bytes((root / "maps" / path.name).read_bytes())
+            else:
+                path.write_bytes(b"stands in")
     (root / "delivery" / "one").write_bytes(b"stands in")
     bpy.ops.wildcap.open_capture(directory=str(root))
     settings = addon("properties").settings(addon("captures").active(bpy.context))
@@ -50,8 +54,8 @@ def look(addon):
 
 
 def next_operator(addon) -> str:
-    return addon("next_step").next_step(addon("panel").gather(bpy.context,
-                                                              addon("captures").active(bpy.context))).operator
+    facts = addon("panel").gather(bpy.context, addon("captures").active(bpy.context))
+    return addon("next_step").next_step(facts).operator
 
 
 def test_what_older_code_made_is_shown_as_such_and_can_be_made_again_by_a_click(addon, updated, monkeypatch):
@@ -66,8 +70,8 @@ def test_what_older_code_made_is_shown_as_such_and_can_be_made_again_by_a_click(
     assert started == ["scan"], "begun with this stage, which makes it again"
 
 
-def test_a_head_that_older_code_made_is_painted_on_assembled_and_rendered_and_no_stage_runs(addon, updated,
-                                                                                            monkeypatch):
+def test_a_head_that_older_code_made_is_painted_on_assembled_and_rendered_and_no_stage_runs(
+        addon, updated, monkeypatch):
     started: list = []
     monkeypatch.setattr(addon("jobs"), "start", lambda *given, **named: started.append((given, named)))
     before = {path: path.read_bytes() for path in updated.rglob("*") if path.is_file()}
@@ -94,8 +98,8 @@ def test_a_mask_painted_after_the_update_asks_for_a_solve_alone(addon, updated):
     bpy.ops.wildcap.bring_in_head()
     look(addon)
     assert next_operator(addon) == "wildcap.solve"
-    assert {name for name, state in states.items()
-            if state == "older"} == set(states) - {"solve"}, "what lies under the mask stays as it is"
+    older = {name for name, state in states.items() if state == "older"}
+    assert older == set(states) - {"solve"}, "what lies under the mask stays as it is"
 
 
 def test_a_capture_of_0_1_0_opens_with_all_its_work(addon, tmp_path):

@@ -17,8 +17,6 @@ from core.contract.messages import CancelledError, Problem, Reporter
 from core.contract.settings import from_json
 from core.face import template
 from core.imaging import images
-from core.training import fine_windows, upscaler
-from core.training.descent import TrainingRun
 from core.upscale import gloss, network
 from core.upscale.enlarge import enlarge, load_network
 from core.upscale.maps import HeadMaps, read_maps
@@ -67,8 +65,8 @@ def test_every_map_is_met_at_the_new_size(capture):
     ):
         got = read(capture.maps_4k / name)
         assert got.shape == expected.shape and np.abs(got - expected)[inner].max() < tolerance, name
-    assert report.figures["method"] == "lanczos" and (report.figures["size_from_px"],
-                                                      report.figures["size_px"]) == (SMALL, LARGE)
+    assert report.figures["method"] == "lanczos"
+    assert (report.figures["size_from_px"], report.figures["size_px"]) == (SMALL, LARGE)
 
 
 def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capture):
@@ -99,8 +97,8 @@ def test_maps_of_the_wanted_size_are_left_as_they_are(capture):
 
 @pytest.mark.parametrize("name", ["normal.png", "specular_albedo.png", "confidence.png", "shading.exr"])
 def test_a_map_of_another_size_is_named(capture, name):
-    (images.write_linear if name.endswith(".exr")
-     else images.write_data)(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
+    write = images.write_linear if name.endswith(".exr") else images.write_data
+    write(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
     with pytest.raises(Problem, match=f"{name} is 33 x 33 pixels, but diffuse_albedo.exr is 256 x 256") as caught:
         read_maps(capture.maps)
     assert caught.value.remedy == "Run the stage solve again."
@@ -141,9 +139,8 @@ def busy() -> network.Rcan:
 def test_strips_are_the_whole(busy, monkeypatch):
     maps = rough_maps(70)
     stripped = {rows: _with_strips(monkeypatch, rows, maps, busy) for rows in (9, 32, 70)}
-    assert np.ptp(stripped[70][..., :3]) > 0.9 and np.abs(stripped[70]
-                                                          - enlarge(maps, lambda share: None,
-                                                                    network=network.Rcan(1, 1, 16))).max() > 0.01
+    untrained = enlarge(maps, lambda share: None, network=network.Rcan(1, 1, 16))
+    assert np.ptp(stripped[70][..., :3]) > 0.9 and np.abs(stripped[70] - untrained).max() > 0.01
     for rows in (9, 32):
         assert np.abs(stripped[rows] - stripped[70]).max() < 1e-5, rows
 
@@ -168,8 +165,8 @@ def test_an_untrained_network_resamples(capture):
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]
     linear = np.stack([truth, truth ** 2, truth / 2], 2)
     assert np.abs(images.srgb_to_linear(large[..., :3]) - linear)[inner].max() < 2e-3
-    assert np.abs(large[..., 3:6]
-                  - tilted(LARGE))[inner].max() < 4e-3 and np.abs(large[..., 6] - truth)[inner].max() < 2e-3
+    assert np.abs(large[..., 3:6] - tilted(LARGE))[inner].max() < 4e-3
+    assert np.abs(large[..., 6] - truth)[inner].max() < 2e-3
 
 
 def test_a_block_begins_as_the_identity():
@@ -182,9 +179,7 @@ def test_the_stage_takes_the_network(capture, busy, monkeypatch):
     report = Reporter("upscale")
     upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "network", **PLAIN}}), report)
     assert report.figures["method"] == "network"
-    linear, coded = images.read_linear(capture.maps_4k
-                                       / "diffuse_albedo.exr"), images.read_linear(capture.maps_4k
-                                                                                   / "diffuse_albedo.png")
+    linear, coded = (images.read_linear(capture.maps_4k / f"diffuse_albedo.{kind}") for kind in ("exr", "png"))
     assert coded.shape == (LARGE, LARGE, 3) and np.abs(linear - coded).max() < 2e-3
     assert np.abs(coded
                   - images.resize(images.read_linear(capture.maps / "diffuse_albedo.exr"), LARGE, LARGE)).max() > 0.02
@@ -221,73 +216,13 @@ def test_a_map_of_many_strips_is_whole(tmp_path):
         truth = np.linspace(0, 1, 3 * rows * 5, dtype=np.float32).reshape(rows, 5, 3)
         images.write_data(tmp_path / "a.png", truth, bits=16)
         images.write_data(tmp_path / "a.exr", truth)
-        assert np.abs(images.read_data(tmp_path / "a.png")
-                      - truth).max() < 1e-5 and np.abs(images.read_data(tmp_path / "a.exr") - truth).max() < 1e-3
+        for name, tolerance in (("a.png", 1e-5), ("a.exr", 1e-3)):
+            assert np.abs(images.read_data(tmp_path / name) - truth).max() < tolerance
 
 
 def test_missing_weights_are_told(tmp_path):
     with pytest.raises(Problem, match="weights are missing"):
         load_network(tmp_path / "upscaler.safetensors")
-
-
-@pytest.fixture(scope="module")
-def windows(tmp_path_factory):
-    """A work folder of a tiny training: windows of noise stand in for painted skins."""
-    work, rng = tmp_path_factory.mktemp("upscaler"), np.random.default_rng(0)
-    for seed in (1000, 1001, 9000):
-        rough = rng.random((7, 24, 24)).astype(np.float32)
-        large = np.stack([images.resize(channel, 96, 96) for channel in rough]).clip(0, 1)
-        large[3:6] = (np.float32([0, 0, 1])[:, None, None] + 0.3 * (large[3:6] - 0.5))
-        large[3:6] /= np.linalg.norm(large[3:6], axis=0)
-        np.save(work / f"window_{seed}_0.npy", large.astype(np.float16))
-    return work
-
-
-def test_a_training_goes_on_where_it_stopped(windows, tmp_path, monkeypatch):
-    tiny = {"model": {"groups": 1, "blocks": 2, "width": 16},
-            "training": {"patch": 8, "batch": 4, "rate": 5e-3, "minutes": 1, "skins": 2, "views": 1, "held_out": 1,
-                         "seed": 0, "workers": 0}}
-    monkeypatch.setitem(upscaler.CONFIGS, "cpu", tiny)
-    out = tmp_path / "upscaler.safetensors"
-    first = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.01, windows))
-    second = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.02, windows))
-    assert second["steps"] > first["steps"] > 0 and second["parameters"] == sum(
-        p.numel() for p in network.Rcan(**tiny["model"]).parameters()
-    )
-    assert load_network(out).tail.weight.abs().max() > 0 and out.with_suffix(".json").is_file()
-    monkeypatch.setitem(upscaler.CONFIGS, "gpu", tiny)
-    with pytest.raises(Problem, match="other data or of another configuration"):
-        upscaler.train_upscaler("gpu", out, Reporter("train"), TrainingRun(work=windows))
-
-
-def test_degrading_keeps_the_mean_and_halves_a_relief_as_asked():
-    large = np.zeros((7, 32, 32), np.float32)
-    large[:3], large[3], large[5], large[6] = images.linear_to_srgb(np.float32(0.25)), 0.3, np.sqrt(1 - 0.09), 0.4
-    small = fine_windows.degraded(large, fine_windows.Degradation(0.0, 0.0, 0.0, 0.5), np.random.default_rng(0))
-    assert small.shape == (7, 8, 8) and np.allclose(images.srgb_to_linear(small[:3]), 0.25,
-                                                    atol=1e-4) and np.allclose(small[6], 0.4)
-    tilt = small[3] / small[5]
-    assert np.allclose(tilt, 0.5 * 0.3 / np.sqrt(1 - 0.09), rtol=1e-3)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_turned_window_is_a_turned_surface(seed):
-    """The normals of a turned height field are the turned normals."""
-    height = np.random.default_rng(9).normal(0, 0.2, (16, 16)).astype(np.float32)
-    turned = fine_windows._turned(_relief(height), np.random.default_rng(seed))
-    candidates = [np.transpose(h) if t else h for h in (height, height[:, ::-1], height[::-1], height[::-1, ::-1])
-                  for t in (False, True)]
-    assert any(np.allclose(turned, _relief(candidate), atol=1e-5) for candidate in candidates)
-
-
-def _relief(height: np.ndarray) -> np.ndarray:
-    """Maps [7, S, S] with the normals of a height field; x along columns, y against rows."""
-    down, right = np.gradient(height)
-    normal = np.stack([-right, down, np.ones_like(height)])
-    maps = np.zeros((7, *height.shape), np.float32)
-    maps[3:6] = normal / np.linalg.norm(normal, axis=0)
-    maps[6] = height  # tells which turn it was
-    return maps
 
 
 def test_the_mean_specular_is_that_of_cheeks_and_forehead():

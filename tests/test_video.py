@@ -36,15 +36,14 @@ def write(path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec
           **options):
     """A video of full-range R'G'B' signals; `times` in units of 1/base second."""
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=Fraction(24),
-                                      options={"preset": "ultrafast", "crf": "1", "x265-params": "log-level=none",
-                                               **options})
+        options = {"preset": "ultrafast", "crf": "1", "x265-params": "log-level=none", **options}
+        stream = container.add_stream(codec, rate=Fraction(24), options=options)
         stream.height, stream.width = signals[0].shape[:2]
         stream.pix_fmt = f"yuv420p{bits}le" if bits > 8 else "yuv420p"
         stream.time_base = stream.codec_context.time_base = Fraction(1, base)
         context = stream.codec_context
-        context.color_trc, context.color_primaries, context.colorspace, context.color_range = (trc, primaries, matrix,
-                                                                                               2 if full else 1)
+        context.color_trc, context.color_primaries, context.colorspace = trc, primaries, matrix
+        context.color_range = 2 if full else 1
         for i, signal in enumerate(signals):
             frame = av.VideoFrame(stream.width, stream.height, stream.pix_fmt)
             for plane, values in zip(frame.planes, planes(signal, matrix, bits, full), strict=True):
@@ -121,8 +120,8 @@ def test_saturated_colours_keep_luminance_and_hue_and_nothing_leaves_the_gamut()
 def test_wide_gamut_without_hdr_is_converted(tmp_path):
     # Display P3's (0.8, 0.5, 0.4) is sRGB's (0.838, 0.486, 0.374), by the matrices of both standards
     path = write(tmp_path / "p3.mov", [patches([[0.8, 0.5, 0.4], [0.5] * 3])] * 3, primaries=P3, bits=10)
-    linear = ((np.array([0.8, 0.5, 0.4]) + 0.055)
-              / 1.055) ** 2.4 @ np.array([[1.2249, -0.2249, 0], [-0.0421, 1.0421, 0], [-0.0196, -0.0786, 1.0983]]).T
+    to_709 = np.array([[1.2249, -0.2249, 0], [-0.0421, 1.0421, 0], [-0.0196, -0.0786, 1.0983]])
+    linear = ((np.array([0.8, 0.5, 0.4]) + 0.055) / 1.055) ** 2.4 @ to_709.T
     assert np.abs(shown(path) - [1.055 * linear ** (1 / 2.4) - 0.055, [0.5] * 3]).max() < 0.012
 
 
@@ -159,8 +158,8 @@ def test_frames_of_a_variable_rate_are_even_in_time(tmp_path):
     pictures = read(path, 13)
     assert [p.time_s for p in pictures] == pytest.approx(np.arange(13) / 4, abs=0.051)
     assert [p.time_s for p in pictures] == pytest.approx([times[p.index] / 1000 for p in pictures], abs=0.002)
-    assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index / 130 for p in pictures],
-                                                              abs=0.01), "the frames they say they are"
+    means = [p.srgb.mean() for p in pictures]
+    assert means == pytest.approx([p.index / 130 for p in pictures], abs=0.01), "the frames they say they are"
 
 
 def test_a_pause_in_the_recording_takes_no_frames():
@@ -168,8 +167,8 @@ def test_a_pause_in_the_recording_takes_no_frames():
     assert len(evenly_in_time(times, 20)) > 13 and np.diff(evenly_in_time(times, 20)).max() < 10, (
         "of 20, as many as the pause's 30 frames leave"
     )
-    assert evenly_in_time(np.arange(1000) * 512,
-                          300).tolist() == np.round(np.linspace(0, 999, 300)).astype(int).tolist()
+    evenly = np.round(np.linspace(0, 999, 300)).astype(int)
+    assert evenly_in_time(np.arange(1000) * 512, 300).tolist() == evenly.tolist()
 
 
 def test_what_lies_between_wanted_frames_is_jumped_over(tmp_path, monkeypatch):

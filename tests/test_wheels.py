@@ -35,8 +35,8 @@ def index(tmp_path, monkeypatch) -> Path:
                            "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
             wheel.writestr(f"{info}/RECORD",
                            f"{name}/__init__.py,,\n{info}/METADATA,,\n{info}/WHEEL,,\n{info}/RECORD,,\n")
-        (requirements / "locks"
-         / f"{lock}.txt").write_text(f"{name}==1.0 --hash=sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}\n")
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        (requirements / "locks" / f"{lock}.txt").write_text(f"{name}==1.0 --hash=sha256:{digest}\n")
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(found))
     monkeypatch.setattr(setup_commands, "REQUIREMENTS", requirements)
@@ -52,8 +52,8 @@ def test_a_folder_of_wheels_is_made_and_installed_from(index, tmp_path, monkeypa
     monkeypatch.delenv("PIP_FIND_LINKS")
     assert main(["install", str(target), "--wheels", str(folder), "--compute", "cpu"]) == 0
     python = environment.python_of(target)
-    assert str(python) in capsys.readouterr().out and environment.verify(python, setup_commands.REQUIREMENTS,
-                                                                         importing=True) == []
+    assert str(python) in capsys.readouterr().out
+    assert environment.verify(python, setup_commands.REQUIREMENTS, importing=True) == []
 
 
 def test_what_keeps_wheels_from_coming_is_said(index, tmp_path, capsys):

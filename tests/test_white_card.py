@@ -15,8 +15,8 @@ bpy = pytest.importorskip("bpy")
 def item(addon, capture):
     """The standin capture with one frame, upper half grey card, lower half burnt out."""
     (capture / "frames").mkdir(exist_ok=True)
-    (capture / "frames"
-     / "00000.jpg").write_bytes(standin.png([[(118, 110, 100)] * 32] * 16 + [[(255, 255, 255)] * 32] * 16))
+    frame = standin.png([[(118, 110, 100)] * 32] * 16 + [[(255, 255, 255)] * 32] * 16)
+    (capture / "frames" / "00000.jpg").write_bytes(frame)
     return addon("captures").active(bpy.context)
 
 
@@ -55,8 +55,12 @@ def test_the_chart_that_the_solver_finds_reaches_the_settings(addon, item, monke
         figures = {"white_point": [0.9, 0.8, 0.6]}
 
     started = []
-    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool,
-                        **options: started.append((tool, options)) or Job())
+
+    def start_tool(item, tool, **options):
+        started.append((tool, options))
+        return Job()
+
+    monkeypatch.setattr(addon("jobs"), "start_tool", start_tool)
     bpy.ops.wildcap.find_color_checker()
     assert started[0][0] == "white_point"
     started[0][1]["then"]()

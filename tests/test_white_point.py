@@ -65,8 +65,8 @@ def test_the_tool_finds_the_chart_in_whichever_frame(tmp_path, capsys):
     capture = filmed(tmp_path, frame(), frame(), frame(LIGHT))
     report = Reporter("white_point")
     white_point.run(capture, Settings(), report)
-    assert report.figures["white_point_frame"] == "00002.jpg" and np.abs(np.array(report.figures["white_point"]) / LIGHT
-                                                                         - 1).max() < 0.02
+    assert report.figures["white_point_frame"] == "00002.jpg"
+    assert np.abs(np.array(report.figures["white_point"]) / LIGHT - 1).max() < 0.02
     assert main(["white", str(capture.root)]) == 0 and "--white-point 0." in capsys.readouterr().out
 
 
@@ -105,8 +105,8 @@ def test_the_command_says_what_is_missing(tmp_path, capsys, words, said):
 
 
 def test_a_white_point_that_is_none_is_refused():
-    assert white_point.given_white("auto") is None and np.allclose(white_point.given_white("0.9,0.8,1.6"),
-                                                                   [0.9, 0.8, 1.6])
+    assert white_point.given_white("auto") is None
+    assert np.allclose(white_point.given_white("0.9,0.8,1.6"), [0.9, 0.8, 1.6])
     for wrong in ("white", "1,1", "0,1,1", "1,nan,1"):
         with pytest.raises(Problem, match="is not a colour"):
             white_point.given_white(wrong)

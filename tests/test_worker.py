@@ -66,11 +66,10 @@ def test_a_job_runs_every_stage_in_order_and_a_second_run_skips_them(root, captu
 
 def test_from_forces_and_until_ends(root, capture, video):
     follow(start(root, capture, source=video, last="texture"))
-    assert finished(follow(start(root, capture, first="scan", last="delight"))) == {"scan": False,
-                                                                                    "registration": False,
-                                                                                    "delight": False}
-    assert finished(follow(start(root, capture, last="shadow_mask"))) == {**dict.fromkeys(stages.NAMES[:6], True),
-                                                                          "shadow_mask": False}
+    again = finished(follow(start(root, capture, first="scan", last="delight")))
+    assert again == {"scan": False, "registration": False, "delight": False}
+    rest = finished(follow(start(root, capture, last="shadow_mask")))
+    assert rest == {**dict.fromkeys(stages.NAMES[:6], True), "shadow_mask": False}
 
 
 def test_a_stage_without_its_inputs_is_refused(root, capture, video):

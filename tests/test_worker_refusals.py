@@ -93,8 +93,12 @@ def test_an_installation_that_stops_says_why(tmp_path, monkeypatch, said, words)
     monkeypatch.setattr(installation, "lock_of", lambda *_: Lock("manylinux_x86_64-3.11", {}))
     monkeypatch.setattr(installation.bare_environment, "make", lambda *_, **__: None)
     monkeypatch.setattr(installation, "steps", lambda *_: [PipStep((said,))])
-    monkeypatch.setattr(installation.BackgroundTask, "run", lambda task, command,
-                        hear: hear(said) or (1, said if "ERROR" in said else ""))
+
+    def run(task, command, hear):
+        hear(said)
+        return 1, said if "ERROR" in said else ""
+
+    monkeypatch.setattr(installation.BackgroundTask, "run", run)
     task = installation.installation(tmp_path / "env", REQUIREMENTS, tmp_path / "env.log", Path(sys.executable),
                                      installation.PackageSource())
     assert words in finish(task).problem and said in (tmp_path / "env.log").read_text()

@@ -51,9 +51,8 @@ class BaseOperator:
         except Problem as problem:
             return self._refuse(root, problem)
         except Exception as error:  # the one place that catches everything: an artist reads problems, not tracebacks
-            return self._refuse(root,
-                                unforeseen.explain(error, self.bl_label,
-                                                   Path(root) / "logs" / unforeseen.LOG if root else None))
+            log = Path(root) / "logs" / unforeseen.LOG if root else None
+            return self._refuse(root, unforeseen.explain(error, self.bl_label, log))
         for key in ("", root, captures.root(captures.active(context))):
             problems.clear(key)
         status.refresh(context)

@@ -59,9 +59,8 @@ def light_with(world: bpy.types.World, hdri: Hdri, turned: float) -> None:
     """Makes the picture the world's background, turned about +Z by `turned` radians, counter-clockwise from above."""
     nodes, links = world.node_tree.nodes, world.node_tree.links
     background = next(n for n in nodes if n.type == 'BACKGROUND')
-    coordinates, mapping, picture = (nodes.new(kind)
-                                     for kind in ('ShaderNodeTexCoord', 'ShaderNodeMapping',
-                                                  'ShaderNodeTexEnvironment'))
+    coordinates, mapping, picture = (nodes.new(kind) for kind in (
+        'ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeTexEnvironment'))
     for node, x in ((coordinates, -900), (mapping, -700), (picture, -450)):
         node.location = (x, 0)
     # Turning what is looked up one way turns the surroundings the other way.

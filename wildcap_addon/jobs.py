@@ -8,7 +8,6 @@ of it reaches the .blend. A job belongs to its capture: opening another .blend, 
 changes nothing; disabling the add-on or closing Blender ends it, and what was finished is kept.
 """
 
-import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +22,7 @@ from ..core.contract.settings import Settings
 from ..core.worker.background import BackgroundTask
 from ..core.worker.client import Worker
 from ..core.worker.job import read_job, write_job
-from . import batches, captures, preferences, problems, properties, status, timings
+from . import batches, captures, incoming, preferences, problems, properties, status, timings
 
 INTERVAL_S = 0.2
 # the folder that holds core/, where the worker starts; nothing is written there
@@ -54,20 +53,9 @@ class Job:
     log: list[str] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class Results:
-    """take(context, list item) is called in Object Mode when nobody is in the middle of a move, for as long as
-    wanted(its folder) says that something waits."""
-
-    take: Callable
-    wanted: Callable[[str], bool]
-
-
 before_start: list[Callable[[], None]] = []
 """What rooms do before a worker reads a capture: the mask that is being painted is saved. May raise Problem, and then
 nothing starts."""
-on_results: list["Results"] = []
-"""What rooms do with new results of the active capture."""
 _jobs: dict[str, Job] = {}  # capture folder -> its job; '' -> the installation
 
 
@@ -257,42 +245,18 @@ def _tick() -> float | None:
     try:
         poll()
         ended = bool(before - set(_jobs))
-        if ended or _wanted():
-            bring_in_results(ended)
+        if ended or incoming.waits():
+            incoming.bring_in(ended)
     except Exception as error:  # nobody is above a timer: without this, Blender would drop it and the tab stand still
         problems.show("", error if isinstance(error, Problem) else unforeseen.explain(error, "listening to the solver"))
     if shown != _shown():  # a redraw of the tab takes time from the worker, and from whoever paints
         status.redraw()
-    return INTERVAL_S if _jobs or _wanted() else None
-
-
-def _wanted() -> bool:
-    root = captures.root(captures.active(bpy.context))
-    return any(results.wanted(root) for results in on_results)
+    return INTERVAL_S if _jobs or incoming.waits() else None
 
 
 def _shown() -> list[tuple]:
     """All that the tab shows of the jobs."""
     return [(root, job.waiting, job.progress, job.previews) for root, job in _jobs.items()]
-
-
-def bring_in_results(ended: bool) -> None:
-    """What is new comes in at once if the artist is in Object Mode and not in the middle of a move: a new head when a
-    job has ended, and what rooms do with results. Otherwise it waits."""
-    window = next(iter(bpy.context.window_manager.windows), None)
-    if window is None or window.modal_operators:
-        return
-    with bpy.context.temp_override(window=window):
-        if ended:
-            status.refresh(bpy.context)
-        item = captures.active(bpy.context)
-        if bpy.context.mode != 'OBJECT' or item is None:
-            return
-        for results in on_results:
-            results.take(bpy.context, item)
-        if ended and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
-            with contextlib.suppress(RuntimeError):  # the tab shows the problem of the click
-                bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)
 
 
 def eta(job: Job) -> str:

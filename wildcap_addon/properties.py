@@ -30,9 +30,8 @@ def settings_group(stage: str, kind: type) -> type:
 
 def _property(field, tooltip: str):
     unit = field.metadata.get("unit")
-    name = field.metadata.get("label") or field.name.removesuffix(f"_{unit}").replace("_",
-                                                                                      " ").title() + (f" ({unit})"
-                                                                                                      if unit else "")
+    words = field.name.removesuffix(f"_{unit}").replace("_", " ").title()
+    name = field.metadata.get("label") or words + (f" ({unit})" if unit else "")
     common = {"name": name, "description": tooltip, "default": field.default}
     limits = {k: field.metadata[k] for k in ("min", "max") if k in field.metadata}
     if "choices" in field.metadata:
@@ -97,8 +96,8 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
         name="Skin Tone", subtype='COLOR_GAMMA', size=3, min=0, max=1, default=(0.69, 0.54, 0.45),
         description="Mean colour of the facial skin without lips, brows and stubble, as the eye sees it (sRGB)",
     )
-    estimated_tone: bpy.props.FloatVectorProperty(name="Estimated Tone", size=3, options={'HIDDEN'},
-                                                  description="What the last estimate was")
+    estimated_tone: bpy.props.FloatVectorProperty(
+        name="Estimated Tone", size=3, options={'HIDDEN'}, description="What the last estimate was")
     tone_group: bpy.props.StringProperty(name="Tone Group", options={'HIDDEN'},
                                          description="What such a tone is called")
     tone_source: bpy.props.StringProperty(name="Tone Source", options={'HIDDEN'},

@@ -72,9 +72,9 @@ def refresh(context) -> None:
 def look(capture: Capture, settings) -> Status:
     """Reads the folder; hashes only files that changed since they were last hashed."""
     if not capture.root.is_dir():
-        return Status(missing=True, problem=Problem(f"The capture folder {capture.root} is not there any more.",
-                                                    "Connect its disk, or click Locate Capture and show where it is "
-                                                    "now."))
+        return Status(missing=True, problem=Problem(
+            f"The capture folder {capture.root} is not there any more.",
+            "Connect its disk, or click Locate Capture and show where it is now."))
     try:
         record = capture.read()
         verdicts = {stage.name: _verdict(capture, stage, record, settings) for stage in stages.STAGES}
@@ -134,8 +134,8 @@ def _interrupted(capture: Capture) -> bool:
     """Whether a stopped solve left a checkpoint, and no mask was painted since it began: it goes on from there only
     with the masks it began with."""
     began = _time(capture.job) or float("inf")
-    return (capture.checkpoints
-            / "solve.safetensors").is_file() and max(map(_time, (capture.shadow_mask, capture.protect_mask))) <= began
+    checkpoint = capture.checkpoints / "solve.safetensors"
+    return checkpoint.is_file() and max(map(_time, (capture.shadow_mask, capture.protect_mask))) <= began
 
 
 def _time(path: Path) -> float:

@@ -54,9 +54,9 @@ def summarise(scores: Scores, columns: dict[str, Column], against: str | None = 
             pairs = [value - theirs for person, value in known.items()
                      if _is_known(theirs := other.get(person, {}).get(measure))]
             values = list(known.values())
-            found.setdefault(method, {})[measure] = Cell(float(np.mean(values)), _deviation(values),
-                                                         float(np.mean(pairs)) if pairs else None,
-                                                         standard_error(pairs), len(values))
+            found.setdefault(method, {})[measure] = Cell(
+                float(np.mean(values)), _deviation(values), float(np.mean(pairs)) if pairs else None,
+                standard_error(pairs), len(values))
     return found
 
 
@@ -78,8 +78,8 @@ def to_markdown(found: dict[str, dict[str, Cell]], columns: dict[str, Column], t
         rows = [[method, *(_difference_text(row.get(name), column) for name, column in shown.items())]
                 for method, row in found.items() if method != against]
         if any(cell is not None for row in rows for cell in row[1:]):
-            tables.append(markdown([f"less *{against}*, person by person",
-                                    *(column.label for column in shown.values())], rows))
+            heads = [f"less *{against}*, person by person", *(column.label for column in shown.values())]
+            tables.append(markdown(heads, rows))
     return "\n\n".join(tables)
 
 
@@ -96,8 +96,8 @@ def to_record(found: dict[str, dict[str, Cell]], scores: Scores) -> dict:
 def _mean_text(cell: Cell | None, column: Column) -> str | None:
     if cell is None:
         return None
-    return f"{round(cell.mean, column.digits) + 0.0:.{column.digits}f}" + ("" if cell.spread is None
-                                                                           else f" ± {cell.spread:.{column.digits}f}")
+    spread = "" if cell.spread is None else f" ± {cell.spread:.{column.digits}f}"
+    return f"{round(cell.mean, column.digits) + 0.0:.{column.digits}f}" + spread
 
 
 def _difference_text(cell: Cell | None, column: Column) -> str | None:
@@ -105,8 +105,8 @@ def _difference_text(cell: Cell | None, column: Column) -> str | None:
     worse by as much."""
     if cell is None or cell.difference is None:
         return None
-    text = f"{cell.difference:+.{column.digits}f}" + ("" if cell.error is None
-                                                      else f" ± {cell.error:.{column.digits}f}")
+    error = "" if cell.error is None else f" ± {cell.error:.{column.digits}f}"
+    text = f"{cell.difference:+.{column.digits}f}" + error
     if cell.error is None or not column.better or abs(cell.difference) <= 2 * cell.error:
         return text
     return f"**{text}**" if cell.difference * column.better > 0 else f"*{text}*"

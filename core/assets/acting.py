@@ -94,15 +94,12 @@ def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarra
     balls = [_ball(base, body, side) for side in "lr"]
     scale = _scale(base, body)
     balls = np.array([[*_placed(centre[None], body, base)[0], radius * scale] for centre, radius in balls])
+    mouth = (builder._lips[0], *(upper for upper, _ in builder._lids.values()))
+    ends = np.searchsorted(builder.used, [[chain[0], chain[-1]] for chain in mouth])
     return ActingHead(copies, np.stack([face, corner, outer[face, corner]], 1), np.concatenate(faces),
-                      np.concatenate(slot_rows), np.concatenate(uv_rows),
-                      kinds, np.pad(anchors, ((0, missing), (0, 0))), np.pad(weights, ((0, missing), (0, 0))), rest,
-                      _seam(rest, copies),
-                      np.searchsorted(builder.used,
-                                      [[chain[0], chain[-1]]
-                                       for chain in (builder._lips[0],
-                                                     *(upper for upper, _ in builder._lids.values()))]),
-                      sparse.vstack(matrices).tocsr(), balls)
+                      np.concatenate(slot_rows), np.concatenate(uv_rows), kinds,
+                      np.pad(anchors, ((0, missing), (0, 0))), np.pad(weights, ((0, missing), (0, 0))), rest,
+                      _seam(rest, copies), ends, sparse.vstack(matrices).tocsr(), balls)
 
 
 def _order(target: np.ndarray, lower: np.ndarray, welded: int) -> tuple[np.ndarray, np.ndarray]:
@@ -226,9 +223,8 @@ def _soft(placed: np.ndarray, strips: np.ndarray, copies: np.ndarray, welded: in
     weights = 1 / (distance**2 + 1e-8)
     depth = ring[strips].min(1)
     eye = placed[strips].mean(1)[:, 2] > -0.02
-    return np.full(len(inner),
-                   SOFT), uv, source[rim[nearest]], weights / weights.sum(1, keepdims=True), np.where(eye | (depth < 3),
-                                                                                                      SKIN, MOUTH)
+    slots = np.where(eye | (depth < 3), SKIN, MOUTH)
+    return np.full(len(inner), SOFT), uv, source[rim[nearest]], weights / weights.sum(1, keepdims=True), slots
 
 
 def _ball(base: Base, body: np.ndarray, side: str) -> tuple[np.ndarray, float]:

@@ -118,8 +118,8 @@ class HeadBuilder:
         number[used] = np.arange(len(used))
         self.used = used  # index of each coarse vertex in the body
         self._boundary_y = self._neck_ring(polygons)
-        self.subdivision, self.faces = catmull_clark([[int(number[i]) for i in polygon] for polygon in polygons],
-                                                     len(used))
+        corners = [[int(number[i]) for i in polygon] for polygon in polygons]
+        self.subdivision, self.faces = catmull_clark(corners, len(used))
         self._relax = self._corner_smoothing([[int(number[i]) for i in polygon] for polygon in polygons], number)
         coarse_mirror = number[self._representative[mirror[used]]]
         assert (coarse_mirror >= 0).all()

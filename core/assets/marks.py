@@ -57,8 +57,8 @@ def _onto_surface(points, vertices, triangles):
     chosen, bary = np.zeros(len(points), int), np.zeros((len(points), 3))
     for k, point in enumerate(points):
         candidates = np.flatnonzero(np.isin(triangles, near[k]).any(1))
-        closest = trimesh.triangles.closest_point(vertices[triangles[candidates]],
-                                                  np.repeat(point[None], len(candidates), 0))
+        points = np.repeat(point[None], len(candidates), 0)
+        closest = trimesh.triangles.closest_point(vertices[triangles[candidates]], points)
         best = np.argmin(np.linalg.norm(closest - point, axis=1))
         chosen[k] = candidates[best]
         bary[k] = trimesh.triangles.points_to_barycentric(vertices[triangles[chosen[k]]][None], closest[best][None])[0]
@@ -113,8 +113,8 @@ def _shaded(caster, normals, colours, origin, direction_of, size: int = 512):
     key = np.array([0.35, -0.75, 0.55]) / np.linalg.norm([0.35, -0.75, 0.55])
     light = 0.75 * np.clip(normal @ key, 0, 1) + 0.2 + 0.15 * np.clip(-(normal * directions).sum(1), 0, 1)
     colour = (colours[corners] * bary[..., None]).sum(1)
-    return images.linear_to_srgb(np.where((triangle >= 0)[:, None], colour * light[:, None],
-                                          0.2).reshape(size, size, 3))
+    shaded = np.where((triangle >= 0)[:, None], colour * light[:, None], 0.2)
+    return images.linear_to_srgb(shaded.reshape(size, size, 3))
 
 
 def _partners(points):

@@ -228,8 +228,8 @@ def _define_post(ray):
             taken, (self.places, self.lines) = (self.places, self.lines), ({}, {})
             return taken
 
-    here = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(ray.get_runtime_context().get_node_id(),
-                                                                         soft=False)
+    strategy = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy
+    here = strategy(ray.get_runtime_context().get_node_id(), soft=False)
     return Post.options(scheduling_strategy=here).remote()
 
 

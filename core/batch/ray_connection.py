@@ -33,8 +33,8 @@ def connect(address: str | None) -> Iterator:
         os.environ["RAY_AUTH_MODE"] = "token"
         os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))
     elif "RAY_AUTH_MODE" not in os.environ:
-        has_token = {"RAY_AUTH_TOKEN",
-                     "RAY_AUTH_TOKEN_PATH"} & os.environ.keys() or (Path.home() / ".ray" / "auth_token").is_file()
+        in_environment = {"RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & os.environ.keys()
+        has_token = in_environment or (Path.home() / ".ray" / "auth_token").is_file()
         os.environ["RAY_AUTH_MODE"] = "token" if has_token else "disabled"
     try:
         with _mute():

@@ -101,8 +101,8 @@ def read_batch(root: str | Path) -> Batch:
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise Problem(f"{path} is not a batch record ({error!r}).",
                       "Plan the batch again from its table: what its captures hold is kept.") from error
-    if len({face.name
-            for face in batch.faces}) < len(batch.faces) or len({face.root for face in batch.faces}) < len(batch.faces):
+    names, roots = {face.name for face in batch.faces}, {face.root for face in batch.faces}
+    if len(names) < len(batch.faces) or len(roots) < len(batch.faces):
         raise Problem(f"{path} names a face or a capture twice.",
                       "Plan the batch again from its table: what its captures hold is kept.")
     return batch

@@ -163,8 +163,8 @@ def rank(values: list[dict[str, float]]) -> list[dict[str, float]]:
         known = [own[measure.label] * measure.worse for own in values if measure.label in own]
         for own, found in zip(values, ranks, strict=True):
             if measure.label in own:
-                found[measure.label] = sum(other < own[measure.label] * measure.worse
-                                           for other in known) / max(len(known) - 1, 1)
+                mine = own[measure.label] * measure.worse
+                found[measure.label] = sum(other < mine for other in known) / max(len(known) - 1, 1)
     return ranks
 
 
@@ -189,8 +189,8 @@ def _card(row: ReviewRow, batch: Batch) -> str:
     link = _link(row.face.capture.report, batch.root)
     title = f'<a href="{link}">{name}</a>' if link else name
     left = [group.label for group in GROUPS[GROUPS.index(state.group):]] if state.group else []
-    words = f"{_duration(row.seconds)} of work" + (f"; still to do: {', '.join(left).lower()}" if left
-                                                   else "") + (f"; on {state.who}" if state.who else "")
+    still = f"; still to do: {', '.join(left).lower()}" if left else ""
+    words = f"{_duration(row.seconds)} of work{still}" + (f"; on {state.who}" if state.who else "")
     problem = (f'<p class="problem">{html.escape(state.problem)} <b>{html.escape(state.remedy)}</b></p>'
                if state.state == STOPPED else "")
     found = "".join(f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>"

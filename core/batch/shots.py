@@ -63,9 +63,8 @@ def _rows_of_folder(folder: Path, root: Path) -> list[tuple[str, dict[str, str]]
     stems = [path.stem for path in inside]
     found = []
     for path in inside:
-        if path.is_dir() and path.absolute() != root and not any((path / name).exists()
-                                                                 for name in (NAME,
-                                                                              "capture.json")) and any(path.iterdir()):
+        ours = any((path / name).exists() for name in (NAME, "capture.json"))
+        if path.is_dir() and path.absolute() != root and not ours and any(path.iterdir()):
             found.append((path.name, {"video": path.name}))
         elif path.is_file() and path.suffix.lower() in VIDEOS:
             found.append((path.name,

@@ -74,8 +74,10 @@ def is_done(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
     settings = face.chosen()
     if not all(face.capture.state(stage, settings) in FINISHED for stage in group.stages):
         return False
-    return group.name != DELIVER or (batch.deliver is None
-                                     or is_delivered(batch, face)) and (not batch.blender or has_sheet(face.capture))
+    if group.name != DELIVER:
+        return True
+    delivered = batch.deliver is None or is_delivered(batch, face)
+    return delivered and (not batch.blender or has_sheet(face.capture))
 
 
 def deliver_settings(batch: Batch, face: BatchFace) -> dict:

@@ -109,9 +109,8 @@ def _priors(bundle: Bundle) -> tuple[np.ndarray, np.ndarray]:
     """Residuals of the landmarks against the head of the identity space [468, 3], and of the logarithms of the focal
     lengths [G], in deviations."""
     model = template_landmarks()
-    return (bundle.points[:len(model.mean)]
-            - model.shape(bundle.coefficients)) / OFFSET_M, np.log(bundle.focal
-                                                                   / bundle.focal_prior) / bundle.focal_spread
+    offsets = (bundle.points[:len(model.mean)] - model.shape(bundle.coefficients)) / OFFSET_M
+    return offsets, np.log(bundle.focal / bundle.focal_prior) / bundle.focal_spread
 
 
 def _cost(bundle: Bundle, seen: Observations, weights: np.ndarray) -> float:

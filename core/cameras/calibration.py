@@ -70,8 +70,9 @@ def read_cameras(path: Path) -> list[Calibrated]:
         cameras = (colmap_folder.read(path) if path.is_dir()
                    else readers[path.suffix.lower()](path.read_text(encoding="utf-8-sig"), path.name))
     except Problem as problem:
-        raise problem if path.name in problem.problem else Problem(f"{path.name} cannot be used: {problem.problem}",
-                                                                   problem.remedy) from problem
+        if path.name in problem.problem:
+            raise
+        raise Problem(f"{path.name} cannot be used: {problem.problem}", problem.remedy) from problem
     except (OSError, UnicodeDecodeError) as error:
         raise Problem(f"{path.name} cannot be read ({error}).", "Export the cameras again.") from error
     if not cameras:

@@ -229,8 +229,9 @@ def _map(job: dict, names: list[str] | None = None) -> list[pycolmap.Reconstruct
 
     folder = Path(job["output"]).with_name("models")
     folder.mkdir(parents=True, exist_ok=True)
-    return list(pycolmap.incremental_mapping(job["database"], job["images"], str(folder), options,
-                                             next_image_callback=another).values())
+    models = pycolmap.incremental_mapping(job["database"], job["images"], str(folder), options,
+                                          next_image_callback=another)
+    return list(models.values())
 
 
 def _aside(function, *arguments) -> None:

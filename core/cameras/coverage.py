@@ -17,9 +17,8 @@ LEVEL_DEG = 5.0
 def angles(centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Camera centres [N, 3] in the head's world -> azimuth [N], 0 in front, positive on the person's left, and
     elevation [N], in degrees."""
-    return np.degrees(np.arctan2(centres[:, 0],
-                                 -centres[:, 1])), np.degrees(np.arctan2(centres[:, 2],
-                                                                         np.hypot(centres[:, 0], centres[:, 1])))
+    x, y, z = centres.T
+    return np.degrees(np.arctan2(x, -y)), np.degrees(np.arctan2(z, np.hypot(x, y)))
 
 
 def widest_deg(centres: np.ndarray) -> float:

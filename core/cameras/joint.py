@@ -152,9 +152,8 @@ def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tr
         rotation, translation, lens = poses[name]
         keypoints = matches.keypoints[name][index[name]] if index[name] else np.zeros((0, 2))
         image = pycolmap.Image(name=name, camera_id=lens, image_id=image_number[name], keypoints=keypoints)
-        rebuilt.add_image_with_trivial_frame(image,
-                                             pycolmap.Rigid3d(np.concatenate([rotation,
-                                                                              np.reshape(translation, (3, 1))], 1)))
+        pose = np.concatenate([rotation, np.reshape(translation, (3, 1))], 1)
+        rebuilt.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
     first = len(template_landmarks().mean)
     for place, elements in zip(bundle.points[first:], members, strict=True):
         rebuilt.add_point3D(place, pycolmap.Track(elements), np.full(3, 128, np.uint8))

@@ -114,8 +114,8 @@ def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray,
         jacobian[:, :, 7:] = np.einsum("kpi,ji->pjk", model.basis, rotation)
         information = np.einsum("np,npij->pij", weights, across)
         normal = np.einsum("pia,pij,pjb->ab", jacobian, information, jacobian, optimize=True) + np.diag(prior)
-        right = -np.einsum("pia,pi->a", jacobian,
-                           np.einsum("np,npi->pi", weights, miss)) - prior * np.concatenate([np.zeros(7), coefficients])
+        pull = np.einsum("pia,pi->a", jacobian, np.einsum("np,npi->pi", weights, miss))
+        right = -pull - prior * np.concatenate([np.zeros(7), coefficients])
         step = np.linalg.solve(normal, right)
         rotation = cv2.Rodrigues(step[:3])[0] @ rotation
         translation = translation + scale * step[3:6]

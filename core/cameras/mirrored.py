@@ -36,8 +36,8 @@ def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report:
     found: name -> face. Of two pictures that show a face from its two sides, one flipped looks like the other whatever
     is true, for faces are symmetric: there only what lies beside the face counts.
     """
-    pairs = [(a, b) for a in suspects for b in trusted] or [(a, b) for i, a in enumerate(suspects)
-                                                            for b in suspects[i + 1:]]
+    among_suspects = [(a, b) for i, a in enumerate(suspects) for b in suspects[i + 1:]]
+    pairs = [(a, b) for a in suspects for b in trusted] or among_suspects
     if len(pairs) > MOST_PAIRS:
         pairs = [pairs[i] for i in np.linspace(0, len(pairs) - 1, MOST_PAIRS).round().astype(int)]
     described: dict[tuple, tuple] = {}
@@ -53,8 +53,8 @@ def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report:
     relation: dict[tuple[str, str], int] = {}
     for done, (a, b) in enumerate(pairs):
         report.progress(done, len(pairs), "looking for mirrored pictures")
-        opposite = a in found and b in found and abs(found[a].yaw_deg
-                                                     + found[b].yaw_deg) < abs(found[a].yaw_deg - found[b].yaw_deg)
+        yaws = [found[name].yaw_deg for name in (a, b) if name in found]
+        opposite = len(yaws) == 2 and abs(yaws[0] + yaws[1]) < abs(yaws[0] - yaws[1])
         plain, flipped = (_agreeing(*(_beside(features(name, turned), found[name], turned, sizes[name]) if opposite
                                       else features(name, turned)
                                       for name, turned in ((a, flip), (b, False)))) for flip in (False, True))
@@ -100,8 +100,8 @@ def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
     points, values = cv2.SIFT_create(MOST_FEATURES, contrastThreshold=0.02).detectAndCompute(grey, None)
     if values is None:
         return np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)
-    return np.array([point.pt for point in points],
-                    np.float32), np.sqrt(values / np.maximum(values.sum(1, keepdims=True), 1e-9))
+    described = np.sqrt(values / np.maximum(values.sum(1, keepdims=True), 1e-9))
+    return np.array([point.pt for point in points], np.float32), described
 
 
 def _agreeing(a: tuple, b: tuple) -> int:

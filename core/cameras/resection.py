@@ -74,9 +74,8 @@ def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, r
     for step, share in enumerate(AGREE_WIDTH_SHARES, 1):
         report.progress(step, 5, "refining cameras by what matches")
         added, used, bundle = agreeing(bundle, names, matches, share * width)
-        seen = Observations(*(np.concatenate([a, b])
-                              for a, b in zip((landmarks.camera, landmarks.point, landmarks.pixel), added,
-                                              strict=True)))
+        parts = zip((landmarks.camera, landmarks.point, landmarks.pixel), added, strict=True)
+        seen = Observations(*(np.concatenate([a, b]) for a, b in parts))
         bundle = adjust(bundle, seen, 10)
     late = place_by_matches(bundle, groups, group_of, names, used, matches)
     miss = np.linalg.norm(bundle.project(landmarks.camera, landmarks.point) - landmarks.pixel, axis=1)
@@ -222,10 +221,10 @@ def _model(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str],
     """As COLMAP writes it: cameras, images, and as points the landmarks and tracks."""
     model = pycolmap.Reconstruction()
     for number, group in enumerate(groups):
-        model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=number + 1, model="SIMPLE_RADIAL",
-                                                          width=group["width"], height=group["height"],
-                                                          params=[bundle.focal[number], group["width"] / 2,
-                                                                  group["height"] / 2, 0]))
+        width, height = group["width"], group["height"]
+        camera = pycolmap.Camera(camera_id=number + 1, model="SIMPLE_RADIAL", width=width, height=height,
+                                 params=[bundle.focal[number], width / 2, height / 2, 0])
+        model.add_camera_with_trivial_rig(camera)
     poses = {name: (bundle.rotations[i], bundle.translations[i]) for i, name in enumerate(names)} | late
     members: list[list] = [[] for _ in bundle.points]
     for number, name in enumerate(sorted(poses), 1):

@@ -63,10 +63,10 @@ def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, re
     room.transform(head.world_from_model)
     everything = sorted((image for image in room.images.values() if image.has_pose), key=lambda image: image.name)
     registered = [image for image in everything if by is None or image.name in by]
-    names, own, width = [image.name
-                         for image in registered], on_head(room, everything, matches), _face_width(room, registered)
-    straight, bundle, reach = straightened(room, everything,
-                                           own), as_bundle(room, registered, False), REACH_WIDTH_SHARES[0] * width
+    names, width = [image.name for image in registered], _face_width(room, registered)
+    own = on_head(room, everything, matches)
+    straight, bundle = straightened(room, everything, own), as_bundle(room, registered, False)
+    reach = REACH_WIDTH_SHARES[0] * width
     _, tracks, still = agreeing(bundle, names, straight, reach)
     if len(tracks) < LEAST_TRACKS:
         return model, None
@@ -158,11 +158,8 @@ def on_head(model: pycolmap.Reconstruction, registered: list, matches: Matches) 
     """The matches between keypoints on the head; model: in the head's world."""
     inside = {}
     for image in registered:
-        camera, outline, keypoints = (
-            model.cameras[image.camera_id],
-            _outline(model, image),
-            matches.keypoints.get(image.name, np.zeros((0, 2))),
-        )
+        camera, outline = model.cameras[image.camera_id], _outline(model, image)
+        keypoints = matches.keypoints.get(image.name, np.zeros((0, 2)))
         if outline is None or not len(keypoints):
             inside[image.name] = np.zeros(len(keypoints), bool)
             continue

@@ -116,8 +116,8 @@ def _place(model: pycolmap.Reconstruction, image: pycolmap.Image, keypoints: np.
            options, refined) -> None:
     numbers, own = np.array(list(points)), np.array(list(points.values()))
     places = np.array([model.points3D[number].xyz for number in numbers])
-    result = pycolmap.estimate_and_refine_absolute_pose(keypoints[own], places, model.cameras[image.camera_id], options,
-                                                        refined)
+    result = pycolmap.estimate_and_refine_absolute_pose(
+        keypoints[own], places, model.cameras[image.camera_id], options, refined)
     if result is None or result["num_inliers"] < LEAST_POINTS:
         return
     added = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image.image_id, keypoints=keypoints)

@@ -88,8 +88,8 @@ def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, setti
     while the head turned."""
     records = frames.records
     few = len(records) <= FEW_PHOTOGRAPHS
-    ways = {"auto": ("plain", "face", "skin", "face") if few
-            else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
+    usual = ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")
+    ways = usual if settings.cameras.features == "auto" else (settings.cameras.features,)
     if len(records) < LEAST_VIEWS:  # a draft
         ways = ("face",)
     matches, faults, moved, partial = Matches(), [], stood, None
@@ -151,8 +151,8 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
         report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % "
                    "less on its own; its cameras are taken.")
         return replace(solved, model=model, head=find_head(model, solved.found, apart), swayed=1 - left)
-    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or not (solved.way != "face"
-                                                                                    or solved.refined):
+    by_faces_alone = solved.way == "face" and not solved.refined
+    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or by_faces_alone:
         return solved
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
     missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
@@ -205,8 +205,8 @@ def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matc
                     {name: face for name, face in found.items() if name not in mirrored}, matches, report)
     registered = result.model.num_reg_images() if result else 0
     if registered < min(LEAST_VIEWS, len(records)):
-        without = f"A face is found in only {len(found)} of {len(records)} frames" + (f", and {', '.join(mirrored)} is "
-                                                                                      "mirrored" if mirrored else "")
+        but = f", and {', '.join(mirrored)} is mirrored" if mirrored else ""
+        without = f"A face is found in only {len(found)} of {len(records)} frames{but}"
         return None, f"{without}; the landmarks of three could have placed the cameras."
     if result.landmark_miss > MOST_LANDMARK_MISS_SHARE:
         return (

@@ -38,8 +38,8 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
     and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise. Photographs are looked at as
     large as they were kept, though not with masks; pixels are the frames' in any case."""
     records, folder = frames.records, capture.frames
-    sequential = matching == "sequential" or (matching == "auto" and frames.kind == VIDEO
-                                              and len(records) > ALL_PAIRS_FRAMES)
+    is_film = frames.kind == VIDEO and len(records) > ALL_PAIRS_FRAMES
+    sequential = matching == "sequential" or (matching == "auto" and is_film)
     with capture.workspace() as work:
         groups = camera_groups(records, folder)
         few = frames.kind == PHOTOGRAPHS and len(records) <= ALL_PAIRS_FRAMES
@@ -59,10 +59,11 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
                           "Run the stage cameras again.") from error
         matches = read_matches(Path(job["database"]))
         sizes = {name: (group["width"], group["height"]) for group in groups for name in group["names"]}
-        scales = {name: [small / large
-                         for small, large in zip(sizes[PurePosixPath(name).name], (group["width"], group["height"]),
-                                                 strict=True)]
-                  for group in job["groups"] for name in group["names"]}
+        scales = {}
+        for group in job["groups"]:
+            for name in group["names"]:
+                width, height = sizes[PurePosixPath(name).name]
+                scales[name] = [width / group["width"], height / group["height"]]
         if model is not None:
             _reduce(model, sizes)
         return model, matches.scaled(scales)
@@ -120,8 +121,8 @@ def _enlarged(groups: list[dict], folder: Path) -> list[dict]:
         for name in group["names"]:
             there = (folder / FULL / name).is_file()
             width, height = images.size(folder / FULL / name) if there else (group["width"], group["height"])
-            focal = group["focal_px"] and group["focal_px"] * math.hypot(width, height) / math.hypot(group["width"],
-                                                                                                     group["height"])
+            diagonal = math.hypot(group["width"], group["height"])
+            focal = group["focal_px"] and group["focal_px"] * math.hypot(width, height) / diagonal
             one = split.setdefault((number, width, height),
                                    {"names": [], "width": width, "height": height, "focal_px": focal})
             one["names"].append(f"{FULL}/{name}" if there else name)

@@ -66,15 +66,15 @@ def _share_that_stays(one: tuple, other: tuple, face: faces.Face, turned: faces.
         return None
     there, found, _ = cv2.calcOpticalFlowPyrLK(first, second, corners[off], None)
     back, again, _ = cv2.calcOpticalFlowPyrLK(second, first, there, None)
-    still = np.linalg.norm((there - corners[off]).reshape(-1, 2),
-                           axis=1) < STILL_DIAGONAL_SHARE * np.hypot(*first.shape)
-    sure = (found.ravel() > 0) & (again.ravel() > 0) & (np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1)
-                                                        < 1)
+    moved = np.linalg.norm((there - corners[off]).reshape(-1, 2), axis=1)
+    still = moved < STILL_DIAGONAL_SHARE * np.hypot(*first.shape)
+    returned = np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1)
+    sure = (found.ravel() > 0) & (again.ravel() > 0) & (returned < 1)
     return float((still & sure).mean())
 
 
 def _on_head(pixels: np.ndarray, face: faces.Face) -> np.ndarray:
     """Which pixels [N, 2] lie on the head, its hair or its neck [N], roughly."""
     x0, y0, x1, y1 = face.box
-    return (np.abs(pixels[:, 0] - (x0 + x1) / 2) < 1.1
-            * (x1 - x0)) & (pixels[:, 1] > y0 - 0.7 * (y1 - y0)) & (pixels[:, 1] < y1 + 0.4 * (y1 - y0))
+    beside = np.abs(pixels[:, 0] - (x0 + x1) / 2) < 1.1 * (x1 - x0)
+    return beside & (pixels[:, 1] > y0 - 0.7 * (y1 - y0)) & (pixels[:, 1] < y1 + 0.4 * (y1 - y0))

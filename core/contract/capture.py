@@ -207,8 +207,9 @@ class Capture:
     def keep_hashes(self, trees: dict[str, dict]) -> None:
         """Records what is about to be slimmed away: stage -> {name it writes: what `hash_tree` gives for it}."""
         record = self.read()
-        write_json(self.json, {**record, "stages": {name: {**entry, "slimmed": trees[name]} if name in trees else entry
-                                                    for name, entry in record["stages"].items()}})
+        entries = {name: {**entry, "slimmed": trees[name]} if name in trees else entry
+                   for name, entry in record["stages"].items()}
+        write_json(self.json, {**record, "stages": entries})
 
     def drop_hashes(self, stage: stages.Stage) -> None:
         """Records that what was slimmed away of a stage is back, as it was."""
@@ -262,8 +263,8 @@ class Capture:
         """Whether a folder without capture.json, which a damaged one may be deleted from to start anew, has been a
         capture: by our record, or by a job."""
         with contextlib.suppress(OSError, ValueError, TypeError):
-            return (self.root / ownership.RECORD).is_file() or {"capture", "from", "until",
-                                                                "quality"} <= set(read_json(self.job))
+            today = {"capture", "from", "until", "quality"}
+            return (self.root / ownership.RECORD).is_file() or today <= set(read_json(self.job))
         return False
 
     def refuse_strangers(self) -> None:

@@ -33,35 +33,32 @@ def _is_entry(entry) -> bool:
     if not isinstance(entry, dict) or not is_number(entry.get("seconds"), 0):
         return False
     typed = all(isinstance(entry.get(field, kind()), kind) for field, kind in ENTRY.items())
-    return typed and ("inputs" not in entry
-                      or entry.keys()
-                      >= SINCE_2) and _are_findings(entry.get("findings", [])) and _are_hashes(entry.get("slimmed", {}))
+    complete = "inputs" not in entry or entry.keys() >= SINCE_2
+    return (typed and complete and _are_findings(entry.get("findings", []))
+            and _are_hashes(entry.get("slimmed", {})))
 
 
 def _is_stop(stopped) -> bool:
-    told = isinstance(stopped,
-                      dict) and all(isinstance(stopped.get(field), str) for field in ("stage", "problem", "remedy"))
+    told = isinstance(stopped, dict) and all(
+        isinstance(stopped.get(field), str) for field in ("stage", "problem", "remedy"))
     return stopped is None or told and _are_findings(stopped.get("findings"))
 
 
 def _is_stamp(value) -> bool:
     """Whether it is a source's stamp: [name, size, content hash, or time] of each file."""
-    return isinstance(value,
-                      list) and all(isinstance(file, list) and len(file) == 3 and plain_name(file[0])
-                                    and is_number(file[1], 0)
-                                    and (isinstance(file[2], str) or is_number(file[2])) for file in value)
+    return isinstance(value, list) and all(
+        isinstance(file, list) and len(file) == 3 and plain_name(file[0]) and is_number(file[1], 0)
+        and (isinstance(file[2], str) or is_number(file[2])) for file in value)
 
 
 def _are_hashes(value) -> bool:
     """Whether it tells what was slimmed away: name -> content hash, or {file: hash} of a folder."""
-    return isinstance(value,
-                      dict) and all(isinstance(tree, str) or isinstance(tree, dict)
-                                    and all(isinstance(each, str) for each in tree.values())
-                                    for tree in value.values())
+    return isinstance(value, dict) and all(
+        isinstance(tree, str) or isinstance(tree, dict) and all(isinstance(each, str) for each in tree.values())
+        for tree in value.values())
 
 
 def _are_findings(value) -> bool:
-    return isinstance(value,
-                      list) and all(isinstance(finding, dict) and isinstance(finding.get("problem"), str)
-                                    and isinstance(finding.get("remedy"), str)
-                                    and isinstance(finding.get("frames"), list) for finding in value)
+    return isinstance(value, list) and all(
+        isinstance(finding, dict) and isinstance(finding.get("problem"), str)
+        and isinstance(finding.get("remedy"), str) and isinstance(finding.get("frames"), list) for finding in value)

@@ -130,8 +130,8 @@ def _require(capture: Capture) -> None:
 
 def lines(found: Deletion, translated=lambda text: text) -> list[str]:
     """The list as sentences; `translated` gives a sentence in the reader's language."""
-    said = [translated("{} files of this face are deleted for good, {} in all:").format(len(found.going),
-                                                                                        megabytes(found.size))]
+    words = translated("{} files of this face are deleted for good, {} in all:")
+    said = [words.format(len(found.going), megabytes(found.size))]
     said += [translated("{}: {} files, {}").format(translated(group.label), group.files, megabytes(group.size))
              for group in found.groups]
     if found.staying:

@@ -71,8 +71,8 @@ def read_irises(capture: Capture) -> tuple[Colour, Colour] | None:
 def _eyeball(told: dict) -> Eyeball:
     eye = Eyeball(_vector(told["centre"]), told["radius"], _vector(told["gaze"]), told["openness"], told["iris_radius"],
                   told["views"])
-    if not all(is_number(value, 0)
-               for value in (eye.openness, eye.iris_radius, eye.views)) or not is_number(eye.radius, 1e-4):
+    counted = all(is_number(value, 0) for value in (eye.openness, eye.iris_radius, eye.views))
+    if not counted or not is_number(eye.radius, 1e-4):
         raise ValueError("an eye has no size")
     if abs(math.hypot(*eye.gaze) - 1) > 1e-3:
         raise ValueError("an eye looks nowhere")

@@ -52,8 +52,8 @@ def matches(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
             parts += [[name, hash_tree(root / name)] for name in ("own_head.obj", "own_head.json")]
     parts += [[name, hash_artefact(root, record, name)] for name in made["inputs"]]
     parts += made["data"]
-    return finished.get("key") == hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(),
-                                                  digest_size=16).hexdigest()
+    text = json.dumps(parts, sort_keys=True)
+    return finished.get("key") == hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
 @cache

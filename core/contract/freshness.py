@@ -60,9 +60,9 @@ def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict
         return Verdict(TO_DO)
     version = str(finished.get("version", ""))
     if "inputs" not in finished:  # by WildCap 0.1.0, which kept one hash of everything
-        same = format_1.matches(root, record, stage,
-                                settings) and (bool(stage.reads)
-                                               or not _other_source(record.get("source_stamp", []), root, record))
+        same = format_1.matches(root, record, stage, settings)
+        if same and not stage.reads:
+            same = not _other_source(record.get("source_stamp", []), root, record)
         return Verdict(OLDER, version=version) if same else Verdict(STALE, ("an input or a setting",), version)
     changed = [*_changed_inputs(finished["inputs"], root, record, stage, settings),
                *_changed_settings(finished, stage, settings)]
@@ -116,8 +116,8 @@ def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, sett
 def _changed_settings(finished: dict, stage: Stage, settings: Settings) -> list[str]:
     """A setting that the record does not know had its default; one that names a path is judged by what the path
     holds."""
-    chosen, then = getattr(settings, stage.name), {**asdict(type(getattr(settings, stage.name))()),
-                                                   **finished["settings"]}
+    chosen = getattr(settings, stage.name)
+    then = {**asdict(type(chosen)()), **finished["settings"]}
     paths = {f.name for f in fields(chosen) if "path" in f.metadata}
     changed = [f"{stage.name}.{name}" for name, value in result_settings(chosen).items() if name not in paths
                and then[name] != value]

@@ -58,8 +58,8 @@ def parse_json(text: str):
 
 def is_number(value, low: float = -math.inf, high: float = math.inf) -> bool:
     """Whether it is a finite number, not a truth value, from `low` to `high`."""
-    return isinstance(value, int | float) and not isinstance(value,
-                                                             bool) and math.isfinite(value) and low <= value <= high
+    numeric = isinstance(value, int | float) and not isinstance(value, bool)
+    return numeric and math.isfinite(value) and low <= value <= high
 
 
 def plain_name(name) -> bool:

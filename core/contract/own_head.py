@@ -22,8 +22,8 @@ def read_skin(capture: Capture, count: int) -> tuple[str, list[tuple[int, int]]]
     try:
         told = read_json(capture.own_head_skin)
         runs = [(first, end) for first, end in told["skin_triangles"]]
-        if not all(type(each) is int for run in runs
-                   for each in run) or not all(0 <= first < end <= count for first, end in runs):
+        numbers = all(type(each) is int for run in runs for each in run)
+        if not numbers or not all(0 <= first < end <= count for first, end in runs):
             raise ValueError(f"its skin is not among the {count} triangles of {capture.own_head.name}")
         return str(told.get("template", "")), runs
     except (OSError, ValueError, KeyError, TypeError) as error:

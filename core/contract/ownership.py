@@ -193,8 +193,8 @@ def _is_temporary_name(path: str) -> bool:
     """Whether it can be a temporary file or folder of ours: in the capture, and hidden. A record may come from a
     stranger with the capture it lies in."""
     parts = PurePosixPath(path).parts
-    return bool(parts) and not {"..",
-                                "/"} & set(parts) and "\\" not in path and ":" not in path and parts[-1].startswith(".")
+    return (bool(parts) and not {"..", "/"} & set(parts) and "\\" not in path and ":" not in path
+            and parts[-1].startswith("."))
 
 
 def adopt_first_format(root: Path) -> None:

@@ -44,9 +44,9 @@ def findings(record: dict) -> list[dict]:
     found = ([{"stage": stopped["stage"], "problem": stopped["problem"], "remedy": stopped["remedy"], "frames": [],
                "stopped": True}] if stopped else [])
     for name in stages.NAMES:
-        here = record["stages"].get(name, {}).get("findings",
-                                                  []) + (stopped["findings"] if stopped and stopped["stage"] == name
-                                                         else [])
+        here = record["stages"].get(name, {}).get("findings", [])
+        if stopped and stopped["stage"] == name:
+            here = here + stopped["findings"]
         found += [{"stage": name, **finding, "stopped": False} for finding in here]
     return found
 

@@ -30,9 +30,8 @@ def copy_to(folder: Path) -> Capture:
                 shutil.copytree(SHIPPED, temporary, dirs_exist_ok=True, copy_function=shutil.copyfile)
                 moved = (temporary / VERTICES).read_text(encoding="ascii")
                 built_in = (SHIPPED.parent / "head.obj").read_text(encoding="ascii").splitlines(keepends=True)
-                (temporary / capture.head.name).write_text(moved
-                                                           + "".join(line for line in built_in
-                                                                     if not line.startswith("v ")), encoding="ascii")
+                rest = "".join(line for line in built_in if not line.startswith("v "))
+                (temporary / capture.head.name).write_text(moved + rest, encoding="ascii")
                 (temporary / VERTICES).unlink()
                 write_json(temporary / capture.json.name, capture.read())
                 ownership.claim_all(temporary)

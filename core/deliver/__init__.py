@@ -120,9 +120,12 @@ def _newest(capture: Capture) -> Path:
     """The 4K maps where they are complete and not older than the solved ones, else those."""
     solved, enlarged = ([folder / name for name in stages.MAPS if name.endswith(".png")]
                         for folder in (capture.maps, capture.maps_4k))
-    fresh = all(path.is_file() for path in enlarged) and min(path.stat().st_mtime
-                                                             for path in enlarged) >= max(path.stat().st_mtime
-                                                                                          for path in solved)
+
+    def time_of(path: Path) -> float:
+        return path.stat().st_mtime
+
+    complete = all(path.is_file() for path in enlarged)
+    fresh = complete and min(map(time_of, enlarged)) >= max(map(time_of, solved))
     return capture.maps_4k if fresh else capture.maps
 
 

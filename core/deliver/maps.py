@@ -62,9 +62,8 @@ class Sources:
         if term in ("level", "weight", "f0", "unreal_specular"):
             # as the node group WildCap Skin has it
             level = np.clip(0.5 * self._file("specular") / max(self.mean, 1e-6), 0, 1)
-            return (level
-                    * {"level": 1.0, "weight": 2.0, "f0": 2 * F0,
-                       "unreal_specular": 2 * F0 / UNREAL_F0}[term]).astype(np.float32)
+            scale = {"level": 1.0, "weight": 2.0, "f0": 2 * F0, "unreal_specular": 2 * F0 / UNREAL_F0}[term]
+            return (level * scale).astype(np.float32)
         values = self._file(term)
         return values / self.unit if term == "displacement" else values
 
@@ -83,8 +82,8 @@ class Sources:
 def write(picture: MapPicture, sources: Sources, path: Path, plan: DeliveryPlan) -> None:
     """One file of the set, atomically. The picture's files must be there (Sources.has)."""
     bits = {"png8": 8, "png16": 16, "exr": 16}[plan.pictures]
-    as_it_is = picture.channels[0].endswith((".r",
-                                             ".x")) and len(picture.channels) == 3 and _file_of(picture.channels[0])
+    first = picture.channels[0]
+    as_it_is = first.endswith((".r", ".x")) and len(picture.channels) == 3 and _file_of(first)
     if as_it_is and _stored_alike(picture, sources, plan, as_it_is):
         sources.check(as_it_is)
         shutil.copyfile(sources.paths[as_it_is], path)  # byte for byte what the worker's stage wrote

@@ -44,8 +44,8 @@ def write(source: Path, path: Path, plan: DeliveryPlan, maps: list[dict], roughn
         elif key in ("g", "s"):
             lines.append(line)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    path.with_suffix(".mtl").write_text("\n".join(_material(plan, tile, maps, roughness, len(tiles) > 1)
-                                                  for tile in tiles), encoding="utf-8")
+    materials = "\n".join(_material(plan, tile, maps, roughness, len(tiles) > 1) for tile in tiles)
+    path.with_suffix(".mtl").write_text(materials, encoding="utf-8")
 
 
 def _tile(corners: list[str], uvs: list[tuple[float, float]], tiles: list[int]) -> int:

@@ -49,9 +49,8 @@ def seen_in(texture: np.ndarray, confidence: np.ndarray) -> np.ndarray:
         return np.zeros((SIZE, SIZE), np.float32)
     light = np.log(np.maximum(images.resize(texture, SIZE, SIZE), 1e-3)).mean(-1).astype(np.float32)
     grows, texel = _on_template()
-    bare = (template.mask("skin", SIZE) > 0.99) & (grows
-                                                   < 0.05) & (template.mask("brows", SIZE)
-                                                              < 0.01) & (images.resize(confidence, SIZE, SIZE) > 0.5)
+    elsewhere = (grows < 0.05) & (template.mask("brows", SIZE) < 0.01)
+    bare = (template.mask("skin", SIZE) > 0.99) & elsewhere & (images.resize(confidence, SIZE, SIZE) > 0.5)
     small = fine(light, float(np.median(texel)))
     return presence(small, deviation(small[bare]), bare, grows, texel)
 

@@ -109,8 +109,8 @@ def detect_others(srgb: np.ndarray, face: Face) -> list[Face]:
     for region in _detect_regions(image, 0.0):
         if np.hypot(region[0] - x, region[1] - y) > 0.5 * max(face.width, region[2] / 1.5):
             other = _landmarks(image, region)
-            if other is not None and other.score > 0.8 and np.hypot(*np.subtract(_middle(other),
-                                                                                 (x, y))) > 0.5 * face.width:
+            sure = other is not None and other.score > 0.8
+            if sure and np.hypot(*np.subtract(_middle(other), (x, y))) > 0.5 * face.width:
                 found.append(other)
     return found
 
@@ -255,8 +255,11 @@ def _crop(image: np.ndarray, region: tuple, size: int) -> tuple[np.ndarray, np.n
 @cache
 def _anchors() -> np.ndarray:
     """Centres of the 896 anchors [896, 2] in pixels of 128 x 128: two per cell of 16 x 16, six per cell of 8 x 8."""
-    return np.concatenate([np.stack(np.meshgrid(*[(np.arange(n) + 0.5) * 128 / n] * 2),
-                                    -1).reshape(-1, 2).repeat(count, 0) for n, count in ((16, 2), (8, 6))])
+    anchors = []
+    for cells, per_cell in ((16, 2), (8, 6)):
+        middles = (np.arange(cells) + 0.5) * 128 / cells
+        anchors.append(np.stack(np.meshgrid(middles, middles), -1).reshape(-1, 2).repeat(per_cell, 0))
+    return np.concatenate(anchors)
 
 
 def _run(network: Path, image: np.ndarray, outputs: tuple | None = None) -> list[np.ndarray]:

@@ -15,11 +15,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..geometry.meshes import Mesh
-from . import template
+from . import eye_asset, template
+from .eye_asset import EyeAsset, turn_by, turn_towards
 
-DATA_FILES = ("assets/face_units.npz",)
-SOFT = 0
-"""Kind of an inner vertex that goes with the rim before it; 1 and 2 are the left and the right eyeball."""
 CORNEA_BULGE, CORNEA_ANGLE = 0.06, 0.52  # of the asset's eyeballs: share of the radius, radians
 CLEAR_M = 0.0004  # between ball and lid
 SAME_M = 1e-5
@@ -53,7 +51,7 @@ class OpenHead:
 def open_lids(head: Mesh, openness: float, gaze: np.ndarray) -> OpenHead:
     """head: a closed head in the template's topology; openness in [0, 1]: 0 shut, 1 as far as MakeHuman opens them;
     gaze [2]: degrees that both eyes turn to the person's left and up."""
-    turn = _turned(np.radians(gaze))
+    turn = turn_by(np.radians(gaze))
     return open_around(head, tuple(place_ball(side, *carry_ball(head, side), turn @ FORWARD) for side in (0, 1)),
                        (openness, openness))
 
@@ -62,7 +60,7 @@ def open_around(head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: 
                 shift: np.ndarray | float = 0.0) -> OpenHead:
     """The closed head with its lids open around given eyeballs; openness: of the left and of the right eye; shift [V +
     C + P, 3] metres: what all vertices are moved by besides, before the lids are pushed out of the balls."""
-    unit = _asset()
+    unit = eye_asset.load()
     rest = np.concatenate([head.vertices, head.vertices[unit.copies], _carried(unit, head)]) + shift
     scale = _scale(unit, head)
     for side, ball in enumerate(balls):
@@ -76,7 +74,7 @@ def open_around(head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: 
 def carry_ball(head: Mesh, side: int) -> tuple[np.ndarray, float]:
     """Centre [3] and radius of an eyeball (0: the left one): moved from the template as the lids before it are, then
     back until the closed lids clear it."""
-    unit, rest = _asset(), template.load().vertices
+    unit, rest = eye_asset.load(), template.load().vertices
     centre, radius = unit.balls[side, :3], unit.balls[side, 3]
     arm = rest - centre
     near = np.flatnonzero((np.linalg.norm(arm, axis=1) < 1.35 * radius) & (arm[:, 1] < -0.3 * radius))
@@ -97,9 +95,9 @@ def carry_ball(head: Mesh, side: int) -> tuple[np.ndarray, float]:
 
 def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -> PosedEyeball:
     """The eyeball of a side (0: the left one) at a place, looking along the unit vector gaze [3]."""
-    unit = _asset()
+    unit = eye_asset.load()
     mesh, (x, y, z, size) = unit.ball_meshes[side], unit.balls[side]
-    vertices = centre + (mesh.vertices - [x, y, z]) @ _towards(gaze).T * (radius / size)
+    vertices = centre + (mesh.vertices - [x, y, z]) @ turn_towards(gaze).T * (radius / size)
     return PosedEyeball(np.asarray(centre, np.float64), float(radius), np.asarray(gaze, np.float64),
                         mesh.moved(vertices))
 
@@ -108,7 +106,7 @@ def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -
 def corners() -> tuple[tuple[int, int], tuple[int, int]]:
     """The vertices at the outer and the inner corner of the left and of the right eye: those that both lids' last edges
     share."""
-    unit, head = _asset(), template.load()
+    unit, head = eye_asset.load(), template.load()
     faces = head.faces.copy()
     faces[unit.corners[:, 0], unit.corners[:, 1]] = unit.corners[:, 2]
     return tuple(tuple(_shared_neighbour(faces, upper[end], lower[end]) for end in (-1, 0))
@@ -132,20 +130,20 @@ def closed_edge(vertices: np.ndarray, side: int, lid: int, off: float) -> np.nda
     inner one [N, 3], moved onto the upper (0) or the lower (1) lid by `off` metres."""
     edge = _edge(vertices, side, 0)  # its vertices are the head's own; the lower lid's are doubles of them
     rows = rows_of_lid(side, lid)
-    skin = vertices[rows[(rows < len(vertices)) & ~np.isin(rows, _asset().rims[side][0])]]
+    skin = vertices[rows[(rows < len(vertices)) & ~np.isin(rows, eye_asset.load().rims[side][0])]]
     away = skin[cKDTree(skin).query(edge, 3)[1]].mean(1) - edge
     return edge + off * away / np.linalg.norm(away, axis=1, keepdims=True)
 
 
 def _edge(vertices: np.ndarray, side: int, lid: int) -> np.ndarray:
     outer, inner = corners()[side]
-    return vertices[[outer, *_asset().rims[side][lid][::-1], inner]]
+    return vertices[[outer, *eye_asset.load().rims[side][lid][::-1], inner]]
 
 
 def rows_of_lid(side: int, lid: int) -> np.ndarray:
     """The vertices of an open head [N] that move with the upper (0) or the lower (1) lid of the left (0) or the right
     eye."""
-    unit, head = _asset(), template.load()
+    unit, head = eye_asset.load(), template.load()
     rows, upper = unit.opens[side][0], unit.rims[side][0]
     order = upper[np.argsort(head.vertices[upper, 0])]
     x, _, z = head.vertices[np.minimum(rows, len(head.vertices) - 1)].T
@@ -156,14 +154,14 @@ def rows_of_lid(side: int, lid: int) -> np.ndarray:
     height = np.zeros(len(head.vertices))
     height[head.faces] = head.uvs[head.face_uvs][..., 1]
     inside = rows >= count  # a socket's UVs go on from those of its lid, up or down
-    above[inside] = unit.uvs[rows[inside] - count,
-                             1] > (unit.weights * height[unit.anchors])[rows[inside] - count].sum(1)
+    socket = rows[inside] - count
+    above[inside] = unit.uvs[socket, 1] > (unit.weights * height[unit.anchors])[socket].sum(1)
     return rows[above == (lid == 0)]
 
 
 def belongs_to(opened: Mesh, head: Mesh) -> bool:
     """Whether the skin of an open head is that closed one's: built alike, and equal where no lid moves."""
-    unit, moving = _asset(), np.zeros(len(head.vertices), bool)
+    unit, moving = eye_asset.load(), np.zeros(len(head.vertices), bool)
     count = len(head.vertices) + len(unit.copies) + len(unit.parts)
     if len(opened.vertices) != count or len(opened.faces) != len(head.faces) + len(unit.faces):
         return False
@@ -181,93 +179,13 @@ def push_out(points: np.ndarray, ball: PosedEyeball) -> np.ndarray:
     return points + v * short[:, None]
 
 
-@dataclass(frozen=True)
-class _Asset:
-    """Of the eyes only: copies [C] the vertex that each doubles; corners [n, 3] triangle, corner, copy; faces [G, 3]
-    and uvs [P, 2] of the sockets; parts [P, 3]; anchors, weights [P, 6]; opens: rows and moves for the left and the
-    right lids; soft_of: the rows of each socket; balls [2, 4]; ball meshes."""
-
-    copies: np.ndarray
-    corners: np.ndarray
-    faces: np.ndarray
-    uvs: np.ndarray
-    parts: np.ndarray
-    anchors: np.ndarray
-    weights: np.ndarray
-    opens: tuple
-    soft_of: tuple
-    balls: np.ndarray
-    ball_meshes: tuple
-    rims: tuple
-
-
-@cache
-def _asset() -> _Asset:
-    with np.load(template.ASSETS.parent / DATA_FILES[0], allow_pickle=False) as stored:
-        z = {name: stored[name] for name in stored.files}
-    step, count, copies = float(z["step"]), int(z["head_vertices"]), z["copies"].astype(int)
-    lids = z["seam"] > 0
-    number = np.full(count + len(copies) + len(z["kind"]), -1)  # of the file's vertices here
-    number[:count] = np.arange(count)
-    number[count:count + len(copies)] = np.where(lids, count + np.cumsum(lids) - 1, copies)
-    first, parts = count + len(copies), z["parts"] * step
-    socket = np.flatnonzero((z["kind"] == SOFT) & (parts[:, 2] > -0.02))
-    number[first + socket] = count + lids.sum() + np.arange(len(socket))
-    quads = z["faces"].astype(int)
-    triangles = np.concatenate([quads[:, :3], quads[quads[:, 3] >= 0][:, [0, 2, 3]]])
-    inside = np.isin(triangles, first + socket).any(1) & (number[triangles] >= 0).all(1)
-    rows = np.cumsum(z["rows_eyesOpenLeft"].astype(int))
-    moves = z["moves_eyesOpenLeft"].T * step
-    mirror = z["mirror"].astype(int)
-    opens = []
-    for r, m in ((rows, moves), (mirror[rows], moves * [-1, 1, 1])):
-        kept = number[r] >= 0
-        opens.append((number[r[kept]], m[kept]))
-    weights = z["weights"][socket].astype(np.float64)
-    corners = z["corners"][number[z["corners"][:, 2]] >= count].copy()
-    corners[:, 2] = number[corners[:, 2]]
-    soft = count + lids.sum() + np.arange(len(socket))
-    return _Asset(copies[lids], corners, number[triangles[inside]], z["uvs"][socket].astype(np.float64), parts[socket],
-                  z["anchors"][socket].astype(int),
-                  weights / weights.sum(1, keepdims=True), tuple(opens),
-                  (soft[parts[socket, 0] > 0], soft[parts[socket, 0] <= 0]),
-                  z["balls"].astype(np.float64), tuple(_ball_mesh(z, first, parts, kind) for kind in (1, 2)),
-                  _rims(z, copies[lids], count))
-
-
-def _ball_mesh(z: dict, first: int, parts: np.ndarray, kind: int) -> Mesh:
-    """One eyeball as the asset has it, turned about its centre so that it looks straight ahead; the asset's look down
-    by two degrees."""
-    rows = np.flatnonzero(z["kind"] == kind)
-    number = np.full(len(z["kind"]), -1)
-    number[rows] = np.arange(len(rows))
-    quads = z["faces"].astype(int) - first
-    quads = quads[(quads[:, :3] >= 0).all(1)]
-    quads = quads[(number[quads[:, :3]] >= 0).all(1)]
-    triangles = number[np.concatenate([quads[:, :3], quads[quads[:, 3] >= 0][:, [0, 2, 3]]])]
-    uvs, centre = z["uvs"][rows].astype(np.float64), z["balls"][kind - 1, :3].astype(np.float64)
-    pupil = parts[rows][np.linalg.norm(uvs - 0.5, axis=1).argmin()] - centre
-    return Mesh(centre + (parts[rows] - centre) @ _towards(pupil / np.linalg.norm(pupil)), triangles, uvs, triangles)
-
-
-def _rims(z: dict, doubled: np.ndarray, count: int) -> tuple:
-    """The edges of the lids, each from the nose outwards, without the corners."""
-    vertices, seam = template.load().vertices, z["seam"][z["seam"] > 0]
-    result = []
-    for side in (1, 2):
-        here = np.flatnonzero(seam == side)
-        here = here[np.argsort(np.abs(vertices[doubled[here], 0]))]
-        result.append((doubled[here], count + here))
-    return tuple(result)
-
-
-def _carried(unit: _Asset, head: Mesh) -> np.ndarray:
+def _carried(unit: EyeAsset, head: Mesh) -> np.ndarray:
     """The sockets' vertices [P, 3] on another head: moved as the rims before them are."""
     shift = head.vertices - template.load().vertices
     return unit.parts + (unit.weights[..., None] * shift[unit.anchors]).sum(1)
 
 
-def _scale(unit: _Asset, head: Mesh) -> float:
+def _scale(unit: EyeAsset, head: Mesh) -> float:
     """How much wider the head's eyes are than the template's."""
     rim = np.concatenate([upper for upper, _ in unit.rims])
     return float(np.ptp(head.vertices[rim, 0]) / np.ptp(template.load().vertices[rim, 0]))
@@ -279,7 +197,7 @@ def _surface(direction: np.ndarray, gaze: np.ndarray, radius: float) -> np.ndarr
     return radius * (1 + CORNEA_BULGE * np.clip(1 - (angle / CORNEA_ANGLE) ** 2, 0, None))
 
 
-def _skin(unit: _Asset, head: Mesh, vertices: np.ndarray) -> Mesh:
+def _skin(unit: EyeAsset, head: Mesh, vertices: np.ndarray) -> Mesh:
     """The head's triangles, parted at the lids, then those of the sockets with the UVs of the skin beside them."""
     faces = head.faces.copy()
     faces[unit.corners[:, 0], unit.corners[:, 1]] = unit.corners[:, 2]
@@ -289,15 +207,3 @@ def _skin(unit: _Asset, head: Mesh, vertices: np.ndarray) -> Mesh:
     uvs = np.concatenate([head.uvs, uv_of[unit.faces].reshape(-1, 2)])
     face_uvs = np.concatenate([head.face_uvs, len(head.uvs) + np.arange(3 * len(unit.faces)).reshape(-1, 3)])
     return replace(head, vertices=vertices, faces=np.concatenate([faces, unit.faces]), uvs=uvs, face_uvs=face_uvs)
-
-
-def _turned(radians: np.ndarray) -> np.ndarray:
-    """The rotation [3, 3] of an eye that looks along -y to the person's left (+x) and up."""
-    (c, s), (d, t) = (np.cos(radians[0]), np.sin(radians[0])), (np.cos(radians[1]), np.sin(radians[1]))
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, d, t], [0, -t, d]])
-
-
-def _towards(gaze: np.ndarray) -> np.ndarray:
-    """The rotation [3, 3] that turns an eye from straight ahead to the unit vector gaze [3]: left or right first, then
-    up or down, without roll."""
-    return _turned(np.array([np.arctan2(gaze[0], -gaze[1]), np.arcsin(np.clip(gaze[2], -1, 1))]))

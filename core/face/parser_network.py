@@ -40,8 +40,8 @@ class ParseNet(nn.Module):
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__()
-        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2,
-                                          padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
+        self.stem = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1)
+        self.enter = nn.Conv2d(FINE, widths[0], 2, stride=2)
         self.down, self.up, self.halve, self.narrow = nn.ModuleList(), nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
         for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
             self.down.append(nn.Sequential(*(_Block(width) for _ in range(depth))))
@@ -50,8 +50,8 @@ class ParseNet(nn.Module):
                 self.narrow.append(nn.Conv2d(widths[level + 1], width, 1))
                 self.up.append(nn.Sequential(*(_Block(width) for _ in range(depth))))
         self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)
-        self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3,
-                                        padding=1), nn.Conv2d(2 * FINE, 4 * len(PARTS), 3, padding=1)
+        self.last = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1)
+        self.out = nn.Conv2d(2 * FINE, 4 * len(PARTS), 3, padding=1)
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
 
@@ -64,8 +64,8 @@ class ParseNet(nn.Module):
                 kept.append(x)
                 x = self.halve[level](x)
         for level in reversed(range(len(self.halve))):
-            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear",
-                                                     align_corners=False)
+            x = functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear", align_corners=False)
+            x = kept[level] + x
             x = self.up[level](x)
         x = torch.cat([fine, functional.pixel_shuffle(self.leave(x), 2)], 1)
         return functional.pixel_shuffle(self.out(functional.gelu(self.last(x))), 2).float()

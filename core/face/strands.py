@@ -103,10 +103,10 @@ def waved(points: np.ndarray, at: np.ndarray, amplitude: float, wavelength_mm: f
     out = points
     for turn, share in ((1.0, 1.0), (2.3, 0.45)):
         phase = 2 * noise(at, wavelength_mm, rng)[:, None, None] + alone * rng.normal(size=(len(points), 1, 1))
-        aside = np.stack([noise(at, 1.5 * wavelength_mm, rng) for _ in range(3)],
-                         1) + alone * rng.normal(size=(len(points), 3))
-        out = out + share * amplitude * along * np.sin(2 * np.pi * turn * along * np.clip(length / 0.05, 0.4, 3)
-                                                       + phase) * aside[:, None]
+        shared = np.stack([noise(at, 1.5 * wavelength_mm, rng) for _ in range(3)], 1)
+        aside = shared + alone * rng.normal(size=(len(points), 3))
+        curl = np.sin(2 * np.pi * turn * along * np.clip(length / 0.05, 0.4, 3) + phase)
+        out = out + share * amplitude * along * curl * aside[:, None]
     return out.astype(np.float32)
 
 

@@ -103,8 +103,8 @@ def _subject(srgb: np.ndarray, last: faces.Face | None) -> tuple[faces.Face | No
     weighed = [(faces.prominence(each, srgb.shape[1], srgb.shape[0]), each) for each in faces.detect_others(srgb, face)]
     if not weighed:
         return face, 0.0
-    weight, (second, rival) = faces.prominence(face, srgb.shape[1],
-                                               srgb.shape[0]), max(weighed, key=lambda pair: pair[0])
+    weight = faces.prominence(face, srgb.shape[1], srgb.shape[0])
+    second, rival = max(weighed, key=lambda pair: pair[0])
     return (rival, weight / second) if second > RIVAL * weight else (face, second / weight)
 
 
@@ -131,8 +131,8 @@ def _drop_blurred(records: list[FrameRecord], contents: list,
     for name in dropped:
         (folder / name).unlink()
         (folder / FULL / name).unlink(missing_ok=True)
-    return [r for r, out in zip(records, bad, strict=True)
-            if not out], [c for c, out in zip(contents, bad, strict=True) if not out], dropped
+    kept = [(r, c) for r, c, out in zip(records, contents, bad, strict=True) if not out]
+    return [r for r, _ in kept], [c for _, c in kept], dropped
 
 
 def _even_out(records: list[FrameRecord], contents: list, folder: Path, report: Reporter) -> list[FrameRecord]:

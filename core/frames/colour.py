@@ -58,8 +58,8 @@ def hlg_light(signal: np.ndarray) -> np.ndarray:
 def pq_light(signal: np.ndarray) -> np.ndarray:
     """PQ signal -> display light, 1.0 at reference white: the EOTF (BT.2100, table 4; SMPTE ST 2084)."""
     root = np.maximum(signal, 0) ** (1 / 78.84375)
-    return (np.maximum(root - 0.8359375, 0)
-            / (18.8515625 - 18.6875 * root)) ** (1 / 0.1593017578125) * (10000 / WHITE_NITS)
+    linear = (np.maximum(root - 0.8359375, 0) / (18.8515625 - 18.6875 * root)) ** (1 / 0.1593017578125)
+    return linear * (10000 / WHITE_NITS)
 
 
 def into_gamut(light: np.ndarray) -> np.ndarray:

@@ -65,7 +65,7 @@ def select_views(sharp: np.ndarray, turn: np.ndarray, count: int) -> list[int]:
     while len(chosen) < count:
         rest = np.setdiff1d(candidates, chosen)
         rest = rest[sharp[rest] >= np.median(sharp[rest])]
-        gap = np.abs(turn[rest][:, None]
-                     - turn[chosen][None]).min(1) + 0.01 * np.abs(rest[:, None] - np.array(chosen)[None]).min(1)
+        turned = np.abs(turn[rest][:, None] - turn[chosen][None]).min(1)
+        gap = turned + 0.01 * np.abs(rest[:, None] - np.array(chosen)[None]).min(1)
         chosen.append(int(rest[np.argmax(gap)]))
     return sorted(chosen)

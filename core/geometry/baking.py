@@ -65,8 +65,8 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
     part = atlas.in_tile(whole, tile, where)
     low, high = _rows(part, size)
     uv = np.full((size, size, 2), np.nan, np.float32)
-    turn, mirrored, covered = np.zeros((size, size),
-                                       np.float32), np.zeros((size, size), bool), np.zeros((size, size), bool)
+    turn = np.zeros((size, size), np.float32)
+    mirrored, covered = np.zeros((size, size), bool), np.zeros((size, size), bool)
     for row in range(0, size, STRIP_ROWS):
         tick(row / size)
         end = min(row + STRIP_ROWS, size)
@@ -140,8 +140,8 @@ def bled(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     weight = images.resize(known.astype(np.float32), small, small)
     mean = images.resize(np.where(known[..., None], image.reshape(*known.shape, -1), 0).astype(np.float32), small,
                          small).reshape(small, small, -1)
-    smooth = cv2.resize(_continued(mean, weight), known.shape[::-1],
-                        interpolation=cv2.INTER_LINEAR).reshape(image.shape)
+    smooth = cv2.resize(_continued(mean, weight), known.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    smooth = smooth.reshape(image.shape)
     nearest = raster.bleed(image, known)
     return np.where(near.reshape(near.shape + (1,) * (image.ndim - 2)), nearest, smooth)
 
@@ -152,9 +152,8 @@ def _continued(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     if min(weight.shape) <= 2:
         return np.broadcast_to(weighted.sum((0, 1)) / max(weight.sum(), 1e-6), weighted.shape).astype(np.float32)
     half = (weight.shape[1] + 1) // 2, (weight.shape[0] + 1) // 2
-    down = cv2.resize(weighted, half,
-                      interpolation=cv2.INTER_AREA).reshape(*half[::-1],
-                                                            -1), cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
+    smaller = cv2.resize(weighted, half, interpolation=cv2.INTER_AREA)
+    down = smaller.reshape(*half[::-1], -1), cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
     gain = np.minimum(4 * down[1], 1) / np.maximum(down[1], 1e-6)  # one known texel of four is enough
     coarse = cv2.resize(_continued(down[0] * gain[..., None], down[1] * gain), weight.shape[::-1],
                         interpolation=cv2.INTER_LINEAR)

@@ -51,8 +51,9 @@ def find_fault(vertices: np.ndarray, faces: np.ndarray, uvs: np.ndarray | None, 
         if values is not None and (values.ndim != 2 or values.shape[1] != width):
             return f"not every {what} has {width} numbers"
         # false for NaN, too
-        if values is not None and values.size and not (values.min() >= -FARTHEST_UNITS
-                                                       and values.max() <= FARTHEST_UNITS):
+        sound = values is None or not values.size or (
+            values.min() >= -FARTHEST_UNITS and values.max() <= FARTHEST_UNITS)
+        if not sound:
             return f"it has a {what} of values that are no numbers (NaN), infinite or beyond {FARTHEST_UNITS:g}"
     for indices, count, what in ((faces, len(vertices), "vertex"), (face_uvs, 0 if uvs is None else len(uvs), "UV")):
         if indices is not None and indices.size and not (indices.min() >= 0 and indices.max() < count):

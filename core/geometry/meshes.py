@@ -64,8 +64,8 @@ def read_obj(path: Path) -> Mesh:
     """Triangles and triangulated polygons with their UVs. Raises Problem for a file without faces, and for one that is
     damaged: a line without its numbers, positions that are no numbers, faces with vertices that are not there."""
     vertices, uvs, faces, face_uvs, polygons = [], [], [], [], []
-    text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig",
-                                                        "replace").replace("\r\n", "\n").replace("\r", "\n")
+    text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
     for number, line in enumerate(text.replace("\\\n", " ").split("\n"), 1):
         key, *words = line.split() or [""]
         try:
@@ -152,8 +152,8 @@ def write_ply(path: Path, mesh: Mesh) -> None:
     numbers."""
     _check_written(path, mesh)
     with replacing(path) as temporary:
-        temporary.write_bytes(trimesh.exchange.ply.export_ply(trimesh.Trimesh(mesh.vertices, mesh.faces,
-                                                                              process=False)))
+        triangles = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        temporary.write_bytes(trimesh.exchange.ply.export_ply(triangles))
 
 
 def write_points(path: Path, points: np.ndarray) -> None:
@@ -173,8 +173,10 @@ def _sound(path: Path, mesh: Mesh) -> Mesh:
 
 
 def _check_written(path: Path, mesh: Mesh) -> None:
-    if fault := find_fault(mesh.vertices, mesh.faces, mesh.uvs,
-                           mesh.face_uvs) or ("" if len(mesh.faces) else "it has no faces"):
+    fault = find_fault(mesh.vertices, mesh.faces, mesh.uvs, mesh.face_uvs)
+    if not fault and not len(mesh.faces):
+        fault = "it has no faces"
+    if fault:
         raise Problem(f"{path} was not written: {fault}.",
                       advise_remaking(Path(path),
                                       "Run again, and if it stays, report it with the logs of this capture. Finished "
@@ -219,8 +221,8 @@ def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
                 > 0).all():
                 faces[own] = corners
                 if face_uvs is not None:
-                    face_uvs[own] = np.concatenate([mesh.face_uvs[start, :1], mesh.face_uvs[own, 1],
-                                                    mesh.face_uvs[start + count - 1, 2:]])[fan]
+                    around = [mesh.face_uvs[start, :1], mesh.face_uvs[own, 1], mesh.face_uvs[start + count - 1, 2:]]
+                    face_uvs[own] = np.concatenate(around)[fan]
                 break
     return replace(mesh, faces=faces, face_uvs=face_uvs)
 

@@ -20,8 +20,8 @@ def noise(points: np.ndarray, wavelength: float, rng: np.random.Generator, smoot
     """
     lattice = rng.standard_normal((LATTICE_NODES,) * 3).astype(np.float32)
     turn = Rotation.random(random_state=rng).as_matrix().astype(np.float32)  # hides the lattice's axes
-    at = (points.astype(np.float32)
-          @ (turn / np.float32(wavelength))).T + rng.uniform(0, LATTICE_NODES, (3, 1)).astype(np.float32)
+    turned = (points.astype(np.float32) @ (turn / np.float32(wavelength))).T
+    at = turned + rng.uniform(0, LATTICE_NODES, (3, 1)).astype(np.float32)
     if smooth:
         # 1 / mean deviation
         return map_coordinates(lattice, at, np.float32, order=3, mode="grid-wrap", prefilter=False) * np.float32(3.03)
@@ -33,5 +33,5 @@ def noise(points: np.ndarray, wavelength: float, rng: np.random.Generator, smoot
 
 def octaves(points: np.ndarray, wavelengths: list[float], rng: np.random.Generator, smooth: bool = False) -> np.ndarray:
     """The sum of `noise` over wavelengths, again of deviation 1."""
-    return sum(noise(points, wavelength, rng, smooth)
-               for wavelength in wavelengths) / np.float32(np.sqrt(len(wavelengths)))
+    total = sum(noise(points, wavelength, rng, smooth) for wavelength in wavelengths)
+    return total / np.float32(np.sqrt(len(wavelengths)))

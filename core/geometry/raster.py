@@ -80,8 +80,8 @@ class RayCaster:
         count = len(directions)
         face, bary, distance = np.full(count, -1), np.zeros((count, 3)), np.full(count, np.inf)
         if count:
-            triangle, ray, location = self._intersector.intersects_id(origins, directions, multiple_hits=False,
-                                                                      return_locations=True)
+            triangle, ray, location = self._intersector.intersects_id(
+                origins, directions, multiple_hits=False, return_locations=True)
             face[ray] = triangle
             bary[ray] = trimesh.triangles.points_to_barycentric(self.mesh.vertices[self.mesh.faces[triangle]], location)
             distance[ray] = np.linalg.norm(location - origins[ray], axis=1)
@@ -126,9 +126,8 @@ def _box(mesh: Mesh, view: View, width: int, height: int) -> tuple[slice, slice]
     if not np.isfinite(pixels).all():
         return slice(0, height), slice(0, width)
     low, high = (edge * [width / view.width, height / view.height] for edge in (pixels.min(0), pixels.max(0)))
-    (left, top), (right,
-                  bottom) = np.floor(low - BENT_SIDE_SHARE
-                                     * (width + height)), np.ceil(high + BENT_SIDE_SHARE * (width + height))
+    margin = BENT_SIDE_SHARE * (width + height)
+    (left, top), (right, bottom) = np.floor(low - margin), np.ceil(high + margin)
     return tuple(slice(int(np.clip(first, 0, size)), int(np.clip(end, 0, size)))
                  for first, end, size in ((top, bottom, height), (left, right, width)))
 

@@ -33,8 +33,8 @@ class Surface:
 
     def __init__(self, mesh: Mesh, spacing: float = 0.002):
         self.mesh, self.normals = mesh, vertex_normals(mesh)
-        dense, faces, self._parent = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, spacing, max_iter=12,
-                                                                      return_index=True)
+        dense, faces, self._parent = trimesh.remesh.subdivide_to_size(
+            mesh.vertices, mesh.faces, spacing, max_iter=12, return_index=True)
         self._tree = cKDTree(dense[faces].mean(1))
         self._caster = RayCaster(mesh)
 

@@ -221,8 +221,8 @@ def _write(path: Path, pixels: np.ndarray, encoding: _Encoding, check: Callable[
     with replacing(path) as temporary:
         _need_space(temporary.parent, pixels.size * (1 if encoding.kind == "uint8" else 2))
         output = oiio.ImageOutput.create(str(temporary))
-        if output is None or not output.open(str(temporary),
-                                             spec) or not _write_rows(output, pixels, check) or not output.close():
+        opened = output is not None and output.open(str(temporary), spec)
+        if not opened or not _write_rows(output, pixels, check) or not output.close():
             error = (output.geterror() if output else oiio.geterror()) or "unknown error"
             # OpenImageIO gives text only: touching the folder ourselves turns a full or read-only disk into its OSError
             with open(temporary, "ab") as file:

@@ -77,8 +77,8 @@ def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray,
     sure = sure * np.clip((INWARD + BAND - np.abs(depth + INWARD / 2)) / BAND, 0, 1)
     fitted = penumbra(distance - shift, np.maximum(width, 0.7 * texel))
     alpha = painted + sure * (fitted - painted)
-    return np.where(depth < -INWARD - BAND, painted,
-                    alpha).astype(np.float32), (sure * (np.abs(distance) < BAND)).astype(np.float32), colour
+    alpha = np.where(depth < -INWARD - BAND, painted, alpha)
+    return alpha.astype(np.float32), (sure * (np.abs(distance) < BAND)).astype(np.float32), colour
 
 
 def penumbra(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
@@ -104,8 +104,8 @@ def _segmented(value: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight:
         gap = lit - shaded
         odds = np.where(gap > 0.02, ((lit + shaded) / 2 - value) / np.maximum(gap, 0.05),
                         np.where(dark > 0.5, 0.5, -0.5))
-        odds = _blur(np.clip(odds, -0.5, 0.5) * np.maximum(weight, 0.02),
-                     smooth) / np.maximum(_blur(np.maximum(weight, 0.02), smooth), 1e-4)
+        known = np.maximum(weight, 0.02)
+        odds = _blur(np.clip(odds, -0.5, 0.5) * known, smooth) / np.maximum(_blur(known, smooth), 1e-4)
         dark = np.where(free, odds > 0, inside).astype(np.float32)
     return dark > 0.5
 

@@ -69,9 +69,8 @@ class _SkinPoints:
 
 
 def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
-              reaches: Callable[[np.ndarray], np.ndarray],
-              weights: np.ndarray, step: Callable[[int, int], None] = lambda done,
-              of: None) -> tuple[Light, np.ndarray, np.ndarray]:
+              reaches: Callable[[np.ndarray], np.ndarray], weights: np.ndarray,
+              step: Callable[[int, int], None] = lambda done, of: None) -> tuple[Light, np.ndarray, np.ndarray]:
     """The light that explains linear skin colours [N, 3] at points with unit normals [N, 3], transfer [N, 9] and
     weights [N].
 
@@ -131,9 +130,8 @@ def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np
     count = len(colours)
     prior = 0.03 + 0.67 * visible * (cosine > 0)  # that the sun reaches a point
     # a first guess of the two states: the sky gives the darker skin its colour, sky and sun the brightest
-    bright = (log.mean(1)
-              - np.quantile(log.mean(1), 0.3)) / max(np.quantile(log.mean(1), 0.97) - np.quantile(log.mean(1), 0.3),
-                                                     1e-3)
+    low, high = np.quantile(log.mean(1), 0.3), np.quantile(log.mean(1), 0.97)
+    bright = (log.mean(1) - low) / max(high - low, 1e-3)
     lit = visible * (bright > 0.5) if start is None else start[0]
     inlier = np.ones(count) if start is None else start[1]
     scale = np.average(colours, axis=0, weights=weights)

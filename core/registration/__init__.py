@@ -147,9 +147,11 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     pose, coefficients = alignment.fit_scan(model, pose, coefficients, found.points, trust, scan, shaped)
     start = pose.apply(model.shape(coefficients))
     targets = nonrigid.LandmarkTargets(found.points, trust, subject.hold, found.put)
-    vertices = nonrigid.fit(model, start, scan, follow, targets, settings.registration.iterations,
-                            lambda share: report.progress(20 + (0.9 * STEPS - 20) * share, 0.9 * STEPS,
-                                                          "fitting the head to the scan"))
+
+    def tell(share: float) -> None:
+        report.progress(20 + (0.9 * STEPS - 20) * share, 0.9 * STEPS, "fitting the head to the scan")
+
+    vertices = nonrigid.fit(model, start, scan, follow, targets, settings.registration.iterations, tell)
     placed = model.mesh.moved(pose.apply(model.mesh.vertices))
     aligned = model.mesh.moved(start)
     vertices = _finished(placed, aligned, vertices, report)

@@ -102,9 +102,8 @@ def from_points(mesh: Mesh, follow: np.ndarray, points: np.ndarray, towards: np.
     distance = ((points[found] - mesh.vertices[vertex]) * direction).sum(1)
     aside = np.linalg.norm(points[found] - mesh.vertices[vertex] - distance[:, None] * direction, axis=1)
     spacing = np.median(np.linalg.norm(mesh.vertices[mesh.faces[:, 0]] - mesh.vertices[mesh.faces[:, 1]], axis=1))
-    good = (np.abs(distance) < reach) & (aside < 3
-                                         * spacing) & ((towards[found] * direction).sum(1)
-                                                       > np.cos(np.radians(MOST_ANGLE_DEG)))
+    facing = (towards[found] * direction).sum(1) > np.cos(np.radians(MOST_ANGLE_DEG))
+    good = (np.abs(distance) < reach) & (aside < 3 * spacing) & facing
     weight = np.clip(1 - (distance / reach) ** 2, 0, 1) ** 2 * follow[vertex]
     corners = np.repeat(vertex[:, None], 3, 1)
     bary = np.tile([1.0, 0.0, 0.0], (len(vertex), 1))

@@ -52,10 +52,10 @@ class OpenEyes:
         """The left and the right eye as eyes.json keeps them."""
         def rounded(vector):
             return tuple(round(float(x), 6) for x in vector)
+        posed = zip(self.opened.balls, self.openness, self.iris_radius, self.measured, strict=True)
         return tuple(Eyeball(rounded(ball.centre), round(ball.radius, 6), rounded(ball.gaze), round(openness, 3),
                              round(float(np.nan_to_num(iris)), 6), views)
-                     for ball, openness, iris, views in zip(self.opened.balls, self.openness, self.iris_radius,
-                                                            self.measured, strict=True))
+                     for ball, openness, iris, views in posed)
 
 
 def lift_rims(views: list[View], found: Landmarks) -> tuple[LidMarks | None, LidMarks | None]:

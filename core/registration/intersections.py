@@ -41,8 +41,8 @@ def mended(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.nda
             break
         moved = vertices - placed.vertices
         part, rest = np.flatnonzero(free), np.flatnonzero(~free)
-        moved[part] = spsolve(laplacian[part][:, part].tocsc(),
-                              -(laplacian[part][:, rest] @ moved[rest])).reshape(-1, 3)
+        solved = spsolve(laplacian[part][:, part].tocsc(), -(laplacian[part][:, rest] @ moved[rest]))
+        moved[part] = solved.reshape(-1, 3)
         vertices[part] = placed.vertices[part] + moved[part]
     return vertices
 

@@ -97,8 +97,8 @@ def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Land
         # the first rounds: least absolute
         robust = 1 / np.maximum(errors, 0.5) if step < 3 else (width ** 2 / (width ** 2 + errors ** 2)) ** 2
         distance = np.linalg.norm(origins - points[:, None], axis=-1)
-        weights = np.where(np.isfinite(errors), robust,
-                           0) * np.maximum(facing, 1e-4) * _view_trust(errors, facing) / distance ** 2
+        sure = np.where(np.isfinite(errors), robust, 0)
+        weights = sure * np.maximum(facing, 1e-4) * _view_trust(errors, facing) / distance ** 2
         points = _nearest_to_rays(origins, rays, weights)
     errors = _errors(views, points, pixels)
     facing = _facing(points, origins)

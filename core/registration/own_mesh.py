@@ -52,8 +52,8 @@ def read(chosen: str, report: Reporter) -> OwnMesh:
             raise Problem(f"The shape {other.name} has {len(positions)} vertices, the neutral mesh {neutral.name} has "
                           f"{len(mesh.vertices)}.",
                           "Leave in the folder only shapes of the same mesh, in the same vertex order.")
-        shapes.append(((positions - mesh.vertices)
-                       * (1.0 if _is_identity(other) else EXPRESSION_SIGMA)).astype(np.float32))
+        scale = 1.0 if _is_identity(other) else EXPRESSION_SIGMA
+        shapes.append(((positions - mesh.vertices) * scale).astype(np.float32))
     return OwnMesh(mesh, np.array(shapes, np.float32).reshape(-1, *mesh.vertices.shape), neutral)
 
 
@@ -161,5 +161,5 @@ def _check(mesh: Mesh, path: Path) -> None:
 
 
 def _same_uvs(a: Mesh, b: Mesh) -> bool:
-    return a.uvs is not None and b.uvs is not None and np.array_equal(a.uvs, b.uvs) and np.array_equal(a.face_uvs,
-                                                                                                       b.face_uvs)
+    return (a.uvs is not None and b.uvs is not None and np.array_equal(a.uvs, b.uvs)
+            and np.array_equal(a.face_uvs, b.face_uvs))

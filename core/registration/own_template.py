@@ -185,8 +185,8 @@ def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, 
                         COVER_ITERATIONS,
                         lambda share: report.progress(0.5 * share, 0.5, "fitting the head to the scan"))
     known = np.flatnonzero(follow > 0.1)
-    face, bary = surfaces.Surface(ours.model.mesh.moved(over),
-                                  SOURCE_SPACING_M).nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
+    source = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M)
+    face, bary = source.nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
     known, face, bary = known[face >= 0], face[face >= 0], bary[face >= 0]
     shift = ((head.vertices - over)[head.faces[face]] * bary[..., None]).sum(1)
     return start + carried.field(start[known], shift, start, report)
@@ -200,8 +200,8 @@ def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficien
     face, bary = surface.nearest(at.vertices, normals, REACH_M[1])
     there = face >= 0
     distance = np.full(len(face), np.inf)
-    distance[there] = np.linalg.norm(raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there],
-                                                        bary[there]) - at.vertices[there], axis=1)
+    nearest = raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there], bary[there])
+    distance[there] = np.linalg.norm(nearest - at.vertices[there], axis=1)
     follow = np.interp(distance, REACH_M, (1, 0)) * np.interp(_free_sky(at, normals), OPEN_SKY_SHARES, (0, 1))
     follow *= np.interp(cKDTree(_rim(surface.mesh)).query(at.vertices)[0], RIM_M, (0, 1))
     uv = np.zeros((len(face), 2))

@@ -194,8 +194,8 @@ def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, v
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
     normal *= np.where((normal @ view.axis) > 0, -1, 1)[..., None]
     key = -0.75 * view.axis - 0.55 * view.rotation[1] + 0.35 * view.rotation[0]
-    light = 0.75 * np.clip(normal @ (key / np.linalg.norm(key)), 0,
-                           1) + 0.2 + 0.15 * np.clip(-(normal @ view.axis), 0, 1)
+    key_light = np.clip(normal @ (key / np.linalg.norm(key)), 0, 1)
+    light = 0.75 * key_light + 0.2 + 0.15 * np.clip(-(normal @ view.axis), 0, 1)
     colour = raster.interpolate(colours, caster.mesh.faces, face, bary)
     return images.linear_to_srgb(np.where((face >= 0)[..., None], colour * light[..., None], 0.2))
 

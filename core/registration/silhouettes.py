@@ -139,9 +139,7 @@ def _borders(outline: Outline, at: np.ndarray, outward: np.ndarray, reach: float
 
 def _histogram(code: np.ndarray) -> np.ndarray:
     """Smoothed shares [HISTOGRAM_BINS**3] of the colours with these codes."""
-    counts = np.bincount(code,
-                         minlength=HISTOGRAM_BINS**3).astype(np.float64).reshape(HISTOGRAM_BINS, HISTOGRAM_BINS,
-                                                                                 HISTOGRAM_BINS)
+    counts = np.bincount(code, minlength=HISTOGRAM_BINS**3).astype(np.float64).reshape((HISTOGRAM_BINS,) * 3)
     for axis in range(3):
         counts = counts + 0.5 * (np.roll(counts, 1, axis) + np.roll(counts, -1, axis))
     return (counts / max(counts.sum(), 1.0)).ravel()

@@ -132,10 +132,11 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
             rows.append((part.at(mesh.vertices), basis, part.direction, part.distance, weight))
         pose, coefficients = stepped(pose, coefficients, rows)
     vertices = pose.apply(model.shape(coefficients))
-    vertices = _relaxed(model, vertices, lambda mesh: constraints.of(mesh, REACH_M[1]),
-                        found,
-                        lambda step: report.progress(first + (steps - first) * (0.7 + 0.3 * step / STEPS), steps,
-                                                     "fitting the head to the views"))
+
+    def tell(step: int) -> None:
+        report.progress(first + (steps - first) * (0.7 + 0.3 * step / STEPS), steps, "fitting the head to the views")
+
+    vertices = _relaxed(model, vertices, lambda mesh: constraints.of(mesh, REACH_M[1]), found, tell)
     parts = constraints.of(model.mesh.moved(vertices), REACH_M[1])
     return FittedHead(pose, coefficients, vertices, {name: len(part) for name, part in parts.items()},
                       {name: float(np.median(np.abs(part.distance))) if len(part) else float("nan")

@@ -61,8 +61,11 @@ def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, 
         seen = _match(views, plan, now.scale, box, guide, mask, tick)
         if guide:  # the nearer pairs of the round before fill what the wide ones cannot match; they weigh little
             seen = maps + seen
-        result = (fuse(seen, box, voxel * now.voxels, lambda k, plan=plan,
-                       tick=tick: tick(len(plan) + min(k, len(plan)), "fusing depth")) if seen else None)
+
+        def fusing(k: int, plan=plan, tick=tick) -> None:
+            tick(len(plan) + min(k, len(plan)), "fusing depth")
+
+        result = fuse(seen, box, voxel * now.voxels, fusing) if seen else None
         done += 2 * len(plan) * now.scale**2
         if result is None:
             break

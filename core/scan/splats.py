@@ -77,8 +77,11 @@ def measure(start: Mesh, views: list[View], voxel: float, box: np.ndarray, devic
     """The surface within the box [2, 3] that surfels trained on all views show, and its depth maps; `start` as in
     train, voxel in metres."""
     photographs = [_photograph(view) for view in views]
-    maps = train(start, photographs, gsplats(), device, STEPS, lambda step,
-                 loss: report.progress(step, STEPS, f"training surfels, loss {loss:.4f}"))
+
+    def tell(step: int, loss: float) -> None:
+        report.progress(step, STEPS, f"training surfels, loss {loss:.4f}")
+
+    maps = train(start, photographs, gsplats(), device, STEPS, tell)
     return fuse(maps, box, voxel, lambda done: report.progress(STEPS, STEPS, "fusing depth")), maps
 
 
@@ -133,9 +136,8 @@ def _colours(mesh: Mesh, normals: np.ndarray, photographs: list[UndistortedFrame
     for p in photographs:
         local = (mesh.vertices - p.centre) @ p.rotation.T
         x, y = np.floor(p.focal * local[:, :2] / local[:, 2:] - p.origin).astype(int).T
-        seen = (x >= 0) & (y >= 0) & (x < p.mask.shape[1]) & (y
-                                                              < p.mask.shape[0]) & (((p.centre - mesh.vertices)
-                                                                                     * normals).sum(1) > 0)
+        inside = (x >= 0) & (y >= 0) & (x < p.mask.shape[1]) & (y < p.mask.shape[0])
+        seen = inside & (((p.centre - mesh.vertices) * normals).sum(1) > 0)
         total[seen] += p.picture[y[seen], x[seen]]
         count[seen] += 1
     return total / count[:, None]
@@ -165,10 +167,8 @@ def _loss(rendered: tuple, p: UndistortedFrame, device: str, geometry: bool) -> 
     mask = torch.tensor(p.mask, dtype=torch.float32, device=device)[..., None]
     target = torch.tensor(p.picture, dtype=torch.float32, device=device) * mask
     shown = colour * mask  # black behind; what surfels show outside the person is held down by their alpha
-    loss = (1 - SSIM) * (shown - target).abs().mean() + SSIM * (1
-                                                                - _ssim(shown, target)) + OUTSIDE * (alpha
-                                                                                                     * (1
-                                                                                                        - mask)).mean()
+    loss = (1 - SSIM) * (shown - target).abs().mean() + SSIM * (1 - _ssim(shown, target))
+    loss = loss + OUTSIDE * (alpha * (1 - mask)).mean()
     if geometry:
         agree = (normals * depth_normals).sum(-1, keepdim=True) * alpha.detach()
         loss = loss + NORMAL * ((alpha.detach() - agree) * mask).mean() + DISTORTION * (distortion * mask).mean()

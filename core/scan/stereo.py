@@ -141,8 +141,8 @@ def warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarray
     height, width = move.shape
     first, last = int(np.floor(min(0, -move.max()))), int(np.ceil(width + max(0, -move.min())))
     y, x = np.mgrid[0:height + step:step, first:last + step:step].astype(np.float64)
-    local = np.stack([(x + 0.5 + origin[0]) / focal, (y + 0.5 + origin[1]) / focal, np.ones_like(x)],
-                     -1).reshape(-1, 3) @ rotation @ view.rotation.T
+    rays = np.stack([(x + 0.5 + origin[0]) / focal, (y + 0.5 + origin[1]) / focal, np.ones_like(x)], -1)
+    local = rays.reshape(-1, 3) @ rotation @ view.rotation.T
     local[:, 2] = np.maximum(local[:, 2], 1e-3)
     pixels = np.asarray(view.camera.img_from_cam(local)).reshape(*x.shape, 2).astype(np.float32) - 0.5
     fy, fx = np.mgrid[0:height, 0:width].astype(np.float32)

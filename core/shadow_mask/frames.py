@@ -39,8 +39,8 @@ def source_of(capture: Capture, settings: Settings) -> str:
     a delighter that looked for a sun in the same way and found none."""
     if settings.shadow_mask.softened:
         return "softened"
-    delighter = str(capture.read()["stages"].get("delight",
-                                                 {}).get("figures", {}).get("delighter", settings.delight.delighter))
+    figures = capture.read()["stages"].get("delight", {}).get("figures", {})
+    delighter = str(figures.get("delighter", settings.delight.delighter))
     if any((capture.delit / "shadow").glob("*.png")):
         return delighter
     return "" if delighter == "shading" else "texture"

@@ -76,8 +76,8 @@ def _expectation_maximisation(log, basis, step, iterations, fixed=False):
 def _log_likelihood(residual: np.ndarray) -> np.ndarray:
     common = residual.mean(-1)
     chroma = residual - common[..., None]
-    return -0.5 * (3 * common**2 / SIGMA_LUMINANCE**2 + (chroma**2).sum(-1)
-                   / SIGMA_CHROMA**2) - np.log(SIGMA_LUMINANCE * SIGMA_CHROMA**2 * (2 * np.pi) ** 1.5)
+    squares = 3 * common**2 / SIGMA_LUMINANCE**2 + (chroma**2).sum(-1) / SIGMA_CHROMA**2
+    return -0.5 * squares - np.log(SIGMA_LUMINANCE * SIGMA_CHROMA**2 * (2 * np.pi) ** 1.5)
 
 
 def smooth_basis(normals: np.ndarray) -> np.ndarray:

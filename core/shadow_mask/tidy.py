@@ -20,8 +20,8 @@ def cohere(odds: np.ndarray, inside: np.ndarray) -> np.ndarray:
     known = inside.astype(np.float32)
     share = 1 / (1 + np.exp(-odds))
     for _ in range(10):
-        around = cv2.GaussianBlur((share * known).astype(np.float32), (0, 0),
-                                  0.005 * size) / np.maximum(cv2.GaussianBlur(known, (0, 0), 0.005 * size), 1e-3)
+        spread = cv2.GaussianBlur((share * known).astype(np.float32), (0, 0), 0.005 * size)
+        around = spread / np.maximum(cv2.GaussianBlur(known, (0, 0), 0.005 * size), 1e-3)
         share = 1 / (1 + np.exp(-np.clip(odds + COHERENCE * (2 * around - 1), -30, 30)))
     return (share > 0.5) & inside
 

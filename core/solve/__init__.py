@@ -173,8 +173,8 @@ def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
         digest.update(tensor.numpy().tobytes())
     digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.compute_device]).encode())
     digest.update(code_key(__package__).encode())  # with the prior's weights
-    digest.update(json.dumps(hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior
-                             else "").encode())
+    own_prior = hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior else ""
+    digest.update(json.dumps(own_prior).encode())
     return digest.hexdigest()
 
 

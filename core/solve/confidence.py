@@ -52,9 +52,8 @@ def spread(prior: ConditionedPrior, o: Observation, reference: torch.Tensor, lig
     device, runs = prior.device, []
     for run in range(RUNS):
         begun = State(0, None, reference.clone(), lights).to(device)
-        state = Sampler(prior, short,
-                        seeded(seed + 7919 * (run + 1), device)).sample({1: o.to(device)}, begun, lambda state,
-                                                                        steps: check())
+        sampler = Sampler(prior, short, seeded(seed + 7919 * (run + 1), device))
+        state = sampler.sample({1: o.to(device)}, begun, lambda state, steps: check())
         runs.append(shown(albedo(state.denoised)).mean(0).cpu())
     return torch.stack(runs).std(0)
 

@@ -74,8 +74,8 @@ def _sampled(settings: Settings, prior: ConditionedPrior, evidence: Evidence, ea
                    settings.seed, report.check)
     rows, columns = (slice(a.start // factor, a.stop // factor) for a in part.inside)
     whole = earlier.spread.clone()
-    whole[rows,
-          columns] = patch[tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor)
-                                 for a, b in zip(part.inside, part.seen, strict=True))]
+    rest = tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor)
+                 for a, b in zip(part.inside, part.seen, strict=True))
+    whole[rows, columns] = patch[rest]
     return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure,
                     earlier.local, earlier.settled)

@@ -155,9 +155,8 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         size = evidence.size // factor
         if factor > 1 and (size < REFERENCE // 4 or size % multiple or evidence.size % factor):
             continue
-        weight, alpha, trust, edge, protected = (torch.from_numpy(_sized(a.numpy(), size))
-                                                 for a in (evidence.weight, evidence.alpha, evidence.trust,
-                                                           evidence.edge, evidence.protected))
+        maps = (evidence.weight, evidence.alpha, evidence.trust, evidence.edge, evidence.protected)
+        weight, alpha, trust, edge, protected = (torch.from_numpy(_sized(a.numpy(), size)) for a in maps)
         texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
         texture = blurred(texture) if recipe.blur else texture
         normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)

@@ -90,10 +90,10 @@ def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float,
               mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha,
               witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
-    evidence, recipe = replace(evidence,
-                               texture=evidence.texture / enlarged(begun.local, evidence.size).exp()), begun.recipe
-    lit = torch.einsum("ck,khw->chw", begun.state.lights.glob,
-                       shading_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
+    recipe = begun.recipe
+    evidence = replace(evidence, texture=evidence.texture / enlarged(begun.local, evidence.size).exp())
+    shading = torch.einsum("ck,khw->chw", begun.state.lights.glob, shading_basis(evidence.normal))
+    lit = shading * albedo_of(begun.reference).clamp_min(1e-3)
     light = evidence.texture * begun.exposure / lit.clamp_min(1e-3)
     if recipe.sharp_edges:
         evidence = with_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))

@@ -80,8 +80,8 @@ class Layout:
         inside = self._inside()
         side = 2 * (torch.arange(e.size) + 0.5) / e.size - 1
         mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone.tensor[None])[0]
-        light = torch.einsum("ck,khw->chw", lights.glob,
-                             shading_basis(e.normal)).clamp_min(1e-2) / exposure / solved.gain[:, None, None]
+        light = torch.einsum("ck,khw->chw", lights.glob, shading_basis(e.normal)).clamp_min(1e-2)
+        light = light / exposure / solved.gain[:, None, None]
         seen = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(DARKEST, 1)
 
         def joined(baked: np.ndarray, beyond: np.ndarray) -> np.ndarray:
@@ -90,12 +90,12 @@ class Layout:
 
         normal = joined(baking.bake_normals(solved.normal, self.back), _picture(mean[3:6]) / 2 + 0.5) * 2 - 1
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+        confidence = np.where(self.back.known, inside * baking.bake(solved.confidence, self.back), 0)
         return replace(solved, diffuse=joined(baking.bake(solved.diffuse, self.back), _picture(seen)),
                        normal=(normal / 2 + 0.5).astype(np.float32),
                        specular=joined(baking.bake(solved.specular, self.back), ((mean[6] + 1) / 2).numpy()),
                        shading=joined(baking.bake(solved.shading, self.back), _picture(light)),
-                       confidence=np.where(self.back.known, inside * baking.bake(solved.confidence, self.back),
-                                           0).astype(np.float32))
+                       confidence=confidence.astype(np.float32))
 
     def _inside(self) -> np.ndarray:
         """[S, S]: 1 within the window's reach, falling to 0 at its border. Small holes, as in the folds of lids and

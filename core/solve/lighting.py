@@ -141,8 +141,8 @@ def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor,
     out = []
     for t, a in zip(texture.reshape(3, -1).to(exact), albedo.reshape(3, -1).to(exact), strict=True):
         normal_matrix = (columns * (w2 * a * a)) @ columns.T
-        damping = ridge * normal_matrix.diagonal().mean().clamp_min(1e-12) * torch.eye(9, dtype=exact,
-                                                                                       device=basis.device)
+        identity = torch.eye(9, dtype=exact, device=basis.device)
+        damping = ridge * normal_matrix.diagonal().mean().clamp_min(1e-12) * identity
         # `solve` asks the device whether it went well
         out.append(torch.linalg.solve_ex(normal_matrix + damping, (columns * (w2 * a)) @ t)[0])
     return torch.stack(out).float()

@@ -9,20 +9,13 @@ map are treated alike.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import torch
 from torch import nn
 from torch.nn import functional
-from torch.utils.checkpoint import checkpoint
 
-LAYOUT = torch.channels_last
-"""Of all maps inside the network: channels first takes longer, in convolutions and in this normalisation
-(benchmarks/solver_speed.py)."""
-
-STRIP = 64
-"""Rows of a map inside the network that are shaped at once where that can be done in pieces."""
+from .network_blocks import LAYOUT, Attention, Down, Fourier, Residual, Up, run_layers
 
 
 @dataclass(frozen=True)
@@ -99,15 +92,11 @@ class UNet(nn.Module):
         super().__init__()
         patch_size, skip_stages, mapping_out = layout.patch_size, layout.skip_stages, layout.mapping_out
         depths, channels, attention = layout.depths, layout.channels, layout.attention or [False] * len(layout.depths)
-        self.patch_size, self.sigma_data, self.skip_stages, self.has_variance = (
-            patch_size,
-            layout.sigma_data,
-            skip_stages,
-            layout.has_variance,
-        )
+        self.patch_size, self.skip_stages = patch_size, skip_stages
+        self.sigma_data, self.has_variance = layout.sigma_data, layout.has_variance
         self.low_memory = False  # keeps a fifth of what the gradient needs, and computes the rest again
         self.multiple = patch_size * 2 ** (len(depths) - 1 - skip_stages)
-        self.timestep_embed = _Fourier(mapping_out)
+        self.timestep_embed = Fourier(mapping_out)
         self.mapping_cond = (nn.Linear(layout.mapping_cond_dim, mapping_out, bias=False) if layout.mapping_cond_dim
                              else None)
         self.mapping = nn.Sequential(nn.Linear(mapping_out, mapping_out), nn.GELU(),
@@ -122,9 +111,9 @@ class UNet(nn.Module):
             above = channels[max(0, level - 1)]
             deepest, halved = level == len(depths) - 1, level > skip_stages
             down.append(_block(layout, [above] + [width] * (depth - 1), width, width, attention[level],
-                               first=_Down() if halved else nn.Identity()))
+                               first=Down() if halved else nn.Identity()))
             up.append(_block(layout, [width if deepest else 2 * width] + [width] * (depth - 1), width, above,
-                             attention[level], last=_Up() if halved else nn.Identity()))
+                             attention[level], last=Up() if halved else nn.Identity()))
         self.u_net = nn.ModuleDict({"d_blocks": nn.ModuleList(down), "u_blocks": nn.ModuleList(up[::-1])})
 
     def lower(self, dtype: torch.dtype) -> UNet:
@@ -149,11 +138,11 @@ class UNet(nn.Module):
         x = self.proj_in(x.contiguous(memory_format=LAYOUT))
         skips = []
         for blocks in self.u_net["d_blocks"][self.skip_stages:]:
-            x = _run(blocks, x, mapped, self.low_memory)
+            x = run_layers(blocks, x, mapped, self.low_memory)
             skips.append(x)
         for level, blocks in enumerate(self.u_net["u_blocks"][:len(skips)]):
             skip = skips.pop()
-            x = _run(blocks, x if level == 0 else torch.cat([x, skip], 1), mapped, self.low_memory)
+            x = run_layers(blocks, x if level == 0 else torch.cat([x, skip], 1), mapped, self.low_memory)
         x = self.proj_out(x)[:, :-1] if self.has_variance else self.proj_out(x)
         return functional.pixel_shuffle(x, self.patch_size) if self.patch_size > 1 else x
 
@@ -166,145 +155,10 @@ def _block(layout: UNetLayout, inputs: list[int], width: int, out: int, attentio
     layers = [] if first is None else [first]
     for i, c_in in enumerate(inputs):
         c_out = out if last is not None and i == len(inputs) - 1 else width
-        layers.append(_Residual(mapping, c_in, width, c_out, norm))
+        layers.append(Residual(mapping, c_in, width, c_out, norm))
         if attention:
-            layers.append(_Attention(mapping, c_out, norm))
+            layers.append(Attention(mapping, c_out, norm))
     return nn.ModuleList(layers if last is None else [*layers, last])
-
-
-def _run(blocks: nn.ModuleList, x: torch.Tensor, mapped: torch.Tensor, low_memory: bool) -> torch.Tensor:
-    """The layers one after the other. In low memory only their inputs are kept for the gradient, and what is inside
-    them is computed a second time."""
-    for layer in blocks:
-        given = (x, mapped) if isinstance(layer, _Residual | _Attention) else (x,)
-        x = checkpoint(layer, *given, use_reentrant=False) if low_memory and x.requires_grad else layer(*given)
-    return x
-
-
-class _Residual(nn.Module):
-    """norm, GELU, conv 3x3, norm, GELU, conv 3x3, plus the input."""
-
-    def __init__(self, mapping: int, c_in: int, width: int, c_out: int, norm: str):
-        super().__init__()
-        self.main = nn.ModuleDict({"0": _Norm(mapping, c_in, max(1, c_in // 32), norm),
-                                   "2": nn.Conv2d(c_in, width, 3, padding=1),
-                                   "4": _Norm(mapping, width, max(1, width // 32), norm),
-                                   "6": nn.Conv2d(width, c_out, 3, padding=1)})
-        self.skip = nn.Conv2d(c_in, c_out, 1, bias=False) if c_in != c_out else nn.Identity()
-        nn.init.zeros_(self.main["6"].weight)
-        nn.init.zeros_(self.main["6"].bias)
-
-    def forward(self, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
-        y = _Shaped.of(self.main["0"], self.main["2"], x, mapped)
-        return _Shaped.of(self.main["4"], self.main["6"], y, mapped) + self.skip(x)
-
-
-class _Shaped(torch.autograd.Function):
-    """convolution(gelu(norm(x))) of a network that does not learn: of all that is worked out only x is kept for the
-    gradient, for the convolution's own input is not needed and the rest, which is cheap, is worked out a second time,
-    in strips where texels do not depend on each other. The same numbers in less than half the memory."""
-
-    @staticmethod
-    def of(norm: _Norm, convolution: nn.Conv2d, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
-        # it learns, or nobody asks for a gradient
-        if mapped.requires_grad or convolution.weight.requires_grad or not x.requires_grad:
-            return convolution(functional.gelu(norm(x, mapped)))
-        return _Shaped.apply(x, mapped, norm, convolution)
-
-    @staticmethod
-    def forward(ctx, x: torch.Tensor, mapped: torch.Tensor, norm: _Norm, convolution: nn.Conv2d) -> torch.Tensor:
-        ctx.save_for_backward(x, mapped)
-        ctx.layers = norm, convolution
-        inner = torch.empty_like(x)
-        for rows in norm.strips(x):
-            inner[:, :, rows] = functional.gelu(norm(x[:, :, rows], mapped))
-        return convolution(inner)
-
-    @staticmethod
-    def backward(ctx, gradient: torch.Tensor) -> tuple:
-        (x, mapped), (norm, convolution) = ctx.saved_tensors, ctx.layers
-        found = torch.ops.aten.convolution_backward(gradient, x, convolution.weight, None, convolution.stride,
-                                                    convolution.padding, convolution.dilation,
-                                                    # of its input only the shape counts, which is x's
-                                                    False, [0, 0], 1, [True, False, False])[0]
-        for rows in norm.strips(x):
-            with torch.enable_grad():
-                part = x[:, :, rows].detach().requires_grad_()
-                inner = functional.gelu(norm(part, mapped))
-            found[:, :, rows] = torch.autograd.grad(inner, part, found[:, :, rows])[0]
-        return found, None, None, None
-
-
-class _Norm(nn.Module):
-    """Normalisation without weights of its own, then x (1 + w) + b with w, b from the mapped noise level."""
-
-    def __init__(self, mapping: int, channels: int, groups: int, kind: str):
-        super().__init__()
-        self.mapper = nn.Linear(mapping, 2 * channels)
-        self.groups, self.kind = groups, kind
-        nn.init.zeros_(self.mapper.weight)
-        nn.init.zeros_(self.mapper.bias)
-
-    def forward(self, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
-        weight, bias = self.mapper(mapped)[:, :, None, None].to(x.dtype).chunk(2, 1)
-        if self.kind == "pixel":
-            # free of copies in channels-last
-            x = functional.layer_norm(x.permute(0, 2, 3, 1), x.shape[1:2], eps=1e-5).permute(0, 3, 1, 2)
-        else:
-            x = functional.group_norm(x, self.groups, eps=1e-5)
-        return torch.addcmul(bias, x, 1 + weight)
-
-    def strips(self, x: torch.Tensor) -> list[slice]:
-        """The rows of x that can be normalised at once without the others."""
-        step = STRIP if self.kind == "pixel" else x.shape[2]
-        return [slice(row, row + step) for row in range(0, x.shape[2], step)]
-
-
-class _Attention(nn.Module):
-    """Self attention over all texels; heads of 64 channels."""
-
-    def __init__(self, mapping: int, channels: int, norm: str):
-        super().__init__()
-        self.heads = max(1, channels // 64)
-        self.norm_in = _Norm(mapping, channels, max(1, channels // 32), norm)
-        self.qkv_proj = nn.Conv2d(channels, 3 * channels, 1)
-        self.out_proj = nn.Conv2d(channels, channels, 1)
-
-    def forward(self, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
-        n, c, h, w = x.shape
-        qkv = self.qkv_proj(self.norm_in(x, mapped)).reshape(n, 3 * self.heads, c // self.heads, h * w).transpose(2, 3)
-        y = functional.scaled_dot_product_attention(*qkv.chunk(3, 1))
-        return x + self.out_proj(y.transpose(2, 3).reshape(n, c, h, w))
-
-
-class _Fourier(nn.Module):
-    """Random Fourier features of a scalar: [N] -> [N, features]."""
-
-    def __init__(self, features: int):
-        super().__init__()
-        self.register_buffer("weight", torch.randn(features // 2, 1))
-
-    def forward(self, value: torch.Tensor) -> torch.Tensor:
-        phase = 2 * math.pi * value[:, None] @ self.weight.T
-        return torch.cat([phase.cos(), phase.sin()], -1)
-
-
-class _Down(nn.Module):
-    """Half the size by the separable kernel [1, 3, 3, 1] / 8, reflected at the border: the triangle filter."""
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=LAYOUT)
-        kernel = (2 - (torch.arange(4, device=x.device) - 1.5).abs()).to(x.dtype) / 4
-        return functional.conv2d(x, torch.outer(kernel, kernel).expand(x.shape[1], 1, 4, 4), stride=2,
-                                 groups=x.shape[1])
-
-
-class _Up(nn.Module):
-    """Twice the size by the same kernel transposed, which is bilinear interpolation; reflected at the border."""
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=LAYOUT)
-        return functional.interpolate(x, scale_factor=2.0, mode="bilinear", align_corners=False)[..., 2:-2, 2:-2]
 
 
 def from_state(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:

@@ -160,8 +160,8 @@ class ReleasedPrior(Prior):
         self.check()
         if self.kind != "noise":
             return Condition(positional_encoding(coords, self.octaves))
-        columns, rows = ((coords + 1) / 2
-                         * self.noise.shape[-1]).round().long().clamp(0, self.noise.shape[-1] - 1).unbind(1)
+        side = self.noise.shape[-1]
+        columns, rows = ((coords + 1) / 2 * side).round().long().clamp(0, side - 1).unbind(1)
         return Condition(self.noise[0][:, rows, columns].transpose(0, 1))
 
 

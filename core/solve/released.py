@@ -48,8 +48,8 @@ def read_config(folder: Path) -> dict:
             raise Problem(f"The prior in {folder} needs a second input through cross attention, which is not known "
                           "here.", CHOOSE)
         levels = len(model["depths"])
-        if not len(model["channels"]) == len(model.get("self_attn_depths")
-                                             or model["depths"]) == levels > model["skip_stages"] >= 0:
+        attention = model.get("self_attn_depths") or model["depths"]
+        if not len(model["channels"]) == len(attention) == levels > model["skip_stages"] >= 0:
             raise ValueError("depths, channels and self_attn_depths are not of one length")
         kind = cond.setdefault("type", "coord")
         if kind not in COND_KINDS:
@@ -79,9 +79,9 @@ def read_weights(folder: Path) -> dict[str, torch.Tensor]:
                       f"({type(error).__name__}). Nothing in it was run.",
                       "Download it again from the authors' page.") from error
     state = state.get("model_ema", state) if isinstance(state, dict) else None
-    if not isinstance(state,
-                      dict) or not state or not all(isinstance(name, str) and isinstance(value, torch.Tensor)
-                                                    for name, value in state.items()):
+    of_tensors = isinstance(state, dict) and state and all(
+        isinstance(name, str) and isinstance(value, torch.Tensor) for name, value in state.items())
+    if not of_tensors:
         raise Problem(f"{path} holds no state dict of a network.", CHOOSE)
     return {name: value.float() for name, value in state.items()}
 

@@ -34,8 +34,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     evidence = read_evidence(capture, read_filmed_head(capture), max(min(height, 1024) // 32, 4) * 32)
     report.progress(1, 2, "looking for the shadow's edges")
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
-    tone = parse_skin_tone(settings.solve.skin_tone) or estimate_from_texture(evidence.texture,
-                                                                              initial.lit_skin(evidence), prior.tones)
+    tone = parse_skin_tone(settings.solve.skin_tone)
+    tone = tone or estimate_from_texture(evidence.texture, initial.lit_skin(evidence), prior.tones)
     found = initial.start(prior, evidence, tone, CELL, recipe)
     snapped = np.clip(images.resize(found.alpha.numpy(), width, height), 0, 1)
     images.write_data(capture.shadow_mask_edges, snapped)

@@ -98,8 +98,8 @@ class Split:
 
     def light(self, normal: torch.Tensor) -> torch.Tensor:
         """The global light [3, S, S] at normals [3, S, S], linear: a factor of the albedo."""
-        return torch.from_numpy(np.exp(np.tensordot(self.coefficients,
-                                                    sh_basis(normal.numpy().astype(np.float64), axis=0), 1))).float()
+        basis = sh_basis(normal.numpy().astype(np.float64), axis=0)
+        return torch.from_numpy(np.exp(np.tensordot(self.coefficients, basis, 1))).float()
 
 
 @dataclass(frozen=True)
@@ -214,8 +214,8 @@ def log_probability(together: Covariances, values: np.ndarray, scales: Scales, t
     total = -0.5 * sum((np.log(found / usual) / VARIED) ** 2 for found, usual in zip(scales, typical, strict=True))
     for axis in range(3):
         lower, column = cholesky(together.covariance(scales, axis), lower=True), values[:, axis]
-        total -= 0.5 * float(np.square(solve_triangular(lower, column,
-                                                        lower=True)).sum()) + float(np.log(np.diag(lower)).sum())
+        white = solve_triangular(lower, column, lower=True)
+        total -= 0.5 * float(np.square(white).sum()) + float(np.log(np.diag(lower)).sum())
     return total
 
 
@@ -228,9 +228,8 @@ def infer(captures: list[Cells], scales: Scales) -> Split:
     traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
     for axis, size in enumerate(OF_AXES):
         told = cho_solve(cho_factor(among.covariance(scales, axis)), values[:, axis])
-        traits[axis], local[axis] = (scales.traits
-                                     * size) ** 2 * beyond.traits @ told, (scales.local
-                                                                           * size) ** 2 * beyond.local @ told
+        traits[axis] = (scales.traits * size) ** 2 * beyond.traits @ told
+        local[axis] = (scales.local * size) ** 2 * beyond.local @ told
         prior = (scales.light * size * OF_ORDERS) ** 2 + LEVEL**2 * (OF_ORDERS == 0)
         coefficients[axis] = VISIBLE * prior * (basis.T @ told[seen.own == 0])
     return Split(AXES.T @ coefficients, *(_spread(AXES.T @ part, first.covered) for part in (traits, local)), scales)

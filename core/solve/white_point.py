@@ -75,8 +75,8 @@ def card_white(srgb: np.ndarray, column: float, row: float, card: str) -> np.nda
         raise Problem(f"The place {column:g}, {row:g} is outside of the frame, which is {width} x {height}.",
                       "Give the pixel's column and row from the upper left.")
     reach = max(2, round(PATCH * max(width, height)))
-    patch = srgb[max(0, int(row) - reach):int(row) + reach + 1,
-                 max(0, int(column) - reach):int(column) + reach + 1].reshape(-1, 3)
+    top, left = max(0, int(row) - reach), max(0, int(column) - reach)
+    patch = srgb[top:int(row) + reach + 1, left:int(column) + reach + 1].reshape(-1, 3)
     if np.median(patch, 0).max() >= 0.98 or np.median(patch, 0).min() < 0.03:
         raise Problem("The card is burnt out or black there.",
                       "Choose another frame or place, or a grey card instead of white paper.")

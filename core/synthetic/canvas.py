@@ -109,8 +109,9 @@ def window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
     columns, factor = slice(column, column + side), size // MASK_SIZE
 
     def mask(name: str) -> np.ndarray:
-        whole = template.mask(name, MASK_SIZE)[row // factor:-(-(row + side) // factor),
-                                               column // factor:-(-(column + side) // factor)]
+        rows = slice(row // factor, -(-(row + side) // factor))
+        columns = slice(column // factor, -(-(column + side) // factor))
+        whole = template.mask(name, MASK_SIZE)[rows, columns]
         return images.resize(whole, side, side)
 
     return _canvas(mesh, size, face[:, columns], bary[:, columns], _landmarks(mesh), mask)

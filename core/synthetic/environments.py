@@ -99,8 +99,8 @@ def _gathered(panorama: np.ndarray) -> np.ndarray:
     """Mean radiance [LIGHTS, 3] of the part of a panorama that is nearest to each light."""
     height, width = panorama.shape[:2]
     if height > WIDTH // 2:
-        panorama, height, width = cv2.resize(panorama, (WIDTH, WIDTH // 2),
-                                             interpolation=cv2.INTER_AREA), WIDTH // 2, WIDTH
+        height, width = WIDTH // 2, WIDTH
+        panorama = cv2.resize(panorama, (width, height), interpolation=cv2.INTER_AREA)
     solid = _solid_angles(height, width).ravel()
     weight = np.bincount(_NEAREST, solid, len(DIRECTIONS))
     return np.stack([np.bincount(_NEAREST, solid * panorama[..., k].ravel(), len(DIRECTIONS)) for k in range(3)],

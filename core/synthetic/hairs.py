@@ -20,8 +20,8 @@ def brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: n
     outer = np.abs(roots[:, 0:1]) / np.abs(ground.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
     # near the nose hairs stand up, then lie along the brow, and at the tail point down
     rise = np.clip(1.6 - 2.3 * outer, -0.3, 1.3) + rng.normal(0, 0.2, outer.shape)
-    direction = np.sign(roots[:, 0:1]) * _along(ground.normal[texel],
-                                                [1.0, 0, 0]) + rise * _along(ground.normal[texel], [0, 0, 1.0])
+    normal = ground.normal[texel]
+    direction = np.sign(roots[:, 0:1]) * _along(normal, [1.0, 0, 0]) + rise * _along(normal, [0, 0, 1.0])
     return _strokes(on, roots, direction, rng.uniform(4.5, 8, len(roots)), 0.11, np.full(len(roots), -0.25), rng)
 
 

@@ -90,9 +90,8 @@ def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: boo
     seen = View(view.name, view.path, view.camera, view.rotation @ rotation, view.translation, True)
     face, bary, _ = raster.render_view(caster, seen, 2)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
-    colour = raster.sample(albedo,
-                           np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2)
-                           * len(albedo)).reshape(*face.shape, 3)
+    at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(albedo)
+    colour = raster.sample(albedo, at).reshape(*face.shape, 3)
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary) @ rotation.T
     shade = (np.full(face.shape, 0.9) if even
              else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1))

@@ -83,8 +83,8 @@ def _position(fraction: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
 def _table(oxygen: float, scattering: float, slope: float, chroma: float) -> np.ndarray:
     """reflectance on a grid, uniform in the logarithms: linear sRGB float32 [TABLE melanin, TABLE blood, 3]."""
     nodes = 65  # smooth functions of two variables: computed coarsely, enlarged cubically
-    melanin, blood = np.geomspace(*MELANIN_RANGE, nodes)[:, None,
-                                                         None], np.geomspace(*BLOOD_RANGE, nodes)[None, :, None]
+    melanin = np.geomspace(*MELANIN_RANGE, nodes)[:, None, None]
+    blood = np.geomspace(*BLOOD_RANGE, nodes)[None, :, None]
     rgb = _integrate(_spectrum(melanin, blood, oxygen, scattering, slope))
     luminance = (rgb @ LUMINANCE)[..., None]
     saturated = (rgb / luminance) ** chroma

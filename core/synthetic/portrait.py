@@ -15,11 +15,11 @@ import cv2
 import numpy as np
 
 from ..imaging import images
-from ..light.spherical_harmonics import sh_basis
 from .environments import Environment, background_radiance, made_environment, panorama_environment
+from .fitted_light import FittedLight, LampOnHead, fitted_light
 from .identities import subject_mesh
 from .light import in_the_way
-from .olat import BASIS, DIRECTIONS, LIGHTS, LightStage, light_stage, mirrored, transport
+from .olat import BASIS, DIRECTIONS, LightStage, light_stage, mirrored, transport
 from .parameters import adorned, sample_parameters
 from .response import curve, develop, expose
 from .sight import MASKS, Sight, landmarks_of, look, random_camera
@@ -27,29 +27,6 @@ from .skin import Skin, make_skin
 
 F0 = 0.08  # reflectance at normal incidence per Specular IOR Level of Blender's Principled BSDF
 GOBOS = ("none", "none", "none", "leaves", "leaves", "blinds", "edge")
-
-
-@dataclass(frozen=True)
-class FittedLight:
-    """The light as a fit to the registered head would find it, up to its usual errors, times the skin's tone: ambient
-    [P, 3] of a second-order sky, sunlit [P, 3] the same and a sun that only the head itself blocks; smooth normals [P,
-    3] of the registered head; direct [P, 3]: what the sun would add where nothing blocks it, None where nobody asks for
-    it."""
-
-    ambient: np.ndarray
-    sunlit: np.ndarray
-    normal: np.ndarray
-    direct: np.ndarray | None = None
-
-
-@dataclass(frozen=True)
-class LampOnHead:
-    """A lamp as it falls on a head: towards [3], unit direction to it; colour [3]: irradiance over pi; reach [P]: what
-    the head itself lets through of it."""
-
-    towards: np.ndarray
-    colour: np.ndarray
-    reach: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -136,9 +113,8 @@ def _under(environment: Environment, sight: Sight, stage: LightStage,
 
 def _brightest(environment: Environment) -> np.ndarray:
     """The environment's dipole [3]: where its light comes from, of length 1 where all of it comes from there."""
-    return (DIRECTIONS * environment.radiance.mean(1, keepdims=True)).mean(0).astype(np.float32) / max(
-        float(environment.radiance.mean()), 1e-6
-    )
+    dipole = (DIRECTIONS * environment.radiance.mean(1, keepdims=True)).mean(0).astype(np.float32)
+    return dipole / max(float(environment.radiance.mean()), 1e-6)
 
 
 def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> tuple[list, list, list]:
@@ -200,8 +176,8 @@ def _softened(sight: Sight, direct: np.ndarray, radius: float) -> np.ndarray:
         if share * radius < 0.25:
             channels.append(direct)
             continue
-        spread = cv2.GaussianBlur(picture, (0, 0),
-                                  share * radius) / np.maximum(cv2.GaussianBlur(head, (0, 0), share * radius), 1e-3)
+        spread = cv2.GaussianBlur(picture, (0, 0), share * radius)
+        spread = spread / np.maximum(cv2.GaussianBlur(head, (0, 0), share * radius), 1e-3)
         channels.append(spread.reshape(-1)[sight.pixel])
     return np.stack(channels, -1).astype(np.float32)
 
@@ -217,8 +193,8 @@ def _background(environment: Environment, sight: Sight, light: float, rng: np.ra
     else:
         ground = np.broadcast_to(rng.uniform(0.02, 0.7, 3), (sight.size, sight.size, 3)).astype(np.float32)
     for scale in (4, 9, 24):
-        blobs = np.exp(rng.normal(0, 0.35, (scale, scale, 1))
-                       + rng.normal(0, 0.12, (scale, scale, 3))).astype(np.float32)
+        bright = rng.normal(0, 0.35, (scale, scale, 1))
+        blobs = np.exp(bright + rng.normal(0, 0.12, (scale, scale, 3))).astype(np.float32)
         blobs = cv2.resize(blobs, (sight.size,) * 2,
                            interpolation=int(rng.choice([cv2.INTER_CUBIC, cv2.INTER_NEAREST])))
         ground = ground * np.clip(blobs, 0.1, 5)
@@ -275,46 +251,6 @@ def _tone(sight: Sight, albedo: np.ndarray) -> np.ndarray:
     """The mean albedo [3] of what skin is seen."""
     skin = sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")]) > 0.5
     return (albedo[skin] if skin.any() else albedo).mean(0)
-
-
-def fitted_light(transfer: np.ndarray, smooth: np.ndarray, lamps: list[LampOnHead], environment: Environment,
-                 tone: np.ndarray, rng: np.random.Generator) -> FittedLight:
-    """What core/light/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a
-    little off.
-
-    Parameters
-    ----------
-    transfer : [P, 9] of the head
-    smooth : [P, 3], its normals without pores
-    lamps : those beside the environment
-    environment : the light from everywhere
-    tone : [3], of the exposed skin
-    rng : of the fit's errors
-    """
-    main = int(np.argmax([lamp.colour.mean() for lamp in lamps])) if lamps else -1
-    sky = BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)
-    for k, lamp in enumerate(lamps):
-        if k != main:
-            sky = sky + sh_basis(lamp.towards)[:, None] * lamp.colour * np.pi
-    found = main >= 0 and rng.random() < 0.85
-    if main >= 0 and not found:
-        sky = sky + sh_basis(lamps[main].towards)[:, None] * lamps[main].colour * np.pi
-    sky = sky * np.exp(rng.normal(0, 0.1, 3)) + rng.normal(0, 0.08, sky.shape) * np.abs(sky[:1])
-    lit = transfer @ sky
-    lit = np.maximum(lit, 0.15 * np.median(lit, 0))
-    normal = smooth + rng.normal(0, 0.05, 3)
-    normal = (normal / np.sqrt(_dot(normal, normal))[:, None]).astype(np.float32)
-    tone = tone * np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3))
-    direct = np.zeros_like(lit)
-    if found:
-        towards = lamps[main].towards + rng.normal(0, 0.06, 3)
-        towards /= np.linalg.norm(towards)
-        direct = np.maximum(normal @ towards, 0)[:,
-                                                 None] * lamps[main].colour * np.exp(rng.normal(0, 0.15)
-                                                                                     + rng.normal(0, 0.05, 3))
-    sunlit = lit + direct * lamps[main].reach[:, None] if found else lit
-    return FittedLight(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal.astype(np.float32),
-                       (direct * tone).astype(np.float32))
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -160,13 +160,13 @@ def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarra
     albedo = _shrunk(colour, over) / np.maximum(cover, 1e-6)[..., None]
     in_face = np.zeros(hit.shape, np.float32)
     in_face[hit] = raster.sample(template.mask("face", 1024), at * 1024 / MAPS)
-    points, normals = raster.interpolate(head.vertices, head.faces, face,
-                                         bary), raster.interpolate(vertex_normals(head), head.faces, face, bary)
+    points = raster.interpolate(head.vertices, head.faces, face, bary)
+    normals = raster.interpolate(vertex_normals(head), head.faces, face, bary)
     dark = np.zeros(hit.shape, np.float32)
     if sun is not None:
         away = (normals[hit] @ sun) <= 0
-        dark[hit] = away | raster.RayCaster(opaque).blocked(points[hit] + 5e-4 * normals[hit],
-                                                            np.repeat(sun[None], hit.sum(), 0))
+        towards_sun = np.repeat(sun[None], hit.sum(), 0)
+        dark[hit] = away | raster.RayCaster(opaque).blocked(points[hit] + 5e-4 * normals[hit], towards_sun)
     return albedo, cover, (_shrunk(in_face, over) > 0.5) & (cover > 0.99), _shrunk(dark, over) > 0.5
 
 
@@ -178,8 +178,8 @@ def write_video(path: Path, pictures: Iterable[np.ndarray], crf: int = 18) -> No
         for number, picture in enumerate(pictures):
             if number == 0:  # the codec is open from the first picture on
                 stream.height, stream.width = picture.shape[:2]
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.round(picture * 255).astype(np.uint8),
-                                                                   format="rgb24")))
+            frame = av.VideoFrame.from_ndarray(np.round(picture * 255).astype(np.uint8), format="rgb24")
+            container.mux(stream.encode(frame))
         container.mux(stream.encode())
 
 

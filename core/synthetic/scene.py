@@ -111,9 +111,8 @@ def camera_path(seed: int, frames: int, degrees: float = 46) -> np.ndarray:
     azimuth = np.radians(degrees) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
     height = np.radians(7 + 13 * np.sin(2 * np.pi * (1.5 * t + 0.1)))
     distance = DISTANCE * (1 + 0.05 * np.sin(2 * np.pi * (1.2 * t + rng.uniform())))
-    position = distance[:,
-                        None] * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height),
-                                          np.sin(height)], -1)
+    direction = np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
+    position = distance[:, None] * direction
     position += _drift(rng, frames, 0.008, 9) + _drift(rng, frames, 0.0015, 2)
     target = np.array([0, -0.01, -0.035]) + _drift(rng, frames, 0.010, 9) + _drift(rng, frames, 0.0015, 2)
     return looking(position, target, _drift(rng, frames, np.radians(1.5), 9)[:, 0])
@@ -123,8 +122,8 @@ def rig() -> np.ndarray:
     """Camera-to-world matrices [16, 4, 4] of a studio: two fixed rows of eight cameras, over 100 degrees from side to
     side, as in multi-view face datasets."""
     height, azimuth = (np.radians(a).ravel() for a in np.meshgrid([-6.0, 22.0], np.linspace(-50, 50, 8), indexing="ij"))
-    position = DISTANCE * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height),
-                                    np.sin(height)], -1)
+    direction = np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
+    position = DISTANCE * direction
     return looking(position, np.broadcast_to([0, -0.01, -0.035], position.shape), np.zeros(len(position)))
 
 

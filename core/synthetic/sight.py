@@ -142,8 +142,8 @@ def save(path: Path, sight: Sight) -> None:
     """As an uncompressed .npz; floats of pixels as halves."""
     halves = ("bary", "albedo", "gloss", "normal", "smooth", "masks", "rays")
     arrays = {f.name: np.asarray(getattr(sight, f.name)) for f in fields(Sight)}
-    arrays |= {name: arrays[name].astype(np.float16)
-               for name in halves} | {"reach": np.round(255 * arrays["reach"]).astype(np.uint8)}
+    arrays |= {name: arrays[name].astype(np.float16) for name in halves}
+    arrays["reach"] = np.round(255 * arrays["reach"]).astype(np.uint8)
     with replacing(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, **arrays)
 
@@ -207,8 +207,8 @@ def _open_eyes(stage: LightStage, view: View, hit: np.ndarray, albedo: np.ndarra
         at = middle + gaze * along - 0.1 * opening * over
         lash = np.zeros(hit.shape, np.uint8)
         cv2.polylines(lash, [np.round(upper * 8).astype(np.int32)], False, 1, max(1, round(0.05 * width)), shift=3)
-        ring, pupil = _disc(hit.shape, at,
-                            0.20 * width) & lid, _disc(hit.shape, at, rng.uniform(0.07, 0.1) * width) & lid
+        ring = _disc(hit.shape, at, 0.20 * width) & lid
+        pupil = _disc(hit.shape, at, rng.uniform(0.07, 0.1) * width) & lid
         for where, colour in ((lid, [0.36, 0.29, 0.26]), (ring, iris), (pupil, [0.01, 0.01, 0.01]),
                               (lash > 0, [0.03, 0.022, 0.018])):
             albedo[where[hit]] = colour

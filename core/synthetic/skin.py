@@ -64,8 +64,8 @@ def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas,
     scar = adornment.scars(on, ground, p.scars, np.random.default_rng([p.adorn_seed, 10]))
     melanin, blood, height = melanin * np.exp(scar.stain), blood * np.exp(scar.flush), height + scar.ridge
 
-    diffuse = pigment.reflectance(melanin, blood, p.oxygen, p.scattering, p.slope,
-                                  p.chroma) * (1 - 0.07 * np.clip(hollow, 0, 1))[:, None]
+    diffuse = pigment.reflectance(melanin, blood, p.oxygen, p.scattering, p.slope, p.chroma)
+    diffuse = diffuse * (1 - 0.07 * np.clip(hollow, 0, 1))[:, None]
     diffuse = adornment.made_up(diffuse, area, adornment.lid_distance(on), p.make_up,
                                 np.random.default_rng([p.adorn_seed, 11]))
     specular = _specular(parameters, on, area, hollow, dry)
@@ -123,8 +123,8 @@ def _relief(p: SkinParameters, on: Canvas, ground: Canvas,
     ridged = 0.8 - np.abs(noise(on.position, 1.1, rng))  # the skin's own mesh of fine lines
     waves = on.soft(lambda at: octaves(at, [14.0, 7.0], rng, smooth=True))
     lips, smooth = area["lips"], 1 - area["lips"]
-    height = smooth * (0.010 * (0.6 + 0.6 * p.pores) * micro - 0.012 * (0.7 + age)
-                       * ridged) + 0.04 * (0.5 + age) * waves - 0.05 * pores * smooth
+    height = smooth * (0.010 * (0.6 + 0.6 * p.pores) * micro - 0.012 * (0.7 + age) * ridged)
+    height = height + 0.04 * (0.5 + age) * waves - 0.05 * pores * smooth
 
     folds = np.zeros(len(on.position), np.float32)
     for curve, width, depth, begins in creases(ground, np.random.default_rng([p.pore_seed, 6])):

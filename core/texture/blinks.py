@@ -42,9 +42,8 @@ def leave_out_blinks(capture: Capture, observations: list[UnwrappedView], surfac
         if not any((o.weight[zone] > 0).any() for o in observations if o.name not in unlike):
             continue
         for observation in (o for o in observations if o.name in unlike):
-            observation.quality, observation.weight = np.where(zone, 0,
-                                                               observation.quality), np.where(zone, 0,
-                                                                                              observation.weight)
+            observation.quality = np.where(zone, 0, observation.quality)
+            observation.weight = np.where(zone, 0, observation.weight)
             left_out.add(observation.name)
     if left_out:
         report.log(f"Left out around the eyes, for a blink or another look: {', '.join(sorted(left_out))}.")

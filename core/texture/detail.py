@@ -56,8 +56,8 @@ def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: in
 
     def around(values: np.ndarray) -> np.ndarray:
         sigma = AROUND * factor
-        return cv2.GaussianBlur(values * seen, (0, 0),
-                                sigma) / np.maximum(cv2.GaussianBlur(seen.astype(np.float32), (0, 0), sigma), 1e-6)
+        spread = cv2.GaussianBlur(values * seen, (0, 0), sigma)
+        return spread / np.maximum(cv2.GaussianBlur(seen.astype(np.float32), (0, 0), sigma), 1e-6)
 
     # variance of the mean
     noise = np.maximum(squares / np.maximum(weights, 1e-9) - mean ** 2, 0) / np.maximum(views - 1, 0.2)

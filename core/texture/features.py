@@ -127,8 +127,8 @@ def _vgg(state: dict[str, Tensor], linear: list[Tensor] | None) -> Features:
             if layer is None:
                 x = functional.max_pool2d(x, 2)
                 continue
-            x = functional.relu(functional.conv2d(x, state[name.format(layer, "weight")],
-                                                  state[name.format(layer, "bias")], padding=1))
+            weight, bias = (state[name.format(layer, kind)] for kind in ("weight", "bias"))
+            x = functional.relu(functional.conv2d(x, weight, bias, padding=1))
             if layer in VGG_TAPS:
                 found.append(x)
         return found
@@ -159,8 +159,8 @@ def _read(path: Path, device: str) -> dict[str, Tensor]:
 def _folded(state: dict[str, Tensor], convolution: str, norm: str) -> tuple[Tensor, Tensor]:
     """Weight and bias of a convolution with its batch normalisation (epsilon 1e-3) folded in."""
     gain = state[f"{norm}.weight"] / torch.sqrt(state[f"{norm}.running_var"] + 1e-3)
-    return state[f"{convolution}.weight"] * gain.view(-1, 1, 1,
-                                                      1), state[f"{norm}.bias"] - gain * state[f"{norm}.running_mean"]
+    weight = state[f"{convolution}.weight"] * gain.view(-1, 1, 1, 1)
+    return weight, state[f"{norm}.bias"] - gain * state[f"{norm}.running_mean"]
 
 
 def _same(x: Tensor, weight: Tensor, bias: Tensor, stride: int, groups: int = 1) -> Tensor:

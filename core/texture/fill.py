@@ -29,8 +29,8 @@ def _push_pull(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     mean = weighted / np.maximum(weight, 1e-6)[..., None]
     height, width = weight.shape
     if min(height, width) <= 2:
-        return np.where(weight[..., None] > 1e-6, mean,
-                        weighted.sum((0, 1)) / max(weight.sum(), 1e-6)).astype(np.float32)
+        overall = weighted.sum((0, 1)) / max(weight.sum(), 1e-6)
+        return np.where(weight[..., None] > 1e-6, mean, overall).astype(np.float32)
     half = (width + 1) // 2, (height + 1) // 2
     down = [cv2.resize(x, half, interpolation=cv2.INTER_AREA) for x in (weighted, weight)]
     gain = np.minimum(4 * down[1], 1) / np.maximum(down[1], 1e-6)  # one known texel of four is enough

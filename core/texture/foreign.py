@@ -100,8 +100,8 @@ def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Unfolded) 
         return np.zeros_like(confidence)
     weight = ((neck > 0.3) & surface.covered).astype(np.float32) * confidence
     sigma = SMOOTH * size
-    smooth = cv2.GaussianBlur(log_texture * weight[..., None], (0, 0),
-                              sigma) / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)[..., None]
+    spread = cv2.GaussianBlur(log_texture * weight[..., None], (0, 0), sigma)
+    smooth = spread / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)[..., None]
     away = smooth - np.median(log_texture[skin], axis=0)
     colour = np.hypot(away[..., 0] - away[..., 1], away[..., 2] - away[..., 1])
     strange = seen & ((colour > COLOUR) | (away.mean(-1) < DARK) | (away.mean(-1) > BRIGHT))

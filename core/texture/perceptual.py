@@ -150,8 +150,9 @@ def _loss(log_texture: Tensor, tile: tuple[Tensor, Tensor, Tensor], features: Fe
     """Perceptual distance plus the gradients' L1; off the head and where a view sees badly, the rendering is the
     picture itself."""
     picture, grid, trust = tile
-    linear = functional.avg_pool2d(functional.grid_sample(log_texture.exp(), grid, mode="bilinear",
-                                                          padding_mode="border", align_corners=False), OVER)
+    linear = functional.grid_sample(log_texture.exp(), grid, mode="bilinear", padding_mode="border",
+                                    align_corners=False)
+    linear = functional.avg_pool2d(linear, OVER)
     rendered = _srgb(linear) * trust + picture * (1 - trust)
     with torch.no_grad():
         wanted = features.layers(picture)

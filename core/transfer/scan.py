@@ -80,12 +80,12 @@ def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float]
     size = len(at.covered)
     face, bary = raster.rasterize_uv(scan, size)
     points = raster.interpolate(scan.vertices, scan.faces, face[at.covered], bary[at.covered]).astype(np.float32)
-    normals = raster.interpolate(vertex_normals(scan), scan.faces, face[at.covered],
-                                 bary[at.covered]).astype(np.float32)
+    normals = raster.interpolate(vertex_normals(scan), scan.faces, face[at.covered], bary[at.covered])
+    normals = normals.astype(np.float32)
     del face, bary
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    caster, total, weights = raster.RayCaster(scan), np.zeros((len(points), 3),
-                                                              np.float32), np.zeros(len(points), np.float32)
+    caster = raster.RayCaster(scan)
+    total, weights = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
     for i, view in enumerate(views):
         tick(i / len(views))
         scale = min(1.0, 640 / max(view.width, view.height))
@@ -102,10 +102,8 @@ def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float]
         looked, pixels = looked[seen], pixels[seen]
         picture = images.read_linear(view.path)
         weight = (cosine[looked] ** SHARPNESS).astype(np.float32)
-        total[looked] += weight[:, None] * raster.sample(picture,
-                                                         pixels
-                                                         * [picture.shape[1] / view.width,
-                                                            picture.shape[0] / view.height])
+        scale = [picture.shape[1] / view.width, picture.shape[0] / view.height]
+        total[looked] += weight[:, None] * raster.sample(picture, pixels * scale)
         weights[looked] += weight
     colours = np.zeros((size, size, 3), np.float32)
     colours[at.covered] = total / np.maximum(weights, 1e-9)[:, None]

@@ -194,9 +194,9 @@ def _lash_row(edge: np.ndarray, lid: str, rng: np.random.Generator) -> np.ndarra
     up, outwards = 1 if lid == "upper" else -1, np.sign(edge[-1, 0])
     t = np.sort(rng.uniform(0.12, 0.96, count))
     at = np.stack([np.interp(t, np.linspace(0, 1, len(edge)), edge[:, axis]) for axis in range(3)], 1)
-    way = np.array([0, -1.0, -0.6 if up > 0 else -0.9]) + (2 * t
-                                                           - 0.9)[:, None] * [0.8 * outwards, 0,
-                                                                              0] + rng.normal(0, 0.12, at.shape)
+    forward = np.array([0, -1.0, -0.6 if up > 0 else -0.9])
+    spread = (2 * t - 0.9)[:, None] * [0.8 * outwards, 0, 0]
+    way = forward + spread + rng.normal(0, 0.12, at.shape)
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     size = length / 1000 * rng.uniform(0.7, 1.1, count) * np.interp(t, [0, 0.4, 1], [0.55, 0.9, 1.0])
     bow = np.array([0, 0, 0.75 if up > 0 else -0.1])

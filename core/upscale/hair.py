@@ -184,8 +184,8 @@ def _behind(brows: np.ndarray, grown: Growth, surface: HeadSurface) -> np.ndarra
     """Brows with those that lie behind hair of the head: as the other one is, where that is seen, and as brows usually
     are where neither is."""
     other, hidden = brows[:, ::-1], grown.head[:, ::-1]  # the template's two sides mirror each other on the map
-    return brows * (1 - grown.head) + grown.head * (other * (1 - hidden) + USUAL["brows"]
-                                                    * template.mask("brows", surface.size) * hidden)
+    usual = USUAL["brows"] * template.mask("brows", surface.size)
+    return brows * (1 - grown.head) + grown.head * (other * (1 - hidden) + usual * hidden)
 
 
 def _closed(picture: np.ndarray, texel: float) -> np.ndarray:

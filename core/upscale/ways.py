@@ -39,6 +39,6 @@ def _brows(position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
 def _beard(position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
     x = position[:, :1] - landmarks[NOSE_BASE, 0]
     corner = landmarks[MOUTH_CORNER]
-    above = np.clip((position[:, 2:] - corner[2]) / max(landmarks[NOSE_BASE, 2] - corner[2], 1.0), 0,
-                    1) * (np.abs(x) < 1.2 * abs(corner[0]))
+    above = np.clip((position[:, 2:] - corner[2]) / max(landmarks[NOSE_BASE, 2] - corner[2], 1.0), 0, 1)
+    above = above * (np.abs(x) < 1.2 * abs(corner[0]))
     return above * np.tanh(x / 8) * [1.0, 0, 0] + [0, 0, -1.0]

@@ -58,8 +58,9 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     report.check()
     seen = _without_strays(seen, maps.confidence, np.abs(_low(channels, seen, surface) - tone)[..., :3].mean(2))
     holes = (seen < 1) & surface.covered
-    report.figure("completed_share_percent", round(100 * float(((1 - seen) * surface.covered * surface.texel**2).sum()
-                                                               / (surface.covered * surface.texel**2).sum()), 1))
+    area = surface.covered * surface.texel**2
+    completed = ((1 - seen) * area).sum() / area.sum()
+    report.figure("completed_share_percent", round(100 * float(completed), 1))
     skin = template.mask("skin", size) * seen
     learnt = grain.measure(channels, slopes, (skin >= 0.99).astype(np.float32), surface, seed)
     report.check()

@@ -69,10 +69,9 @@ class BackgroundTask:
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
         environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
                        and name != switchlight_api.KEY_VARIABLE}
-        self._process = subprocess.Popen([str(word) for word in command], env=environment, stdin=subprocess.DEVNULL,
-                                         stdout=subprocess.PIPE,
-                                         stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace",
-                                         **apart)
+        self._process = subprocess.Popen(
+            [str(word) for word in command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **apart)
         if self._cancelled_at is not None:
             self._kill()
         last_error = ""

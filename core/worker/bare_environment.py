@@ -41,9 +41,8 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
     if answer(python, "import sys; print(sys.prefix != sys.base_prefix)") != "True":
         raise Problem(f"No environment can be made from {base} ({error or 'it does not start'}).",
                       "Use an Existing Python.")
-    if wheel_only or not answer(python,
-                                "import ensurepip; print(ensurepip.version())") or run([python, "-m", "ensurepip",
-                                                                                        "--default-pip"])[0]:
+    has_pip = not wheel_only and answer(python, "import ensurepip; print(ensurepip.version())")
+    if not has_pip or run([python, "-m", "ensurepip", "--default-pip"])[0]:
         unpack_pip(folder, pip_source.fetch(requirements, wheels))
     if answer(python, "import pip; print('pip')") != "pip":
         raise Problem(f"pip does not work in {folder}.", "Use an Existing Python, or choose another folder.")
@@ -94,9 +93,8 @@ def _by_hand(folder: Path, base: Path) -> None:
             (folder / "lib" / f"python{short}" / "site-packages").mkdir(parents=True, exist_ok=True)
             for name in ("python", "python3", f"python{short}"):
                 (python.parent / name).symlink_to(real)
-        (folder
-         / "pyvenv.cfg").write_text(f"home = {real.parent}\ninclude-system-site-packages = false\nversion = "
-                                    f"{version}\nexecutable = {real}\n",
-                                    encoding="utf-8")
+        text = (f"home = {real.parent}\ninclude-system-site-packages = false\nversion = {version}\n"
+                f"executable = {real}\n")
+        (folder / "pyvenv.cfg").write_text(text, encoding="utf-8")
     except OSError as error:
         raise storage_problem(error, folder) from error

@@ -3,7 +3,8 @@
 """The settings on the command line: --set and --settings for every one, a flag for those that have one, and the list of
 all.
 
-Ground floor: standard library only. Names, types, choices and help come from the fields in contract/settings.py.
+Ground floor: standard library only. Names, types, choices and help come from the fields in contract/settings.py and
+contract/stage_settings.py.
 """
 
 from __future__ import annotations

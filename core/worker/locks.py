@@ -90,8 +90,8 @@ def lock_name(description: str) -> str:
     if system == "darwin" and _numbers(about["macos"]) < MACOS:
         raise Problem(f"The solver needs macOS {MACOS[0]} or newer; this is {about['macos']}.",
                       f"Update macOS. Or: {ELSEWHERE}")
-    if machine not in ("arm64", "x86_64",
-                       "amd64") or about["bits"] != 64 or (machine == "arm64" and system != "darwin"):
+    known = machine in ("arm64", "x86_64", "amd64") and about["bits"] == 64
+    if not known or (machine == "arm64" and system != "darwin"):
         raise Problem(f"There is no solver for this processor ({machine}, {about['bits']} bits): pycolmap is not made "
                       "for it.", ELSEWHERE)
     if system.startswith("linux") and (about["libc"][0] != "glibc" or _numbers(about["libc"][1]) < GLIBC):

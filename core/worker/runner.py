@@ -10,15 +10,13 @@ from __future__ import annotations
 import contextlib
 import importlib
 import os
-import sys
 import time
-import traceback
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 
 from .. import __version__
-from ..contract import ownership, report, slimmed, unforeseen
+from ..contract import report, slimmed, unforeseen
 from ..contract.capture import Capture
 from ..contract.files import storage_problem
 from ..contract.freshness import FINISHED, OLDER
@@ -30,7 +28,6 @@ from ..contract.messages import (
     Log,
     Message,
     Problem,
-    Progress,
     Reporter,
     StageDone,
     out_of_memory,
@@ -39,6 +36,7 @@ from ..contract.portable_paths import convert_settings, read_portable
 from ..contract.settings import Settings, from_json
 from ..contract.stages import Stage
 from .job import JobRequest, read_job
+from .stage_log import at_work
 
 
 def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None,
@@ -88,7 +86,7 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
         finished = capture.read()["stages"][stage.name]
         emit(StageDone(stage.name, finished["seconds"], True, finished["figures"]))
         return state
-    with _at_work(stage, capture, emit, cancelled) as reporter:
+    with at_work(stage, capture, emit, cancelled) as reporter:
         try:
             bring_back(stage, job, emit, cancelled)
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
@@ -112,7 +110,7 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
 def run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
     """Runs one of stages.TOOLS and sends its figures. Raises whatever it raises."""
     started = time.monotonic()
-    with _at_work(tool, job.capture, emit, cancelled) as reporter:
+    with at_work(tool, job.capture, emit, cancelled) as reporter:
         bring_back(tool, job, emit, cancelled)
         _room(tool).run(job.capture, _with_device(tool, job.settings, reporter), reporter)
     emit(StageDone(tool.name, round(time.monotonic() - started, 2), False, reporter.figures))
@@ -127,7 +125,7 @@ def bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None], ca
         entry = capture.read()["stages"][stage.name]
         if not slimmed.is_back(capture.root, entry):  # as where a worker was killed just before it could say so
             emit(Log(f"{stage.label}: slimmed away, and made again for {step.label}."))
-            with _at_work(stage, capture, emit, cancelled) as reporter:
+            with at_work(stage, capture, emit, cancelled) as reporter:
                 settings = _with_device(stage, _as_before(stage, entry, job), reporter)
                 conditions, started = capture.conditions(stage, settings), time.monotonic()
                 _make(stage, capture, settings, reporter)
@@ -243,66 +241,6 @@ def _with_device(step: Stage, settings: Settings, reporter: Reporter) -> Setting
     return replace(settings, device=proof.device)
 
 
-@contextlib.contextmanager
-def _at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], cancelled: Callable[[], bool]):
-    """The reporter of a stage or tool; what is printed meanwhile, and the traceback of what stops it, go to its log.
-    Raises Problem where an input is missing."""
-    missing = [name for name in step.reads if not capture.has(name)]
-    if missing:
-        raise Problem(f"{step.label} needs {missing[0]}, which this capture does not have.",
-                      "Run the stages before it first: click Reconstruct.")
-    emit(Progress(step.name, 0, 1, "Starting"))
-    kept_before = ownership.kept_files(capture.root)
-    with _log_of(capture, step) as log:
-        try:
-            yield Reporter(step.name, _logging(emit, log), cancelled)
-        except Problem as problem:
-            with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
-                traceback.print_exception(problem, file=log)  # what it came from is of use to whoever reads the log
-            raise
-        finally:
-            for kept in sorted(ownership.kept_files(capture.root) - kept_before):
-                emit(
-                    Log(f"A file was not as WildCap had written it, and was in the way of a new one: it is now {kept}.")
-                )
-
-
 def _room(step: Stage):
     """The module that does a stage's or tool's work; importing it may take seconds."""
     return importlib.import_module("." + step.module.split(".", 1)[1], __package__.rpartition(".")[0])
-
-
-@contextlib.contextmanager
-def _log_of(capture: Capture, stage: Stage):
-    """logs/STAGE.log as an open text file; stdout and stderr, also of C++ libraries, go there meanwhile."""
-    path = capture.logs / f"{stage.name}.log"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        log = open(path, "w", encoding="utf-8", buffering=1)
-    except OSError as error:
-        raise storage_problem(error, path) from error
-    kept = [os.dup(1), os.dup(2)]
-    try:
-        for descriptor in (1, 2):
-            os.dup2(log.fileno(), descriptor)
-        yield log
-    finally:
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError, ValueError):
-                stream.flush()
-        for descriptor, original in zip((1, 2), kept, strict=True):
-            os.dup2(original, descriptor)
-            os.close(original)
-        with contextlib.suppress(OSError):
-            log.close()
-
-
-def _logging(emit: Callable[[Message], None], log) -> Callable[[Message], None]:
-    """`emit` that also keeps the stage's log lines in its log."""
-    def both(message: Message) -> None:
-        if isinstance(message, Log):
-            with contextlib.suppress(OSError):
-                print(time.strftime("%H:%M:%S"), message.text, file=log)
-        emit(message)
-
-    return both

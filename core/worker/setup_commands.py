@@ -49,10 +49,10 @@ def _add_build(parser: argparse.ArgumentParser) -> None:
 
 def _install(options: argparse.Namespace) -> int:
     folder = options.folder.absolute()
+    source = installation.PackageSource(options.compute, "folder" if options.wheels else options.packages,
+                                        options.wheels)
     task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), Path(sys.executable),
-                                     installation.PackageSource(options.compute,
-                                                                "folder" if options.wheels else options.packages,
-                                                                options.wheels))
+                                     source)
     _follow(task)
     print(f"The solver is ready: {python_of(folder)}")
     return 0
@@ -63,10 +63,12 @@ def _wheels(options: argparse.Namespace) -> int:
     compute = "cpu" if options.compute == "auto" else options.compute
     if compute == ("cuda" if name.startswith("macosx") else "apple"):
         raise Problem(f"There is no solver for {compute} on {name}.", "Leave --compute out, or choose another.")
-    task = BackgroundTask("wheels",
-                          lambda task: wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder,
-                                                       lambda command: task.run(command,
-                                                                                lambda line: _hear(task, line))))
+
+    def work(task: BackgroundTask):
+        return wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder,
+                               lambda command: task.run(command, lambda line: _hear(task, line)))
+
+    task = BackgroundTask("wheels", work)
     _follow(task)
     print(f"{len(task.result)} wheels for {name} in {options.folder}, "
           f"{index.gigabytes(sum(path.stat().st_size for path in task.result))}; "

@@ -31,8 +31,8 @@ def download(requirements: Path, name: str, compute: str, source: str, folder: P
     with tempfile.TemporaryDirectory(prefix="wildcap_wheels_") as scratch:
         own_pip = pip_steps.PipStep(("--no-deps", "--require-hashes", "-r",
                                      str(Path(requirements) / "locks" / "pip.txt")))
-        code, error = pip_steps.carry_out([*pip_steps.steps(requirements, lock, compute, source, Path(scratch)),
-                                           own_pip], lambda words: run([*pip, *words]))
+        steps = [*pip_steps.steps(requirements, lock, compute, source, Path(scratch)), own_pip]
+        code, error = pip_steps.carry_out(steps, lambda words: run([*pip, *words]))
     if code:
         raise Problem(f"Not all wheels for {name} could be had "
                       f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",

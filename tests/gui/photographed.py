@@ -53,8 +53,8 @@ def somebody() -> Person:
 def cameras() -> np.ndarray:
     """Camera-to-world matrices [N, 4, 4]."""
     azimuth, height = np.radians(AZIMUTHS), np.radians(HEIGHTS)
-    position = scene.DISTANCE * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height),
-                                          np.sin(height)], -1)
+    direction = np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
+    position = scene.DISTANCE * direction
     target = np.broadcast_to([0, -0.01, -0.035], position.shape)
     return scene.looking(position + target, target, np.radians([1.0, -2.0, 1.5, 0.0, -1.0, 2.0, -1.5]))
 

@@ -102,8 +102,8 @@ def frames(triangles: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.n
     area = np.bincount(triangles.ravel(), np.linalg.norm(normal, axis=1).repeat(3), count)[:, None]
     outer = (after[:, :, None] * before[:, None]).reshape(-1, 9)
     # [V, 17]
-    moments = area / area.mean() * np.concatenate([np.ones((count, 1)), before, after,
-                                                   (before**2).sum(1, keepdims=True), outer], 1)
+    columns = [np.ones((count, 1)), before, after, (before**2).sum(1, keepdims=True), outer]
+    moments = area / area.mean() * np.concatenate(columns, 1)
     moments, degree = moments.astype(np.float32), degree.astype(np.float32)
     for _ in range(STEPS):
         moments = np.add.reduceat((moments / degree)[edges[:, 1]], starts)

@@ -14,7 +14,8 @@ from ...core.contract.eyes_record import Eyeball, read_eyes, read_irises
 from .asset import SOFT, FaceUnits
 
 SOCKETS_M = -0.02
-"""Height below the eyes' middle above which what is soft inside is a socket, and not the mouth (core/face/lids.py)."""
+"""Height below the eyes' middle above which what is soft inside is a socket, and not the mouth
+(core/face/eye_asset.py)."""
 
 
 @dataclass(frozen=True)

@@ -149,8 +149,8 @@ class WILDCAP_OT_next_mask(MaskWalk, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and cls.allowed(cls.face(context) is not None,
-                                                     "No other mask waits to be looked at")
+        return super().poll(context) and cls.allowed(
+            cls.face(context) is not None, "No other mask waits to be looked at")
 
     @staticmethod
     def face(context):
@@ -170,8 +170,8 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         found = batches.state_of(captures.root(captures.active(context)))
-        return super().poll(context) and cls.allowed(found is not None and found.state == WAITING,
-                                                     "This face's mask does not wait: click Next Mask")
+        return super().poll(context) and cls.allowed(
+            found is not None and found.state == WAITING, "This face's mask does not wait: click Next Mask")
 
     def work(self, context):
         root = captures.root(captures.require(context))

@@ -15,7 +15,7 @@ from ...core.batch.record import Batch
 from ...core.contract import switchlight_api, unforeseen
 from ...core.contract.files import storage_problem
 from ...core.contract.messages import Problem
-from .. import batches, captures, jobs, preferences, problems, status
+from .. import batches, captures, incoming, jobs, preferences, problems, status
 
 INTERVAL_S = 0.5
 LOG = "run.log"
@@ -133,7 +133,7 @@ def _tick() -> float:
         root = captures.root(captures.active(bpy.context))
         before, _worked = _worked, root if batches.works_on(root) else ""
         if before and before == root != _worked:
-            jobs.bring_in_results(True)
+            incoming.bring_in(True)
     except Exception as error:  # nobody is above a timer: without this, Blender would drop it and the tab stand still
         problems.show("", unforeseen.explain(error, "listening to the batch"))
         changed = True

@@ -26,8 +26,8 @@ def _deliver(asked) -> list[Path]:
         if delivery_presets.PRESETS[asked.preset].open_eyes and not obj.data.shape_keys:
             bpy.ops.wildcap.add_face_units()
     chosen = item.deliver
-    chosen.what, chosen.preset, chosen.format, chosen.folder = asked.what, asked.preset, asked.format, str(asked.folder
-                                                                                                           or "")
+    chosen.what, chosen.preset, chosen.format = asked.what, asked.preset, asked.format
+    chosen.folder = str(asked.folder or "")
     root = captures.root(item)
     with contextlib.suppress(RuntimeError):  # what the button refuses, it has told
         bpy.ops.wildcap.deliver('EXEC_DEFAULT')

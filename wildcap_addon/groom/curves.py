@@ -104,8 +104,8 @@ def _made(name: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray)
     data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
     _attribute(data, "radius", 'FLOAT', 'POINT').data.foreach_set("value", radius.astype(np.float32).ravel())
     rgba = np.concatenate([colour, np.ones((count, 1))], 1)
-    _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR',
-               'CURVE').data.foreach_set("color", rgba.astype(np.float32).ravel())
+    colours = _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR', 'CURVE').data
+    colours.foreach_set("color", rgba.astype(np.float32).ravel())
     return data
 
 
@@ -190,9 +190,8 @@ def _deform_group() -> bpy.types.NodeTree:
         group.is_modifier = True
         for side in ('INPUT', 'OUTPUT'):
             group.interface.new_socket("Geometry", in_out=side, socket_type='NodeSocketGeometry')
-        source, deform, target = (group.nodes.new(kind)
-                                  for kind in ('NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface',
-                                               'NodeGroupOutput'))
+        source, deform, target = (group.nodes.new(kind) for kind in (
+            'NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface', 'NodeGroupOutput'))
         deform.location, target.location = (200, 0), (420, 0)
         group.links.new(source.outputs[0], deform.inputs["Curves"])
         group.links.new(deform.outputs["Curves"], target.inputs[0])

@@ -30,10 +30,9 @@ class WILDCAP_OT_grow_hair(BaseOperator, bpy.types.Operator):
     bl_label = "Grow Hair"
     bl_options = {'REGISTER', 'UNDO'}
 
-    beard_mm: bpy.props.FloatProperty(name="Beard Length (mm)",
-                                      description="How long a beard is, which its picture does not tell: stubble has 1 "
-                                                  "to 2 mm",
-                                      default=BEARD_MM, min=0.5, max=60.0)
+    beard_mm: bpy.props.FloatProperty(
+        name="Beard Length (mm)", default=BEARD_MM, min=0.5, max=60.0,
+        description="How long a beard is, which its picture does not tell: stubble has 1 to 2 mm")
     length: bpy.props.FloatProperty(name="Length", description="Times the length of brows and lashes", default=1.0,
                                     min=0.2, max=3.0)
     thickness: bpy.props.FloatProperty(name="Thickness",

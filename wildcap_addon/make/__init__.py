@@ -4,21 +4,21 @@
 
 import bpy
 
-from .. import jobs, terminal
+from .. import incoming, terminal
 from . import command, operators, results
 
-RESULTS = jobs.Results(results.take, results.has_news)
+RESULTS = incoming.Results(results.take, results.has_news)
 _register, _unregister = bpy.utils.register_classes_factory(operators.CLASSES)
 
 
 def register():
     _register()
-    jobs.on_results.append(RESULTS)
+    incoming.on_results.append(RESULTS)
     terminal.commands.extend(command.COMMANDS)
 
 
 def unregister():
     terminal.forget(command.COMMANDS)
-    jobs.on_results.remove(RESULTS)
+    incoming.on_results.remove(RESULTS)
     results.forget()
     _unregister()

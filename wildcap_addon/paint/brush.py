@@ -44,8 +44,8 @@ def restore(context, before: dict) -> None:
     with contextlib.suppress(RuntimeError):  # its library may be gone
         if reference is not None and reference["relative_asset_identifier"]:
             bpy.ops.brush.asset_activate(**reference)
-    if before["brush"] and (paint.brush is None
-                            or paint.brush.name != before["brush"]) and before["brush"] in bpy.data.brushes:
+    other = before["brush"] and (paint.brush is None or paint.brush.name != before["brush"])
+    if other and before["brush"] in bpy.data.brushes:
         with contextlib.suppress(AttributeError):  # read-only since 5.0
             paint.brush = bpy.data.brushes[before["brush"]]
     for each in list(bpy.data.brushes):

@@ -55,11 +55,11 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
                 column.prop(item.shadow_mask, "softened", text="")
             found = session.offered()
             if found == 'SNAPPED':
-                layout.operator("wildcap.edit_mask", text="Take Snapped Mask", icon='CHECKMARK',
-                                depress=True).kind = found
+                take = layout.operator("wildcap.edit_mask", text="Take Snapped Mask", icon='CHECKMARK', depress=True)
+                take.kind = found
             text = "Take Detected Mask" if found == 'PROPOSAL' else "Back to Proposal"
-            layout.operator("wildcap.edit_mask", text=text, icon='LOOP_BACK',
-                            depress=found == 'PROPOSAL').kind = ('PROPOSAL')
+            back = layout.operator("wildcap.edit_mask", text=text, icon='LOOP_BACK', depress=found == 'PROPOSAL')
+            back.kind = 'PROPOSAL'
 
 
 class WILDCAP_PT_mask(CapturePanel, bpy.types.Panel):

@@ -160,8 +160,8 @@ def after_undo(context) -> None:
         _session.written = ()
     elif _session is not None:
         places.face(_session, sheet.is_there())
-    elif _ended is not None and context.mode == 'PAINT_TEXTURE' and active is not None and active.name in (_ended.head,
-                                                                                                           sheet.NAME):
+    elif (_ended is not None and context.mode == 'PAINT_TEXTURE' and active is not None
+          and active.name in (_ended.head, sheet.NAME)):
         places.leave(context, _ended)
         before.put_back(context, _ended.before)
 

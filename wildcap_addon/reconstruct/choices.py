@@ -97,8 +97,8 @@ class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.with_capture(context) and cls.allowed(captures.active(context).registration.template,
-                                                         "The built-in head is fitted alone already")
+        return cls.with_capture(context) and cls.allowed(
+            captures.active(context).registration.template, "The built-in head is fitted alone already")
 
     def work(self, context):
         captures.require(context).registration.template = ""

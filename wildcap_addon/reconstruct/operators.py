@@ -17,10 +17,9 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
     bl_idname = "wildcap.reconstruct"
     bl_label = "Reconstruct"
 
-    first: bpy.props.StringProperty(name="From",
-                                    description="The stage to begin with, done again even if it is fresh; empty: what "
-                                                "is not done yet",
-                                    options={'SKIP_SAVE'})
+    first: bpy.props.StringProperty(
+        name="From", options={'SKIP_SAVE'},
+        description="The stage to begin with, done again even if it is fresh; empty: what is not done yet")
 
     @classmethod
     def description(cls, context, properties):
@@ -146,8 +145,8 @@ class WILDCAP_OT_hide_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.in_object_mode(context) and cls.allowed(landmarks.shown_landmarks(),
-                                                           "No landmarks are shown: click Show Landmarks first")
+        return cls.in_object_mode(context) and cls.allowed(
+            landmarks.shown_landmarks(), "No landmarks are shown: click Show Landmarks first")
 
     def work(self, context):
         landmarks.hide()
@@ -161,8 +160,8 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        shown = cls.in_object_mode(context) and cls.allowed(landmarks.shown_landmarks(),
-                                                            "No landmarks are shown: click Show Landmarks first")
+        shown = cls.in_object_mode(context) and cls.allowed(
+            landmarks.shown_landmarks(), "No landmarks are shown: click Show Landmarks first")
         return shown and jobs.can_start(cls, context)
 
     def work(self, context):

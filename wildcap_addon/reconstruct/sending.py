@@ -27,9 +27,9 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.with_capture(context) and cls.allowed(captures.active(context).delight.delighter == "switchlight",
-                                                         "Only SwitchLight sends anything: choose it as the delighter "
-                                                         "first")
+        return cls.with_capture(context) and cls.allowed(
+            captures.active(context).delight.delighter == "switchlight",
+            "Only SwitchLight sends anything: choose it as the delighter first")
 
     def tell(self) -> tuple[str, ...]:
         item = captures.require(bpy.context)

@@ -137,6 +137,6 @@ def _lamp(lamp: Lamp, radius: float) -> bpy.types.Object:
         data.angle = radians(lamp.angle)
     obj = bpy.data.objects.new(data.name, data)
     direction = Vector(lamp.direction).normalized()
-    obj.matrix_local = Matrix.Translation(direction * lamp.distance
-                                          * radius) @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
+    place = Matrix.Translation(direction * lamp.distance * radius)
+    obj.matrix_local = place @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
     return obj

@@ -133,8 +133,8 @@ def _build(material, paths: dict, obj) -> None:
     normal.uv_map = obj.data.uv_layers[0].name
     attribute = _node(tree, "WildCap Regions", 'ShaderNodeAttribute', (-200, -520))
     attribute.attribute_name = regions.ATTRIBUTE
-    output = next((n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL'),
-                  None) or _node(tree, "Material Output", 'ShaderNodeOutputMaterial', (340, 0))
+    output = next((n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL'), None)
+    output = output or _node(tree, "Material Output", 'ShaderNodeOutputMaterial', (340, 0))
     for source, socket, target, name in (
         ("WildCap Albedo", "Color", skin, "Albedo"), ("WildCap Specular", "Color", skin, "Specular"),
         ("WildCap Normal", "Color", normal, "Color"), ("WildCap Normal Map", "Normal", skin, "Normal"),

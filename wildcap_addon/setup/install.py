@@ -83,11 +83,11 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
 
 def describe_plan(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
     """What an installation means, before the artist says yes; `free` bytes are on the folder's disk."""
-    return (iface_("PyTorch {} for {} and {} more packages.").format(plan.packages.get("torch", ""),
-                                                                     iface_(COMPUTES[compute]), len(plan.packages) - 1),
+    torch, others = plan.packages.get("torch", ""), len(plan.packages) - 1
+    return (iface_("PyTorch {} for {} and {} more packages.").format(torch, iface_(COMPUTES[compute]), others),
             iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
-            iface_("{} on disk in {}, where {} are free.").format(index.gigabytes(plan.disk), folder,
-                                                                  index.gigabytes(free)),
+            iface_("{} on disk in {}, where {} are free.").format(
+                index.gigabytes(plan.disk), folder, index.gigabytes(free)),
             "You can go on working meanwhile, cancel, and continue later.")
 
 

@@ -6,8 +6,8 @@ import bpy
 
 from . import eyedropper, operators, panel, preview, white_card
 
-register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *eyedropper.CLASSES,
-                                                            *white_card.CLASSES, *panel.CLASSES))
+register, _unregister = bpy.utils.register_classes_factory(
+    (*operators.CLASSES, *eyedropper.CLASSES, *white_card.CLASSES, *panel.CLASSES))
 
 
 def unregister():

@@ -31,8 +31,8 @@ class WILDCAP_OT_pick_skin_tone(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         item = captures.active(context)
-        return cls.with_capture(context) and cls.allowed(captures.head(context, item) is not None,
-                                                         "The head is not in this scene: click Bring In Head")
+        return cls.with_capture(context) and cls.allowed(
+            captures.head(context, item) is not None, "The head is not in this scene: click Bring In Head")
 
     def invoke(self, context, event):
         context.window.cursor_modal_set('EYEDROPPER')
@@ -112,8 +112,8 @@ def colour_at(image: bpy.types.Image, uv) -> tuple[float, float, float]:
     image.pixels.foreach_get(pixels)
     column, row = int(uv[0] * width), int(uv[1] * height)  # Blender's rows go up
     reach = max(1, round(PATCH * width))
-    patch = pixels.reshape(height, width, -1)[max(0, row - reach):row + reach + 1,
-                                              max(0, column - reach):column + reach + 1, :3]
+    top, left = max(0, row - reach), max(0, column - reach)
+    patch = pixels.reshape(height, width, -1)[top:row + reach + 1, left:column + reach + 1, :3]
     if not image.is_float:  # bytes are as in the file, sRGB; float images are linear already
         patch = np.where(patch <= 0.04045, patch / 12.92, ((patch + 0.055) / 1.055) ** 2.4)
     mean = patch.mean((0, 1))

@@ -77,8 +77,8 @@ def set_tone(root: str, figures: dict) -> None:
             if captures.root(item) == root:
                 item.skin_tone, item.use_skin_tone = figures["skin_tone_srgb"], True
                 item.estimated_tone = figures["skin_tone_srgb"]
-                item.tone_group, item.tone_source = figures.get("skin_tone_group",
-                                                                ""), figures.get("skin_tone_source", "")
+                item.tone_group = figures.get("skin_tone_group", "")
+                item.tone_source = figures.get("skin_tone_source", "")
                 item.tone_deviation = figures.get("skin_tone_deviation_l", 0.0)
 
 

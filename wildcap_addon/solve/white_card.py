@@ -102,8 +102,8 @@ class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):
 
     def _show(self, context):
         """Puts the frame into the editor in place of the one before."""
-        before, self._shown = self._shown, bpy.data.images.load(str(captures.folder(captures.require(context)).frames
-                                                                    / self._frames[self._at]))
+        frame = captures.folder(captures.require(context)).frames / self._frames[self._at]
+        before, self._shown = self._shown, bpy.data.images.load(str(frame))
         self._area.spaces.active.image = self._shown
         if before is not None:
             bpy.data.images.remove(before)

@@ -92,5 +92,5 @@ def _placed(transform) -> tuple[float, np.ndarray, np.ndarray] | None:
     def numbers(key: str, default: str) -> np.ndarray:
         return np.array([float(x) for x in transform.findtext(key, default).split()])
 
-    return float(numbers("scale", "1")[0]), numbers("rotation",
-                                                    "1 0 0 0 1 0 0 0 1").reshape(3, 3), numbers("translation", "0 0 0")
+    rotation = numbers("rotation", "1 0 0 0 1 0 0 0 1").reshape(3, 3)
+    return float(numbers("scale", "1")[0]), rotation, numbers("translation", "0 0 0")

@@ -58,8 +58,8 @@ def beard_region(on: Canvas) -> np.ndarray:
     line = np.interp(x, [0, 13, 24, 36, 52, ear[0]],
                      [nose[2] + 1, nose[2] - 2, nose[2] - 2, corner[2] + 15, corner[2] + 25, ear[2] - 5])
     jaw = np.interp(y, [chin[1], ear[1] - 10], [chin[2] - 10, corner[2] - 22])
-    soft = np.clip((line - z) / 9 + 0.4, 0, 1) * np.clip((ear[1] + 4 - y) / 8, 0,
-                                                         1) * np.clip((z - jaw) / 14 + 0.5, 0, 1)
+    below, before = np.clip((line - z) / 9 + 0.4, 0, 1), np.clip((ear[1] + 4 - y) / 8, 0, 1)
+    soft = below * before * np.clip((z - jaw) / 14 + 0.5, 0, 1)
     # on either side below the lower lip
     bare = 0.55 * np.exp(-0.5 * ((x - 15) / 5) ** 2 - 0.5 * ((z - corner[2] + 15) / 4) ** 2)
     return (soft * (1 - bare) * (1 - np.clip(1.5 * regions(on)["lips"], 0, 1))).astype(np.float32)

@@ -23,9 +23,8 @@ def brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Gene
     outer = np.abs(on.position[:, :1]) / np.abs(on.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
     rise = np.clip(1.5 - 2.2 * outer, -0.35, 1.3)
     way = np.sign(on.position[:, :1]) * [1.0, 0, 0] + rise * [0, 0, 1.0]
-    density = (1.25 - 0.6
-               * outer[:, 0].clip(0, 1)) * 1.15 * person.brow * np.clip(region * 2.4 - 1.5 + 0.6
-                                                                        * min(person.brow, 1.3), 0, 1)
+    chance = np.clip(region * 2.4 - 1.5 + 0.6 * min(person.brow, 1.3), 0, 1)
+    density = (1.25 - 0.6 * outer[:, 0].clip(0, 1)) * 1.15 * person.brow * chance
     roots = strewn(ground, density, way, rng)
     roots = turned(roots, rng.normal(0, 0.22, len(roots.at)))
     count = len(roots.at)
@@ -51,8 +50,8 @@ def lashes(person: Person, head: OpenHead, rng: np.random.Generator) -> Strands:
             shut = person.openness < 0.2
             outward = np.array([0, -1.0, -0.55 if shut else 0.05 * up]) + 28 * aside + rng.normal(0, 0.13, at.shape)
             outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-            size = length * rng.uniform(0.65, 1.1,
-                                        count) * np.interp(t / (len(edge) - 1), [0, 0.35, 1], [0.55, 0.9, 1.0])
+            along = np.interp(t / (len(edge) - 1), [0, 0.35, 1], [0.55, 0.9, 1.0])
+            size = length * rng.uniform(0.65, 1.1, count) * along
             bow = np.array([0, 0, 0.7 * up if not shut else 0.25])
             roots = Roots(at + 0.0002 * out, out, outward, at)
             points.append(_bowed(roots, size, bow))

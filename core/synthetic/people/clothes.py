@@ -39,8 +39,8 @@ def shirt(person: Person, head: Mesh) -> Mesh:
     c, s = np.cos(turn), np.sin(turn)
     height = COLLAR_Z - low * c**2 - ahead * s**2 + (edge - COLLAR_Z) * np.clip(1 - at / len(PROFILE), 0, 1)[:, None]
     vertices = np.stack([NECK[0] + (radius + side) * c, NECK[1] + (radius + deep) * s, height], -1).reshape(-1, 3)
-    folds = octaves(1000 * vertices, [70.0, 28.0], rng,
-                    smooth=True)[:, None] * np.repeat(np.clip(side / 0.05, 0, 1), AROUND)[:, None]
+    free = np.repeat(np.clip(side / 0.05, 0, 1), AROUND)  # cloth folds where it lies off the neck
+    folds = octaves(1000 * vertices, [70.0, 28.0], rng, smooth=True)[:, None] * free[:, None]
     away = vertices - [*NECK, -0.25]
     vertices = vertices + 0.003 * folds * away / np.linalg.norm(away, axis=1, keepdims=True)
     k, r = np.meshgrid(np.arange(AROUND), np.arange(ROWS - 1))

@@ -27,13 +27,13 @@ def backdrop(directions: np.ndarray, environment: Environment, light: float, rng
         ground = background_radiance(environment, directions) * np.float32(np.exp(rng.normal(0, 0.3)))
         ground = cv2.resize(ground, (size, size))
     else:
-        ground = np.broadcast_to(rng.uniform(0.02, 0.8) * np.exp(rng.normal(0, 0.3, 3)),
-                                 (size, size, 3)).astype(np.float32) * light
+        wall = rng.uniform(0.02, 0.8) * np.exp(rng.normal(0, 0.3, 3))
+        ground = np.broadcast_to(wall, (size, size, 3)).astype(np.float32) * light
         for scale in (2, 5, 12, 40):
-            blobs = rng.normal(0, 0.3 * rng.random(),
-                               (scale, scale, 1)) + rng.normal(0, 0.12 * rng.random() / scale**0.4, (scale, scale, 3))
-            ground = ground * np.clip(cv2.resize(np.exp(blobs).astype(np.float32), (size, size),
-                                                 interpolation=cv2.INTER_CUBIC), 0.1, 5)
+            bright = rng.normal(0, 0.3 * rng.random(), (scale, scale, 1))
+            blobs = bright + rng.normal(0, 0.12 * rng.random() / scale**0.4, (scale, scale, 3))
+            blobs = cv2.resize(np.exp(blobs).astype(np.float32), (size, size), interpolation=cv2.INTER_CUBIC)
+            ground = ground * np.clip(blobs, 0.1, 5)
     if rng.random() < 0.6:
         for _ in range(int(rng.integers(1, 14))):
             ground = _thing(ground, rng.uniform(-0.1, 1.1, 2) * size,
@@ -128,8 +128,8 @@ def _glasses(radiance: np.ndarray, landmarks: np.ndarray, light: float,
     for eye in EYES:
         one, other = landmarks[list(eye)]
         reach = 0.85 * np.linalg.norm(other - one)
-        turn, axes = float(np.degrees(np.arctan2(*(other - one)[::-1]))), (max(2, int(reach)),
-                                                                           max(2, int(reach * round_)))
+        turn = float(np.degrees(np.arctan2(*(other - one)[::-1])))
+        axes = max(2, int(reach)), max(2, int(reach * round_))
         cv2.ellipse(over, np.round((one + other) / 2).astype(int).tolist(), axes, turn, 0, 360, 255, thick, cv2.LINE_AA)
     where = over.astype(np.float32) / 255
     colour = np.float32(rng.uniform(0.005, 0.3) * light) * np.exp(rng.normal(0, 0.2, 3)).astype(np.float32)

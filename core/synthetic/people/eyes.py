@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture on an eyeball: white with its vessels, iris with fibres and a darker rim, pupil. Rings about the middle,
-as lids.Ball says."""
+as lids.PosedEyeball says."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def eye_picture(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512
     fibres = sum(np.interp(turn, np.linspace(-np.pi, np.pi, n), np.append(v := rng.normal(size=n - 1), v[0]))
                  for n in (60, 140, 260)) / np.sqrt(3)
     rough = gaussian_filter(rng.normal(size=(size, size)), 3) * 8
-    light = np.exp(0.22 * fibres * (1 - 0.5 * inward) + 0.10
-                   * rough) * (1 + 0.35 * np.exp(-((inward - 0.25) / 0.15) ** 2))
+    light = np.exp(0.22 * fibres * (1 - 0.5 * inward) + 0.10 * rough)
+    light = light * (1 + 0.35 * np.exp(-((inward - 0.25) / 0.15) ** 2))
     coloured = np.asarray(iris) * (light * (1 - 0.65 * _step(inward, 0.93, 0.10)))[..., None]
     coloured = coloured * (1 - 0.97 * (1 - _step(angle, pupil, 0.025)))[..., None] + 0.002
-    vessel = np.clip(gaussian_filter(rng.normal(size=(size, size)), 1.2) * 4 - 0.9, 0,
-                     1) * np.clip((angle - 1.25 * rim) / rim, 0, 1)
+    vessel = np.clip(gaussian_filter(rng.normal(size=(size, size)), 1.2) * 4 - 0.9, 0, 1)
+    vessel = vessel * np.clip((angle - 1.25 * rim) / rim, 0, 1)
     yellow = 1 - np.array([0.02, 0.06, 0.14]) * rng.random() * np.clip((angle - rim) / rim, 0, 1)[..., None]
-    white = WHITE * np.exp(rng.normal(0, 0.05)) * yellow * (1 - 0.35
-                                                            * vessel[..., None]) + 0.35 * vessel[..., None] * VESSELS
+    white = WHITE * np.exp(rng.normal(0, 0.05)) * yellow * (1 - 0.35 * vessel[..., None])
+    white = white + 0.35 * vessel[..., None] * VESSELS
     outside = _step(angle, rim, 0.05)[..., None]
     return (coloured * (1 - outside) + white * outside).astype(np.float32)
 

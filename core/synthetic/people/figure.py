@@ -75,8 +75,8 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
         colour = np.asarray(person.brow_colour if part == "brows" else person.hair_colour, np.float32)
         share = (UNDER[part] if person.beard != "stubble" or part != "beard" else 0.1) * where[:, None]
         diffuse = diffuse * (1 - share) + np.minimum(colour, diffuse) * share
-    return skin, on.spread(diffuse.astype(np.float32)), {part: on.spread(where.astype(np.float32))
-                                                         for part, where in growth.items()}
+    grows = {part: on.spread(where.astype(np.float32)) for part, where in growth.items()}
+    return skin, on.spread(diffuse.astype(np.float32)), grows
 
 
 def grown(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:

@@ -42,8 +42,8 @@ def _before_the_ears(on: Canvas) -> np.ndarray:
     """Where hair of the head comes down between temple and ear, [N] in [0, 1]."""
     x, y, z = on.position.T
     band = np.clip((y - SIDEBURN_MM[0]) / 5, 0, 1) * np.clip((SIDEBURN_MM[1] - y) / 4, 0, 1) * (np.abs(x) > 50)
-    return band * np.clip((z - SIDEBURN_MM[2]) / 8, 0,
-                          1) * np.clip((SIDEBURN_MM[3] - z) / 8, 0, 1) * (1 - regions(on)["ears"])
+    above, below = np.clip((z - SIDEBURN_MM[2]) / 8, 0, 1), np.clip((SIDEBURN_MM[3] - z) / 8, 0, 1)
+    return band * above * below * (1 - regions(on)["ears"])
 
 
 def head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:

@@ -27,9 +27,8 @@ def moles(side: int, rng: np.random.Generator) -> np.ndarray:
         axes = (radius * np.exp(rng.normal(0, 0.2, 2)) * 16).astype(int)
         cv2.ellipse(spot, (at * 16).astype(int).tolist(), axes.tolist(), float(rng.uniform(0, 180)), 0, 360, 255, -1,
                     cv2.LINE_AA, 4)
-        log += (spot.astype(np.float32) / 255)[...,
-                                               None] * (rng.normal(-0.5, 0.4)
-                                                        + rng.normal(0, 0.1, 3)).astype(np.float32)
+        tint = rng.normal(-0.5, 0.4) + rng.normal(0, 0.1, 3)
+        log += (spot.astype(np.float32) / 255)[..., None] * tint.astype(np.float32)
     return np.clip(log, -1.6, 1.0)
 
 
@@ -52,6 +51,6 @@ def tufts(side: int, landmarks: np.ndarray, rng: np.random.Generator) -> np.ndar
         lines = [np.round(16 * np.stack(pair)).astype(np.int32) for pair in zip(roots, ends, strict=True)]
         cv2.polylines(strands, lines, False, 255, width, cv2.LINE_AA, 4)
         colour = rng.normal(-0.9, 0.5) + rng.normal(0, 0.12, 3)
-        log += (cv2.GaussianBlur(strands, (0, 0), rng.uniform(0.3, 1.2)).astype(np.float32)
-                / 255)[..., None] * colour.astype(np.float32)
+        soft = cv2.GaussianBlur(strands, (0, 0), rng.uniform(0.3, 1.2)).astype(np.float32)
+        log += (soft / 255)[..., None] * colour.astype(np.float32)
     return np.clip(log, -2.2, 1.2)

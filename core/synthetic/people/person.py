@@ -61,9 +61,8 @@ def sample_person(seed: int) -> Person:
     hair = str(rng.choice(HAIR, p=(0.1, 0.3, 0.45, 0.15) if male else (0.02, 0.08, 0.3, 0.6)))
     beard = str(rng.choice(BEARD, p=(0.3, 0.3, 0.12, 0.28))) if male else "none"
     brown = 0.25 + 0.74 * np.clip(skin.melanin / 0.12, 0, 1)
-    iris = IRISES[rng.choice(5,
-                             p=np.array([0.55 * brown, 0.45 * brown, 0.3 * (1 - brown), 0.25 * (1 - brown),
-                                         0.45 * (1 - brown)]))]
+    shares = [0.55 * brown, 0.45 * brown, 0.3 * (1 - brown), 0.25 * (1 - brown), 0.45 * (1 - brown)]
+    iris = IRISES[rng.choice(5, p=np.array(shares))]
     # dyed and sun-bleached hair leaves the brows as they were
     brow_colour = np.asarray(skin.hair_colour) * np.exp(rng.normal(-0.1, 0.25))
     dye = np.random.default_rng([seed, 80])

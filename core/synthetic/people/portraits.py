@@ -24,8 +24,9 @@ from ...imaging import images
 from ...light.skylight import radiance_transfer
 from ...light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..environments import Environment, made_environment, panorama_environment
+from ..fitted_light import FittedLight, LampOnHead, fitted_light
 from ..olat import BASIS, LIGHTS
-from ..portrait import GOBOS, FittedLight, LampOnHead, Portrait, fitted_light, gobo
+from ..portrait import GOBOS, Portrait, gobo
 from ..response import curve, develop, expose
 from .clutter import backdrop, cover, with_open_mouth
 from .figure import Figure
@@ -96,8 +97,8 @@ class Sitter:
     def _position(self, view: View) -> np.ndarray:
         face, bary, _ = raster.render_view(self.scene.whole, view, 1)
         mesh = self.scene.whole.mesh
-        points = raster.interpolate(mesh.vertices, mesh.faces, np.maximum(face, 0),
-                                    bary) - self.bald.mesh.vertices.mean(0)
+        points = raster.interpolate(mesh.vertices, mesh.faces, np.maximum(face, 0), bary)
+        points = points - self.bald.mesh.vertices.mean(0)
         return np.where(face[..., None] >= 0, points, 0).astype(np.float16)
 
 
@@ -213,9 +214,8 @@ def _surfaces(stage: RelightableView, shares: np.ndarray, sky: np.ndarray,
     own = np.maximum(transfer @ sky, 0.02)
     own_free = np.clip(transfer[..., :1] * np.float32(np.sqrt(4 * np.pi)), 0.2, 1)  # under a sky of radiance one
     strands = np.maximum((sh_basis(normal) * lambert) @ sky, 0.02) * free ** rng.uniform(0.6, 1.3)
-    body = shares[...,
-                  [PARTS.index(name) for name in ("skin", "lips", "eyes")]].sum(-1,
-                                                                                keepdims=True) * stage.here[..., None]
+    bare = [PARTS.index(name) for name in ("skin", "lips", "eyes")]
+    body = shares[..., bare].sum(-1, keepdims=True) * stage.here[..., None]
     seen = body * own * np.clip(free / own_free, 0.25, 1) + (1 - body) * strands
     rougher, brighter = rng.uniform(0.75, 1.15), rng.uniform(0.4, 2.0)
     gloss = np.float32([GLOSS[name] for name in PARTS])
@@ -239,8 +239,8 @@ def _lit(stage: RelightableView, surface: _Surface, sky: np.ndarray, lamps: list
         lamp = stage.unlit.lamps[k]
         arrives = surface.reach[..., k] * through
         diffuse = diffuse + _softened(np.maximum(surface.normal @ lamp, 0) * arrives, surface.there, radius) * tint
-        shine = shine + (highlight(surface.normal, towards, lamp, surface.rough)
-                         * arrives)[..., None] * surface.reflectance * tint
+        glint = highlight(surface.normal, towards, lamp, surface.rough) * arrives
+        shine = shine + glint[..., None] * surface.reflectance * tint
     return diffuse.astype(np.float32), shine.astype(np.float32)
 
 
@@ -270,17 +270,16 @@ def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list,
         arrives = [f * r * through for f, r in zip(facing, reach, strict=True)]
         lost += share * (1 - (1 - grown[..., 0]) * arrives[0] - grown[..., 0] * arrives[1])
     seen = diffuse[stage.here].mean() if stage.here.any() else 1.0
-    return lost / np.float32(strength.sum()), float(np.clip(strength.sum()
-                                                            / (strength.sum() + 2
-                                                               * max(seen - 0.5 * strength.sum(), 0.05)), 0, 1))
+    main = strength.sum()
+    share = main / (main + 2 * max(seen - 0.5 * main, 0.05))
+    return lost / np.float32(main), float(np.clip(share, 0, 1))
 
 
 def _fitted(stage: RelightableView, environment: Environment, lamps: list[int], tints: list, tone: np.ndarray,
             rng: np.random.Generator) -> FittedLight:
     here = stage.here.ravel()
-    transfer, smooth = stage.transfer.reshape(-1,
-                                              9).astype(np.float32), stage.normal.reshape(-1,
-                                                                                          3).astype(np.float32) / 127
+    transfer = stage.transfer.reshape(-1, 9).astype(np.float32)
+    smooth = stage.normal.reshape(-1, 3).astype(np.float32) / 127
     shining = [LampOnHead(stage.unlit.lamps[k], tint, stage.reach[..., k].ravel().astype(np.float32)[here] / 255)
                for k, tint in zip(lamps, tints, strict=True)]
     found = fitted_light(transfer[here], smooth[here], shining, environment, tone, rng)

@@ -45,8 +45,8 @@ class Scene:
     def __init__(self, figure: Figure, blockers: Mesh | None = None):
         body = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)]
         meshes, part = [*body, figure.shirt], [SKIN, EYES, EYES, CLOTHES]
-        flat = [np.zeros((len(mesh.faces), 3), np.float32)
-                for mesh in body] + [np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
+        flat = [*(np.zeros((len(mesh.faces), 3), np.float32) for mesh in body),
+                np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
         for strands in figure.strands:
             mesh = prisms(strands)
             meshes.append(mesh)
@@ -92,8 +92,8 @@ def look(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3)
         normal = np.cross(b - a, c - a)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         points = a * bary[hit, :1] + b * bary[hit, 1:2] + c * bary[hit, 2:]
-        dark[hit] = (normal @ sun <= 0) | scene.opaque.blocked(points + 5e-4 * normal,
-                                                               np.repeat(sun[None], hit.sum(), 0))
+        towards_sun = np.repeat(sun[None], hit.sum(), 0)
+        dark[hit] = (normal @ sun <= 0) | scene.opaque.blocked(points + 5e-4 * normal, towards_sun)
     bare, normal = _bare(scene, view, over)
     cover = _shrunk(hit.astype(np.float32), over)
     return Truth(_shrunk(seen, over) / np.maximum(cover, 1e-6)[..., None], bare, cover, _shrunk(parts, over),
@@ -108,9 +108,8 @@ def _bare(scene: Scene, view: View, over: int) -> tuple[np.ndarray, np.ndarray]:
     colour[hit] = scene.albedo(face[hit], bary[hit], scene.figure.skin.diffuse)
     normal[hit] = raster.interpolate(scene.normals, scene.body.mesh.faces, face[hit], bary[hit])
     cover, normal = _shrunk(hit.astype(np.float32), over)[..., None], _shrunk(normal, over)
-    return _shrunk(colour, over) / np.maximum(cover,
-                                              1e-6), normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True),
-                                                                         1e-6)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    return _shrunk(colour, over) / np.maximum(cover, 1e-6), normal / np.maximum(length, 1e-6)
 
 
 def _of_uv(scene: Scene, name: str, face: np.ndarray, bary: np.ndarray) -> np.ndarray:

@@ -115,16 +115,15 @@ def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) ->
     picture[hit, :-1], picture[hit, -1] = layers, 1
     size = view.height
     picture = picture.reshape(size, over, size, over, -1).mean((1, 3))
-    albedo, shares, normal, reach, free = np.split(picture[..., :-1] / np.maximum(picture[..., -1:], 1e-6),
-                                                   np.cumsum([3, len(PARTS), 3, LAMPS]), 2)
+    mean = picture[..., :-1] / np.maximum(picture[..., -1:], 1e-6)
+    albedo, shares, normal, reach, free = np.split(mean, np.cumsum([3, len(PARTS), 3, LAMPS]), 2)
     shares = shares * picture[..., -1:]
     shares[..., -1] = 1 - picture[..., -1]
-    return Unlit(_bytes(images.linear_to_srgb(albedo)), _bytes(shares),
-                 np.round(127 * normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-                                                                                   ).astype(np.int8), _bytes(reach),
-                 _bytes(free[..., 0]),
-                 lamps.astype(np.float32), view.rotation.astype(np.float32), view.centre.astype(np.float32),
-                 np.float32(view.camera.params[0]), view.project(landmarks_of(scene.figure))[0].astype(np.float32))
+    length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    return Unlit(_bytes(images.linear_to_srgb(albedo)), _bytes(shares), np.round(127 * normal / length).astype(np.int8),
+                 _bytes(reach), _bytes(free[..., 0]), lamps.astype(np.float32), view.rotation.astype(np.float32),
+                 view.centre.astype(np.float32), np.float32(view.camera.params[0]),
+                 view.project(landmarks_of(scene.figure))[0].astype(np.float32))
 
 
 def true_shares(parts: np.ndarray) -> np.ndarray:

@@ -30,8 +30,8 @@ def flow():
     yield from d.until(lambda: target.is_dir() or addon.problem(root), "the delivery", LIMIT_S)
     assert target.is_dir(), addon.problem(root)
     told = json.loads((target / "provenance.json").read_text(encoding="utf-8"))
-    assert told["versions"]["Blender"] and {f"{root.stem}.fbx",
-                                            f"textures/T_{root.stem}_N.png"} <= set(told["files"]), told["files"]
+    files = set(told["files"])
+    assert told["versions"]["Blender"] and {f"{root.stem}.fbx", f"textures/T_{root.stem}_N.png"} <= files, files
     assert not [path for path in target.parent.iterdir() if path.name.startswith(".")]
     yield from d.park()
     d.screenshot("deliver_3_done")

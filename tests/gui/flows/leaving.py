@@ -49,8 +49,8 @@ def own_things() -> None:
     unified = bpy.context.scene.tool_settings.unified_paint_settings
     unified.size, unified.use_unified_size, unified.use_unified_color, unified.color = 123, True, True, (0.9, 0.2, 0.6)
     paint.mode, paint.canvas = 'IMAGE', bpy.data.images.new("My Canvas", 8, 8)
-    paint.stencil_image, paint.stencil_color, paint.invert_stencil = bpy.data.images.new("My Stencil", 8,
-                                                                                         8), (0.25, 0.5, 0.75), True
+    paint.stencil_image = bpy.data.images.new("My Stencil", 8, 8)
+    paint.stencil_color, paint.invert_stencil = (0.25, 0.5, 0.75), True
     bpy.ops.object.mode_set(mode='OBJECT')
 
 

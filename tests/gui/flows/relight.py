@@ -77,8 +77,8 @@ def from_a_terminal(root: Path) -> None:
     command = ["blender", "--command", "wildcap", "relight", str(root), "window", "--resolution", "32", "--samples",
                "1"]
     done = subprocess.run(command, env=os.environ, capture_output=True, text=True, timeout=180)
-    assert done.returncode == 0 and (root / "renders"
-                                     / "window.png").is_file(), done.stdout[-2000:] + done.stderr[-2000:]
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    assert (root / "renders" / "window.png").is_file(), done.stdout[-2000:]
     d.say("blender --command wildcap relight")
 
 

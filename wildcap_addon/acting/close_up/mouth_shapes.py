@@ -159,10 +159,8 @@ def _teeth(jaw: str, arch: _Arch, up: float) -> list[tuple[np.ndarray, np.ndarra
             )
             away = away - 0.0011 * larger * np.clip(0.25 - h[:, None], 0, 1)
             down = -up * (reach - 1) * length - up * -LAP_M
-            points = place + square[0][None, :,
-                                       None] * (swell[:, None] * width
-                                                / 2)[...,
-                                                     None] * run + away[..., None] * out + down[..., None] * [0, 0, 1.0]
+            along = square[0][None, :, None] * (swell[:, None] * width / 2)[..., None] * run
+            points = place + along + away[..., None] * out + down[..., None] * [0, 0, 1.0]
             points = points.reshape(-1, 3)
             k = np.arange(AROUND)
             quads = [np.stack([r * AROUND + k, r * AROUND + (k + 1) % AROUND, (r + 1) * AROUND + (k + 1) % AROUND,

@@ -159,9 +159,8 @@ def _caruncle(tree, inputs):
     lift = math(tree, 'SUBTRACT', math(tree, 'MULTIPLY', gap, _attribute(tree, "lift", 'FLOAT')), SUNK_M)
     flesh = vector(tree, 'ADD', middle, scaled(tree, out, lift))
     ball = vector(tree, 'SUBTRACT', ball, scaled(tree, out, SUNK_M))
-    return add(tree, 'GeometryNodeSetPosition', {"Geometry": inputs["Geometry"],
-                                                 "Position": _between(tree, flesh, ball,
-                                                                      _attribute(tree, "onto", 'FLOAT'))}).outputs[0]
+    position = _between(tree, flesh, ball, _attribute(tree, "onto", 'FLOAT'))
+    return add(tree, 'GeometryNodeSetPosition', {"Geometry": inputs["Geometry"], "Position": position}).outputs[0]
 
 
 def _on_shell(tree, shell, place) -> tuple:

@@ -64,15 +64,13 @@ def white_pattern() -> np.ndarray:
         at_corner = number % 4 != 0
         around = (rng.integers(2) * np.pi + rng.normal(0, CORNER / 2)) if at_corner else rng.uniform(0, 2 * np.pi)
         width = rng.uniform(0.7, 1.9) if at_corner else rng.uniform(0.5, 1.0)
-        dots[number % 3
-             == 0].extend(_vessel(rng, around, rows * rng.uniform(0.75, 1.0), width, rng.uniform(0.06, 0.45) * rows))
+        vessel = _vessel(rng, around, rows * rng.uniform(0.75, 1.0), width, rng.uniform(0.06, 0.45) * rows)
+        dots[number % 3 == 0].extend(vessel)
     vessels, deep = _drawn(dots[0]), _blur(_drawn(dots[1]), 3.0)
     out, turn = (np.arange(rows) + 0.5)[:, None] / rows, np.arange(columns)[None] * 2 * np.pi / columns
     mottled = 0.5 + 0.25 * _noise(rng, WHITE_SIZE, 5, 14)
-    pink = (0.12 + 0.88
-            * np.abs(np.cos(turn)) ** 1.5) * _smooth(out, 0.06,
-                                                     0.6) * (0.6 + 0.8
-                                                             * mottled) + 0.12 * np.exp(-(((out - 0.13) / 0.07) ** 2))
+    inner = (0.12 + 0.88 * np.abs(np.cos(turn)) ** 1.5) * _smooth(out, 0.06, 0.6) * (0.6 + 0.8 * mottled)
+    pink = inner + 0.12 * np.exp(-(((out - 0.13) / 0.07) ** 2))
     red = np.clip(0.9 * _blur(vessels, 0.6) + 0.45 * deep, 0, 1)
     return np.stack([red, np.clip(pink, 0, 1), np.clip(0.5 + 0.3 * red + 0.06 * _noise(rng, WHITE_SIZE, 20, 60), 0, 1)],
                     -1)

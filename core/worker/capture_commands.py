@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The commands about a capture that is there, and what people bring into it by hand: python -m core status, delete,
+report-problem, mask and landmarks. Standard library only."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ..contract import artist_landmarks, deletion, report, settings, stages
+from ..contract.capture import Capture
+from ..contract.messages import Problem
+from .job import read_job
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def add_commands(commands) -> None:
+    """Adds them to the subparsers of `python -m core`."""
+    status = commands.add_parser("status", help="say which stages of a capture are done")
+    status.add_argument("capture", metavar="CAPTURE", type=Path)
+    status.set_defaults(command=_status)
+    gone = commands.add_parser("delete",
+                               help="delete a face: all that WildCap wrote of it; without --yes, list what would go "
+                                    "and what would stay")
+    gone.add_argument("capture", metavar="CAPTURE", type=Path)
+    gone.add_argument("--yes", action="store_true", help="delete it, for good")
+    gone.set_defaults(command=_delete)
+    about = commands.add_parser("report-problem",
+                                help="write a zip to send: logs, versions, settings; no pictures, names or paths")
+    about.add_argument("capture", metavar="CAPTURE", type=Path, nargs="?")
+    about.add_argument("--to", metavar="ZIP", type=Path, required=True)
+    about.set_defaults(command=_report_problem)
+    mask = commands.add_parser("mask", help="bring a painted shadow mask in")
+    mask = mask.add_subparsers(required=True, metavar="import")
+    bring = mask.add_parser("import", help="make a picture the capture's shadow mask: white is shadow")
+    bring.add_argument("capture", metavar="CAPTURE", type=Path)
+    bring.add_argument("picture", metavar="PNG", type=Path)
+    bring.set_defaults(command=_mask_import)
+    marks = commands.add_parser("landmarks", help="put landmarks by hand; they win over what was found")
+    marks = marks.add_subparsers(required=True, metavar="set|free|import")
+    put = marks.add_parser("set", help="put one landmark at a place of the capture's world")
+    put.add_argument("capture", metavar="CAPTURE", type=Path)
+    put.add_argument("index", metavar="INDEX", help="0 to 467, as in landmarks.json")
+    put.add_argument("position", metavar=("X", "Y", "Z"), nargs=3, type=float, help="metres")
+    put.set_defaults(command=_landmarks)
+    free = marks.add_parser("free", help="let the frames say again where a landmark is")
+    free.add_argument("capture", metavar="CAPTURE", type=Path)
+    free.add_argument("index", metavar="INDEX")
+    free.set_defaults(command=_landmarks, position=None)
+    many = marks.add_parser("import", help='take the points of a JSON file: {"points": {"152": [x, y, z]}}, metres')
+    many.add_argument("capture", metavar="CAPTURE", type=Path)
+    many.add_argument("file", metavar="JSON", type=Path)
+    many.set_defaults(command=_landmarks)
+
+
+def _status(options: argparse.Namespace) -> int:
+    """States under the settings of the last job."""
+    capture = Capture(options.capture)
+    if not capture.root.is_dir():
+        raise Problem(f"There is no capture at {capture.root}.",
+                      "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
+    record = capture.read()
+    chosen = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()
+    print(f"source        {capture.source or 'none yet'}")
+    for stage in stages.STAGES:
+        finished, verdict = record["stages"].get(stage.name), capture.verdict(stage, chosen)
+        print(f"{stage.name:13} {verdict.state:6}"
+              + (f" {finished['seconds']:8.1f} s  {finished.get('finished', '')}" if finished else "")
+              + (f"  {verdict.reason()}" if verdict.reason() else "")
+              + ("  slimmed away" if (finished or {}).get("slimmed") else ""))
+    if capture.shadow_mask.is_file():
+        print("shadow mask   painted")
+    for finding in report.findings(record):
+        print(f"{'stopped' if finding['stopped'] else 'finding':13} {finding['problem']} {finding['remedy']}")
+    return 0
+
+
+def _delete(options: argparse.Namespace) -> int:
+    capture = Capture(options.capture)
+    found = deletion.delete(capture) if options.yes else deletion.plan(capture)
+    print(*deletion.lines(found), sep="\n")
+    if not options.yes:
+        print("Nothing was deleted; --yes does it.")
+    return 0
+
+
+def _report_problem(options: argparse.Namespace) -> int:
+    from . import problem_report
+
+    capture = Capture(options.capture) if options.capture else None
+    if capture is not None and not capture.json.is_file():
+        raise Problem(f"There is no capture at {capture.root}.",
+                      "Check the name, or leave it out for a report about the installation alone.")
+    print(problem_report.write(options.to, ROOT, Path(sys.executable), capture))
+    print(f"It holds {', '.join(problem_report.TOLD)}; no pictures, and no names or paths of yours. Nothing was sent: "
+          "look into it first.")
+    return 0
+
+
+def _mask_import(options: argparse.Namespace) -> int:
+    from ..imaging.mask_import import import_mask  # needs OpenImageIO
+
+    print(f"{import_mask(Capture(options.capture), options.picture)} is now the shadow mask; solve comes next.")
+    return 0
+
+
+def _landmarks(options: argparse.Namespace) -> int:
+    if "file" in options and not options.file.is_file():
+        raise Problem(f"There is no file at {options.file}.", "Check its name.")
+    points = artist_landmarks.read(options.file) if "file" in options else {options.index: options.position}
+    count = len(artist_landmarks.put(Capture(options.capture), points))
+    print(f"{count} landmark{'' if count == 1 else 's'} put by hand; the stage registration comes next.")
+    return 0

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The log of a stage: what it and the libraries below it print, and the traceback of what stops it, go there."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+
+from ..contract import ownership
+from ..contract.capture import Capture
+from ..contract.files import storage_problem
+from ..contract.messages import Log, Message, Problem, Progress, Reporter
+from ..contract.stages import Stage
+
+
+@contextlib.contextmanager
+def at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], cancelled: Callable[[], bool]):
+    """The reporter of a stage or tool; what is printed meanwhile, and the traceback of what stops it, go to its log.
+    Raises Problem where an input is missing."""
+    missing = [name for name in step.reads if not capture.has(name)]
+    if missing:
+        raise Problem(f"{step.label} needs {missing[0]}, which this capture does not have.",
+                      "Run the stages before it first: click Reconstruct.")
+    emit(Progress(step.name, 0, 1, "Starting"))
+    kept_before = ownership.kept_files(capture.root)
+    with _log_of(capture, step) as log:
+        try:
+            yield Reporter(step.name, _logging(emit, log), cancelled)
+        except Problem as problem:
+            with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
+                traceback.print_exception(problem, file=log)  # what it came from is of use to whoever reads the log
+            raise
+        finally:
+            for kept in sorted(ownership.kept_files(capture.root) - kept_before):
+                emit(
+                    Log(f"A file was not as WildCap had written it, and was in the way of a new one: it is now {kept}.")
+                )
+
+
+@contextlib.contextmanager
+def _log_of(capture: Capture, stage: Stage):
+    """logs/STAGE.log as an open text file; stdout and stderr, also of C++ libraries, go there meanwhile."""
+    path = capture.logs / f"{stage.name}.log"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        log = open(path, "w", encoding="utf-8", buffering=1)
+    except OSError as error:
+        raise storage_problem(error, path) from error
+    kept = [os.dup(1), os.dup(2)]
+    try:
+        for descriptor in (1, 2):
+            os.dup2(log.fileno(), descriptor)
+        yield log
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        for descriptor, original in zip((1, 2), kept, strict=True):
+            os.dup2(original, descriptor)
+            os.close(original)
+        with contextlib.suppress(OSError):
+            log.close()
+
+
+def _logging(emit: Callable[[Message], None], log) -> Callable[[Message], None]:
+    """`emit` that also keeps the stage's log lines in its log."""
+    def both(message: Message) -> None:
+        if isinstance(message, Log):
+            with contextlib.suppress(OSError):
+                print(time.strftime("%H:%M:%S"), message.text, file=log)
+        emit(message)
+
+    return both

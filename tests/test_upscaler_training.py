@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The upscaler's training: it goes on where it stopped, and what it learns from is degraded and turned as it says."""
+
+import numpy as np
+import pytest
+
+from core.contract.messages import Problem, Reporter
+from core.imaging import images
+from core.training import fine_windows, upscaler
+from core.training.descent import TrainingRun
+from core.upscale import network
+from core.upscale.enlarge import load_network
+
+
+@pytest.fixture(scope="module")
+def windows(tmp_path_factory):
+    """A work folder of a tiny training: windows of noise stand in for painted skins."""
+    work, rng = tmp_path_factory.mktemp("upscaler"), np.random.default_rng(0)
+    for seed in (1000, 1001, 9000):
+        rough = rng.random((7, 24, 24)).astype(np.float32)
+        large = np.stack([images.resize(channel, 96, 96) for channel in rough]).clip(0, 1)
+        large[3:6] = (np.float32([0, 0, 1])[:, None, None] + 0.3 * (large[3:6] - 0.5))
+        large[3:6] /= np.linalg.norm(large[3:6], axis=0)
+        np.save(work / f"window_{seed}_0.npy", large.astype(np.float16))
+    return work
+
+
+def test_a_training_goes_on_where_it_stopped(windows, tmp_path, monkeypatch):
+    tiny = {"model": {"groups": 1, "blocks": 2, "width": 16},
+            "training": {"patch": 8, "batch": 4, "rate": 5e-3, "minutes": 1, "skins": 2, "views": 1, "held_out": 1,
+                         "seed": 0, "workers": 0}}
+    monkeypatch.setitem(upscaler.CONFIGS, "cpu", tiny)
+    out = tmp_path / "upscaler.safetensors"
+    first = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.01, windows))
+    second = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.02, windows))
+    assert second["steps"] > first["steps"] > 0 and second["parameters"] == sum(
+        p.numel() for p in network.Rcan(**tiny["model"]).parameters()
+    )
+    assert load_network(out).tail.weight.abs().max() > 0 and out.with_suffix(".json").is_file()
+    monkeypatch.setitem(upscaler.CONFIGS, "gpu", tiny)
+    with pytest.raises(Problem, match="other data or of another configuration"):
+        upscaler.train_upscaler("gpu", out, Reporter("train"), TrainingRun(work=windows))
+
+
+def test_degrading_keeps_the_mean_and_halves_a_relief_as_asked():
+    large = np.zeros((7, 32, 32), np.float32)
+    large[:3], large[3], large[5], large[6] = images.linear_to_srgb(np.float32(0.25)), 0.3, np.sqrt(1 - 0.09), 0.4
+    small = fine_windows.degraded(large, fine_windows.Degradation(0.0, 0.0, 0.0, 0.5), np.random.default_rng(0))
+    assert small.shape == (7, 8, 8) and np.allclose(small[6], 0.4)
+    assert np.allclose(images.srgb_to_linear(small[:3]), 0.25, atol=1e-4)
+    tilt = small[3] / small[5]
+    assert np.allclose(tilt, 0.5 * 0.3 / np.sqrt(1 - 0.09), rtol=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_turned_window_is_a_turned_surface(seed):
+    """The normals of a turned height field are the turned normals."""
+    height = np.random.default_rng(9).normal(0, 0.2, (16, 16)).astype(np.float32)
+    turned = fine_windows._turned(_relief(height), np.random.default_rng(seed))
+    candidates = [np.transpose(h) if t else h for h in (height, height[:, ::-1], height[::-1], height[::-1, ::-1])
+                  for t in (False, True)]
+    assert any(np.allclose(turned, _relief(candidate), atol=1e-5) for candidate in candidates)
+
+
+def _relief(height: np.ndarray) -> np.ndarray:
+    """Maps [7, S, S] with the normals of a height field; x along columns, y against rows."""
+    down, right = np.gradient(height)
+    normal = np.stack([-right, down, np.ones_like(height)])
+    maps = np.zeros((7, *height.shape), np.float32)
+    maps[3:6] = normal / np.linalg.norm(normal, axis=0)
+    maps[6] = height  # tells which turn it was
+    return maps
