@@ -74,7 +74,7 @@ def draw_masks(mesh: Mesh, points: np.ndarray) -> dict[str, np.ndarray]:
     outline = face_outline(points)
     signed = distance_inside(position.reshape(-1, 3), outline).reshape(size, size)
     soft = np.clip(signed / 0.0015 + 0.5, 0, 1)
-    ears = _connected(_ear(position), size)
+    ears = _connected(_ear(position))
     # a slanted plane from under the chin to the nape
     below = np.clip((-0.075 - 0.55 * position[..., 1] + 0.028 - position[..., 2]) / 0.003, 0, 1)
     masks = {"face": soft * (1 - ears)}
@@ -118,7 +118,7 @@ def _ear(position: np.ndarray) -> np.ndarray:
     return (x > 0.0745) & (y > 0.052) & (y < 0.115) & (z > -0.06) & (z < 0.035)
 
 
-def _connected(mask: np.ndarray, size: int) -> np.ndarray:
+def _connected(mask: np.ndarray) -> np.ndarray:
     """Holes closed, specks removed, edge softened."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
     closed = cv2.morphologyEx(cv2.morphologyEx(mask.astype(np.uint8) * 255, cv2.MORPH_CLOSE, disc), cv2.MORPH_OPEN,

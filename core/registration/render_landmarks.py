@@ -88,11 +88,6 @@ def to_ours(points: np.ndarray, pose: Pose) -> np.ndarray:
     return (points - pose.face) @ pose.turn.T * (FACE_M / pose.width)
 
 
-def from_ours(points: np.ndarray, pose: Pose) -> np.ndarray:
-    """The inverse of to_ours."""
-    return points @ pose.turn * (pose.width / FACE_M) + pose.face
-
-
 def _find_pose(mesh: Mesh, report: Reporter | None) -> Pose:
     """The way to hold the mesh in which it shows the surest upright face from the front."""
     used = mesh.vertices[np.unique(mesh.faces)]
