@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 import trimesh
 
+from ..face.faces import BROW_LINES, EYE_LINES, LIP_LINE
 from ..geometry.meshes import Mesh
 from ..geometry.raster import bleed, interpolate, rasterize_uv
-from .marks import BROWS, EYES, LIPS, OVAL
+from .marks import OVAL
 
 MASK_SIZE = 1024
 _NOSE = (168, 417, 465, 343, 437, 420, 279, 358, 327, 326, 2, 97, 98, 129, 49, 198, 217, 114, 245, 193)
@@ -78,9 +79,9 @@ def draw_masks(mesh: Mesh, points: np.ndarray) -> dict[str, np.ndarray]:
     # a slanted plane from under the chin to the nape
     below = np.clip((-0.075 - 0.55 * position[..., 1] + 0.028 - position[..., 2]) / 0.003, 0, 1)
     masks = {"face": soft * (1 - ears)}
-    masks["lips"] = _filled(uv[list(LIPS)], size)
-    masks["brows"] = np.maximum(*(_filled(uv[list(b)], size, grow=6) for b in BROWS))
-    masks["eyes"] = np.maximum(*(_filled(uv[list(e)], size, grow=14) for e in EYES))
+    masks["lips"] = _filled(uv[list(LIP_LINE)], size)
+    masks["brows"] = np.maximum(*(_filled(uv[list(b)], size, grow=6) for b in BROW_LINES))
+    masks["eyes"] = np.maximum(*(_filled(uv[list(e)], size, grow=14) for e in EYE_LINES))
     masks["nose"] = _filled(cv2.convexHull(uv[list(_NOSE)].astype(np.float32))[:, 0], size)
     masks["nostrils"] = _nostrils(mesh, position, masks["nose"])
     masks["ears"] = ears
