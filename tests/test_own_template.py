@@ -117,7 +117,7 @@ def check_head_of_others(path: Path, capture: Capture, report: Reporter, shapes:
     corners = [[corner.split("/")[:2] for corner in face] for face in lines(own.path, "f ")]
     assert [[corner.split("/") for corner in face] for face in lines(capture.own_head, "f ")] == corners, "and polygons"
     fitted = meshes.read_obj(capture.own_head).vertices
-    middle = own_template._at_landmarks(person()[0]).mean(0)
+    middle = template.landmark_points(person()[0]).mean(0)
     assert fitted.shape == own.mesh.vertices.shape and np.linalg.norm(fitted - middle, axis=1).min() < 0.02
 
 
