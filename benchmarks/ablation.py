@@ -35,9 +35,7 @@ import torch
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from core.contract.capture import Capture
-from core.face import template
 from core.face.head import read_head
-from core.geometry import meshes
 from core.imaging import images
 from core.solve import initial, maps
 from core.solve.evidence import read_evidence
@@ -46,11 +44,11 @@ from core.solve.prior import WEIGHTS, load
 from core.solve.problem import State, albedo, photometric
 from core.solve.recipes import OURS, RECIPES, Recipe
 from core.solve.sampler import Sampler, seeded
-from core.solve.skin_tone import GIVEN, SkinTone
+from core.solve.skin_tone import SkinTone
 
 from . import figures
 from .ablation_measures import measure, summary, table
-from .uv_problems import LEE_PERRY_SMITH, SHADOWS, MaskedUvProblem, problem
+from .uv_problems import LEE_PERRY_SMITH, SHADOWS, MaskedUvProblem, problem, skin_weight
 
 SUBJECTS = ("9000", "9002", "9004", "9007", "9008", LEE_PERRY_SMITH.name if LEE_PERRY_SMITH.is_dir() else "9001")
 FACE_CROP, CELLS = 768, 96
@@ -179,9 +177,7 @@ def solve_row(given: MaskedUvProblem, row: str, seed: int, steps: int) -> np.nda
         return given.texture
     changes, cells, mask, with_prior = ROWS[row]
     recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": steps, **changes})
-    skin = _skin(len(given.albedo))
-    tone = SkinTone.from_linear((given.albedo * skin[..., None]).sum((0, 1)) / skin.sum(), GIVEN)
-    return solved(given, recipe, tone, seed, cells, mask, with_prior)
+    return solved(given, recipe, given.tone, seed, cells, mask, with_prior)
 
 
 def solved(given: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS,
@@ -190,11 +186,8 @@ def solved(given: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0
     size, prior = len(given.albedo), _prior()
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
-        images.write_linear(capture.texture, given.texture)
-        images.write_data(capture.texture_confidence, np.ones((size, size), np.float32))
-        images.write_data(capture.shadow_mask_auto,
-                          {"painted": given.mask, "empty": 0 * given.mask, "full": 0 * given.mask + 1}[mask])
-        meshes.write_obj(capture.head, template.load())
+        replace(given, mask={"painted": given.mask, "empty": 0 * given.mask, "full": 0 * given.mask + 1}[mask]
+                ).write(capture)
         evidence = read_evidence(capture, read_head(capture), size)
     start = initial.start(prior, evidence, tone, FACE_CROP / cells, recipe)
     if with_prior:
@@ -230,7 +223,7 @@ def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: 
 def tone_error(given: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
     """CIEDE2000 between a requested skin tone and the mean of the solved facial skin: as it is delivered, and before
     the mean is brought to the request."""
-    skin, found = _skin(len(given.albedo)), []
+    skin, found = skin_weight(len(given.albedo)), []
     for rescale in (OURS.rescale, "none"):
         albedo = solved(given, replace(OURS, steps=steps, rescale=rescale), np.array(tone))
         mean = images.linear_to_srgb((albedo * skin[..., None]).sum((0, 1)) / skin.sum())
@@ -252,10 +245,6 @@ def draw(options: argparse.Namespace) -> None:
 @lru_cache(maxsize=1)
 def _prior():
     return load()
-
-
-def _skin(size: int) -> np.ndarray:
-    return template.mask("skin", size) * (1 - template.mask("eyes", size))
 
 
 def _key(row: str, subject: str, shadows: str, options: argparse.Namespace, seed: int) -> str:

@@ -25,14 +25,12 @@ from core import solve
 from core.contract.capture import Capture
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
-from core.face import template
-from core.geometry import meshes
 from core.imaging import images
 from core.solve.recipes import OURS
-from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
+from core.solve.skin_tone import format_skin_tone
 
 from .figures import write
-from .solve_uv import problem
+from .uv_problems import plain_problem
 
 SHADOWS = ("leaves", "self", "blinds")
 
@@ -66,22 +64,17 @@ def main() -> None:
 
 def solved(subject: int, shadows: str, size: int, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Error [S, S] and confidence [S, S] of one problem, and bool [S, S], the face."""
-    truth, texture, _, mask = problem(subject, size, shadows)
-    skin = template.mask("skin", size) * (1 - template.mask("eyes", size))
-    tone = SkinTone.from_linear((truth * skin[..., None]).sum((0, 1)) / skin.sum(), GIVEN)
+    given = plain_problem(subject, shadows, size)
     settings = from_json({"delight": {"delighter": "none"},
-                          "solve": {"size": size, "steps": steps, "skin_tone": format_skin_tone(tone),
+                          "solve": {"size": size, "steps": steps, "skin_tone": format_skin_tone(given.tone),
                                     "checkpoint_every": 600}})
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
-        images.write_linear(capture.texture, texture)
-        images.write_data(capture.texture_confidence, np.ones((size, size), np.float32))
-        images.write_data(capture.shadow_mask_auto, mask)
-        meshes.write_obj(capture.head, template.load())
+        given.write(capture)
         solve.run(capture, settings, Reporter("solve"))
         albedo = images.read_linear(capture.maps / "diffuse_albedo.exr")
         confidence = images.read_mask(capture.maps / "confidence.png")
-    face = template.mask("face", size) > 0.5
+    truth, face = given.albedo, given.face
     gain = (albedo[face] * truth[face]).sum(0) / (albedo[face] ** 2).sum(0)
     return np.abs(images.linear_to_srgb(albedo * gain) - images.linear_to_srgb(truth)).mean(-1), confidence, face
 

@@ -58,8 +58,7 @@ def places(head: meshes.Mesh, points: dict[str, list[float]]) -> dict[str, np.nd
 def misses(head: meshes.Mesh, views: dict[str, View], marks: dict) -> dict[str, dict[str, float]]:
     """view -> point -> miss in percent of the face's width; views by the name of their photograph."""
     at = places(head, marks["points"])
-    face, bary = template.landmarks()
-    temples = (head.vertices[head.faces[face]] * bary[..., None]).sum(1)[list(TEMPLES)]
+    temples = template.landmark_points(head)[list(TEMPLES)]
     found = {}
     for name, marked in marks["views"].items():
         if name not in views:

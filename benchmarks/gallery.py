@@ -93,8 +93,7 @@ def relit(capture: Capture) -> list[np.ndarray]:
 
 def face_square(view: View, head: meshes.Mesh) -> tuple[slice, slice]:
     """Rows and columns of the square about the face in a view, within the picture."""
-    face, bary = template.landmarks()
-    pixels, _ = view.project((head.vertices[head.faces[face]] * bary[..., None]).sum(1))
+    pixels, _ = view.project(template.landmark_points(head))
     middle, side = (pixels.min(0) + pixels.max(0)) / 2, 1.35 * (pixels.max(0) - pixels.min(0)).max()
     side = int(min(side, view.width, view.height))
     left, top = (int(np.clip(middle[k] - side / 2, 0, (view.width, view.height)[k] - side)) for k in (0, 1))

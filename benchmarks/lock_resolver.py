@@ -10,9 +10,13 @@ it runs in, so it is asked without dependencies, and the conditions are judged h
 from __future__ import annotations
 
 import json
+import re
+import struct
 import subprocess
 import sys
 import tempfile
+import urllib.parse
+import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +24,10 @@ from packaging.requirements import Requirement
 
 from core.contract.messages import Problem
 from core.worker import locks, wheels
+
+END = struct.Struct("<4s4H2LH")
+"""End of a zip file's central directory without a comment (PKWARE APPNOTE 4.3.16): its size and offset are the sixth
+and seventh."""
 
 
 @dataclass(frozen=True)
@@ -96,3 +104,43 @@ def environment_of(name: str) -> dict[str, str]:
             "python_full_version": f"{python}.0", "implementation_name": "cpython",
             "platform_python_implementation": "CPython",
             "implementation_version": f"{python}.0", "platform_release": "", "platform_version": "", "extra": ""}
+
+
+def wheel_files(url: str) -> tuple[int, list[tuple[str, int]]]:
+    """Bytes to download of a wheel at an address, and its files with their bytes unpacked: a wheel's own directory, at
+    its end, says them. Raises Problem when it is not there, or the server gives no parts of it."""
+    try:
+        tail, total = _part(url, -END.size)
+        *_, size, offset, _ = END.unpack(tail)
+        return total, _listed(_part(url, offset, size)[0])
+    except (OSError, ValueError, struct.error) as error:
+        raise Problem(f"{urllib.parse.urlsplit(url).hostname or url} did not answer ({error}).",
+                      "Check the network connection, and try again.") from error
+
+
+def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
+    """`size` bytes of a file from `offset` (the last ones where it is negative), and the whole file's size."""
+    parts = urllib.parse.urlsplit(url)
+    if parts.scheme == "file":
+        path = Path(urllib.request.url2pathname(parts.path))
+        total = path.stat().st_size
+        with open(path, "rb") as file:
+            file.seek(offset % total)
+            return file.read() if size is None else file.read(size), total
+    wanted = f"bytes={offset}" if offset < 0 else f"bytes={offset}-{'' if size is None else offset + size - 1}"
+    with urllib.request.urlopen(urllib.request.Request(url, headers={"Range": wanted}), timeout=30) as answer:
+        found = re.fullmatch(r"bytes \d+-\d+/(\d+)", answer.headers.get("Content-Range", ""))
+        if found is None:
+            raise ValueError("it gives no parts of a file")
+        return answer.read(), int(found[1])
+
+
+def _listed(directory: bytes) -> list[tuple[str, int]]:
+    """Name and bytes unpacked of the files in a zip file's central directory (PKWARE APPNOTE 4.3.12)."""
+    files, at = [], 0
+    while directory[at:at + 4] == b"PK\1\2":
+        size, name_length, *more = struct.unpack_from("<L3H", directory, at + 24)
+        name = directory[at + 46:at + 46 + name_length].decode("utf-8", "replace")
+        files += [(name, size)] * (not name.endswith("/"))  # which a folder's does
+        at += 46 + name_length + sum(more)
+    return files

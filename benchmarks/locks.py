@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Writes requirements/locks: every package of the solver for each platform and Python, pinned, with the hash of its
-wheel.
+wheel, its bytes to download and its bytes on disk.
 
     python -m benchmarks.locks [NAME ...]      NAME as win_amd64-3.13; all of them without one
     python -m benchmarks.locks --table         packages, bytes to download and longest path of each, as the locks say
@@ -28,10 +28,12 @@ from .lock_resolver import Wheel
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 HEAD = "# {name}: written by `python -m benchmarks.locks`, out of worker.txt.\n"
 NOT_VERIFIED = ("# not verified: the index that has this build was not reached when this was written, so its hash is "
-                "not known.\n")
+                "not known,\n# and its size is taken to be that of the package index's build for Linux.\n")
 PIP = "26.3"
 TEMPORARY = ".0123456789012345"
 """What Python appends to a compiled file's name while it writes it: a dot and a number of 15 digits or so."""
+COMPILED = 1.25
+"""Bytes of compiled Python for each of source, which pip adds (PyTorch's and SciPy's: 1.20 and 1.38)."""
 
 
 def write(name: str) -> None:
@@ -41,32 +43,41 @@ def write(name: str) -> None:
     wheels = lock_resolver.resolve(name, [line for line in direct if line])
     torch = wheels["torch"]
     public = torch.version.partition("+")[0]
-    builds = {torch.sha256: torch}
     # a folder of wheels has another build than the index, which has the one without a local version
     if "+" in torch.version:
         wheels["torch"] = lock_resolver.ask(name, [f"torch==={public}"])["torch"]
-        builds[wheels["torch"].sha256] = wheels["torch"]
-    lines = [HEAD.format(name=name), *_figures(name, wheels)]
-    for wheel in sorted(wheels.values(), key=lambda wheel: wheel.name):
-        hashes = sorted({wheel.sha256, *(builds if wheel.name == "torch" else ())})
-        lines.append(_line(wheel.name, public if wheel.name == "torch" else wheel.version, *hashes))
+    lines = [HEAD.format(name=name), *_packages(name, wheels, torch.sha256)]
     _write(f"{name}.txt", lines)
     _write_pip(name)
     for compute in ("cpu", "cuda"):
         _write_build(name, compute, public, torch, wheels)
-    print(f"{name}: {len(wheels)} packages, {''.join(lines[1:3]).replace('# ', '')}", end="")
+    print(f"{name}: {len(wheels)} packages, {lines[1].removeprefix('# ')}", end="")
 
 
-def _figures(name: str, wheels: dict[str, Wheel]) -> list[str]:
-    """What a lock says of its wheels' files, in two comments."""
-    files = [index.wheel_files(wheel.url) for wheel in wheels.values()]
-    longest = max((path for _, listed in files for file, _ in listed for path in installed_paths(file, name)), key=len)
-    return [f"# longest path: {len(longest)} characters below the environment's folder: {longest}\n",
-            f"# download: {sum(size for size, _ in files)} bytes\n"]
+def _packages(name: str, wheels: dict[str, Wheel], torch: str = "") -> list[str]:
+    """The longest path of all, then the packages, with their sizes; `torch` is the hash of a build of PyTorch that is
+    taken as well."""
+    files = {other: lock_resolver.wheel_files(wheel.url) for other, wheel in wheels.items()}
+    longest = max((path for _, listed in files.values() for file, _ in listed for path in installed_paths(file, name)),
+                  key=len)
+    lines = [f"# longest path: {len(longest)} characters below the environment's folder: {longest}\n"]
+    for other, wheel in sorted(wheels.items()):
+        hashes = {wheel.sha256, torch} - {""} if other == "torch" else {wheel.sha256}
+        lines.append(_line(other, wheel.version, *sorted(hashes)) + _size(other, wheel.version, *sizes(*files[other])))
+    return lines
+
+
+def sizes(download: int, files: list[tuple[str, int]]) -> tuple[int, int]:
+    """Bytes to download and bytes on disk of a wheel's files, those among them that pip compiles."""
+    return download, round(sum(size * (1 + COMPILED * file.endswith(".py")) for file, size in files))
 
 
 def _line(name: str, version: str, *hashes: str) -> str:
     return " \\\n".join([f"{name}=={version}", *(f"    --hash=sha256:{value}" for value in hashes)]) + "\n"
+
+
+def _size(name: str, version: str, download: int, disk: int) -> str:
+    return f"# {name}=={version}: {download} bytes, {disk} on disk\n"
 
 
 def _write_pip(name: str) -> None:
@@ -96,25 +107,35 @@ def _write_build(name: str, compute: str, version: str, local: Wheel, wheels: di
     system = {"win_amd64": "win32", "macosx_arm64": "darwin"}.get(name.rpartition("-")[0], "linux")
     build = pip_steps.BUILDS.get((system, compute), "")
     if build:
-        lines = _own_build(name, f"{version}+{build}", build, local)
+        lines = _own_build(name, f"{version}+{build}", build, local, compute)
     elif compute == "cuda" and system == "linux":
         libraries = {other: wheel
                      for other, wheel in lock_resolver.resolve(name, [f"torch==={version}"], cuda=True).items()
                      if other not in wheels}
-        lines = [*_figures(name, libraries),
-                 *(_line(other, wheel.version, wheel.sha256) for other, wheel in sorted(libraries.items()))]
+        lines = _packages(name, libraries)
     else:
         return
     _write(f"{name}-{compute}.txt", [HEAD.format(name=f"{name}, {compute}"), *lines])
 
 
-def _own_build(name: str, version: str, build: str, local: Wheel) -> list[str]:
+def _own_build(name: str, version: str, build: str, local: Wheel, compute: str) -> list[str]:
     try:
         links = ("--find-links", f"{pip_steps.TORCH}{build}/torch/")
         found = local if local.version == version else lock_resolver.ask(name, [f"torch=={version}"], *links)["torch"]
+        taken = sizes(*lock_resolver.wheel_files(found.url))
     except Problem:
-        return [NOT_VERIFIED, f"torch=={version}\n"]
-    return [_line("torch", version, found.sha256)]
+        return [NOT_VERIFIED, f"torch=={version}\n", _size("torch", version, *_linux_size(name, compute))]
+    return [_line("torch", version, found.sha256), _size("torch", version, *taken)]
+
+
+def _linux_size(name: str, compute: str) -> tuple[int, int]:
+    """The size of the index's build for Linux, with CUDA's libraries where it is for CUDA: other systems' builds have
+    them within."""
+    linux = f"manylinux_x86_64-{name.rpartition('-')[2]}"
+    known = [size for pinned, size in locks.read(REQUIREMENTS, linux).sizes.items() if pinned.startswith("torch==")]
+    if compute == "cuda":
+        known += locks.read(REQUIREMENTS, f"{linux}-cuda").sizes.values()
+    return tuple(map(sum, zip(*known, strict=True)))
 
 
 def _write(name: str, lines: list[str]) -> None:
@@ -126,8 +147,8 @@ def table() -> str:
     """One line per lock, as the locks themselves say."""
     rows = ["| lock | packages | to download | longest path below the folder |", "| --- | --- | --- | --- |"]
     for lock in (locks.read(REQUIREMENTS, name) for name in locks.names()):
-        rows.append(f"| `{lock.name}` | {len(lock.lines)} | {index.gigabytes(lock.download)} | {lock.longest} "
-                    "characters |")
+        download = index.gigabytes(sum(size for size, _ in lock.sizes.values()))
+        rows.append(f"| `{lock.name}` | {len(lock.lines)} | {download} | {lock.longest} characters |")
     return "\n".join(rows)
 
 

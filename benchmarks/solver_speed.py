@@ -126,24 +126,15 @@ def prepare(folder: Path, source: Path | None) -> None:
 def make(folder: str, source: str | None) -> None:
     import shutil
 
-    import numpy as np
-
-    from benchmarks.solve_uv import problem
+    from benchmarks.uv_problems import plain_problem
     from core.contract.capture import Capture
-    from core.face import template
-    from core.geometry import meshes
-    from core.imaging import images
 
     capture = Capture(Path(folder) / "a.wildcap")
     if source:
         shutil.copytree(source, capture.root,
                         ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "logs", "lock"))
         return
-    _, texture, _, mask = problem(9000, 512, "leaves")
-    images.write_linear(capture.texture, texture)
-    images.write_data(capture.texture_confidence, np.ones(texture.shape[:2], np.float32))
-    images.write_data(capture.shadow_mask_auto, mask)
-    meshes.write_obj(capture.head, template.load())
+    plain_problem(9000, "leaves", 512).write(capture)
 
 
 def measured(row: SolverVariant, folder: Path, options: argparse.Namespace) -> dict:

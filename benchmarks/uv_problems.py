@@ -6,7 +6,8 @@ the paper assumes, not quite.
 texture = albedo * (global SH + the rest) * shadow, blurred by a texel, with noise. The global SH are fitted to a sky
 with its occlusion and a sun; the rest is what they cannot explain, scaled to 10 % of the light; shadow is what cast
 shadows leave of it, per channel. Of kind "delit" the shading is nearly flat already, 30 to 60 % of each shadow is left
-and the colour is off by a few percent over large regions, as a delighter leaves its frames.
+and the colour is off by a few percent over large regions, as a delighter leaves its frames. A
+`plain_problem` has a sky and a sun as they are, and noise.
 """
 
 from __future__ import annotations
@@ -21,12 +22,14 @@ import numpy as np
 import torch
 import trimesh
 
+from core.contract.capture import Capture
 from core.contract.files import replacing
 from core.contract.messages import Reporter
 from core.face import template
-from core.geometry import meshes
+from core.geometry import meshes, raster
 from core.imaging import images
 from core.solve.lighting import fit_global, shading_basis
+from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic import light
 from core.synthetic.light import bake, random_light
 from core.synthetic.parameters import sample_parameters
@@ -60,6 +63,19 @@ class MaskedUvProblem:
         """bool [S, S]"""
         return template.mask("face", len(self.albedo)) > 0.5
 
+    @property
+    def tone(self) -> SkinTone:
+        """The true skin's, eyes left out."""
+        skin = skin_weight(len(self.albedo))
+        return SkinTone.from_linear((self.albedo * skin[..., None]).sum((0, 1)) / skin.sum(), GIVEN)
+
+    def write(self, capture: Capture) -> None:
+        """What the solver reads of a capture: a texture that was seen all over, the mask, the built-in head."""
+        images.write_linear(capture.texture, self.texture)
+        images.write_data(capture.texture_confidence, np.ones(self.shadow.shape, np.float32))
+        images.write_data(capture.shadow_mask_auto, self.mask)
+        meshes.write_obj(capture.head, template.load())
+
     def regions(self) -> dict[str, np.ndarray]:
         """Name -> bool [S, S]: in the shadow, in a band of 12 texels (of a 1024 map) to either side of its border, and
         outside."""
@@ -86,6 +102,22 @@ def problem(subject: str, shadows: str, size: int, kind: str = "raw") -> MaskedU
     lit *= 0.8 / np.percentile(lit[face].max(-1), 99.5)
     seen = cv2.GaussianBlur(lit, (3, 3), 0.5) + rng.normal(0, NOISE, lit.shape)
     return MaskedUvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
+
+
+def plain_problem(seed: int, shadows: str, size: int) -> MaskedUvProblem:
+    """A subject of core/synthetic in a random light of that seed; `shadows`: self, leaves, blinds or edge."""
+    rng, albedo = np.random.default_rng([seed, 7]), albedo_of(str(seed), size)
+    shading, shadow, _ = bake(template.load(), size, random_light(rng), shadows, rng)
+    covered = raster.rasterize_uv(template.load(), size)[0] >= 0
+    bright = np.percentile((albedo * shading)[covered].max(-1), 99.5)
+    exposure = min(rng.uniform(0.7, 1.1) / np.percentile(shading[covered].mean(-1), 90), 1 / bright)
+    seen = albedo * (shading * exposure) + np.random.default_rng(seed).normal(0, NOISE, albedo.shape)
+    return MaskedUvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
+
+
+def skin_weight(size: int) -> np.ndarray:
+    """[S, S] in [0, 1]: skin, eyes left out."""
+    return template.mask("skin", size) * (1 - template.mask("eyes", size))
 
 
 def albedo_of(subject: str, size: int) -> np.ndarray:

@@ -16,12 +16,6 @@ LEFT_CHEEK_UV = (0.7, 0.4)
 SIDE = 64
 
 
-def left_cheek_direction() -> tuple[float, float]:
-    """(x, y) of the left cheek seen from above, in radii."""
-    angle = (LEFT_CHEEK_UV[0] - 0.5) * math.pi * 1.6
-    return math.sin(angle), -math.cos(angle)
-
-
 def png(pixels: list[list[tuple[int, ...]]]) -> bytes:
     """An 8 bit PNG, RGB or grey after the length of the first pixel; rows from the top."""
     def chunk(kind: bytes, data: bytes) -> bytes:

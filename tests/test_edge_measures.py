@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.measures.edges import ALONG, LINE, profile, score_edges
+from benchmarks.measures.edges import ALONG, LINE, score_edges
 from core.light.shadow_edges import signed_distance
 
 HEIGHT = 500
@@ -62,13 +62,6 @@ def test_lost_pores_are_no_line_and_are_told_by_the_detail():
     found = score(np.zeros(SHADOW.shape), np.where(near, blurred, TRUE))
     assert found.overshoot < 0.01 and found.detail_within < 0.6 and found.detail_away > 0.95
     assert score(-TRUE).detail_away == 0.0
-
-
-def test_the_profile_follows_the_distance():
-    bins = np.array([-30.0, -10, -4, 4, 10, 30])
-    found = profile(np.where(AT, 0.5, np.where(SHADOW, -0.1, 0.2)), SHADOW, MASK, bins)
-    assert found == pytest.approx([-0.1, -0.1, 0.5, 0.2, 0.2])
-    assert np.isnan(profile(TRUE, SHADOW, MASK & SHADOW, bins)[-1])
 
 
 def test_without_an_edge_there_is_no_figure():

@@ -2,9 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baked light whose answer is known: a white sky, a sun over a plane and over a plane with a sphere above it."""
 
+from dataclasses import replace
+
 import numpy as np
 import trimesh
 
+from core.face import template
+from core.geometry import raster
 from core.geometry.meshes import Mesh
 from core.geometry.raster import RayCaster
 from core.light.spherical_harmonics import LAMBERT, UNIFORM, per_function, sh_basis
@@ -71,17 +75,15 @@ def test_a_larger_sun_softens_the_shadow_s_edge():
     assert soft[1] > 3 * soft[0]
 
 
-def test_a_problem_holds_its_own_answer_and_repeats():
-    problem, again = light.uv_problem(3, 128, "leaves"), light.uv_problem(3, 128, "leaves")
-    assert np.array_equal(problem.texture, again.texture)
-    assert np.allclose(problem.texture, problem.albedo * problem.shading)
-    inside = problem.covered
-    assert 0.02 < (problem.shadow[inside] > 0.5).mean() < 0.9
-    assert 0 <= problem.shadow.min() and problem.shadow.max() <= 1
+def test_a_heads_light_is_the_sky_s_and_what_is_left_of_the_sun_s():
+    rng = np.random.default_rng([3, 7])
+    drawn, inside = light.random_light(rng), raster.rasterize_uv(template.load(), 128)[0] >= 0
+    shading, shadow, normal = light.bake(template.load(), 128, drawn, "leaves", rng)
+    assert 0.02 < (shadow[inside] > 0.5).mean() < 0.9 and 0 <= shadow.min() and shadow.max() <= 1
     # where nothing blocks the sun, shading is the sky's and the whole sun's; where all is blocked, it is darker than
     # that by the sun's share
-    cosine = np.maximum(problem.world_normal @ problem.sun, 0)[..., None] * problem.sun_colour
-    open_sky = problem.shading - cosine * (1 - problem.shadow[..., None])
+    cosine = np.maximum(normal @ drawn.sun, 0)[..., None] * drawn.colour
     lit = inside & (cosine[..., 0] > 0.1)
-    assert (open_sky[lit] > -1e-4).all()
-    assert light.uv_problem(3, 128, "none").shadow.max() == 0
+    assert (shading - cosine * (1 - shadow[..., None]))[lit].min() > -1e-4
+    without = replace(drawn, colour=0 * drawn.colour)
+    assert light.bake(template.load(), 128, without, "none", rng)[1].max() == 0

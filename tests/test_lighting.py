@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.light.spherical_harmonics import GAMMA_BANDS, per_function
 from core.solve.lighting import Lights, Shader, constant_light, fit_global, interpolation, shading_basis
-
-BAND_OF = torch.tensor(per_function(GAMMA_BANDS))
-# of 1, y, z, x, xy, yz, 3 z^2 - 1, xz, x^2 - y^2 those that change their sign with x
-SIDEWAYS = torch.tensor([0, 0, 0, 1, 1, 0, 0, 1, 0])
 
 
 def sphere(rows: int = 200, columns: int = 400):

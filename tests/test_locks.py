@@ -3,14 +3,17 @@
 """The locks: one for each platform and Python, complete, with hashes; who has none is told before a download; and what
 pip is told by them."""
 
+import http.server
 import json
 import os
 import re
 import subprocess
 import sys
+import threading
 import time
 import urllib.error
 import urllib.request
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -18,7 +21,7 @@ import pytest
 from benchmarks import lock_resolver
 from benchmarks import locks as maker
 from core.contract.messages import Problem
-from core.worker import index, locks, pip_source, pip_steps
+from core.worker import locks, pip_source, pip_steps
 from core.worker.environment import required
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
@@ -38,7 +41,12 @@ def test_every_lock_has_all_direct_requirements_and_a_hash_for_every_package(nam
             f"run `python -m benchmarks.locks {name}`"
         )
     assert all(re.fullmatch(r"[a-z0-9-]+==[\w.!]+( --hash=sha256:[0-9a-f]{64})+", line) for line in lock.lines.values())
-    assert lock.download > 100_000_000
+    known = locks.known_sizes(REQUIREMENTS, name)
+    assert set(lock.sizes) == {line.partition(" ")[0] for line in lock.lines.values()}
+    assert all(disk > download / 2 > 1000 for download, disk in known.values())
+    assert sum(download for download, _ in lock.sizes.values()) > 100_000_000
+    for other in filter(None, (locks.beside(REQUIREMENTS, name, compute) for compute in ("cpu", "cuda"))):
+        assert {line.partition(" ")[0] for line in locks.read(REQUIREMENTS, other.stem).lines.values()} <= set(known)
 
 
 def test_no_lock_names_a_host_or_a_path():
@@ -161,6 +169,45 @@ def test_what_a_device_needs_here_is_found_out(monkeypatch):
             pip_steps.compute_of("cuda" if system == "darwin" else "apple")
 
 
+def test_sizes_come_from_a_wheels_own_directory_wherever_it_lies(tmp_path):
+    content = os.urandom(70_000) + bytes(500_000)
+    with zipfile.ZipFile(tmp_path / "a-1-py3-none-any.whl", "w", zipfile.ZIP_DEFLATED) as wheel:
+        wheel.writestr("a/data.bin", content)
+        wheel.writestr("a/é.txt", "ü" * 10)
+        wheel.writestr("a/b.py", "#" * 1000)
+    size = (tmp_path / "a-1-py3-none-any.whl").stat().st_size
+
+    class WithRanges(http.server.SimpleHTTPRequestHandler):
+        whole = False
+
+        def do_GET(self):
+            data = (tmp_path / self.path[1:]).read_bytes()
+            first, last = self.headers["Range"].removeprefix("bytes=").split("-")
+            start, end = (len(data) - int(last), len(data)) if not first else (int(first), int(last) + 1)
+            self.send_response(200 if self.whole else 206)
+            if not self.whole:
+                self.send_header("Content-Range", f"bytes {start}-{end - 1}/{len(data)}")
+            self.send_header("Content-Length", str(len(data) if self.whole else end - start))
+            self.end_headers()
+            self.wfile.write(data if self.whole else data[start:end])
+
+        def log_message(self, *_):
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), WithRanges)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    address = f"http://127.0.0.1:{server.server_port}/a-1-py3-none-any.whl"
+    for url in (address, (tmp_path / "a-1-py3-none-any.whl").as_uri()):
+        assert maker.sizes(*lock_resolver.wheel_files(url)) == (size, len(content) + 20 + 2250)
+    WithRanges.whole = True
+    with pytest.raises(Problem, match="no parts"):
+        lock_resolver.wheel_files(address)
+    server.shutdown()
+    server.server_close()
+    with pytest.raises(Problem, match="did not answer"):
+        lock_resolver.wheel_files(address)
+
+
 def index_page() -> str:
     """The package index's page for pip; skips where it cannot be reached."""
     page = f"{(pip_source.setting('index-url') or pip_source.INDEX).rstrip('/')}/pip/"
@@ -194,15 +241,15 @@ def test_every_lock_is_what_the_index_has(name):
                 assert fits, f"{wheel.name} needs {need}"
 
 
-def test_the_longest_path_and_the_download_are_what_the_wheels_say():
+def test_the_longest_path_and_the_sizes_are_what_the_wheels_say():
     """Of one lock, to spare the index: the wheels' own lists of files."""
     index_page()
     lock = locks.read(REQUIREMENTS, "win_amd64-3.13")
     found = lock_resolver.ask(lock.name, [], "--require-hashes", "-r", str(REQUIREMENTS / "locks" / f"{lock.name}.txt"))
-    files = [index.wheel_files(wheel.url) for wheel in found.values()]
-    assert max(len(path) for _, listed in files for file, _ in listed
+    files = {f"{wheel.name}=={wheel.version}": lock_resolver.wheel_files(wheel.url) for wheel in found.values()}
+    assert max(len(path) for _, listed in files.values() for file, _ in listed
                for path in maker.installed_paths(file, lock.name)) == lock.longest
-    assert sum(size for size, _ in files) == lock.download
+    assert {pinned: maker.sizes(*known) for pinned, known in files.items()} == lock.sizes
 
 
 def test_the_table_has_a_line_for_every_lock():

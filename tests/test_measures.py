@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.measures.agreement import agreement, disagreement, excess
-from benchmarks.measures.calibration import WITHIN_ONE, by_group, calibrate, negative_log_likelihood
+from benchmarks.measures.agreement import agreement
+from benchmarks.measures.calibration import calibrate, negative_log_likelihood
 from benchmarks.measures.parts import score_parts
 from benchmarks.measures.references import blur_divided_out, face_height, flat_colour
 from benchmarks.measures.shared_light import fit_light, log_ratio, without_light
@@ -84,13 +84,6 @@ def test_answers_that_are_one_but_for_a_gain_agree_and_a_step_of_a_tenth_is_twen
     assert agreement([TRUE], tone) is None
 
 
-def test_what_the_true_map_disagrees_by_is_not_counted():
-    tone = TRUE.mean(0)
-    noisy = [TRUE * np.exp(0.05 * RNG.normal(size=TRUE.shape)) for _ in range(3)]
-    assert excess(noisy, noisy, tone) == 0
-    assert excess(noisy, [TRUE] * 3, tone) == pytest.approx(disagreement(noisy, tone), rel=1e-6)
-
-
 def test_parts_share_the_gain_of_the_face():
     brows = np.arange(N) < 500
     answer = np.where(brows[:, None], TRUE * 1.5, TRUE)
@@ -108,7 +101,7 @@ def test_a_true_sigma_covers_two_thirds_and_beats_a_constant():
     sigma = np.exp(RNG.normal(-2, 0.7, 200_000))
     error = sigma * RNG.normal(size=sigma.shape)
     found = calibrate(error, sigma)
-    assert found.coverage == pytest.approx(WITHIN_ONE, abs=0.005)
+    assert found.coverage == pytest.approx(0.6827, abs=0.005)
     assert found.likelihood == pytest.approx(-2 + 0.5 + math.log(2 * math.pi) / 2, abs=0.01)
     # log rms less mean log sigma
     assert found.gained == pytest.approx(np.log(np.sqrt((sigma**2).mean())) + 2, abs=0.02)
@@ -122,13 +115,6 @@ def test_the_best_constant_is_the_root_mean_square():
     assert all(negative_log_likelihood(error, s) > best.constant for s in (0.2, 0.28, 0.32, 0.5))
     with pytest.raises(ValueError):
         negative_log_likelihood(error, 0.0)
-
-
-def test_groups_are_judged_apart():
-    light, error = np.arange(2000) < 1000, RNG.normal(0, 0.1, 2000)
-    found = by_group(error, np.where(light, 0.1, 0.01), {"light": light, "dark": ~light, "nobody": light & ~light})
-    assert set(found) == {"light", "dark"}
-    assert found["light"].coverage == pytest.approx(WITHIN_ONE, abs=0.05) and found["dark"].coverage < 0.15
 
 
 def test_reference_answers():

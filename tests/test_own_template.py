@@ -117,7 +117,7 @@ def check_head_of_others(path: Path, capture: Capture, report: Reporter, shapes:
     corners = [[corner.split("/")[:2] for corner in face] for face in lines(own.path, "f ")]
     assert [[corner.split("/") for corner in face] for face in lines(capture.own_head, "f ")] == corners, "and polygons"
     fitted = meshes.read_obj(capture.own_head).vertices
-    middle = own_template._at_landmarks(person()[0]).mean(0)
+    middle = template.landmark_points(person()[0]).mean(0)
     assert fitted.shape == own.mesh.vertices.shape and np.linalg.norm(fitted - middle, axis=1).min() < 0.02
 
 
@@ -152,7 +152,7 @@ def test_parts_without_a_counterpart_follow_the_skin_around_them():
     start = np.concatenate([skin.vertices, ball.vertices])
     label = np.repeat([0, 1], [len(skin.vertices), len(ball.vertices)])
     moved = skin.vertices * 1.1 + [0.01, 0, 0]
-    final = carried.along(start, None, label, np.arange(len(skin.vertices)), moved, Reporter("x"))
+    final = carried.along(start, label, np.arange(len(skin.vertices)), moved, Reporter("x"))
     assert np.allclose(final[:len(moved)], moved)
     assert np.linalg.norm(final[len(moved):].mean(0) - [0.01, 0, 0.0935]) < 0.001
     assert np.ptp(np.linalg.norm(final[len(moved):] - final[len(moved):].mean(0), axis=1)) < 1e-6

@@ -13,7 +13,6 @@ import torch
 from benchmarks import parts as benchmark
 from core.contract.messages import Problem, Reporter
 from core.face import parser
-from core.face.faces import Face
 from core.face.parser_network import ParseNet, network_input
 from core.face.parts import BRIDGE, CHIN, PARTS, SIDE, cut, inside, put_back, to_crop
 from core.synthetic.identities import reserved_seeds
@@ -53,10 +52,6 @@ def landmarks(turn: float = 0.0, size: float = 100.0, middle: tuple[float, float
     points[10] = [0, -0.5 * size]
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     return np.concatenate([points @ np.array([[c, s], [-s, c]]) + middle, np.zeros((468, 1))], 1).astype(np.float32)
-
-
-def face_of(points: np.ndarray) -> Face:
-    return Face((*points[:, :2].min(0), *points[:, :2].max(0)), points, 1.0)
 
 
 def randomly(network: ParseNet) -> ParseNet:

@@ -20,7 +20,6 @@ from core.training.descent import TrainingRun
 from core.training.patches import Windows, mean_map, spread_about
 
 QUIET = Reporter("train", emit=lambda message: None)
-SMALL = 1024 // 4
 
 
 def smooth(seed: int, channels: int, size: int = skins.SIZE) -> np.ndarray:

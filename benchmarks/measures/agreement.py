@@ -29,9 +29,3 @@ def agreement(answers: list[np.ndarray], tone: np.ndarray) -> float | None:
     """The same in dB (PSNR of the mean squared difference)."""
     found = disagreement(answers, tone)
     return None if found is None else to_decibels(found)
-
-
-def excess(answers: list[np.ndarray], true: list[np.ndarray], tone: np.ndarray) -> float | None:
-    """The squared disagreement beyond that of the true map through the same registrations, at least 0."""
-    found, least = disagreement(answers, tone), disagreement(true, tone)
-    return None if found is None or least is None else max(found - least, 0.0)

@@ -12,9 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-WITHIN_ONE = 0.6827
-"""Share of Gaussian errors that lie within one sigma."""
-
 
 @dataclass(frozen=True)
 class Calibration:
@@ -45,10 +42,3 @@ def calibrate(error: np.ndarray, sigma: np.ndarray) -> Calibration:
     best = max(float(np.sqrt(np.mean(np.asarray(error, np.float64) ** 2))), 1e-12)
     return Calibration(negative_log_likelihood(error, sigma), negative_log_likelihood(error, best),
                        float(np.mean(np.abs(error) <= sigma)), len(error))
-
-
-def by_group(error: np.ndarray, sigma: np.ndarray, groups: dict[str, np.ndarray],
-             least: int = 100) -> dict[str, Calibration]:
-    """The same for each group (a tone, a region: bool [N]) of at least so many errors. A constant is the best of its
-    own group."""
-    return {name: calibrate(error[where], sigma[where]) for name, where in groups.items() if where.sum() >= least}

@@ -46,18 +46,6 @@ class EdgeScores:
         return None if self.bright is None else self.bright + self.dark
 
 
-def profile(residual: np.ndarray, shadow: np.ndarray, mask: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Median of a residual [H, W] over the pixels of `mask` by signed distance to the border of a shadow, bool [H, W]:
-    [B], nan where none falls.
-
-    `edges` [B + 1]: the bins' limits in pixels, negative inside the shadow.
-    """
-    distance = signed_distance(shadow)
-    bins = [residual[mask & (distance >= low) & (distance < high)]
-            for low, high in zip(edges[:-1], edges[1:], strict=True)]
-    return np.array([np.median(values) if len(values) else np.nan for values in bins])
-
-
 def score_edges(log: np.ndarray, log_true: np.ndarray, shadow: np.ndarray, mask: np.ndarray, height: float,
                 lit: np.ndarray | None = None) -> EdgeScores:
     """Logarithms of linear green of answer and truth [H, W]; shadow, mask bool [H, W]; height: the face's, in pixels.

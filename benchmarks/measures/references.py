@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 
 NOTHING, FLAT, BLUR, TRUE = "doing nothing", "flat colour", "blur divided out", "true light"
-REFERENCES = (NOTHING, FLAT, BLUR, TRUE)
 BLURRED = 0.02
 """Deviation of the blur as a share of the face's height."""
 DARKEST = 1e-3

@@ -16,11 +16,6 @@ from ..imaging import images
 
 OVAL = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149,
         150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109)
-LIPS = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 409, 270, 269, 267, 0, 37, 39, 40, 185)
-# the person's left, right
-BROWS = ((276, 283, 282, 295, 285, 336, 296, 334, 293, 300), (46, 53, 52, 65, 55, 107, 66, 105, 63, 70))
-EYES = ((263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466),
-        (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246))
 YAWS = (-35, -18, 0, 18, 35)
 
 
@@ -132,7 +127,7 @@ def _painted(vertices, points):
     import cv2
 
     colours = np.tile([0.55, 0.36, 0.28], (len(vertices), 1))
-    for outline, colour in [(LIPS, (0.42, 0.14, 0.13)), *((b, (0.08, 0.05, 0.04)) for b in BROWS)]:
+    for outline, colour in [(faces.LIP_LINE, (0.42, 0.14, 0.13)), *((b, (0.08, 0.05, 0.04)) for b in faces.BROW_LINES)]:
         polygon = points[list(outline)][:, [0, 2]].astype(np.float32)
         inside = [v[1] < 0.03 and cv2.pointPolygonTest(polygon, (float(v[0]), float(v[2])), False) >= 0
                   for v in vertices]

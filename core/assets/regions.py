@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 import trimesh
 
+from ..face.faces import BROW_LINES, EYE_LINES, LIP_LINE
 from ..geometry.meshes import Mesh
 from ..geometry.raster import bleed, interpolate, rasterize_uv
-from .marks import BROWS, EYES, LIPS, OVAL
+from .marks import OVAL
 
 MASK_SIZE = 1024
 _NOSE = (168, 417, 465, 343, 437, 420, 279, 358, 327, 326, 2, 97, 98, 129, 49, 198, 217, 114, 245, 193)
@@ -74,13 +75,13 @@ def draw_masks(mesh: Mesh, points: np.ndarray) -> dict[str, np.ndarray]:
     outline = face_outline(points)
     signed = distance_inside(position.reshape(-1, 3), outline).reshape(size, size)
     soft = np.clip(signed / 0.0015 + 0.5, 0, 1)
-    ears = _connected(_ear(position), size)
+    ears = _connected(_ear(position))
     # a slanted plane from under the chin to the nape
     below = np.clip((-0.075 - 0.55 * position[..., 1] + 0.028 - position[..., 2]) / 0.003, 0, 1)
     masks = {"face": soft * (1 - ears)}
-    masks["lips"] = _filled(uv[list(LIPS)], size)
-    masks["brows"] = np.maximum(*(_filled(uv[list(b)], size, grow=6) for b in BROWS))
-    masks["eyes"] = np.maximum(*(_filled(uv[list(e)], size, grow=14) for e in EYES))
+    masks["lips"] = _filled(uv[list(LIP_LINE)], size)
+    masks["brows"] = np.maximum(*(_filled(uv[list(b)], size, grow=6) for b in BROW_LINES))
+    masks["eyes"] = np.maximum(*(_filled(uv[list(e)], size, grow=14) for e in EYE_LINES))
     masks["nose"] = _filled(cv2.convexHull(uv[list(_NOSE)].astype(np.float32))[:, 0], size)
     masks["nostrils"] = _nostrils(mesh, position, masks["nose"])
     masks["ears"] = ears
@@ -118,7 +119,7 @@ def _ear(position: np.ndarray) -> np.ndarray:
     return (x > 0.0745) & (y > 0.052) & (y < 0.115) & (z > -0.06) & (z < 0.035)
 
 
-def _connected(mask: np.ndarray, size: int) -> np.ndarray:
+def _connected(mask: np.ndarray) -> np.ndarray:
     """Holes closed, specks removed, edge softened."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
     closed = cv2.morphologyEx(cv2.morphologyEx(mask.astype(np.uint8) * 255, cv2.MORPH_CLOSE, disc), cv2.MORPH_OPEN,

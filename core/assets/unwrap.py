@@ -23,7 +23,7 @@ def unwrap(vertices: np.ndarray, faces: np.ndarray, mirror: np.ndarray, scale: n
     points = vertices[origin]
     fixed, start = _boundary(points, seam_left, seam_right, ring)
     rest = _rest_shapes(points[cut_faces]) * scale[:, None, None]
-    uv = _mean_value_embedding(points, cut_faces, fixed, start)
+    uv = _mean_value_embedding(points, cut_faces, start)
     uv = _symmetric(uv, twin)
     uv = _minimise(uv, cut_faces, rest, fixed, twin, steps)
     assert (_areas(uv, cut_faces) > 0).all(), "the unwrap overlaps"
@@ -85,7 +85,7 @@ def _boundary(points, seam_left, seam_right, ring):
     return fixed, start
 
 
-def _mean_value_embedding(points, faces, fixed, start):
+def _mean_value_embedding(points, faces, start):
     held = ~np.isnan(start[:, 0])
     rows, columns, values = [], [], []
     for k in range(3):

@@ -22,8 +22,7 @@ from ..face import faces, template
 from ..geometry import meshes
 from ..imaging import images
 
-RIGHT_LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246)
-LEFT_LIDS = (263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466)
+LEFT_LIDS, RIGHT_LIDS = faces.EYE_LINES
 PUPILS_PER_LIDS = 63.0 / 62.156 / 1.019
 """The template's pupils are 63 mm apart, the middles of its lids' outlines a little less; and the head that fits a
 net's landmarks came out 1.9 % too large over six synthetic heads of known size (benchmarks/head_scale.py)."""

@@ -23,8 +23,8 @@ PICTURE_FIELD = "source_image"
 BALANCE = ("Credits", "Total")
 """Where the answer to CREDITS holds what is left."""
 CREDITS_PER_PICTURE, CREDITS_PER_PREVIEW = 1.0, 0.5
-PREVIEW_PX, LARGEST_PX = 512, 2048
-"""Longer side of a preview's answer at most, and above which a picture is made smaller by the service."""
+PREVIEW_PX = 512
+"""Longer side of a preview's answer at most. A picture longer than 2048 is made smaller by the service."""
 MOST_AT_ONCE = 3
 """Calls under way at the same time; the service takes 100 pictures a minute, and each takes it about five seconds."""
 

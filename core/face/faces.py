@@ -23,6 +23,11 @@ RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
 """Landmarks at the outer and inner corner of the person's right eye, and at the inner and outer of the left: they stay
 put when the lids close."""
 BROW, CHIN, NOSE = 9, 152, 1
+LIP_LINE = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 409, 270, 269, 267, 0, 37, 39, 40, 185)
+BROW_LINES = ((276, 283, 282, 295, 285, 336, 296, 334, 293, 300), (46, 53, 52, 65, 55, 107, 66, 105, 63, 70))
+EYE_LINES = ((263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466),
+             (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246))
+"""Closed outlines in landmarks; of brows and lids the person's left and right."""
 EYE_CROP = 2.3
 """Side of the square that the eye network is shown, in distances between the eye's corners."""
 NEAR_DEG, FAR_DEG = 50.0, 25.0

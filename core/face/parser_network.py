@@ -17,7 +17,6 @@ from .parts import PARTS
 
 CHANNELS = 4  # sRGB in [-1, 1], 0 beyond the picture, and where the picture is
 FINE = 16  # features at half the crop's resolution
-MULTIPLE = 32  # of pixels, to be halved so often
 
 
 def network_input(srgb: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -36,7 +35,8 @@ def network_input(srgb: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 class ParseNet(nn.Module):
-    """[N, CHANNELS, S, S] -> logits [N, len(PARTS), S, S]. S is a multiple of MULTIPLE."""
+    """[N, CHANNELS, S, S] -> logits [N, len(PARTS), S, S]. S is a multiple of 32, to be
+    halved so often."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__()

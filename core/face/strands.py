@@ -5,7 +5,7 @@ curves, the CPU as slim prisms."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -115,11 +115,6 @@ def coloured(count: int, colour: np.ndarray, grey: float, rng: np.random.Generat
     shade = np.exp(rng.normal(0, 0.22, (count, 1)) + rng.normal(0, 0.05, (count, 3)))
     white = np.array([0.42, 0.40, 0.37]) * np.exp(rng.normal(0, 0.15, (count, 1)))
     return np.where(rng.random((count, 1)) < grey, white, np.clip(colour * shade, 0.003, 0.8)).astype(np.float32)
-
-
-def moved(strands: Strands, shift) -> Strands:
-    """The same hairs with their points [M, K, 3] as `shift` maps them."""
-    return replace(strands, points=np.asarray(shift(strands.points), np.float32))
 
 
 def prisms(strands: Strands, sides: int = 3) -> Mesh:

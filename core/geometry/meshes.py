@@ -47,7 +47,7 @@ def joined(meshes: list[Mesh]) -> Mesh:
 def face_normals(mesh: Mesh) -> np.ndarray:
     """Unit normals [F, 3]; zero for a degenerate triangle."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    return _unit(np.cross(b - a, c - a))
+    return unit(np.cross(b - a, c - a))
 
 
 def vertex_normals(mesh: Mesh) -> np.ndarray:
@@ -57,7 +57,7 @@ def vertex_normals(mesh: Mesh) -> np.ndarray:
     total = np.zeros_like(mesh.vertices)
     for i in range(3):
         np.add.at(total, mesh.faces[:, i], weighted)
-    return _unit(total)
+    return unit(total)
 
 
 def read_obj(path: Path) -> Mesh:
@@ -227,5 +227,6 @@ def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
     return replace(mesh, faces=faces, face_uvs=face_uvs)
 
 
-def _unit(vectors: np.ndarray) -> np.ndarray:
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """[..., 3], each of length 1; zeros stay."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-20)

@@ -17,7 +17,7 @@ import trimesh
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .meshes import Mesh, vertex_normals
+from .meshes import Mesh, unit, vertex_normals
 from .raster import RayCaster, interpolate
 
 CANDIDATES = (8, 64)
@@ -147,9 +147,9 @@ def frames(normals: np.ndarray, faces: np.ndarray, tangent: np.ndarray, hand: np
            bary: np.ndarray):
     """Tangent, bitangent and normal, unit and square to each other, [N, 3] each, at samples face [N] (all >= 0), bary
     [N, 3]; normals [V, 3] and faces [F, 3] of the mesh, tangent and hand from `tangents`."""
-    n = _unit((normals[faces[face]] * bary[..., None]).sum(1))
+    n = unit((normals[faces[face]] * bary[..., None]).sum(1))
     t = (tangent[face] * bary[..., None]).sum(1)
-    t = _unit(t - (t * n).sum(1, keepdims=True) * n)
+    t = unit(t - (t * n).sum(1, keepdims=True) * n)
     return t, np.cross(n, t) * hand[face][:, None], n
 
 
@@ -160,7 +160,3 @@ def _angles(corners: np.ndarray) -> np.ndarray:
         a, b = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
         found.append(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(1)))
     return np.stack(found, 1)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-20)

@@ -120,7 +120,7 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), found,
                     subject.follow)
     quality.figures_of_views(report, fitted, views, head)
-    quality.judge_views(report, views, head, fitted)
+    quality.judge_views(head, fitted)
     quality.tell_draft(report, views, head)
     _finish(capture, settings, views, head, subject, report)
 

@@ -22,8 +22,7 @@ ROUND_RADIUS_SHARE = 0.06
 """Deviation from a sphere, as a share of its radius, below which a part is a ball."""
 
 
-def along(start: np.ndarray, faces: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray,
-          report: Reporter) -> np.ndarray:
+def along(start: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray, report: Reporter) -> np.ndarray:
     """Final vertices [V, 3]. start [V, 3]: all as placed by the similarity; label [V]: connected part of each; skin
     [S]: indices of the fitted ones, fitted [S, 3]: where they went."""
     final = start.copy()

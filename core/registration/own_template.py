@@ -25,6 +25,7 @@ from ..geometry.meshes import Mesh, vertex_normals
 from ..imaging import images
 from . import alignment, carried, nonrigid, own_mesh, render_landmarks
 from .correspondence import Scan
+from .eyes import LID_MARKS
 
 ITERATIONS, COVER_ITERATIONS = 14, 8
 """Steps of the fit to the head, and of laying the built-in head over the artist's mesh."""
@@ -107,7 +108,8 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
 
     known = np.flatnonzero(np.isfinite(found.points).all(1))
     seen = found.points[known]
-    at, bary = surfaces.Surface(whole, 0.004).nearest(seen, _facing_camera(whole, seen), 0.02, -1.0)
+    # any side of the surface will do
+    at, bary = surfaces.Surface(whole, 0.004).nearest(seen, np.tile([0.0, -1.0, 0.0], (len(seen), 1)), 0.02, -1.0)
     label = _components(whole)
     main = np.bincount(label[whole.faces[at[at >= 0], 0]]).argmax()
     used = np.flatnonzero(label == main)
@@ -121,11 +123,11 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     weight[told], marks_at[told], marks_bary[told] = found.trust[told], of_skin[at[good]], bary[good]
     model = alignment.HeadModel(skin, shapes[:, used], marks_at, marks_bary, weight)
 
-    target = _at_landmarks(head)
+    target = template.landmark_points(head)
     trust = template.landmark_weights().copy()
     eyes = _open_eyes(found.points) != _open_eyes(target)
     if eyes and not len(shapes):
-        trust[_lid_marks()] = 0
+        trust[list(LID_MARKS)] = 0
     report.progress(0, 1, "placing the artist's mesh")
     surface = surfaces.Surface(head, SOURCE_SPACING_M)
     dense = Scan(_dense(head))
@@ -135,7 +137,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
         placed, coefficients = alignment.fit_scan(model, placed, coefficients, target, trust, dense, follow)
         follow = _follow(model, placed, coefficients, surface, eyes)
     if eyes:
-        trust[_lid_marks()] = 0
+        trust[list(LID_MARKS)] = 0
     start = placed.apply(model.shape(coefficients))
     start = _matched(model, start, follow, head, ours, report)
     vertices = nonrigid.fit(model, start, dense, follow,
@@ -147,7 +149,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     distances = dense.distances(vertices[drawn], vertex_normals(final)[drawn], 0.01)
     _require_laid(own, distances, int(drawn.sum()))
     everything = placed.apply(whole.vertices + np.tensordot(coefficients, shapes, 1))
-    everything = carried.along(everything, whole.faces, label, used, vertices, report)
+    everything = carried.along(everything, label, used, vertices, report)
     counterpart = np.zeros(len(whole.vertices), bool)
     normals = vertex_normals(final)
     near = surface.nearest(vertices, normals, PAINTED_M)[0] >= 0
@@ -244,23 +246,6 @@ def _components(mesh: Mesh) -> np.ndarray:
     return trimesh.graph.connected_component_labels(edges, len(mesh.vertices))
 
 
-def _facing_camera(mesh: Mesh, points: np.ndarray) -> np.ndarray:
-    """Unit vectors [N, 3] towards the front: any side of the surface will do."""
-    return np.repeat([[0.0, -1.0, 0.0]], len(points), 0)
-
-
-def _at_landmarks(head: Mesh) -> np.ndarray:
-    """The landmarks [468, 3] of the registered built-in head."""
-    face, bary = template.landmarks()
-    return (head.vertices[head.faces[face]] * bary[..., None]).sum(1)
-
-
-def _lid_marks() -> list[int]:
-    """The marks along the lids, their corners left out: those stay put when an eye closes."""
-    corners = (*render_landmarks.faces.LEFT_EYE, *render_landmarks.faces.RIGHT_EYE)
-    return [mark for line in render_landmarks.EYE_LINES for mark in line if mark not in corners]
-
-
 def _open_eyes(points: np.ndarray) -> bool:
     width = np.linalg.norm(points[263] - points[362]) + np.linalg.norm(points[133] - points[33])
     gap = sum(np.linalg.norm(points[upper] - points[lower]) for upper, lower in render_landmarks.EYE_LIDS)
@@ -279,7 +264,7 @@ def _drawn(head: Mesh, own: Mesh, picture: np.ndarray, size: int = 480) -> np.nd
     """The picture the face was found in, then the built-in head and the artist's from the front, and the artist's from
     the side."""
     shots = [images.resize(picture, size, size)]
-    middle = np.nanmean(_at_landmarks(head), axis=0)
+    middle = np.nanmean(template.landmark_points(head), axis=0)
     for mesh, yaw in ((head, 0), (own, 0), (own, 50)):
         moved = mesh.moved(mesh.vertices - middle)
         view = render_landmarks.view_from(yaw, 5, size, 0.30)

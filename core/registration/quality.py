@@ -100,7 +100,7 @@ def figures_of_views(report: Reporter, fitted, views: list[View], head: Mesh) ->
     report.figure("views_apart", views_apart(views, head))
 
 
-def judge_views(report: Reporter, views: list[View], head: Mesh, fitted) -> None:
+def judge_views(head: Mesh, fitted) -> None:
     """Raises Problem where a head does not fit what the views show."""
     x = head.vertices[:, 0]
     if not fitted.miss_m["landmarks"] < MOST_MISS_WIDTH_SHARE * np.ptp(x):

@@ -31,10 +31,7 @@ VIEWS_DEG = ((0, 0), (-18, 0), (18, 0), (-35, 0), (35, 0), (0, 12), (0, -12), (-
 """Yaw and pitch of the views, degrees."""
 SKIN, LIPS, BROWS = (0.55, 0.36, 0.28), (0.42, 0.14, 0.13), (0.08, 0.05, 0.04)
 """Linear colours: plain heads are found, painted ones are marked better."""
-LIP_LINE = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 409, 270, 269, 267, 0, 37, 39, 40, 185)
-BROW_LINES = ((276, 283, 282, 295, 285, 336, 296, 334, 293, 300), (46, 53, 52, 65, 55, 107, 66, 105, 63, 70))
-EYE_LINES = ((263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466),
-             (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246))
+LIP_LINE, EYE_LINES = faces.LIP_LINE, faces.EYE_LINES
 EYE_LIDS = ((386, 374), (159, 145))
 """Middle of the upper and the lower lid of the person's left and right eye."""
 TEMPLES = (127, 162, 234, 356, 389, 454)
@@ -86,11 +83,6 @@ def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, l
 def to_ours(points: np.ndarray, pose: Pose) -> np.ndarray:
     """Points of the mesh [N, 3] in our axes, in metres, around the middle of its face."""
     return (points - pose.face) @ pose.turn.T * (FACE_M / pose.width)
-
-
-def from_ours(points: np.ndarray, pose: Pose) -> np.ndarray:
-    """The inverse of to_ours."""
-    return points @ pose.turn * (pose.width / FACE_M) + pose.face
 
 
 def _find_pose(mesh: Mesh, report: Reporter | None) -> Pose:
@@ -206,7 +198,7 @@ def _painted(mesh: Mesh, points: np.ndarray) -> np.ndarray:
 
     colours = np.tile(SKIN, (len(mesh.vertices), 1))
     front = mesh.vertices[:, 1] < np.nanmax(points[:, 1])
-    for outline, colour in ((LIP_LINE, LIPS), *((line, BROWS) for line in BROW_LINES)):
+    for outline, colour in ((LIP_LINE, LIPS), *((line, BROWS) for line in faces.BROW_LINES)):
         polygon = points[list(outline)][:, [0, 2]].astype(np.float32)
         if np.isfinite(polygon).all():
             near = np.flatnonzero(front & (mesh.vertices[:, [0, 2]] >= polygon.min(0)).all(1)

@@ -24,7 +24,7 @@ from ..face.head import Head
 from ..geometry import atlas, baking, meshes
 from .evidence import REFERENCE, Evidence, Extent
 from .lighting import Lights, shading_basis
-from .maps import DARKEST, Maps
+from .maps import DARKEST, Maps, picture_of
 from .prior import Prior, load, mean_at
 from .skin_tone import SkinTone
 
@@ -53,7 +53,7 @@ class Layout:
 
     def mean_face(self) -> torch.Tensor:
         """Our prior's mean face in the window [7, C, C]."""
-        face = _picture(self.face)
+        face = picture_of(self.face)
         normal = 2 * baking.bake_normals(face[..., 3:6] / 2 + 0.5, self.there) - 1
         return _planes(np.dstack([baking.bake(face[..., :3], self.there), normal,
                                   baking.bake(face[..., 6], self.there)]))
@@ -88,13 +88,13 @@ class Layout:
             share = inside.reshape(inside.shape + (1,) * (baked.ndim - 2))
             return (share * baked + (1 - share) * beyond).astype(np.float32)
 
-        normal = joined(baking.bake_normals(solved.normal, self.back), _picture(mean[3:6]) / 2 + 0.5) * 2 - 1
+        normal = joined(baking.bake_normals(solved.normal, self.back), picture_of(mean[3:6]) / 2 + 0.5) * 2 - 1
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
         confidence = np.where(self.back.known, inside * baking.bake(solved.confidence, self.back), 0)
-        return replace(solved, diffuse=joined(baking.bake(solved.diffuse, self.back), _picture(seen)),
+        return replace(solved, diffuse=joined(baking.bake(solved.diffuse, self.back), picture_of(seen)),
                        normal=(normal / 2 + 0.5).astype(np.float32),
                        specular=joined(baking.bake(solved.specular, self.back), ((mean[6] + 1) / 2).numpy()),
-                       shading=joined(baking.bake(solved.shading, self.back), _picture(light)),
+                       shading=joined(baking.bake(solved.shading, self.back), picture_of(light)),
                        confidence=confidence.astype(np.float32))
 
     def _inside(self) -> np.ndarray:
@@ -181,8 +181,3 @@ def _box(box: Box, side: int) -> torch.Tensor:
 def _planes(picture: np.ndarray) -> torch.Tensor:
     """[H, W, C] -> [C, H, W]."""
     return torch.from_numpy(np.ascontiguousarray(picture.transpose(2, 0, 1), np.float32))
-
-
-def _picture(planes: torch.Tensor) -> np.ndarray:
-    """[C, H, W] -> [H, W, C]."""
-    return np.ascontiguousarray(planes.permute(1, 2, 0).numpy(), np.float32)

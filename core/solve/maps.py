@@ -65,8 +65,8 @@ def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tenso
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
     each = gain[:, None, None]
     trusted = confidence(evidence.weight, explained, diffuse * each, albedo(start.reference), spread)
-    return Maps(_picture((diffuse * each).clamp(DARKEST, 1)), specular, _picture(normal), _picture(shading / each),
-                trusted.numpy(), gain)
+    return Maps(picture_of((diffuse * each).clamp(DARKEST, 1)), specular, picture_of(normal),
+                picture_of(shading / each), trusted.numpy(), gain)
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
@@ -106,10 +106,10 @@ def write_preview(capture: Capture, state: State, seen: dict[int, Observation], 
         shading = o.shader.total(state.lights).clamp_min(0).cpu()
     scale = 0.6 / max(float(np.percentile(shading.numpy(), 95)), 1e-6)
     for name, image in (("albedo", albedo(state.denoised).cpu()), ("shading", scale * shading)):
-        images.write_srgb(capture.preview / f"{name}.png", images.linear_to_srgb(_picture(image)))
+        images.write_srgb(capture.preview / f"{name}.png", images.linear_to_srgb(picture_of(image)))
         report.preview(f"preview/{name}.png")
 
 
-def _picture(maps: torch.Tensor) -> np.ndarray:
-    """[3, H, W] -> [H, W, 3]."""
-    return np.ascontiguousarray(maps.permute(1, 2, 0).numpy(), np.float32)
+def picture_of(planes: torch.Tensor) -> np.ndarray:
+    """[C, H, W] -> [H, W, C]."""
+    return np.ascontiguousarray(planes.permute(1, 2, 0).numpy(), np.float32)

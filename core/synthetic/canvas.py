@@ -91,7 +91,7 @@ class Canvas:
 def canvas(size: int) -> Canvas:
     """The built-in template's canvas; made once per size and process."""
     mesh = template.load()
-    return make_canvas(mesh, size, _landmarks(mesh), lambda name: template.mask(name, size))
+    return make_canvas(mesh, size, template.landmark_points(mesh), lambda name: template.mask(name, size))
 
 
 def make_canvas(mesh: Mesh, size: int, landmarks: np.ndarray, mask: Callable[[str], np.ndarray]) -> Canvas:
@@ -114,13 +114,7 @@ def window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
         whole = template.mask(name, MASK_SIZE)[rows, columns]
         return images.resize(whole, side, side)
 
-    return _canvas(mesh, size, face[:, columns], bary[:, columns], _landmarks(mesh), mask)
-
-
-def _landmarks(mesh: Mesh) -> np.ndarray:
-    """[468, 3] in metres."""
-    face, bary = template.landmarks()
-    return (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
+    return _canvas(mesh, size, face[:, columns], bary[:, columns], template.landmark_points(mesh), mask)
 
 
 def _canvas(mesh: Mesh, size: int, face: np.ndarray, bary: np.ndarray, landmarks: np.ndarray,

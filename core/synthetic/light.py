@@ -1,8 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light baked into the template's UV space with known truth: a smooth sky with its ambient occlusion, and a sun whose
-hard or soft shadows the head itself, leaves, blinds or a roof's edge cast. `uv_problem` is one texture as a capture
-would give it, with its answer.
+hard or soft shadows the head itself, leaves, blinds or a roof's edge cast.
 
 The sky is precomputed radiance transfer in second-order spherical harmonics (Sloan, Kautz and Snyder 2002); 1 is a
 white surface's light.
@@ -10,7 +9,7 @@ white surface's light.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -21,29 +20,9 @@ from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.noise import noise
 from ..light.skylight import radiance_transfer
 from ..light.spherical_harmonics import LAMBERT, UNIFORM, per_function, sh_basis
-from .parameters import sample_parameters
-from .skin import make_skin
 
 TRANSFER_RAYS = 192
 SUN_RAYS = 20
-
-
-@dataclass(frozen=True)
-class UvProblem:
-    """float32, linear. texture = albedo * shading [S, S, 3]; normal [S, S, 3] tangent space detail; world_normal [S, S,
-    3] of the smooth head; shadow [S, S]: the blocked share of the sun's light where the surface faces it, 0 elsewhere;
-    sky [9, 3] and sun_colour [3] are the light, sun [3] points to the sun; covered bool [S, S]."""
-
-    texture: np.ndarray
-    albedo: np.ndarray
-    normal: np.ndarray
-    world_normal: np.ndarray
-    shading: np.ndarray
-    shadow: np.ndarray
-    sky: np.ndarray
-    sun: np.ndarray
-    sun_colour: np.ndarray
-    covered: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -55,23 +34,6 @@ class SkyAndSun:
     sun: np.ndarray
     colour: np.ndarray
     radius: float
-
-
-def uv_problem(seed: int, size: int = 512, shadows: str | None = None) -> UvProblem:
-    """A random subject under random light. `shadows`: none, self, leaves, blinds or edge; drawn from the seed if not
-    given."""
-    rng = np.random.default_rng([seed, 7])
-    kind = shadows or str(rng.choice(["self", "leaves", "blinds", "edge"]))
-    skin = make_skin(sample_parameters(seed), size)
-    light = random_light(rng)
-    if kind == "none":
-        light = replace(light, colour=light.colour * 0)
-    shading, shadow, world_normal = bake(template.load(), size, light, kind, rng)
-    bright = np.percentile((skin.diffuse * shading)[skin.covered].max(-1), 99.5)
-    exposure = min(rng.uniform(0.7, 1.1) / np.percentile(shading[skin.covered].mean(-1), 90), 1 / bright)
-    shading = shading * exposure
-    return UvProblem(skin.diffuse * shading, skin.diffuse, skin.normal, world_normal, shading, shadow,
-                     light.sky * exposure, light.sun, light.colour * exposure, skin.covered)
 
 
 def random_light(rng: np.random.Generator) -> SkyAndSun:

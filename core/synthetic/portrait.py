@@ -17,13 +17,11 @@ import numpy as np
 from ..imaging import images
 from .environments import Environment, background_radiance, made_environment, panorama_environment
 from .fitted_light import FittedLight, LampOnHead, fitted_light
-from .identities import subject_mesh
 from .light import in_the_way
-from .olat import BASIS, DIRECTIONS, LightStage, light_stage, mirrored, transport
-from .parameters import adorned, sample_parameters
+from .olat import BASIS, DIRECTIONS, LightStage, mirrored, transport
 from .response import curve, develop, expose
 from .sight import MASKS, Sight, landmarks_of, look, random_camera
-from .skin import Skin, make_skin
+from .skin import Skin
 
 F0 = 0.08  # reflectance at normal incidence per Specular IOR Level of Blender's Principled BSDF
 GOBOS = ("none", "none", "none", "leaves", "leaves", "blinds", "edge")
@@ -48,14 +46,6 @@ class Portrait:
     face: np.ndarray
     skin: np.ndarray
     fitted: FittedLight
-
-
-def portrait(seed: int, size: int = 256, light: int = 0, panoramas: list[np.ndarray] = (),
-             texels: int = 1024) -> Portrait:
-    """The subject of a seed, seen and lit as (seed, light) decide: the same numbers give the same picture."""
-    stage, skin = light_stage(subject_mesh(seed)), make_skin(adorned(sample_parameters(seed), seed), texels)
-    sight = sight_of(stage, skin, np.random.default_rng([seed, 40, light]), size)
-    return relit(sight, stage, np.random.default_rng([seed, 41, light]), panoramas)
 
 
 def sight_of(stage: LightStage, skin: Skin, rng: np.random.Generator, size: int) -> Sight:

@@ -101,8 +101,7 @@ def random_camera(landmarks: np.ndarray, size: int, rng: np.random.Generator) ->
 
 def landmarks_of(stage: LightStage) -> np.ndarray:
     """MediaPipe's landmarks [468, 3] on a head of the built-in topology, metres."""
-    face, bary = template.landmarks()
-    return (stage.mesh.vertices[stage.mesh.faces[face]] * bary[..., None]).sum(1)
+    return template.landmark_points(stage.mesh)
 
 
 def look(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, relief: np.ndarray,

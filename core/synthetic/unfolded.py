@@ -11,7 +11,6 @@ from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from ..contract.files import replacing
@@ -107,10 +106,6 @@ def landmarks_in_uv(side: int) -> np.ndarray:
     head = template.load()
     uv = (head.uvs[head.face_uvs[face]] * bary[..., None]).sum(1)
     return np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * side
-
-
-def _resized(picture: np.ndarray, side: int) -> np.ndarray:
-    return picture if len(picture) == side else cv2.resize(picture, (side, side), interpolation=cv2.INTER_AREA)
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:

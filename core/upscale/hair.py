@@ -118,8 +118,7 @@ def _enlarged(picture: np.ndarray, size: int) -> np.ndarray:
 
 def _zones(surface: HeadSurface) -> dict[str, np.ndarray]:
     """Where brows, lashes and beard may grow, [S, S] in [0, 1] each."""
-    face, bary = template.landmarks()
-    points = (surface.mesh.vertices[surface.mesh.faces[face]] * bary[..., None]).sum(1)
+    points = template.landmark_points(surface.mesh)
     size, position = surface.size, surface.position
     eyes = template.mask("eyes", size) > 0
     rims = np.full(eyes.sum(), np.inf, np.float32)

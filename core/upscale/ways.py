@@ -13,7 +13,7 @@ import numpy as np
 LEFT_BROW = ((285, 336), (295, 296), (282, 334), (283, 293), (276, 300))
 RIGHT_BROW = ((55, 107), (65, 66), (52, 105), (53, 63), (46, 70))
 """Lower and upper landmarks of the person's brows, from the nose to the temple."""
-NOSE_BASE, LIP_TOP, MOUTH_CORNER = 2, 0, 291
+NOSE_BASE, MOUTH_CORNER = 2, 291
 
 
 def usual(part: str, position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..contract.messages import Problem
@@ -44,12 +44,13 @@ print(json.dumps({"python": sys.version_info[:2], "system": sys.platform, "machi
 @dataclass(frozen=True)
 class Lock:
     """`lines`: package -> its requirement with version and hashes; `longest` is the longest path below an environment's
-    folder, in characters, while it is installed, and `download` is in bytes; both 0 where the file does not say."""
+    folder, in characters, while it is installed, 0 where the file does not say; `sizes`: PACKAGE==VERSION -> bytes to
+    download, and bytes on disk with the Python that pip compiles."""
 
     name: str
     lines: dict[str, str]
     longest: int = 0
-    download: int = 0
+    sizes: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     @property
     def platform(self) -> str:
@@ -110,7 +111,10 @@ def read(requirements: Path, name: str) -> Lock:
     text = path.read_text(encoding="utf-8")
     joined = [line.partition("#")[0].strip() for line in text.replace("\\\n", " ").splitlines()]
     lines = {normal(re.split(r"[=<>!\s\[]", line, maxsplit=1)[0]): re.sub(r"\s+", " ", line) for line in joined if line}
-    return Lock(name, lines, _figure(r"# longest path: (\d+)", text), _figure(r"# download: (\d+)", text))
+    longest = re.search(r"# longest path: (\d+)", text)
+    sizes = {pinned: (int(download), int(disk))
+             for pinned, download, disk in re.findall(r"# (\S+==\S+): (\d+) bytes, (\d+) on disk", text)}
+    return Lock(name, lines, int(longest[1]) if longest else 0, sizes)
 
 
 def beside(requirements: Path, name: str, compute: str) -> Path | None:
@@ -118,6 +122,15 @@ def beside(requirements: Path, name: str, compute: str) -> Path | None:
     one."""
     path = Path(requirements) / "locks" / f"{name}-{compute}.txt"
     return path if path.is_file() else None
+
+
+def known_sizes(requirements: Path, name: str) -> dict[str, tuple[int, int]]:
+    """Lock.sizes of a lock and of what lies beside it."""
+    found = dict(read(requirements, name).sizes)
+    for compute in ("cpu", "cuda"):
+        if beside(requirements, name, compute) is not None:
+            found |= read(requirements, f"{name}-{compute}").sizes
+    return found
 
 
 def check_path(lock: Lock, folder: Path, limited: bool) -> None:
@@ -137,8 +150,3 @@ def normal(name: str) -> str:
 
 def _numbers(version: str) -> tuple[int, ...]:
     return tuple(int(part) for part in re.findall(r"\d+", version)[:2])
-
-
-def _figure(pattern: str, text: str) -> int:
-    found = re.search(pattern, text)
-    return int(found[1]) if found else 0

@@ -3,8 +3,9 @@
 """pip itself, where Python brings none: its wheel, from a folder or from the package index that this machine's pip
 would use.
 
-Standard library only. The index is found as pip finds it (environment, then pip.conf), so that a studio's mirror serves
-here, too.
+Standard library only. This is the one page of an index that we read ourselves: without pip there is nobody else to do
+it, and a lock pins the file by its hash but names no address, for a studio's mirror has its own. The index is found as
+pip finds it (environment, then pip.conf), so that such a mirror serves here, too.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ import numpy as np
 from ...core.contract.messages import Problem
 from .. import local_view
 from .asset import LEFT_EYE, SIDES, load
+from .close_up.ball import places
 
 KEY = "wildcap_gaze"
 """Custom property of the empty, and of the shape keys whose units look at it."""
@@ -109,18 +110,12 @@ def _eye(obj, number: int) -> _Eye:
     asset, keys = load(), obj.data.shape_keys.key_blocks
     inner = np.flatnonzero(asset.kind == LEFT_EYE + number)
     rows = len(asset.template) + len(asset.copies) + inner
-    ball = _places(keys[0])[rows]
+    ball = places(keys[0])[rows]
     fit = np.concatenate([2 * ball, np.ones((len(ball), 1))], 1)
     centre = np.linalg.lstsq(fit, (ball**2).sum(1), rcond=None)[0][:3]
     pupil = rows[np.linalg.norm(asset.uvs[inner] - 0.5, axis=1).argmin()]
-    looks = {way: _unit(_places(keys[f"eyeLook{way}{SIDES[number]}"])[pupil] - centre) for way in WAYS}
-    return _Eye(centre, _unit(_places(keys[0])[pupil] - centre), looks)
-
-
-def _places(key) -> np.ndarray:
-    values = np.empty(3 * len(key.data), np.float32)
-    key.data.foreach_get("co", values)
-    return values.reshape(-1, 3).astype(np.float64)
+    looks = {way: _unit(places(keys[f"eyeLook{way}{SIDES[number]}"])[pupil] - centre) for way in WAYS}
+    return _Eye(centre, _unit(places(keys[0])[pupil] - centre), looks)
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:

@@ -37,8 +37,7 @@ def fields(folder: Path) -> np.ndarray:
     neutral = _vertices(model / "generic_neutral_mesh.obj")
     marks = neutral[_landmarks(model / "vertex_indices.json")]
     mesh = template.load()
-    triangle, bary = template.landmarks()
-    ours = (mesh.vertices[mesh.faces[triangle]] * bary[..., None]).sum(1)[list(OURS)]
+    ours = template.landmark_points(mesh)[list(OURS)]
     scale, turn, shift = _similarity(ours, marks)
     warp = RBFInterpolator(scale * ours[JAW:] @ turn.T + shift, marks[JAW:] - (scale * ours[JAW:] @ turn.T + shift),
                            smoothing=1e-3)
