@@ -134,7 +134,7 @@ def evenly_lit(tmp_path_factory):
 
 def test_what_the_views_of_a_head_agree_on_is_its_colour_whatever_their_exposures(evenly_lit):
     head, views, albedo = evenly_lit
-    found = texels.gather(head, views, SILENT)
+    found = texels.gather(head, views)
     truth = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), texels.SIDE, texels.SIDE), 1e-3))
     where = (found.seen > 0.5) & (template.mask("skin", texels.SIDE) > 0.9)
     error = (found.log - truth)[where]
