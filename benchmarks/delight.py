@@ -4,7 +4,8 @@
 the flat true tone.
 
     python -m benchmarks.delight [--data DIR] [--sets NAME ...] [--capture NAME=FOLDER ...] [--opendelight PATH]
-    [--quick] [--json OUT] [--pictures FOLDER]
+    [--quick] [--parts] [--json OUT]
+    [--pictures FOLDER]
 
 Sets: faceolat (--data: laid out like ../shared/data/faceolat), portraits (synthetic subjects that no training sees, six
 per group of skin tone, two lights each), lps_sun, sample, or any folder laid out as benchmarks/albedo_score.py says. A
@@ -29,6 +30,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
@@ -36,7 +38,9 @@ from core import delight
 from core.contract.capture import Capture
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import Settings
-from core.delight.whole_head import whole_head
+from core.delight import second_opinion
+from core.delight.contract import Delit
+from core.delight.whole_head import WEIGHTS, whole_head
 from core.imaging import images
 
 from . import figures
@@ -69,8 +73,10 @@ def main() -> None:
     parser.add_argument("--opendelight", default="", help="the authors' checkpoint")
     parser.add_argument("--weights", type=Path,
                         help="weights of our network, with their card beside them, instead of those that are shipped")
-    parser.add_argument("--texels", type=Path, metavar="FILE",
-                        help="weights of `core train texels`, for a row of their own on captures: whole head")
+    parser.add_argument("--parts", action="store_true",
+                        help="on captures also the network without the whole head's answer, and that answer alone")
+    parser.add_argument("--texels", type=Path, metavar="FILE", default=WEIGHTS,
+                        help="of --parts: weights of the whole head's network")
     parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
     parser.add_argument("--json", type=Path, help="where the results go; what it holds of other sets and rows stays")
@@ -81,8 +87,9 @@ def main() -> None:
         settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
     if options.weights:
         importlib.import_module("core.delight.network").WEIGHTS = options.weights
-    if options.texels:
-        delight.DELIGHTERS["whole head"] = partial(whole_head, weights=options.texels)
+    if options.parts:
+        delight.DELIGHTERS |= {"frames and fit": without_whole_head,
+                               "whole head": partial(whole_head, weights=options.texels)}
     captures = dict(pair.split("=", 1) for pair in options.capture)
     results = (figures.read(options.json.stem, options.json.parent)["figures"] if options.json
                and options.json.is_file() else {})
@@ -146,6 +153,12 @@ def measure(chosen: Photographs, settings: Settings, features: bool = True, only
                           sheet([[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p), *delit]
                                  for p, *delit in zip(spread, *shown, strict=True)]))
     return results
+
+
+def without_whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
+    """The delighter network as its frames and the fitted light alone would have it."""
+    with mock.patch.object(second_opinion, "WHOLE", 0.0):
+        yield from delight.DELIGHTERS["network"](capture, settings, report)
 
 
 def rows(chosen: Photographs, settings: Settings) -> list[str]:

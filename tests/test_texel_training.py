@@ -192,8 +192,8 @@ def test_a_training_goes_on_where_it_stopped_and_its_weights_are_read_again(work
     network = whole_head.load("cpu", out)
     assert sum(value.numel() for value in network.parameters()) == second["parameters"]
     (work / "state.pt").unlink()
-    assert training.train_texels("cpu", work / "next.safetensors", SILENT,
-                                 run(0.01, start=out))["started"] == "the weights before"
+    third = training.train_texels("cpu", work / "next.safetensors", SILENT, run(0.01, start=out))
+    assert third["started"] == "the weights before" and third["before"]["steps"] == second["steps"]
     (work / "person_9100.npz").unlink()
     with pytest.raises(Problem, match="There are no people in"):
         training.train_texels("cpu", out, SILENT, run(0.06))

@@ -62,6 +62,15 @@ def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch
     return told
 
 
+def card_before(start: Path | None) -> dict:
+    """Of the card beside the weights that a training begins with: how these were made; empty where there is none."""
+    path = Path(start).with_suffix(".json") if start else None
+    if path is None or not path.is_file():
+        return {}
+    card = json.loads(path.read_text(encoding="utf-8"))
+    return {name: card[name] for name in ("command", "steps", "minutes", "people", "before") if name in card}
+
+
 def again(training: str, state: dict) -> str:
     """The command that made a training's weights, but for its own options."""
     data = state["data"]

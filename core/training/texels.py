@@ -32,7 +32,7 @@ from ..solve.prior import fast_dtype
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .prior import FIRST_SEED, HELD_OUT_SEED
-from .release import TrainingCard, again, release
+from .release import TrainingCard, again, card_before, release
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
 from .texel_batches import (
     TexelBatch,
@@ -88,7 +88,8 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
     data = {"seeds": _people(t), "held_out_seeds": _held_out(t),
             "panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
-            "started": "the weights before" if start else "random weights", "from": "", "skins": [],
+            "started": "the weights before" if start else "random weights", "before": card_before(start),
+            "from": "", "skins": [],
             "held_out_skins": [], "notices": []}
     if not run.growing:
         prepare(config, work, report)
@@ -201,7 +202,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
             "better than the best constant")
     command = again("texels", state) + (" --hdri hdri" if data["panoramas"] else "")
     ready = sum(person_path(work, seed).is_file() for seed in data["seeds"])
-    more = {"panoramas": data["panoramas"], "people": ready, "started": data["started"]}
+    more = {"panoramas": data["panoramas"], "people": ready, "started": data["started"], "before": data["before"]}
     return release(out, state,
                    TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what},
                                 more), store=pack)
