@@ -4,8 +4,7 @@
 the flat true tone.
 
     python -m benchmarks.delight [--data DIR] [--sets NAME ...] [--capture NAME=FOLDER ...] [--opendelight PATH]
-    [--quick] [--parts] [--json OUT]
-    [--pictures FOLDER]
+    [--quick] [--parts] [--json OUT] [--pictures FOLDER]
 
 Sets: faceolat (--data: laid out like ../shared/data/faceolat), portraits (synthetic subjects that no training sees, six
 per group of skin tone, two lights each), lps_sun, sample, or any folder laid out as benchmarks/albedo_score.py says. A
