@@ -27,6 +27,8 @@ from pathlib import Path
 from core.contract.stages import NAMES
 from core.worker.client import THREAD_VARIABLES
 
+STAGES_FILES = "what a stage reads of the stages before it"
+
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -44,6 +46,19 @@ def main() -> int:
         return _run(arguments, work)
     finally:
         shutil.rmtree(work, ignore_errors=True)
+
+
+def table(recorded: dict) -> str:
+    """Markdown of a record's figures; the files of all stages are one row."""
+    from .figures import markdown
+
+    rows: dict[str, Counter] = {}
+    for kind, row in recorded["rows"].items():
+        rows.setdefault(STAGES_FILES if kind.startswith("stage ") else kind, Counter()).update(row)
+    rows["all"] = Counter(recorded["all"])
+    return markdown(["what was spoiled", "cases", "refused by name", "accepted, with sound results", "faults"],
+                    [[kind, *(row[name] for name in ("cases", "refused", "accepted", "faults"))]
+                     for kind, row in rows.items()])
 
 
 def _run(arguments: argparse.Namespace, work: Path) -> int:

@@ -29,6 +29,12 @@ from core.worker.client import THREAD_VARIABLES
 
 from . import kills_disk
 
+WORDS = {"moment": "worker killed at a random moment of a random stage", "write": "the same while it writes",
+         "command": "the same, begun as Blender begins it",
+         "mask": "killed while the add-on saves a mask", "deliver": "killed while it delivers over an older delivery",
+         "full": "disk full at a random byte", "asleep": "worker stopped, replaced, awakened",
+         "at_once": "two workers at once", "colmap": "COLMAP killed, or the worker beside it, or both", "all": "all"}
+
 MIX = {"moment": 12, "write": 12, "command": 2, "mask": 6, "deliver": 6, "full": 4, "asleep": 4, "at_once": 2,
        "colmap": 4}
 """Kinds of trial, and how many of each there are in a round."""
@@ -105,6 +111,15 @@ def _run(arguments: argparse.Namespace, work: Path, watched: tuple[Path, Path], 
         for left in work.glob(f"trials/{number}*"):
             shutil.rmtree(left) if left.is_dir() else left.unlink()
     return _tell(found, arguments, figures, private, time.monotonic() - began)
+
+
+def table(recorded: dict) -> str:
+    """Markdown of figures["rows"]."""
+    from .figures import markdown
+
+    return markdown(["what happens", "trials", "times that it struck", "without a fault"],
+                    [[WORDS[kind], row["trials"], row["struck"], row["faultless"]]
+                     for kind, row in recorded["rows"].items()])
 
 
 def _draw(arguments: argparse.Namespace) -> list[str]:

@@ -68,8 +68,8 @@ def weights_of(model: dict, cond_channels: int, wrapped: bool) -> dict[str, torc
     put("mapping.2", mapping, mapping)
     put("proj_in", widths[max(0, skip - 1)], (7 + cond_channels) * p2, 1, 1)
     put("proj_out", 7 * p2 + model.get("has_variance", False), widths[max(0, skip - 1)], 1, 1)
-    levels = zip(model["depths"], widths, model["self_attn_depths"], strict=True)
-    for level, (depth, width, attention) in enumerate(levels):
+    shapes = zip(model["depths"], widths, model["self_attn_depths"], strict=True)
+    for level, (depth, width, attention) in enumerate(shapes):
         above, up = widths[max(0, level - 1)], f"u_net.u_blocks.{levels - 1 - level}"
         put_blocks(f"u_net.d_blocks.{level}", 1, [above] + [width] * (depth - 1), width, width, attention)
         put_blocks(up, 0, [width if level == levels - 1 else 2 * width] + [width] * (depth - 1), width, above,
