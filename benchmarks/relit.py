@@ -93,7 +93,7 @@ def main() -> int:
 
 
 @dataclass(frozen=True)
-class Subject:
+class RelitSubject:
     """name; capture, solved; maps: the folder of the true ones; truth: where cameras.json lies; seed: whose head it
     is."""
 
@@ -110,24 +110,24 @@ class Subject:
         return worn_by(self.capture, read_worn(self.maps), head.moved(pose.apply(head.vertices)))
 
 
-def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[Subject]:
+def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubject]:
     """Each subject that was asked for and has been solved."""
     if arguments.sample:
         maps = work / "sample_truth"
         if not (maps / "normal.png").exists():  # written last
             write_maps(maps, make_skin(sample_parameters(sample.RESERVED["sample"]), sample.MAPS))
         truth = Path(sample.__file__).parent / "sample"
-        yield Subject("sample", Capture(arguments.sample.resolve()), maps, truth, sample.RESERVED["sample"])
+        yield RelitSubject("sample", Capture(arguments.sample.resolve()), maps, truth, sample.RESERVED["sample"])
     for person in (p for p in PEOPLE if arguments.people and p.name in arguments.only):
         capture = Capture(arguments.people.resolve() / f"{person.name}.wildcap")
         if (capture.maps / "normal.png").is_file():
             truth = arguments.people.resolve() / person.name
-            yield Subject(person.name, capture, truth / "maps", truth, person.seed)
+            yield RelitSubject(person.name, capture, truth / "maps", truth, person.seed)
         else:
             print(f"{person.name} has not been solved and is left out.", file=sys.stderr)
 
 
-def render(subject: Subject, work: Path, lights: list[str], wanted: list[str]) -> None:
+def render(subject: RelitSubject, work: Path, lights: list[str], wanted: list[str]) -> None:
     """work/renders/ROW_LIGHT.exr of all rows, and face.exr."""
     capture, truth = subject.capture, subject.maps
     renders, mask = work / "renders", work / "mask.png"

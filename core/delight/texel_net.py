@@ -37,7 +37,7 @@ FINE, FINEST = 24, 12
 
 
 @dataclass(frozen=True)
-class HeadMaps:
+class UnfoldedMaps:
     """What Texels says of N heads, on one device: float32 [N, channels, S, S]."""
 
     log: torch.Tensor
@@ -50,13 +50,13 @@ class HeadMaps:
     free: torch.Tensor
 
 
-def maps_of(texels: Texels, device: str | torch.device) -> HeadMaps:
+def maps_of(texels: Texels, device: str | torch.device) -> UnfoldedMaps:
     """One head's texels."""
-    return HeadMaps(**{name: torch.from_numpy(np.atleast_3d(getattr(texels, name)).transpose(2, 0, 1)[None].copy())
-                       .float().to(device) for name in HeadMaps.__dataclass_fields__})
+    return UnfoldedMaps(**{name: torch.from_numpy(np.atleast_3d(getattr(texels, name)).transpose(2, 0, 1)[None].copy())
+                       .float().to(device) for name in UnfoldedMaps.__dataclass_fields__})
 
 
-def network_input(maps: HeadMaps) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+def network_input(maps: UnfoldedMaps) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """[N, CHANNELS, S, S] and light [N, 6, S, S] for TexelNet, and the mean log colour [N, 3, 1, 1] of the face that
     was seen, by which the log-shading that comes out is lower. light: what the fitted sky gives and the fitted sun
     would add, each channel over the mean of both on the face."""

@@ -15,7 +15,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from .network_blocks import LAYOUT, Attention, Down, Fourier, Residual, Up, run_layers
+from .network_blocks import LAYOUT, Down, Fourier, Residual, SelfAttention, Up, run_layers
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def _block(layout: UNetLayout, inputs: list[int], width: int, out: int, attentio
         c_out = out if last is not None and i == len(inputs) - 1 else width
         layers.append(Residual(mapping, c_in, width, c_out, norm))
         if attention:
-            layers.append(Attention(mapping, c_out, norm))
+            layers.append(SelfAttention(mapping, c_out, norm))
     return nn.ModuleList(layers if last is None else [*layers, last])
 
 

@@ -23,7 +23,7 @@ def run_layers(blocks: nn.ModuleList, x: torch.Tensor, mapped: torch.Tensor, low
     """The layers one after the other. In low memory only their inputs are kept for the gradient, and what is inside
     them is computed a second time."""
     for layer in blocks:
-        given = (x, mapped) if isinstance(layer, Residual | Attention) else (x,)
+        given = (x, mapped) if isinstance(layer, Residual | SelfAttention) else (x,)
         x = checkpoint(layer, *given, use_reentrant=False) if low_memory and x.requires_grad else layer(*given)
     return x
 
@@ -107,7 +107,7 @@ class Norm(nn.Module):
         return [slice(row, row + step) for row in range(0, x.shape[2], step)]
 
 
-class Attention(nn.Module):
+class SelfAttention(nn.Module):
     """Self attention over all texels; heads of 64 channels."""
 
     def __init__(self, mapping: int, channels: int, norm: str):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from ..delight.texel_net import HeadMaps
+from ..delight.texel_net import UnfoldedMaps
 from ..light.spherical_harmonics import UNIFORM, sh_basis
 from ..synthetic.olat import BASIS, DIRECTIONS, LIGHTS
 from ..upscale.network import linear_to_srgb
@@ -122,11 +122,11 @@ def fit_light(carried: torch.Tensor, radiance: torch.Tensor, lamps: Lamps, tone:
 
 
 def as_captured(log: torch.Tensor, apart: torch.Tensor, seen: torch.Tensor, fitted: dict[str, torch.Tensor],
-                 dice: Dice) -> HeadMaps:
+                 dice: Dice) -> UnfoldedMaps:
     """What a capture would know: all that comes from the head's shape moved by how far registration is off."""
     names, parts = zip(*fitted.items(), strict=True)
     beside = moved(torch.cat(parts, 1), dice.spread(0.4, 2.5, len(log)), dice)
     known = dict(zip(names, beside.split([part.shape[1] for part in parts], 1), strict=True))
     there = (seen > 0.02).float()
-    return HeadMaps(log=log * there, spread=apart * there, seen=seen,
+    return UnfoldedMaps(log=log * there, spread=apart * there, seen=seen,
                     **known | {"normal": unit(known["normal"])})

@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from ..delight.texel_net import HeadMaps
+from ..delight.texel_net import UnfoldedMaps
 from ..delight.texels import DARKEST
 from ..synthetic.olat import DIRECTIONS, GLOSS, LIGHTS
 from ..synthetic.unfolded import LAMPS, SIDE
@@ -41,7 +41,7 @@ class LitPeople:
     by; shadow [N, 1, S, S] in [0, 1]: the lost share of the lamps' light, and strong [N], how much of all light they
     are."""
 
-    maps: HeadMaps
+    maps: UnfoldedMaps
     shading: torch.Tensor
     shadow: torch.Tensor
     strong: torch.Tensor
