@@ -149,13 +149,12 @@ def test_a_look_is_told_what_the_whole_head_says_of_what_it_shows(evenly_lit, mo
     head, views, _ = evenly_lit
     u = (np.mgrid[0:texels.SIDE, 0:texels.SIDE][1] + 0.5) / texels.SIDE
     ramp = np.repeat((1.5 * (u - 0.5))[..., None], 3, 2).astype(np.float32)
-    monkeypatch.setattr(whole_head, "load", lambda device: None)
     monkeypatch.setattr(whole_head, "tell_shading",
                         lambda net, known: whole_head.Shading(ramp, ramp[..., 0], ramp[..., 0]))
     face, bary, _ = render_view(head.caster, views[2], 0.25)
     empty = np.zeros((*face.shape, 3), np.float32)
     look = ShadingEstimate((0, 0, 1), empty, empty[..., 0], empty, face, bary)
-    (seen,) = whole_head.answers_in_looks(head, views, [look], "cpu", lambda done, of: None)
+    (seen,) = whole_head.answers_in_looks(None, head, views, [look], lambda done, of: None)
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, face, bary)
     expected = 1.5 * (uv[face >= 0][:, 0] - 0.5)
     for told in (seen.log[..., 0], seen.shadow):

@@ -42,6 +42,7 @@ from .second_opinion import beyond, coarse, of_both, with_whole_head
 from .shading import light_in_frame, light_seen
 from .unet import DARKEST, SIDE, DelightNet, network_input
 from .whole_head import READING, answers_in_looks
+from .whole_head import load as load_whole_head
 
 DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
@@ -53,6 +54,7 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see
     the head."""
     net, views = load(settings.compute_device), read_views(capture, selected_only=True)
+    whole = load_whole_head(settings.compute_device)
     head = lit_head(read_head(capture), views, report)
     looks, fitted = [], []
     for i, view in enumerate(views):
@@ -66,7 +68,7 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
         def step(done: int, of: int) -> None:
             report.progress(6 * of + done, 8 * of, READING)
 
-        looks = with_whole_head(looks, answers_in_looks(head, views, looks, settings.compute_device, step), skins)
+        looks = with_whole_head(looks, answers_in_looks(whole, head, views, looks, step), skins)
     looks = [without_hair(look, log, share) for look, log, share in zip(looks, fitted, hair, strict=True)]
     looks = without_casts(looks, skins)
     for i, (view, look) in enumerate(zip(views, looks, strict=True)):

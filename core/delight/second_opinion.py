@@ -5,7 +5,7 @@ whole head's. Their errors differ, so a mean is better than any.
 
 The fit holds over the whole head and knows the colours of sun and sky; the network knows what no fit explains. Where
 they are far apart the fit is wrong more often: a lamp it did not find, a lifted hand, hair. The whole head's answer
-cannot follow pigment, so it keeps brows, beards and blotches, and takes a single small shadow for one of them.
+follows little of the pigment, and takes a single small shadow for it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .evening import ShadingEstimate
 
 FITTED = 0.8  # weight of the fitted light's answer where the two agree ...
 DOUBT = 1.0  # ... and natural log units of luminance between them at which it is half of that
-
+# on five captures of five synthetic people, by the PSNR and FLIP of their delit frames; nobody was left out
 WHOLE = 0.5  # weight of the whole head's answer ...
 MISSED = 0.25  # ... which is nothing where so much of the sun is lost of which it does not know ...
 MISSED_CELLS = 1.0  # ... on average over a Gaussian of that deviation: borders are not where a shadow is missed

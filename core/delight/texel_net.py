@@ -5,14 +5,14 @@ sure that is.
 
 The shading has the form of the light that was fitted to the skin: sky, and as much of the sun as nothing blocks. Which
 share that is the network tells texel by texel, and what the fit gets wrong over cells of four: so a shadow's border is
-as fine as the map, and all else too coarse to follow a brow, a mole or a pore. A U-Net whose deepest map, 16 texels
+as fine as the map, and all else too coarse to follow hairs, small moles or pores. A U-Net whose deepest map, 16 texels
 wide, attends to all of itself: one half of a face tells the light on the other. Its finest level, where maps are large,
 is kept thin.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 
 import numpy as np
@@ -52,8 +52,11 @@ class UnfoldedMaps:
 
 def maps_of(texels: Texels, device: str | torch.device) -> UnfoldedMaps:
     """One head's texels."""
-    return UnfoldedMaps(**{name: torch.from_numpy(np.atleast_3d(getattr(texels, name)).transpose(2, 0, 1)[None].copy())
-                       .float().to(device) for name in UnfoldedMaps.__dataclass_fields__})
+    def tensor(values: np.ndarray) -> torch.Tensor:
+        planes = np.atleast_3d(values).transpose(2, 0, 1)[None]
+        return torch.from_numpy(np.ascontiguousarray(planes, np.float32)).to(device)
+
+    return UnfoldedMaps(*(tensor(getattr(texels, field.name)) for field in fields(UnfoldedMaps)))
 
 
 def network_input(maps: UnfoldedMaps) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:

@@ -67,10 +67,10 @@ def whole_head(capture: Capture, settings: Settings, report: Reporter, weights: 
         yield _delit(view, head, found)
 
 
-def answers_in_looks(head: LitHead, views: list[View], looks: list[ShadingEstimate], device: str,
+def answers_in_looks(net: TexelNet, head: LitHead, views: list[View], looks: list[ShadingEstimate],
                      step: Callable[[int, int], None]) -> list[HeadInLook]:
     """The whole head's answer in each look, as coarse as a look is. The head has the built-in UVs."""
-    found = tell_shading(load(device), gather(head, views, step))
+    found = tell_shading(net, gather(head, views, step))
     coarse = images.resize(np.concatenate([np.exp(found.log), found.shadow[..., None]], -1), LOOKED_AT, LOOKED_AT)
     maps = np.concatenate([np.log(coarse[..., :3]), coarse[..., 3:]], -1).astype(np.float32)
     answers = []

@@ -17,13 +17,11 @@ from .olat import BASIS, LIGHTS
 class FittedLight:
     """The light as a fit to the registered head would find it, up to its usual errors, times the skin's tone: ambient
     [P, 3] of a second-order sky, sunlit [P, 3] the same and a sun that only the head itself blocks; smooth normals [P,
-    3] of the registered head; direct [P, 3]: what the sun would add where nothing blocks it, None where nobody asks for
-    it."""
+    3] of the registered head."""
 
     ambient: np.ndarray
     sunlit: np.ndarray
     normal: np.ndarray
-    direct: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -64,12 +62,11 @@ def fitted_light(transfer: np.ndarray, smooth: np.ndarray, lamps: list[LampOnHea
     normal = smooth + rng.normal(0, 0.05, 3)
     normal = (normal / np.sqrt(np.einsum("ij,ij->i", normal, normal))[:, None]).astype(np.float32)
     tone = tone * np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3))
-    direct = np.zeros_like(lit)
+    sunlit = lit
     if found:
         towards = lamps[main].towards + rng.normal(0, 0.06, 3)
         towards /= np.linalg.norm(towards)
         strength = np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
         direct = np.maximum(normal @ towards, 0)[:, None] * lamps[main].colour * strength
-    sunlit = lit + direct * lamps[main].reach[:, None] if found else lit
-    return FittedLight(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal.astype(np.float32),
-                       (direct * tone).astype(np.float32))
+        sunlit = lit + direct * lamps[main].reach[:, None]
+    return FittedLight(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal)

@@ -77,7 +77,7 @@ def sweep(crowd: Crowd, who: torch.Tensor, visible: torch.Tensor, dice: Dice) ->
 
 
 def misplaced(log: torch.Tensor, even: torch.Tensor,
-               dice: Dice) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+              dice: Dice) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """The mean of what some views see whose registration is off, of a picture and of its shading alike, and how far
     they lie apart [N, 1, S, S]."""
     n, both = len(log), torch.cat([log, even], 1)
