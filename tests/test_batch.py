@@ -21,7 +21,7 @@ from core.batch.known_hashes import known_hashes
 from core.batch.record import read_batch
 from core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, derive_state
 from core.contract import hashes, lease
-from core.contract.messages import Problem
+from core.contract.messages import Problem, Progress
 
 from . import tiny_batch
 from .tiny_batch import core, finished, make, states
@@ -195,6 +195,21 @@ def test_whatever_ends_it_nothing_is_lost_and_it_goes_on(code, tmp_path, way):
     tiny_batch.set_mood(capture, {})
     assert core(code, "batch", "run", batch.root).returncode == 0
     assert states(batch) == {"a": DONE, "b": DONE} and finished(batch)["a"]["cameras"] == once
+
+
+def test_a_stage_that_begins_is_told_at_once_and_how_far_it_is_once_in_a_while(code, tmp_path):
+    batch = make(code, tmp_path, "a")
+    board, face = local.Board(batch, 1, lambda line: None), batch.faces[0]
+
+    def told() -> tuple[str, float]:
+        working = json.loads((batch.root / local.PROGRESS).read_text())["working"]["a"]
+        return working["stage"], working["share"]
+
+    board.write(now=True)
+    for stage, done, expected in (("frames", 0, ("Frames", 0)), ("frames", 1, ("Frames", 0)),
+                                  ("cameras", 0, ("Cameras", 0))):
+        board.hear(face, Progress(stage, done, 2, "Starting"))
+        assert told() == expected
 
 
 def test_what_somebody_else_named_like_the_request_to_stop_is_no_request_and_stays(code, tmp_path):

@@ -62,10 +62,10 @@ class Board:
     def hear(self, face: BatchFace, message: Message) -> None:
         """Keeps what a face's worker says of its progress."""
         if isinstance(message, Progress):
-            share = message.done / message.of if message.of else 0.0
-            self._working[face.name] = {"stage": LABELS[message.stage], "share": round(share, 3),
-                                        "eta_s": message.eta_s}
-            self.write()
+            share, stage = message.done / message.of if message.of else 0.0, LABELS[message.stage]
+            begins = self._working.get(face.name, {}).get("stage") != stage
+            self._working[face.name] = {"stage": stage, "share": round(share, 3), "eta_s": message.eta_s}
+            self.write(now=begins)  # of a stage that begins it may be the only word for a minute
 
     def end(self, face: BatchFace, state: str, words: str) -> None:
         self._working.pop(face.name, None)
@@ -82,7 +82,7 @@ class Board:
         return (time.monotonic() - self._began) / paced * (self._faces - len(self.tally.ended)) if paced else None
 
     def write(self, now: bool = False) -> None:
-        """progress.json, once in a while."""
+        """progress.json, once in a while, or `now`."""
         with self._lock:
             if not now and time.monotonic() - self._written < EVERY_S:
                 return
