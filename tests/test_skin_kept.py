@@ -12,7 +12,7 @@ from .flat_patch import assembled, height_map, paint, seen, sockets, white_world
 
 EXPECTED = """
 ShaderNodeAttribute WildCap Regions: attribute_name=wildcap_roughness
-ShaderNodeGroup WildCap Skin: Specular Amount=1.25, Roughness=0.45, IOR=1.4, Subsurface=1, Subsurface Scale=0.003, Displacement=0, Midlevel=0
+ShaderNodeGroup WildCap Skin: Specular Amount=1.25, Roughness=0.45, IOR=1.4, Subsurface=1, Subsurface Scale=0.003, Displacement=0, Midlevel=0, Oil=0
 ShaderNodeNormalMap WildCap Normal Map: uv_map=UVMap
 ShaderNodeOutputMaterial Material Output
 ShaderNodeTexImage WildCap Albedo: diffuse_albedo.png sRGB, interpolation=Cubic
@@ -27,11 +27,14 @@ WildCap Normal.Color -> WildCap Normal Map.Color
 WildCap Regions.Fac -> WildCap Skin.Region
 WildCap Skin / NodeGroupInput WildCap Input
 WildCap Skin / NodeGroupOutput WildCap Output
-WildCap Skin / ShaderNodeBsdfPrincipled WildCap Principled: subsurface_method=RANDOM_WALK_SKIN, Subsurface Radius=1 0.37 0.19
+WildCap Skin / ShaderNodeBsdfPrincipled WildCap Principled: subsurface_method=RANDOM_WALK_SKIN, Subsurface Radius=1 0.37 0.19, Coat Roughness=0.3, Coat IOR=1.47
 WildCap Skin / ShaderNodeDisplacement WildCap Displacement
+WildCap Skin / ShaderNodeMath WildCap Coat: operation=MULTIPLY
+WildCap Skin / ShaderNodeMath WildCap Oily: operation=MULTIPLY, use_clamp=True, Value=-6.25
 WildCap Skin / ShaderNodeMath WildCap Regions: operation=MULTIPLY_ADD, use_clamp=True
 WildCap Skin / ShaderNodeMath WildCap Specular Level: operation=MULTIPLY, use_clamp=True
 WildCap Skin / ShaderNodeMix WildCap Given Back: B=1.048 1.073 1.078 1
+WildCap Skin / WildCap Coat.Value -> WildCap Principled.Coat Weight
 WildCap Skin / WildCap Displacement.Displacement -> WildCap Output.Displacement
 WildCap Skin / WildCap Given Back.Result -> WildCap Principled.Base Color
 WildCap Skin / WildCap Input.Albedo -> WildCap Given Back.A
@@ -40,6 +43,8 @@ WildCap Skin / WildCap Input.Height -> WildCap Displacement.Height
 WildCap Skin / WildCap Input.IOR -> WildCap Principled.IOR
 WildCap Skin / WildCap Input.Midlevel -> WildCap Displacement.Midlevel
 WildCap Skin / WildCap Input.Normal -> WildCap Principled.Normal
+WildCap Skin / WildCap Input.Oil -> WildCap Coat.Value
+WildCap Skin / WildCap Input.Region -> WildCap Oily.Value
 WildCap Skin / WildCap Input.Region -> WildCap Regions.Value
 WildCap Skin / WildCap Input.Roughness -> WildCap Regions.Value
 WildCap Skin / WildCap Input.Roughness -> WildCap Regions.Value
@@ -48,6 +53,7 @@ WildCap Skin / WildCap Input.Specular Amount -> WildCap Specular Level.Value
 WildCap Skin / WildCap Input.Subsurface -> WildCap Given Back.Fac
 WildCap Skin / WildCap Input.Subsurface -> WildCap Principled.Subsurface Weight
 WildCap Skin / WildCap Input.Subsurface Scale -> WildCap Principled.Subsurface Scale
+WildCap Skin / WildCap Oily.Value -> WildCap Coat.Value
 WildCap Skin / WildCap Principled.BSDF -> WildCap Output.BSDF
 WildCap Skin / WildCap Regions.Value -> WildCap Principled.Roughness
 WildCap Skin / WildCap Specular Level.Value -> WildCap Principled.Specular IOR Level
@@ -108,7 +114,8 @@ def test_a_file_of_version_1_is_rebuilt_inside_and_keeps_what_the_artist_did(pat
                        if line.startswith("WildCap Skin / ")]
     replaced = {"WildCap Given Back.Result -> WildCap Principled.Base Color",
                 "ShaderNodeBsdfPrincipled WildCap Principled: subsurface_method=RANDOM_WALK_SKIN, Subsurface Radius=1 "
-                "0.37 0.19"}
+                "0.37 0.19, Coat Roughness=0.3, Coat IOR=1.47",
+                "WildCap Coat.Value -> WildCap Principled.Coat Weight"}
     assert set(inside_expected) - set(without) <= replaced
     skin.inputs["Specular Amount"].default_value = 2.0
     assembled()

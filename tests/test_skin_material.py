@@ -95,6 +95,29 @@ def test_displacement_is_off_by_default_and_then_in_the_heads_own_metres(patch, 
     assert sunk == pytest.approx([0, 0.2 * math.sin(math.pi / 4), 0.4 * math.sin(math.pi / 4)], abs=0.015)
 
 
+def test_oil_lies_where_skin_is_smoother_than_the_cheeks_and_reflects_as_its_film_does(patch, tmp_path):
+    """A black patch without gloss of its own, all of it nose, forehead or cheek; at normal incidence under even
+    light."""
+    paint(patch, "diffuse_albedo.png", [[(0, 0, 0)] * 4] * 4)
+    paint(patch, "normal.png", [[(0.5, 0.5, 1)] * 4] * 4)
+    material = assembled()
+    skin = sockets(material)
+    assert skin["Oil"].default_value == 0, "none by itself"
+    skin["Specular Amount"].default_value = 0.0
+    for link in list(skin["Region"].links):
+        material.node_tree.links.remove(link)
+    white_world()
+    reflected = {}
+    for oil, region in ((0.0, -0.16), (1.0, 0.0), (1.0, 0.15), (1.0, -0.08), (1.0, -0.16), (1.0, -0.25)):
+        skin["Oil"].default_value, skin["Region"].default_value = oil, region
+        reflected[oil, region] = float(seen(tmp_path / "oil.exr", samples=256).mean())
+    film = ((1.47 - 1) / (1.47 + 1)) ** 2
+    assert max(reflected[0.0, -0.16], reflected[1.0, 0.0], reflected[1.0, 0.15]) < 1e-3, reflected
+    assert reflected[1.0, -0.16] == pytest.approx(film, rel=0.1)
+    assert reflected[1.0, -0.08] == pytest.approx(reflected[1.0, -0.16] / 2, rel=0.1)
+    assert reflected[1.0, -0.25] == pytest.approx(reflected[1.0, -0.16], rel=0.1), "no more than one film"
+
+
 def test_the_regions_are_rougher_or_smoother_than_the_cheeks(addon):
     """On the built-in head, at the vertices nearest to a few places."""
     regions = addon("relight.regions")

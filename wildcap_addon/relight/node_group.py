@@ -4,6 +4,7 @@
 
     Albedo, what scattering loses of it given back -> Base Color
     Specular x Specular Amount, clamped -> Specular IOR Level        Roughness x (1 + Region) -> Roughness
+    Oil, where Region is smoother than the cheeks -> Coat Weight
     Height, Midlevel, Displacement -> Displacement, in the object's own units
 
 Sockets are addressed by name, which is the same from Blender 4.2 to 5.x. A group of an older version is rebuilt inside:
@@ -13,7 +14,7 @@ sockets, their values, and an artist's own nodes and links stay.
 import bpy
 
 NAME = "WildCap Skin"
-VERSION = 3
+VERSION = 4
 
 SCATTERING_M = 0.003
 """Scale of the scattering, 3 mm, by which SCATTERING_RGB is multiplied"""
@@ -25,6 +26,10 @@ mean over six tones of `python -m benchmarks.even_light`. The other random walk 
 TYPICAL_SPECULAR = 0.35
 """Mean of the specular map on cheeks and forehead where nobody measured it. The map holds levels for an IOR of 1.5, of
 which 0.35 is skin's 2.8 percent"""
+OILY = -0.16
+"""Region of the nose, where a full coat of Oil lies; the forehead has some two thirds of it, the cheeks none"""
+SEBUM_IOR, SEBUM_ROUGHNESS = 1.47, 0.3
+"""The film's, of what skin secretes (squalene 1.49, triglycerides 1.46); smoother than the skin below, by eye"""
 
 # name, socket type, default, range, tooltip; what the maps feed comes first
 INPUTS = (
@@ -45,6 +50,8 @@ INPUTS = (
      "How far the surface stands out, in metres of the head's own space"),
     ("Displacement", 'NodeSocketFloat', 0.0, (0.0, 10.0), "Times the height; 1 is the scan's own relief, 0 is none"),
     ("Midlevel", 'NodeSocketFloat', 0.0, (-10.0, 10.0), "Height that displaces nothing"),
+    ("Oil", 'NodeSocketFloat', 0.0, (0.0, 1.0),
+     "A thin shining film on nose, forehead, lids and lips. No capture tells how much there is: 0 is none"),
 )
 OUTPUTS = (("BSDF", 'NodeSocketShader'), ("Displacement", 'NodeSocketVector'))
 
@@ -54,6 +61,8 @@ NODES = (
     ("WildCap Given Back", 'ShaderNodeMix', None, (-400, 340)),
     ("WildCap Specular Level", 'ShaderNodeMath', "Math", (-400, 80)),
     ("WildCap Regions", 'ShaderNodeMath', None, (-400, -120)),
+    ("WildCap Oily", 'ShaderNodeMath', None, (-400, -320)),
+    ("WildCap Coat", 'ShaderNodeMath', None, (-200, -320)),
     ("WildCap Principled", 'ShaderNodeBsdfPrincipled', "Principled BSDF", (0, 0)),
     ("WildCap Displacement", 'ShaderNodeDisplacement', None, (0, -420)),
     ("WildCap Output", 'NodeGroupOutput', "Group Output", (340, 0)),
@@ -67,6 +76,8 @@ LINKS = (
     ("WildCap Input", "Region", "WildCap Regions", 0), ("WildCap Input", "Roughness", "WildCap Regions", 1),
     ("WildCap Input", "Roughness", "WildCap Regions", 2),
     ("WildCap Regions", 0, "WildCap Principled", "Roughness"),
+    ("WildCap Input", "Region", "WildCap Oily", 0), ("WildCap Oily", 0, "WildCap Coat", 0),
+    ("WildCap Input", "Oil", "WildCap Coat", 1), ("WildCap Coat", 0, "WildCap Principled", "Coat Weight"),
     ("WildCap Input", "Subsurface", "WildCap Given Back", MIX_FACTOR),
     ("WildCap Input", "Albedo", "WildCap Given Back", MIX_A),
     ("WildCap Given Back", MIX_RESULT, "WildCap Principled", "Base Color"),
@@ -126,7 +137,13 @@ def _nodes(group) -> dict[str, bpy.types.Node]:
 def _set_up(nodes: dict[str, bpy.types.Node]) -> None:
     nodes["WildCap Specular Level"].operation, nodes["WildCap Specular Level"].use_clamp = 'MULTIPLY', True
     nodes["WildCap Regions"].operation, nodes["WildCap Regions"].use_clamp = 'MULTIPLY_ADD', True
+    nodes["WildCap Oily"].operation, nodes["WildCap Oily"].use_clamp = 'MULTIPLY', True
+    nodes["WildCap Oily"].inputs[1].default_value = 1 / OILY
+    nodes["WildCap Coat"].operation = 'MULTIPLY'
     shader = nodes["WildCap Principled"]
+    if not shader.inputs["Coat Weight"].default_value:  # else an artist's own coat, inside of an older version
+        shader.inputs["Coat IOR"].default_value = SEBUM_IOR
+        shader.inputs["Coat Roughness"].default_value = SEBUM_ROUGHNESS
     shader.subsurface_method = 'RANDOM_WALK_SKIN'
     shader.inputs["Subsurface Radius"].default_value = SCATTERING_RGB
     back = nodes["WildCap Given Back"]
@@ -137,9 +154,11 @@ def _set_up(nodes: dict[str, bpy.types.Node]) -> None:
 
 
 def _wire(group) -> None:
-    """Links ours with each other; where an artist's node feeds one of ours, it goes on doing so."""
+    """Links ours with each other; where an artist's node feeds one of ours, or their own coat lies on it, it goes on
+    doing so."""
     for source, output, target, socket in LINKS:
         into = group.nodes[target].inputs[socket]
-        if into.is_linked and into.links[0].from_node.name not in {name for name, *_ in NODES}:
+        theirs = into.is_linked and into.links[0].from_node.name not in {name for name, *_ in NODES}
+        if theirs or socket == "Coat Weight" and into.default_value:
             continue
         group.links.new(group.nodes[source].outputs[output], into)
