@@ -202,8 +202,7 @@ def test_a_stage_that_begins_is_told_at_once_and_how_far_it_is_once_in_a_while(c
     board, face = local.Board(batch, 1, lambda line: None), batch.faces[0]
 
     def told() -> tuple[str, float]:
-        working = json.loads((batch.root / local.PROGRESS).read_text())["working"]["a"]
-        return working["stage"], working["share"]
+        return tuple(json.loads((batch.root / local.PROGRESS).read_text())["working"]["a"].values())[:2]
 
     board.write(now=True)
     for stage, done, expected in (("frames", 0, ("Frames", 0)), ("frames", 1, ("Frames", 0)),
