@@ -36,7 +36,7 @@ from core.solve.tone import SIZE, estimate_from_frames, estimate_from_texture
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.pigment import reflectance
 from core.synthetic.sample import RESERVED
-from core.training.prior import HELD_OUT_SEED
+from core.training.seeds import HELD_OUT_SEED
 from core.training.tones import PHONES, photographed, scenes_of
 
 from .figures import write

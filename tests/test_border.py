@@ -47,6 +47,26 @@ def test_where_the_light_is_even_nothing_is_missing():
     assert border.missing(1 / light, 0 * mask, torch.ones(SIZE, SIZE), TEXEL).max() == 0, "and no mask has no border"
 
 
+def test_steps_that_differ_more_than_a_delighter_leaves_are_mostly_the_skins_own():
+    """A border of which a part runs along a beard: the share of its steps that is light falls as their variance
+    grows."""
+    light, mask = light_and_mask(0.1)
+    bearded = torch.from_numpy((np.abs(Y - 512) < 200).astype(np.float32))
+    clean = border.missing(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()
+    steps = []
+    for dark in (0.9, 0.6, 0.3):
+        beard_inside = light * (1 - (1 - dark) * bearded * mask)
+        value = beard_inside.log().mean(0).numpy()
+        seen, sure = border.border_steps(value, mask.numpy(), np.ones((SIZE, SIZE), np.float32), TEXEL)
+        share, found = border.share_of_light(seen, sure), border.missing(beard_inside, mask, torch.ones(SIZE, SIZE),
+                                                                         TEXEL).numpy()
+        assert share == pytest.approx(min(1, border.LEFT**2 / border.spread(seen, sure)[1] ** 2))
+        steps.append((share, found[128, int(430 / TEXEL)]))
+    (least, alike), (_, some), (most, unlike) = steps
+    assert least == 1 and most < 0.2, steps
+    assert alike > clean[128, int(430 / TEXEL)] and unlike < 0.25, "a beard of 70 % is not taken for 70 % of the light"
+
+
 def test_the_outline_of_what_was_seen_is_no_border_and_far_from_one_nothing_is_known():
     light, _ = light_and_mask(0.0)
     seen = torch.from_numpy((X < 600).astype(np.float32))

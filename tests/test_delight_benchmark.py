@@ -127,7 +127,7 @@ def test_a_folder_without_photographs_is_refused(tmp_path):
 
 
 def test_portraits_are_of_people_that_no_training_sees(monkeypatch):
-    from core.training.prior import HELD_OUT_SEED
+    from core.training.seeds import HELD_OUT_SEED
 
     assert delight_portraits.FIRST_SEED > HELD_OUT_SEED
     seeds = delight_portraits.subjects_by_tone(1)

@@ -20,6 +20,7 @@ from core.synthetic.people import figure, snapshot, unlit
 from core.training import descent, snapshots
 from core.training import parser as training
 from core.training.descent import TrainingRun
+from core.training.seeds import named_subjects
 
 QUIET = Reporter("train", emit=lambda message: None)
 SEED, VIEWS = 3, 2  # a man with cropped hair, a full beard and open eyes
@@ -172,7 +173,7 @@ def test_the_shipped_network_knows_the_parts_of_somebody_it_never_saw(work):
 
 def test_nothing_is_learnt_from_people_that_are_measured():
     for config in training.CONFIGS.values():
-        named = training.named_figures(config["training"])
+        named = named_subjects(config["training"]["figures"], config["training"]["held_out"])
         assert len(set(named["seeds"])) == config["training"]["figures"] and not set(named["seeds"]) & set(
             named["held_out_seeds"]
         )

@@ -210,7 +210,7 @@ def test_a_seed_is_one_person(someone):
 
 def test_training_never_draws_a_person_who_is_filmed():
     from benchmarks import likenesses
-    from core.training.prior import FIRST_SEED, HELD_OUT_SEED
+    from core.training.seeds import FIRST_SEED, HELD_OUT_SEED
 
     filmed = {each.seed for each in (*likenesses.LIKENESSES, *likenesses.HELD_BACK)}
     assert len(filmed) == 8 and filmed <= reserved_seeds()

@@ -4,17 +4,19 @@
 
 from __future__ import annotations
 
+from .. import shadow_steps
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
 
 TITLE = "Shadow masks"
-SAYS = "the proposed mask against the true shadow, and what a shadow that is masked exactly leaves in the albedo"
-RECORDS = ("shadow_mask", "painted_shadow")
+SAYS = ("the proposed mask against the true shadow, what a shadow that is masked exactly leaves in the albedo, and how "
+        "much of a step along a mask's border is light")
+RECORDS = ("shadow_mask", "painted_shadow", "shadow_steps")
 SCORES = {"true": "true", "masked": "masked", "iou": "IoU", "precision": "precision", "recall": "recall",
           "border_f": "border F"}
 
 
-def sections(proposed: Figures, painted: Figures) -> Sections:
+def sections(proposed: Figures, painted: Figures, steps: Figures) -> Sections:
     seconds = proposed.processor_seconds
     return [("The mask that finds itself", prose("""
         The proposal against the true shadow (where the sun does not reach, the side turned away included), over the
@@ -37,4 +39,12 @@ def sections(proposed: Figures, painted: Figures) -> Sections:
             [f"{row.light:.1f}", row.mask, f"{100 * row.left:.0f} %"] for row in painted.rows.values()]), """
         After a delighter local light is held to what the shadow's own border says is missing (`core/solve/border.py`),
         for a proposal takes dark skin and beards along. What the artist adds to the proposal is taken at its word.
-        """))]
+        """)),
+        ("Steps along a mask's border", prose("""
+        Inside of M less outside, natural log, mean ± deviation along its border: what the delighter took out; what the
+        solver sees, its texture over the mean face in its light; and what is left of the light in truth. The last
+        differs by much the same on every capture, whatever is seen: what is seen beyond it is skin's own (a beard
+        along whose edge the mask runs). So the solver takes LEFT^2 over the variance of what it sees for light. *Taken
+        for light*: that share, with LEFT from the other captures alone; *best*: the slope of the true steps on those
+        that are seen.
+        """, shadow_steps.table(steps.rows)))]

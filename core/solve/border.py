@@ -5,6 +5,10 @@ differs on its two sides is light.
 
 Inside a shadow a darker skin and a lesser light look the same; at its edge they do not. What the steps along the border
 say holds for some way inwards, less the farther in and the shorter the border is that says it.
+
+But a border may run along a beard, whose steps are of all sizes. Those that a delighter left differ along a border by
+LEFT, whatever the capture; what they differ by more than that is skin's own, and with both taken for Gaussians the
+light's share of each step is LEFT^2 over the variance (Wiener 1949).
 """
 
 from __future__ import annotations
@@ -24,6 +28,8 @@ WINDOW = 8.0  # deviation of the windows over which a side is averaged
 INWARDS = 40.0  # deviation over which a step holds for what is around it
 LITTLE = 0.05  # share of a window of INWARDS that border must fill, for its step to hold by half
 DARKEST = 0.9  # more of the light than this never goes
+# deviation, along M's border, of the step in the light that a delighter left, natural log: benchmarks/shadow_steps.py
+LEFT = 0.14
 
 
 def missing(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texel: float) -> torch.Tensor:
@@ -34,21 +40,41 @@ def missing(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texe
     weight [S, S]: how far a texel tells of light, 0 off the facial skin, so that the outline of the face is no border;
     `texel` is the side of one in texels of a 1024 map.
     """
-    inside = alpha.numpy() > 0.5
-    if not inside.any() or inside.all():
-        return torch.zeros_like(alpha)
-    depth = signed_distance(inside) * texel  # negative inside
     value = np.log(np.clip(light.numpy(), 0.05, 4)).mean(0).astype(np.float32)
-    near = weight.numpy() * np.clip(1.5 - np.abs(np.abs(depth) - AWAY) / BAND, 0, 1) * (np.abs(depth) > 2)
+    steps, sure = border_steps(value, alpha.numpy(), weight.numpy(), texel)
+    step = _blurred(-sure * steps, INWARDS / texel) / (_blurred(sure, INWARDS / texel) + LITTLE)
+    share = 1 - np.exp(-np.maximum(share_of_light(steps, sure) * step, 0))
+    return torch.from_numpy(share.clip(0, DARKEST).astype(np.float32))
+
+
+def border_steps(value: np.ndarray, alpha: np.ndarray, weight: np.ndarray,
+                 texel: float) -> tuple[np.ndarray, np.ndarray]:
+    """By how much values [S, S] are larger inside of M than outside, at the places of its border [S, S], and how surely
+    that is known [S, S] in [0, 1], 0 away from the border; alpha, weight and texel as in `missing`."""
+    inside = alpha > 0.5
+    if not inside.any() or inside.all():
+        return np.zeros_like(value), np.zeros_like(value)
+    depth = signed_distance(inside) * texel  # negative inside
+    near = weight * np.clip(1.5 - np.abs(np.abs(depth) - AWAY) / BAND, 0, 1) * (np.abs(depth) > 2)
     sides, known = [], []
     for side in (depth < 0, depth > 0):
         share = _blurred(near * side, WINDOW / texel)
         sides.append(_blurred(near * side * value, WINDOW / texel) / np.maximum(share, 1e-4))
         known.append(share)
     sure = np.minimum(*known) * (np.abs(depth) < REACH)
-    sure = np.where(sure > 0.02, sure / max(float(sure.max()), 1e-6), 0)
-    step = _blurred(sure * (sides[1] - sides[0]), INWARDS / texel) / (_blurred(sure, INWARDS / texel) + LITTLE)
-    return torch.from_numpy((1 - np.exp(-np.maximum(step, 0))).clip(0, DARKEST).astype(np.float32))
+    return sides[0] - sides[1], np.where(sure > 0.02, sure / max(float(sure.max()), 1e-6), 0)
+
+
+def share_of_light(steps: np.ndarray, sure: np.ndarray) -> float:
+    """The share in (0, 1] of the steps of `border_steps` that is light, and no skin."""
+    return LEFT**2 / max(spread(steps, sure)[1] ** 2, LEFT**2)
+
+
+def spread(values: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
+    """Mean and deviation of values [S, S] under a weight [S, S]; zeros without any."""
+    total = max(float(weight.sum()), 1e-6)
+    mean = float((weight * values).sum()) / total
+    return mean, (float((weight * (values - mean) ** 2).sum()) / total) ** 0.5
 
 
 def _blurred(image: np.ndarray, sigma: float) -> np.ndarray:

@@ -92,9 +92,7 @@ def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float,
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
     recipe = begun.recipe
     evidence = replace(evidence, texture=evidence.texture / enlarged(begun.local, evidence.size).exp())
-    shading = torch.einsum("ck,khw->chw", begun.state.lights.glob, shading_basis(evidence.normal))
-    lit = shading * albedo_of(begun.reference).clamp_min(1e-3)
-    light = evidence.texture * begun.exposure / lit.clamp_min(1e-3)
+    light = remaining_light(evidence, begun)
     if recipe.sharp_edges:
         evidence = with_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))
     evidence = replace(evidence, alpha=mask(evidence.alpha))
@@ -107,6 +105,13 @@ def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float,
         evidence, marks = with_marks(evidence, witness)
     return replace(begun, alpha=evidence.alpha, marks=tuple(marks),
                    observations=observations(evidence, begun.exposure, cell, prior.multiple, recipe))
+
+
+def remaining_light(evidence: Evidence, begun: Start) -> torch.Tensor:
+    """The texture over the reference face in its global light [3, S, S], linear: about 1, less where light is missing
+    or the skin is darker."""
+    shading = torch.einsum("ck,khw->chw", begun.state.lights.glob, shading_basis(evidence.normal))
+    return evidence.texture * begun.exposure / (shading * albedo_of(begun.reference).clamp_min(1e-3)).clamp_min(1e-3)
 
 
 def lit_skin(evidence: Evidence) -> torch.Tensor:

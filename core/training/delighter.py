@@ -15,8 +15,6 @@ the others: what is drawn then depends on when.
 
 from __future__ import annotations
 
-import math
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -28,12 +26,12 @@ from torch.utils.data import Dataset
 from ..contract.messages import Problem, Reporter
 from ..delight.unet import DelightNet
 from ..solve.prior import fast_dtype
-from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .people import People, is_prepared, prepare_people
 from .portraits import PortraitBatch, Portraits, mirrored, prepare
-from .prior import FIRST_SEED, HELD_OUT_SEED, named_data
+from .prior import named_data
 from .release import TrainingCard, again, release
+from .seeds import held_out_seeds, panorama_names, training_seeds
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
@@ -80,13 +78,10 @@ def train_delighter(config: str, out: Path, report: Reporter, run: descent.Train
     Problem : where the work folder holds a training on other data, or, growing, no people yet
     """
     hdri, start = run.hdri, run.start
-    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_delighter")
-    work.mkdir(parents=True, exist_ok=True)
-    t = CONFIGS[config]["training"]
-    device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
-    data = named_data(t, skins,
-                      held_out) | {"panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
-                                   "people": _people(t), "started": "the weights before" if start else "random weights"}
+    work, t, device = descent.work_folder(run, "delighter"), CONFIGS[config]["training"], descent.device_of(config)
+    data = named_data(t, skins, held_out) | {
+        "panoramas": panorama_names(hdri), "people": training_seeds(t["people"]),
+        "started": "the weights before" if start else "random weights"}
     if not run.growing:
         prepare_delighter(config, work, report)
     if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind])
@@ -104,10 +99,7 @@ def train_delighter(config: str, out: Path, report: Reporter, run: descent.Train
     if start:
         network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
-                                    rate=lambda step,
-                                    share: t["rate"] * min(1.0, (step + 1) / 200)
-                                    * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 200, 0.01),
                                     betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"],
                                     save_every=600)
     objective = descent.Objective(
@@ -124,14 +116,8 @@ def prepare_delighter(config: str, work: Path, report: Reporter) -> None:
     """The sights of all people, those of the held-out ones first."""
     t = CONFIGS[config]["training"]
     work.mkdir(parents=True, exist_ok=True)
-    prepare_people([*range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"]), *_people(t)], t["views"], work, report,
+    prepare_people(held_out_seeds(t["held_out"]) + training_seeds(t["people"]), t["views"], work, report,
                    max(2, t["workers"]))
-
-
-def _people(t: dict) -> list[int]:
-    """Seeds of the people to learn from."""
-    return [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["people"])
-            if seed not in reserved_seeds()][:t["people"]]
 
 
 def losses(network: DelightNet, batch: PortraitBatch, device: str) -> dict[str, torch.Tensor]:

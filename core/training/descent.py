@@ -9,6 +9,8 @@ seconds, history, network, optimiser, average, and what else the training keeps.
 
 from __future__ import annotations
 
+import math
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -61,6 +63,27 @@ class TrainingRecipe:
     averaging: float
     workers: int
     save_every: float
+
+
+def work_folder(run: TrainingRun, training: str) -> Path:
+    """The folder of a run of `train NAME`, made if it is not there."""
+    work = Path(run.work or Path(tempfile.gettempdir()) / f"wildcap_{training}")
+    work.mkdir(parents=True, exist_ok=True)
+    return work
+
+
+def device_of(config: str) -> str:
+    """Every configuration but `cpu` is for a graphics card, where there is one."""
+    return "cuda" if config != "cpu" and torch.cuda.is_available() else "cpu"
+
+
+def cosine(rate: float, warming: int, least: float) -> Callable[[int, float], float]:
+    """A learning rate that grows over the first `warming` steps, then falls along half a cosine to `least` of `rate`
+    (Loshchilov and Hutter 2017)."""
+    def at(step: int, share: float) -> float:
+        return rate * min(1.0, (step + 1) / warming) * max(least, 0.5 + 0.5 * math.cos(math.pi * share))
+
+    return at
 
 
 def beginning(config: str, data: dict, network: torch.nn.Module, **more) -> dict:

@@ -30,12 +30,12 @@ from ..face.glasses import MOST_YAW_DEG, WEIGHTS, band, describe
 from ..geometry import raster
 from ..geometry.views import View
 from ..synthetic.environments import read_panoramas
-from ..synthetic.identities import reserved_seeds
 from ..synthetic.people import glasses, unlit
 from ..synthetic.people.figure import make_figure
 from ..synthetic.people.snapshot import photograph
+from .seeds import held_out_seeds, training_seeds
 
-FIRST_SEED, HELD_OUT_SEED, HELD_OUT = 3000, 9000, 4
+FIRST_SEED, HELD_OUT = 3000, 4
 VIEWS, SIZE, MARGIN, TEXELS = 6, 272, 1.6, 512
 """Of each figure, and of a view: its side in pixels and in sides of the face's landmarks; texels of a figure's maps."""
 RIDGE = 0.1
@@ -90,8 +90,7 @@ def train(figures: int, pictures: int, work: Path, out: Path, hdri: Path | None,
 
 def seeds(figures: int) -> tuple[list[int], list[int]]:
     """Who is learnt from and who is kept from it."""
-    return ([seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * figures) if seed not in reserved_seeds()][:figures],
-            list(range(HELD_OUT_SEED, HELD_OUT_SEED + HELD_OUT)))
+    return training_seeds(figures, FIRST_SEED), held_out_seeds(HELD_OUT)
 
 
 def prepare(of: list[int], work: Path, report: Reporter) -> None:

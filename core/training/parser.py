@@ -14,8 +14,6 @@ process prepares the others: what is drawn then depends on when.
 
 from __future__ import annotations
 
-import math
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -26,10 +24,9 @@ from torch.utils.data import Dataset
 from ..contract.messages import Problem, Reporter
 from ..face.parser_network import ParseNet
 from ..face.parts import PARTS
-from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
-from .prior import FIRST_SEED, HELD_OUT_SEED
 from .release import TrainingCard, again, release
+from .seeds import named_subjects, panorama_names
 from .snapshots import SnapshotBatch, Snapshots, is_prepared, prepare
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "parser.safetensors"
@@ -71,12 +68,8 @@ def train_parser(config: str, out: Path, report: Reporter, run: descent.Training
     Problem : where the work folder holds a training on other data, or, growing, none of its figures yet
     """
     hdri = run.hdri
-    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_parser")
-    work.mkdir(parents=True, exist_ok=True)
-    t = CONFIGS[config]["training"]
-    device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
-    data = named_figures(t) | {"panoramas": sorted(p.name for p in Path(hdri).iterdir()
-                                                   if p.suffix.lower() in (".hdr", ".exr")) if hdri else []}
+    work, t, device = descent.work_folder(run, "parser"), CONFIGS[config]["training"], descent.device_of(config)
+    data = named_subjects(t["figures"], t["held_out"]) | {"panoramas": panorama_names(hdri)}
     if not run.growing:
         prepare_figures(config, work, report)
     if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
@@ -87,10 +80,7 @@ def train_parser(config: str, out: Path, report: Reporter, run: descent.Training
     torch.manual_seed(t["seed"])
     network = ParseNet(**CONFIGS[config]["model"])
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
-                                    rate=lambda step,
-                                    share: t["rate"] * min(1.0, (step + 1) / 100)
-                                    * max(0.02, 0.5 + 0.5 * math.cos(math.pi * share)),
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 100, 0.02),
                                     betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"],
                                     save_every=150)
     objective = descent.Objective(Steps(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step,
@@ -100,18 +90,10 @@ def train_parser(config: str, out: Path, report: Reporter, run: descent.Training
     return export(work, out)
 
 
-def named_figures(t: dict) -> dict:
-    """Who is learnt from and who is kept from it."""
-    seeds = [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["figures"])
-             if seed not in reserved_seeds()][:t["figures"]]
-    return {"seeds": seeds, "held_out_seeds": list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"])), "skins": [],
-            "held_out_skins": [], "notices": []}
-
-
 def prepare_figures(config: str, work: Path, report: Reporter) -> None:
     """The sights of all figures, those of the held-out ones first."""
     t = CONFIGS[config]["training"]
-    named = named_figures(t)
+    named = named_subjects(t["figures"], t["held_out"])
     work.mkdir(parents=True, exist_ok=True)
     prepare(named["held_out_seeds"] + named["seeds"], t["views"], work, report)
 

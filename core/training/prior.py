@@ -15,7 +15,6 @@ painted over). Such skins teach the diffuse channels only.
 from __future__ import annotations
 
 import json
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +24,10 @@ from torch.utils.data import Dataset
 from ..contract.messages import Problem, Reporter
 from ..solve.network import UNet, denoise
 from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype, packed
-from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .patches import PatchBatch, Windows, mean_map, reference_skins, spread_about
 from .release import TrainingCard, again, release
+from .seeds import named_subjects
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
 OCTAVES = 6
@@ -47,10 +46,6 @@ CONFIGS = {
 """`wide_every`: every so many steps the windows are twice as wide and a quarter as many."""
 SIGMA = {1: (-2.4, 1.2), 2: (-1.8, 1.3), 4: (-1.0, 1.5)}
 """Mean and deviation of ln sigma per scale: the solver sees the coarse maps at high noise and the fine ones at low."""
-FIRST_SEED = 1000
-"""Training takes the seeds from here on, held-out skins those from HELD_OUT_SEED on; the sample subject's and the
-benchmarks' are reserved."""
-HELD_OUT_SEED = 9000
 BLINDFOLDED = 0.25
 """Share of the whole skins' windows whose normals and specular go in as pure noise, as all of those do that have none:
 they must follow from the diffuse, of which more is then to be seen (ln sigma lower by CLEARER)."""
@@ -78,10 +73,7 @@ def train_prior(config: str, out: Path, report: Reporter, run: descent.TrainingR
     ------
     Problem : where `skins` is no carried folder, or the work folder holds a training on other data
     """
-    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_prior")
-    work.mkdir(parents=True, exist_ok=True)
-    t = CONFIGS[config]["training"]
-    device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
+    work, t, device = descent.work_folder(run, "prior"), CONFIGS[config]["training"], descent.device_of(config)
     data = named_data(t, skins, held_out)
     windows, seen, unseen = _windows(data, skins, work, report)
     held_out_windows = {kind: Windows(s, real=0.5).draw(96, t["patch"], np.random.default_rng(1))
@@ -96,12 +88,12 @@ def train_prior(config: str, out: Path, report: Reporter, run: descent.TrainingR
     def figures(average: dict) -> dict:
         return {kind: _held_out_loss(average, statistics, config, b, device) for kind, b in held_out_windows.items()}
 
-    # constant, then linear to zero over the second half
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
-                                    rate=lambda step,
-                                    share: t["rate"] * min(1.0, (step + 1) / 200)
-                                    * max(0.02, min(1.0, 2 * (1 - share))),
-                                    betas=(0.9, 0.99), weight_decay=1e-3, averaging=0.9995, workers=t["workers"],
+    def rate(step: int, share: float) -> float:
+        """Constant, then linear to zero over the second half."""
+        return t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share)))
+
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], rate, betas=(0.9, 0.99), weight_decay=1e-3,
+                                    averaging=0.9995, workers=t["workers"],
                                     save_every=120)
     descent.descend(network, state, descent.Objective(_PriorSteps(windows, t), loss, figures), recipe, work, device,
                     report)
@@ -130,10 +122,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
 
 def named_data(t: dict, skins: Path | None, held_out: list[str]) -> dict:
     """What is trained on and what is kept from it, by name."""
-    seeds = [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["skins"])
-             if seed not in reserved_seeds()][:t["skins"]]
-    data = {"seeds": seeds, "held_out_seeds": list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"])), "from": "",
-            "skins": [], "held_out_skins": [], "notices": []}
+    data = named_subjects(t["skins"], t["held_out"])
     if skins is None:
         return data
     names = carried_names(skins)

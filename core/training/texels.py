@@ -14,8 +14,6 @@ people that are there while another process makes the others.
 
 from __future__ import annotations
 
-import math
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -29,10 +27,9 @@ from ..delight.packed import pack, unpack
 from ..delight.texel_net import BANDS, TexelNet
 from ..delight.texels import SIDE
 from ..solve.prior import fast_dtype
-from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
-from .prior import FIRST_SEED, HELD_OUT_SEED
 from .release import TrainingCard, again, card_before, release
+from .seeds import named_subjects, panorama_names
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
 from .texel_batches import (
     TexelBatch,
@@ -82,15 +79,10 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
     Problem : where the work folder holds a training on other data, or, growing, no people yet
     """
     hdri, start = run.hdri, run.start
-    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_texels")
-    work.mkdir(parents=True, exist_ok=True)
-    t = CONFIGS[config]["training"]
-    device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
-    data = {"seeds": _people(t), "held_out_seeds": _held_out(t),
-            "panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
-            "started": "the weights before" if start else "random weights", "before": card_before(start),
-            "from": "", "skins": [],
-            "held_out_skins": [], "notices": []}
+    work, t, device = descent.work_folder(run, "texels"), CONFIGS[config]["training"], descent.device_of(config)
+    data = named_subjects(t["people"], t["held_out"]) | {
+        "panoramas": panorama_names(hdri), "started": "the weights before" if start else "random weights",
+        "before": card_before(start)}
     if not run.growing:
         prepare(config, work, report)
     if not all(is_prepared(data[kind], work) for kind in ("seeds", "held_out_seeds")):
@@ -104,10 +96,7 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
     if start:
         network.load_state_dict(unpack(load_file(start)))
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
-                                    rate=lambda step,
-                                    share: t["rate"] * min(1.0, (step + 1) / 200)
-                                    * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 200, 0.01),
                                     betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=0, save_every=180)
     objective = descent.Objective(_TexelSteps(UnfoldedPeople(data["seeds"], work, device), t, run.growing),
                                   lambda batch, step, share: sum(losses(network, batch, device).values()),
@@ -119,7 +108,8 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
 def prepare(config: str, work: Path, report: Reporter) -> None:
     """Makes the people that the work folder lacks, those held out first."""
     t = CONFIGS[config]["training"]
-    prepare_people([*_held_out(t), *_people(t)], work, report)
+    named = named_subjects(t["people"], t["held_out"])
+    prepare_people(named["held_out_seeds"] + named["seeds"], work, report)
 
 
 def losses(network: TexelNet, batch: TexelBatch, device: str) -> dict[str, torch.Tensor]:
@@ -226,16 +216,6 @@ class _TexelSteps(Dataset):
         batch = self.people.draw(max(1, self.t["pairs"] // 2) if fine else self.t["pairs"], SIDE if fine else SIDE // 2,
                                  rng)
         return mirrored(batch) if step % 2 else batch
-
-
-def _people(t: dict) -> list[int]:
-    """Seeds of the people to learn from."""
-    return [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["people"])
-            if seed not in reserved_seeds()][:t["people"]]
-
-
-def _held_out(t: dict) -> list[int]:
-    return list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"]))
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -29,7 +29,7 @@ from ..synthetic import light, pigment
 from ..synthetic.exposure import phone_exposure
 from ..synthetic.parameters import sample_parameters
 from ..synthetic.skin import make_skin
-from .prior import FIRST_SEED, HELD_OUT_SEED
+from .seeds import FIRST_SEED, HELD_OUT_SEED
 
 SIZE = 32  # texels along a side: the skin's mean needs no detail
 PHONES = 2  # pictures of each subject in each light, each by another phone before other surroundings

@@ -11,8 +11,6 @@ Needs neither Blender nor the internet. A second run goes on where the first was
 
 from __future__ import annotations
 
-import math
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +23,8 @@ from ..upscale.enlarge import WEIGHTS
 from ..upscale.network import MISSED, Rcan, bicubic
 from . import command_line, descent
 from .fine_windows import FineWindows, prepare
-from .prior import named_data
 from .release import TrainingCard, again, release
+from .seeds import named_subjects
 
 _MODEL = {"groups": 5, "blocks": 10, "width": 64}
 CONFIGS = {
@@ -71,11 +69,8 @@ def train_upscaler(config: str, out: Path, report: Reporter, run: descent.Traini
     ------
     Problem : where the work folder holds a training of another configuration
     """
-    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_upscaler")
-    work.mkdir(parents=True, exist_ok=True)
-    t = CONFIGS[config]["training"]
-    device = "cuda" if config != "cpu" and torch.cuda.is_available() else "cpu"
-    data = named_data(t, None, [])
+    work, t, device = descent.work_folder(run, "upscaler"), CONFIGS[config]["training"], descent.device_of(config)
+    data = named_subjects(t["skins"], t["held_out"])
     for seeds in (data["seeds"], data["held_out_seeds"]):
         prepare(seeds, t["views"], work, report, max(2, t["workers"]))
     held_out = FineWindows(data["held_out_seeds"], t["views"],
@@ -87,10 +82,7 @@ def train_upscaler(config: str, out: Path, report: Reporter, run: descent.Traini
     def loss(batch, step, share):
         return _error(network, batch, device, max(growth for growth in GROWTH if growth[0] <= share)[1]).mean()
 
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
-                                    rate=lambda step,
-                                    share: t["rate"] * min(1.0, (step + 1) / 100)
-                                    * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 100, 0.01),
                                     betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"],
                                     save_every=180)
     objective = descent.Objective(_UpscalerSteps(FineWindows(data["seeds"], t["views"], work), t), loss,
