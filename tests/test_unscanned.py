@@ -16,7 +16,7 @@ from core.contract.settings import from_json
 from core.geometry import meshes
 from core.geometry.views import read_points, read_views
 from core.imaging import images
-from core.registration import constraints, quality, silhouettes
+from core.registration import constraints, quality, silhouettes, unscanned
 from core.synthetic import painted_head
 
 AZIMUTHS = (-72, -36, 0, 36, 72)
@@ -123,6 +123,27 @@ def test_an_outline_is_found_to_a_fraction_of_a_millimetre(fitted):
     moved = silhouettes.compare(outline, truth.moved(truth.vertices + 0.003 * towards), edges, follow, 0.006)
     expected = -0.003 * (moved.direction @ towards)
     assert np.median(np.abs(moved.distance - expected)) < 1e-3
+
+
+def test_where_a_scan_ends_the_outlines_bring_the_jaw_in_and_what_lies_on_the_scan_stays(fitted):
+    """The true head with a jaw that is 5 mm too narrow beside a scan of the middle of the face."""
+    capture, _ = fitted
+    model, truth = registration.load_model(), painted_head.person()[0].mesh
+    views, report = read_views(capture), Reporter("registration")
+    marks = registration.landmarks.with_artists(registration.landmarks.find(views, report, 100), {})
+    subject = registration._subject(marks, report)
+    aside = np.abs(truth.vertices[:, 0])
+    beside = np.clip((aside - 0.035) / 0.025, 0, 1)
+    narrow = truth.vertices - 0.005 * beside[:, None] * np.sign(truth.vertices[:, :1]) * [1, 0, 0]
+    shown = registration._shown(capture, views, subject, report)
+    found = unscanned.beyond_scan(model, narrow, beside == 0, shown, report, 0, 100)
+    normals = meshes.vertex_normals(truth)
+    off = {name: 1e3 * np.abs(((vertices - truth.vertices) * normals).sum(1))
+           for name, vertices in (("before", narrow), ("after", found))}
+    jaw = (registration.weights_of(model)[0] > 0.5) & (beside == 1)
+    assert jaw.sum() > 100 and np.median(off["after"][jaw]) < 0.6 * np.median(off["before"][jaw])
+    stayed = off["after"][beside == 0]
+    assert np.percentile(stayed, 95) < 0.15 and stayed.max() < 0.6, "what was measured stays; its rim, nearly"
 
 
 def test_points_behind_the_skin_or_of_its_far_side_do_not_pull():

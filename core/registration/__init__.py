@@ -3,8 +3,7 @@
 """Registration: the built-in head with its fixed topology and UVs takes the shape of the scan.
 
 Landmarks lifted from several frames place it, identity shapes bring it near, and a regularised non-rigid fit lays it on
-the scan; it stays watertight where the scan has holes. Where there is no scan it is fitted to what the views themselves
-show.
+the scan. Where the scan ends, and where there is none, it is fitted to what the views themselves show.
 """
 
 from __future__ import annotations
@@ -108,12 +107,7 @@ def _subject(found: landmarks.Landmarks, report: Reporter) -> Subject:
 
 def _by_views(capture: Capture, settings: Settings, views: list[View], subject: Subject, report: Reporter) -> None:
     model, found = subject.model, subject.found
-    seen = np.max([subject.follow,
-                   *(strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SEEN.items())],
-                  axis=0)
-    points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)
-    fitted = unscanned.fit(model, unscanned.ShownByViews(views, found, subject.trust, points, seen), report, 10,
-                           0.9 * STEPS)
+    fitted = unscanned.fit(model, _shown(capture, views, subject, report), report, 10, 0.9 * STEPS)
     placed = model.mesh.moved(fitted.pose.apply(model.mesh.vertices))
     aligned = model.mesh.moved(fitted.pose.apply(model.shape(fitted.coefficients)))
     head = model.mesh.moved(_finished(placed, aligned, fitted.vertices, report))
@@ -123,6 +117,13 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     quality.judge_views(head, fitted)
     quality.tell_draft(report, views, head)
     _finish(capture, settings, views, head, subject, report)
+
+
+def _shown(capture: Capture, views: list[View], subject: Subject, report: Reporter) -> unscanned.ShownByViews:
+    seen = np.max([subject.follow, *(strength * _per_vertex(subject.model.mesh, template.mask(name, 512))
+                                     for name, strength in SEEN.items())], axis=0)
+    points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)
+    return unscanned.ShownByViews(views, subject.found, subject.trust, points, seen)
 
 
 def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, report: Reporter) -> unscanned.Points:
@@ -149,9 +150,14 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     targets = nonrigid.LandmarkTargets(found.points, trust, subject.hold, found.put)
 
     def tell(share: float) -> None:
-        report.progress(20 + (0.9 * STEPS - 20) * share, 0.9 * STEPS, "fitting the head to the scan")
+        report.progress(20 + (0.6 * STEPS - 20) * share, STEPS, "fitting the head to the scan")
 
     vertices = nonrigid.fit(model, start, scan, follow, targets, settings.registration.iterations, tell)
+    signed, _ = scan.match(vertices, meshes.vertex_normals(model.mesh.moved(vertices)), nonrigid.FAR_M)
+    on_scan = np.isfinite(signed) & (follow > 0.5)
+    chosen = [view for view in views if view.selected] or views
+    vertices = unscanned.beyond_scan(model, vertices, on_scan, _shown(capture, chosen, subject, report), report,
+                                     0.6 * STEPS, 0.9 * STEPS)
     placed = model.mesh.moved(pose.apply(model.mesh.vertices))
     aligned = model.mesh.moved(start)
     vertices = _finished(placed, aligned, vertices, report)

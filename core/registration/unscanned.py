@@ -8,7 +8,8 @@ Gauss-Newton on a similarity and coefficients with prior N(0, 1), then thin-plat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sparse
@@ -42,6 +43,8 @@ MOST_AREA_M2 = 4e-5
 """That a single one counts for."""
 PULL = 0.02
 """Weight of staying where the identity fit is, against data of weight one."""
+HELD = 10.0
+"""The same for what lies on a scan."""
 STEPS = 8
 
 
@@ -111,15 +114,11 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
     -------
     The fit, in the world of the views, metres.
     """
-    views, found, trust, follow = shown.views, shown.landmarks, shown.trust, shown.follow
-    pose, coefficients = fit_landmarks(model, found.points, trust)
+    found = shown.landmarks
+    pose, coefficients = fit_landmarks(model, found.points, shown.trust)
     start = model.mesh.moved(pose.apply(model.shape(coefficients)))
-    outlines = []
-    for i, view in enumerate(views):
-        report.progress(first + 0.4 * (steps - first) * i / len(views), steps,
-                        f"looking for the outline of the face in {view.name}")
-        outlines.append(silhouettes.prepare(view, start, follow, min(1.0, OUTLINE_PX / max(view.width, view.height))))
-    constraints = _ViewConstraints(model, shown, outlines, silhouettes.edges_of(model.mesh))
+    constraints = _view_constraints(model, start, shown, lambda share, what: report.progress(
+        first + 0.4 * (steps - first) * share, steps, what))
     parts: dict[str, Constraints] = {}
     for step in range(ROUNDS):
         report.progress(first + (steps - first) * (0.4 + 0.3 * step / ROUNDS), steps, "finding the nearest head")
@@ -143,7 +142,51 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
                        for name, part in parts.items()})
 
 
-def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks, tick) -> np.ndarray:
+def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, shown: ShownByViews, report: Reporter,
+                first: float, steps: float) -> np.ndarray:
+    """A head that lies on a scan, where the scan ends drawn towards what the views show: jaw, temples and ears are seen
+    as outlines and matched points long before a dense surface of them can be measured.
+
+    Parameters
+    ----------
+    model : the template
+    vertices : [V, 3] in metres, as the scan's fit left them
+    on_scan : bool [V]: they lie on the scan, and stay
+    shown : what is to be explained, in the same world
+    report : hears of progress, from `first` to `steps`
+    first, steps : where the progress of this part of the stage begins, and where it ends
+
+    Returns
+    -------
+    Vertices [V, 3].
+    """
+    shown = replace(shown, follow=np.where(on_scan, 0, shown.follow))
+    start = model.mesh.moved(vertices)
+    constraints = _view_constraints(model, start, shown, lambda share, what: report.progress(
+        first + 0.8 * (steps - first) * share, steps, what))
+
+    def tell(step: int) -> None:
+        report.progress(first + (steps - first) * (0.8 + 0.2 * step / STEPS), steps, "fitting the head beyond the scan")
+
+    def told(mesh: Mesh) -> dict[str, Constraints]:
+        return {name: part for name, part in constraints.of(mesh, REACH_M[0]).items() if name != "landmarks"}
+
+    return _relaxed(model, vertices, told, shown.landmarks, tell, np.where(on_scan, HELD, PULL))
+
+
+def _view_constraints(model: HeadModel, start: Mesh, shown: ShownByViews,
+                      tell: Callable[[float, str], None]) -> _ViewConstraints:
+    """With the outlines of the views' pictures, which are found about the head `start`; tell(share done, what)."""
+    outlines, views = [], shown.views
+    for i, view in enumerate(views):
+        tell(i / len(views), f"looking for the outline of the face in {view.name}")
+        scale = min(1.0, OUTLINE_PX / max(view.width, view.height))
+        outlines.append(silhouettes.prepare(view, start, shown.follow, scale))
+    return _ViewConstraints(model, shown, outlines, silhouettes.edges_of(model.mesh))
+
+
+def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks, tick,
+             pull: np.ndarray | float = PULL) -> np.ndarray:
     """Vertices [V, 3]: thin-plate displacements of `start`, stiff to soft; constraints(mesh) -> {kind: Constraints}."""
     area, laplacian = nonrigid.operators(model.mesh.moved(start))
     bending = (laplacian.T @ sparse.diags(1 / area) @ laplacian).tocsr()
@@ -152,7 +195,7 @@ def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks,
     for step in range(STEPS):
         tick(step)
         length = STIFF_M * (SOFT_M / STIFF_M) ** (step / (STEPS - 1))
-        matrix, right = length**4 * bending + sparse.diags(PULL * area), np.zeros_like(start)
+        matrix, right = length**4 * bending + sparse.diags(pull * area), np.zeros_like(start)
         for name, part in constraints(model.mesh.moved(vertices)).items():
             if not len(part):
                 continue
