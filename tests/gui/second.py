@@ -108,7 +108,8 @@ def walk_and_quit():
     yield 1.0
     d.screenshot("batch_2_looked_at")
     yield from d.press("wildcap.solve_all")
-    yield from d.until(lambda: batches.line(batches.view()) != "", "the batch's first word", 60)
+    yield from d.until(lambda: batches.line(batches.view()) != "", "the batch's first word",
+                       addon.START_LIMIT_S)
     tell("solving", batch=json.loads((folder / "lock").read_text())["pid"])
     bpy.ops.wm.quit_blender()
     yield 600.0

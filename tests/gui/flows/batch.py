@@ -34,7 +34,7 @@ def flow():
     root = plan(folder / "batch")
     yield from d.open_tab("WildCap")
     blender = second.start("walk_and_quit", folder)
-    told = yield from second.heard(blender, folder, "solving", 240)
+    told = yield from second.heard(blender, folder, "solving", 180 + addon.START_LIMIT_S)
     yield from d.until(lambda: blender.poll() is not None, "the end after File > Quit", 20)
     assert blender.poll() == 0 and batch_faces.alive(told["batch"]), "the batch outlives its Blender"
     yield from painting.kept(root / "anna.wildcap" / "shadow_mask.png", np.load(folder / "stroke.npy"), 1)
