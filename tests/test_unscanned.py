@@ -143,6 +143,8 @@ def test_where_a_scan_ends_the_outlines_bring_the_jaw_in_and_what_lies_on_the_sc
     jaw = (registration.weights_of(model)[0] > 0.5) & (beside == 1)
     assert jaw.sum() > 100 and np.median(off["after"][jaw]) < 0.6 * np.median(off["before"][jaw])
     stayed = off["after"][beside == 0]
+    whole = unscanned.beyond_scan(model, truth.vertices, np.ones(len(aside), bool), shown, report, 0, 100)
+    assert np.abs(whole - truth.vertices).max() < 1e-4, "a scan of all of it leaves nothing to do"
     assert np.percentile(stayed, 95) < 0.15 and stayed.max() < 0.6, "what was measured stays; its rim, nearly"
 
 

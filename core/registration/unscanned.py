@@ -160,10 +160,9 @@ def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, sho
     -------
     Vertices [V, 3].
     """
-    shown = replace(shown, follow=np.where(on_scan, 0, shown.follow))
-    start = model.mesh.moved(vertices)
-    constraints = _view_constraints(model, start, shown, lambda share, what: report.progress(
+    all_of_it = _view_constraints(model, model.mesh.moved(vertices), shown, lambda share, what: report.progress(
         first + 0.8 * (steps - first) * share, steps, what))
+    constraints = replace(all_of_it, shown=replace(shown, follow=np.where(on_scan, 0, shown.follow)))
 
     def tell(step: int) -> None:
         report.progress(first + (steps - first) * (0.8 + 0.2 * step / STEPS), steps, "fitting the head beyond the scan")
