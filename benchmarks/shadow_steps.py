@@ -8,7 +8,7 @@ FOLDER holds captures with a texture, a proposed mask and a truth, as benchmarks
 inside of M less outside, at the places of its border: what the delighter took out; what the solver sees, its texture
 over the mean face in its global light, in which skin's own steps are; and what is left of the light in truth, texture
 over true albedo. The last one's deviation is what core/solve/border.py calls LEFT: beside it stand that of all other
-captures, the share of the steps that the solver takes for light by these, and the best share, the slope of the true
+people, the share of the steps that the solver takes for light by these, and the best share, the slope of the true
 steps on those that it sees.
 """
 
@@ -20,42 +20,34 @@ from pathlib import Path
 
 import numpy as np
 
+from core.contract.settings import Settings
 from core.face.head import read_filmed_head
 from core.imaging import images
 from core.solve import border, initial
-from core.solve.evidence import FACE_CROP, REFERENCE, read_evidence
+from core.solve.evidence import REFERENCE, read_evidence
 from core.solve.prior import load
 from core.solve.recipes import OURS
 from core.solve.skin_tone import parse_skin_tone
 
 from . import figures, people
 from .measures.references import TRUE
-from .state_captures import Filmed, find
+from .state_captures import Filmed, add_captures, captures_asked
 
-CELLS = 96
-"""Of the light's grid along a face, as the solve takes them where nothing else is asked for."""
 COMMAND = "python -m benchmarks.shadow_steps FOLDER --json docs/figures/shadow_steps.json"
-HEAD = ["capture", "taken out", "seen", "left in truth", "LEFT of the others", "taken for light", "best"]
+HEAD = ["capture", "taken out", "seen", "left in truth", "LEFT of other people", "taken for light", "best"]
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
-    parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
+    add_captures(parser)
     parser.add_argument("--json", type=Path, help="where the figures go")
     asked = parser.parse_args()
-    folder = asked.folder.resolve()
-    captures = [filmed for filmed in find(folder, (asked.truths or folder).resolve(), folder / "state")
-                if filmed.name.startswith(tuple(asked.only))]
-    if not captures:
-        parser.error(f"{folder} holds no capture with a texture and a truth.")
     rows = {}
-    for filmed in captures:
+    for filmed in captures_asked(parser, asked):
         rows[filmed.name] = measure(filmed)
         print(f"{filmed.name}: measured", file=sys.stderr, flush=True)
-    for name, row in rows.items():
-        others = [other["left_spread"] for key, other in rows.items() if key != name]
+    for row in rows.values():
+        others = [other["left_spread"] for other in rows.values() if other["person"] != row["person"]]
         row["left_of_others"] = float(np.sqrt(np.mean(np.square(others)))) if others else None
         row["taken"] = min(1.0, (row["left_of_others"] / row["seen_spread"]) ** 2) if others else None
     print(table(rows))
@@ -70,7 +62,7 @@ def measure(filmed: Filmed) -> dict:
     capture = filmed.capture
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE)
     tone = parse_skin_tone(people.skin_tone(filmed.truth))
-    begun = initial.start(load(), evidence, tone, FACE_CROP / CELLS, OURS)
+    begun = initial.start(load(), evidence, tone, evidence.cell_side(Settings().solve.grid_cells), OURS)
     luminance = {name: np.log(np.maximum(images.resize(np.ascontiguousarray(image, np.float32), REFERENCE,
                                                        REFERENCE).mean(-1), 1e-3))
                  for name, image in (("filmed", images.read_linear(capture.texture_filmed)),
@@ -79,7 +71,7 @@ def measure(filmed: Filmed) -> dict:
     weight = (evidence.weight * evidence.trust * evidence.skin).numpy()
     kinds = {"removed": luminance["filmed"] - luminance["delit"], "seen": seen,
              "left": luminance["delit"] - luminance["true"]}
-    row, steps = {}, {}
+    row, steps = {"person": filmed.person}, {}
     for kind, value in kinds.items():
         steps[kind], sure = border.border_steps(value.astype(np.float32), begun.alpha.numpy(), weight, evidence.texel)
         row |= dict(zip((kind, f"{kind}_spread"), border.spread(steps[kind], sure), strict=True))

@@ -43,7 +43,7 @@ from . import figures, people
 from .measures.references import NOTHING, TRUE
 from .measures.table import Column, Scores, summarise, to_markdown, to_record
 from .pages import Sections, write_page
-from .state_captures import DELIT, SIZE, SOLVED, Filmed, find
+from .state_captures import DELIT, SIZE, SOLVED, Filmed, add_captures, captures_asked
 from .state_scores import in_uv, mean_of, of_person, small
 
 TITLE = "Skin or light"
@@ -85,9 +85,7 @@ PLAIN = 0.5
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
-    parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
+    add_captures(parser)
     parser.add_argument("--beside", nargs="+", default=[], metavar="NAME=FOLDER",
                         help="the same captures, solved in another way")
     parser.add_argument("--skins", type=Path, help="carried skins, for the traits' reach")
@@ -97,11 +95,7 @@ def main() -> int:
     parser.add_argument("--page", type=Path)
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
-    folder = asked.folder.resolve()
-    captures = [filmed for filmed in find(folder, (asked.truths or folder).resolve(), folder / "state")
-                if filmed.name.startswith(tuple(asked.only))]
-    if not captures:
-        parser.error(f"{folder} holds no capture with a texture and a truth.")
+    captures = captures_asked(parser, asked)
     if asked.picture:
         images.write_srgb(asked.picture, parts_side_by_side(captures[0]))
         return 0

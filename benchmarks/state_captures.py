@@ -10,6 +10,7 @@ head's UVs, where there are any).
 
 from __future__ import annotations
 
+import argparse
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -130,6 +131,23 @@ def find(folder: Path, truths: Path, work: Path) -> list[Filmed]:
     first: dict[str, str] = {}
     return [Filmed(name, first.setdefault(_true_head(truth), name), capture, truth, work)
             for name, capture, truth in pairs]
+
+
+def add_captures(parser: argparse.ArgumentParser) -> None:
+    """The arguments that name captures with a truth."""
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
+    parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
+
+
+def captures_asked(parser: argparse.ArgumentParser, asked: argparse.Namespace) -> list[Filmed]:
+    """The captures that these arguments name; ends with an error where there are none."""
+    folder = asked.folder.resolve()
+    found = [filmed for filmed in find(folder, (asked.truths or folder).resolve(), folder / "state")
+             if filmed.name.startswith(tuple(asked.only))]
+    if not found:
+        parser.error(f"{folder} holds no capture with a texture and a truth.")
+    return found
 
 
 def landmarks_in_uv(size: int = SIZE) -> np.ndarray:

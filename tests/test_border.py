@@ -62,7 +62,7 @@ def test_steps_that_differ_more_than_a_delighter_leaves_are_mostly_the_skins_own
                                                                          TEXEL).numpy()
         assert share == pytest.approx(min(1, border.LEFT**2 / border.spread(seen, sure)[1] ** 2))
         steps.append((share, found[128, int(430 / TEXEL)]))
-    (least, alike), (_, some), (most, unlike) = steps
+    (least, alike), _, (most, unlike) = steps
     assert least == 1 and most < 0.2, steps
     assert alike > clean[128, int(430 / TEXEL)] and unlike < 0.25, "a beard of 70 % is not taken for 70 % of the light"
 

@@ -45,6 +45,6 @@ def sections(proposed: Figures, painted: Figures, steps: Figures) -> Sections:
         solver sees, its texture over the mean face in its light; and what is left of the light in truth. The last
         differs by much the same on every capture, whatever is seen: what is seen beyond it is skin's own (a beard
         along whose edge the mask runs). So the solver takes LEFT^2 over the variance of what it sees for light. *Taken
-        for light*: that share, with LEFT from the other captures alone; *best*: the slope of the true steps on those
+        for light*: that share, with LEFT from other people alone; *best*: the slope of the true steps on those
         that are seen.
         """, shadow_steps.table(steps.rows)))]

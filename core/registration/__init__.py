@@ -120,6 +120,7 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
 
 
 def _shown(capture: Capture, views: list[View], subject: Subject, report: Reporter) -> unscanned.ShownByViews:
+    """What these views show of a head that no scan tells of."""
     seen = np.max([subject.follow, *(strength * _per_vertex(subject.model.mesh, template.mask(name, 512))
                                      for name, strength in SEEN.items())], axis=0)
     points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)

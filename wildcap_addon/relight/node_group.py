@@ -13,6 +13,8 @@ sockets, their values, and an artist's own nodes and links stay.
 
 import bpy
 
+from ...core.contract import skin_regions
+
 NAME = "WildCap Skin"
 VERSION = 4
 
@@ -26,7 +28,7 @@ mean over six tones of `python -m benchmarks.even_light`. The other random walk 
 TYPICAL_SPECULAR = 0.35
 """Mean of the specular map on cheeks and forehead where nobody measured it. The map holds levels for an IOR of 1.5, of
 which 0.35 is skin's 2.8 percent"""
-OILY = -0.16
+OILY = skin_regions.ROUGHNESS["nose"]
 """Region of the nose, where a full coat of Oil lies; the forehead has some two thirds of it, the cheeks none"""
 SEBUM_IOR, SEBUM_ROUGHNESS = 1.47, 0.3
 """The film's, of what skin secretes (squalene 1.49, triglycerides 1.46); smoother than the skin below, by eye"""
@@ -141,7 +143,7 @@ def _set_up(nodes: dict[str, bpy.types.Node]) -> None:
     nodes["WildCap Oily"].inputs[1].default_value = 1 / OILY
     nodes["WildCap Coat"].operation = 'MULTIPLY'
     shader = nodes["WildCap Principled"]
-    if not shader.inputs["Coat Weight"].default_value:  # else an artist's own coat, inside of an older version
+    if not _is_theirs(shader.inputs["Coat Weight"]):
         shader.inputs["Coat IOR"].default_value = SEBUM_IOR
         shader.inputs["Coat Roughness"].default_value = SEBUM_ROUGHNESS
     shader.subsurface_method = 'RANDOM_WALK_SKIN'
@@ -158,7 +160,12 @@ def _wire(group) -> None:
     doing so."""
     for source, output, target, socket in LINKS:
         into = group.nodes[target].inputs[socket]
-        theirs = into.is_linked and into.links[0].from_node.name not in {name for name, *_ in NODES}
-        if theirs or socket == "Coat Weight" and into.default_value:
-            continue
-        group.links.new(group.nodes[source].outputs[output], into)
+        if not _is_theirs(into):
+            group.links.new(group.nodes[source].outputs[output], into)
+
+
+def _is_theirs(socket) -> bool:
+    """Whether an artist's node feeds a socket of ours, or it is a coat of their own, inside of an older version."""
+    if socket.is_linked:
+        return socket.links[0].from_node.name not in {name for name, *_ in NODES}
+    return socket.name == "Coat Weight" and socket.default_value > 0
