@@ -13,7 +13,8 @@ pytest.importorskip("OpenImageIO")
 
 from core.contract.eyes_record import Eyeball  # noqa: E402
 from core.contract.messages import Reporter  # noqa: E402
-from core.face import faces, lids  # noqa: E402
+from core.face import lids  # noqa: E402
+from core.face.eye_reader import SIDE, EyeShares  # noqa: E402
 from core.face.head import Head  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
@@ -108,10 +109,20 @@ def test_an_iris_that_no_frame_faces_has_no_colour(tmp_path):
 
 
 def test_the_iris_is_what_lids_and_pupil_leave_of_it():
-    edge = np.linspace(10, 50, 9)
-    lid = 12 * np.sin(np.linspace(0, np.pi, 9))
-    eye = faces.Eye(np.stack([edge, 30 - lid], 1), np.stack([edge, 30 + lid], 1), np.array([30.0, 30.0]), 14.0)
-    ring = iris.iris_pixels((60, 60), eye)
-    assert not ring[30, 30] and ring[30, 40] and not ring[30, 45] and not ring[30 - 13, 30] and ring[30, 20]
-    shut = replace(eye, upper=eye.lower)
-    assert not iris.iris_pixels((60, 60), shut).any()
+    """Of an eyeball that looks into the camera, where the reader sees the lower half of the iris alone."""
+    view = camera(0, 0.0, scale=2.5)
+    eye = Eyeball((0.0, 0.0, 0.0), 0.012, tuple(view.centre / np.linalg.norm(view.centre)), 0.9, 0.0059, 5)
+    shape = (view.height, view.width, 3)
+    (middle,), (depth,) = view.project(np.zeros((1, 3)))
+    disc = depth - np.sqrt(0.012**2 - 0.0059**2)  # how far away the iris lies
+    radius = 0.0059 * view.camera.mean_focal_length() / disc
+    move = np.array([[1.0, 0, SIDE / 2 - middle[0]], [0, 1.0, SIDE / 2 - middle[1]]])
+    share = np.zeros((SIDE, SIDE), np.float32)
+    share[SIDE // 2:] = 1
+    rows, columns = iris.iris_pixels(view, eye, EyeShares(share, share, move), shape)
+    x, y = columns + 0.5 - middle[0], rows + 0.5 - middle[1]
+    assert len(rows) == pytest.approx(np.pi * radius**2 * (0.85**2 - 0.55**2) / 2, rel=0.1)
+    assert (np.hypot(x, y) / radius > 0.54).all() and (np.hypot(x, y) / radius < 0.86).all() and y.min() > -1.5
+    shut = EyeShares(share, np.zeros_like(share), move)
+    assert not len(iris.iris_pixels(view, eye, shut, shape)[0])
+    assert not len(iris.iris_pixels(view, replace(eye, iris_radius=0.0), EyeShares(share, share, move), shape)[0])

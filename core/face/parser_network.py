@@ -35,10 +35,9 @@ def network_input(srgb: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 class ParseNet(nn.Module):
-    """[N, CHANNELS, S, S] -> logits [N, len(PARTS), S, S]. S is a multiple of 32, to be
-    halved so often."""
+    """[N, CHANNELS, S, S] -> logits [N, parts, S, S]. S is a multiple of 32, to be halved so often."""
 
-    def __init__(self, widths: list[int], depths: list[int]):
+    def __init__(self, widths: list[int], depths: list[int], parts: int = len(PARTS)):
         super().__init__()
         self.stem = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1)
         self.enter = nn.Conv2d(FINE, widths[0], 2, stride=2)
@@ -51,7 +50,7 @@ class ParseNet(nn.Module):
                 self.up.append(nn.Sequential(*(_Block(width) for _ in range(depth))))
         self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)
         self.last = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1)
-        self.out = nn.Conv2d(2 * FINE, 4 * len(PARTS), 3, padding=1)
+        self.out = nn.Conv2d(2 * FINE, 4 * parts, 3, padding=1)
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
 

@@ -27,6 +27,7 @@ from . import (
     alignment,
     bust,
     drawing,
+    eye_looks,
     eyeballs,
     eyes,
     hair,
@@ -187,12 +188,14 @@ def _finish(capture: Capture, settings: Settings, views: list[View], head: meshe
     remove_file(capture.head_open)
     remove_file(capture.eyes)
     if eyes.are_open(found.opening):
-        seen = eyeballs.fit(head, eyeballs.lift_rims(views, found), found.opening)
+        looks = eye_looks.look(views, found, report)
+        seen = eyeballs.fit(head, eyeballs.mark_rims(looks, head, found.opening, report), found.opening)
         head = seen.head
         meshes.write_obj(capture.head_open, seen.opened.skin)
         write_eyes(capture, *seen.records())
         eyeballs.figures(report, seen)
-        images.write_srgb(capture.picture("registration", "eyes"), drawing.eyes_overlay(views, found, seen.opened))
+        images.write_srgb(capture.picture("registration", "eyes"),
+                          drawing.eyes_overlay(views, found, looks, seen.opened))
     meshes.write_obj(capture.head, head)
     write_json(capture.landmarks, landmarks.to_json(found))
     own_template.run(capture, settings, head,

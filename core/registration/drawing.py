@@ -7,16 +7,20 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from ..face.eye_reader import EyeShares
 from ..face.lids import OpenHead
 from ..geometry import raster
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
 from ..imaging import images
+from .eye_looks import EyeLook
 from .landmarks import Landmarks
 
 RIM_UV = (0.4 / np.pi) ** 0.6
 """Distance from the middle of an eyeball's UVs of the ring at 0.4 radians, near the iris' edge, over the half of their
 width."""
+FINER = 4
+"""Pixels of an outline for one of the reader's crop."""
 
 
 def overlay(views: list[View], mesh: Mesh, found: Landmarks, height: int = 640) -> np.ndarray:
@@ -26,14 +30,16 @@ def overlay(views: list[View], mesh: Mesh, found: Landmarks, height: int = 640) 
     return np.hstack([_one(view, mesh, caster, normals, edges, found, height) for view in views])
 
 
-def eyes_overlay(views: list[View], found: Landmarks, opened: OpenHead, side: int = 300) -> np.ndarray:
+def eyes_overlay(views: list[View], found: Landmarks, looks: tuple[list[EyeLook], list[EyeLook]], opened: OpenHead,
+                 side: int = 300) -> np.ndarray:
     """sRGB [3 side, 2 side, 3]: the right and the left eye in three frames, with the edges of the head's lids (green),
-    a ring near the iris' edge (blue) and the network's marks (red)."""
-    return np.vstack([np.hstack([_eye(view, found, opened, which, side) for which in (1, 0)])
+    a ring near the iris' edge (blue) and where the reader saw ball and iris end (red)."""
+    shares = [{one.view.name: one.shares for one in seen} for seen in looks]
+    return np.vstack([np.hstack([_eye(view, shares[which].get(view.name), opened, which, side) for which in (1, 0)])
                       for view in three_views(views, found)])
 
 
-def _eye(view: View, found: Landmarks, opened: OpenHead, which: int, side: int) -> np.ndarray:
+def _eye(view: View, shares: EyeShares | None, opened: OpenHead, which: int, side: int) -> np.ndarray:
     ball = opened.balls[which]
     (middle,), (depth,) = view.project(ball.centre[None])
     reach = 1.4 * ball.radius * view.camera.mean_focal_length() / depth
@@ -53,10 +59,11 @@ def _eye(view: View, found: Landmarks, opened: OpenHead, which: int, side: int) 
     iris = ball.mesh.vertices[np.abs(2 * np.linalg.norm(ball.mesh.uvs - 0.5, axis=1) - RIM_UV) < 0.04]
     for x, y in ((view.project(iris)[0] - middle) * scale + side / 2 - 0.5):
         cv2.circle(canvas, (round(x), round(y)), 1, (0.2, 0.6, 1.0), -1, cv2.LINE_AA)
-    if view.name in found.eyes:
-        eye = found.eyes[view.name][2 - which]
-        for x, y in ((np.concatenate([eye.upper, eye.lower]) - middle) * scale + side / 2 - 0.5):
-            cv2.circle(canvas, (round(x), round(y)), 2, (1.0, 0.2, 0.1), -1, cv2.LINE_AA)
+    for share in () if shares is None else (shares.ball, shares.iris):
+        there = cv2.resize(share, None, fx=FINER, fy=FINER, interpolation=cv2.INTER_LINEAR) > 0.5
+        for line in cv2.findContours(there.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]:
+            at = (line[:, 0] + 0.5) / FINER - shares.move[:, 2]
+            drawn(at @ np.linalg.inv(shares.move[:, :2]).T, (1.0, 0.2, 0.1), closed=True)
     return canvas
 
 

@@ -17,17 +17,14 @@ from ..contract.eyes_record import SIDES, Eyeball
 from ..contract.messages import Reporter
 from ..face import lids
 from ..geometry.meshes import Mesh
-from ..geometry.views import View
-from .landmarks import Landmarks
-from .lid_marks import LidMarks, lift, usable
+from .eye_looks import EyeLook
+from .irises import CENTRE_SIGMA_M, GAZE_SIGMA
+from .lid_marks import LidMarks, mark
 
 RIM_SIGMA_M, IRIS_SIGMA_M = 0.0006, 0.0010
-"""How well an edge's mark tells where the eyeball ends, and the iris where its front is."""
-GAZE_SIGMA = 0.17
-"""Radians by which eyes usually turn in the head: they look ahead, and some ten degrees around."""
-CENTRE_SIGMA_M, RADIUS_SIGMA = 0.0025, 0.06
-"""How well the head around tells where an eyeball lies, and (as a share) how large it is: MakeHuman's eyes over its own
-heads."""
+"""How well an edge's mark tells where the eyeball ends, and the iris where it lies before it."""
+RADIUS_SIGMA = 0.06
+"""How well the head around tells how large an eyeball is, as a share: MakeHuman's eyes over its own heads."""
 ROUNDS = 12
 CORNER_REACH_M, RIM_REACH_M = 0.008, 0.006
 """How far around the eye's corners the face follows them, and around a lid's edge the lid: some centimetre, and half of
@@ -58,16 +55,11 @@ class OpenEyes:
                      for ball, openness, iris, views in posed)
 
 
-def lift_rims(views: list[View], found: Landmarks) -> tuple[LidMarks | None, LidMarks | None]:
-    """The edges of the left and the right lids, from the frames that see each of them well."""
-    seen = [view for view in views if view.name in found.eyes]
-    rims = []
-    for side in (0, 1):
-        # the right eye stands first there
-        sights = [(found.eyes[view.name][0], found.eyes[view.name][2 - side]) for view in seen]
-        use = usable(sights, side)
-        rims.append(lift([seen[i] for i in use], [sights[i][1] for i in use]))
-    return tuple(rims)
+def mark_rims(looks: tuple[list[EyeLook], list[EyeLook]], head: Mesh, opening: float,
+              report: Reporter) -> tuple[LidMarks | None, LidMarks | None]:
+    """The edges of the left and the right lids of a closed head, as far as the views tell of them."""
+    begun = fit(head, (None, None), opening).opened
+    return mark(looks[0], begun, 0, report), mark(looks[1], begun, 1, report)
 
 
 def figures(report: Reporter, eyes: OpenEyes) -> None:
@@ -113,26 +105,27 @@ def _with_corners(head: Mesh, rims: tuple) -> Mesh:
 
 
 def _place(head: Mesh, side: int, found: LidMarks | None) -> lids.PosedEyeball:
-    """The eyeball whose surface the edges of the lids lie on, and on whose front the iris does; by least squares, under
-    what the head around tells."""
+    """The eyeball whose surface the edges of the lids and of the iris lie on; by least squares, under what the head
+    around tells."""
     centre, radius = lids.carry_ball(head, side)
     if found is None:
         return lids.place_ball(side, centre, radius, lids.FORWARD)
     edge = np.concatenate([found.upper[2:-2], found.lower[2:-2]])  # near the corners the lids leave the ball
     off = _clearance(head, side, lids.place_ball(side, centre, radius, lids.FORWARD), found)
     start, size = centre, radius
-    front = 1 + lids.CORNEA_BULGE
     for _ in range(ROUNDS):
         out, ahead = edge - centre, found.iris - centre
         far, front_far = np.linalg.norm(out, axis=1), np.linalg.norm(ahead)
+        # where a ring of the iris' radius lies on the ball
+        front = np.sqrt(max(radius**2 - found.iris_radius**2, 1e-9))
         rows = np.concatenate([
             np.column_stack([-out / far[:, None], -np.ones(len(out))]) / RIM_SIGMA_M,
-            np.append(-ahead / front_far, -front)[None] / IRIS_SIGMA_M,
+            np.append(-ahead / front_far, -radius / front)[None] / IRIS_SIGMA_M,
             np.column_stack([-np.eye(3)[[0, 2]] / front_far, [0, 0]]) / GAZE_SIGMA,
-            np.column_stack([np.eye(3), np.zeros(3)]) / CENTRE_SIGMA_M,
+            np.column_stack([np.diag(1 / CENTRE_SIGMA_M), np.zeros(3)]),
             np.array([[0, 0, 0, 1 / (RADIUS_SIGMA * size)]]),
         ])
-        left = np.concatenate([(radius + off - far) / RIM_SIGMA_M, [(front * radius - front_far) / IRIS_SIGMA_M],
+        left = np.concatenate([(radius + off - far) / RIM_SIGMA_M, [(front - front_far) / IRIS_SIGMA_M],
                                -ahead[[0, 2]] / front_far / GAZE_SIGMA, (start - centre) / CENTRE_SIGMA_M,
                                [(size - radius) / (RADIUS_SIGMA * size)]])
         step = np.linalg.lstsq(rows, left, rcond=None)[0]

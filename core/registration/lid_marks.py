@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the edges of open lids and the irises lie in the world: the eye network's marks in the frames that see an eye
-well, lifted to points."""
+"""Where the edges of open lids and the irises lie in the world: the edges and the disc that fit what the eye reader saw
+in all frames at once."""
 
 from __future__ import annotations
 
@@ -9,20 +9,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..face.faces import Eye, shows_eye
-from ..geometry.views import View
+from ..contract.messages import Reporter
+from ..face import lids
+from ..face.eye_reader import SIDE
+from ..geometry import raster
+from ..geometry.meshes import joined
+from .eye_looks import EyeLook
+from .irises import fit_iris
+from .lid_edges import fit_edges
 
-LEAST_VIEWS, LEAST_DEG = 2, 8.0
-"""So many views, so far apart, lift a mark."""
-ROUNDS = 10
-ROBUST_PX = 1.0
-"""Error of a mark that counts half, at least: the network's marks are not finer."""
+MARKS = 9
+"""On each edge, from corner to corner."""
+LEAST_TOLD = 0.5
+"""Share of the edges' points that a view must tell of."""
+OVER = 2
+"""Rays along the side of a pixel of the crop."""
 
 
 @dataclass(frozen=True)
 class LidMarks:
-    """Of one eye, metres: upper and lower edge of the lids [9, 3], from the outer corner to the inner one, the ends
-    shared; centre of the iris [3] and its radius; views: how many it was lifted from."""
+    """Of one eye, metres: upper and lower edge of the lids [MARKS, 3], from the outer corner to the inner one, the ends
+    shared; iris [3]: the middle of the disc within the iris' edge, and its radius; views: how many told of them."""
 
     upper: np.ndarray
     lower: np.ndarray
@@ -36,37 +43,36 @@ class LidMarks:
         return float(np.linalg.norm(self.upper[0] - self.upper[-1]))
 
 
-def usable(seen: list[tuple[float, Eye]], side: int) -> list[int]:
-    """Which sights (yaw of the head in degrees, eye) of the left (0) or right (1) eye hold: it is not beyond the nose,
-    and as open as it usually is."""
-    there = [i for i, (yaw, _) in enumerate(seen) if shows_eye(yaw, side)]
-    usual = float(np.median([seen[i][1].opening for i in there])) if there else 0.0
-    return [i for i in there if seen[i][1].is_open_as(usual)]
+def mark(looks: list[EyeLook], opened: lids.OpenHead, side: int, report: Reporter) -> LidMarks | None:
+    """The marks of the left (0) or the right eye that fit what was seen of it, beginning with a head whose lids are
+    open about as wide; None where nothing was seen."""
+    if not looks:
+        return None
+    ball = opened.balls[side]
+    iris, radius, shift = fit_iris(looks, ball)
+    caster = raster.RayCaster(joined([part.moved(part.vertices + shift) for part in (opened.skin, ball.mesh)]))
+    expected = []
+    for one in looks:
+        report.check()
+        expected.append(_expected(one, caster, len(opened.skin.faces)))
+    begun = (edge + shift for edge in lids.edges(opened.skin.vertices, side))
+    upper, lower, told = fit_edges(looks, expected, *begun, ball.centre + shift)
+    if told < LEAST_TOLD:
+        return None
+    return LidMarks(_spread(upper), _spread(lower), iris, radius, len(looks))
 
 
-def lift(views: list[View], eyes: list[Eye]) -> LidMarks | None:
-    """The rims of one eye from its marks in several views; None where these are too few or too near to each other."""
-    if len(views) < LEAST_VIEWS:
-        return None
-    pixels = np.stack([np.concatenate([eye.upper, eye.lower[1:-1], eye.iris[None]]) for eye in eyes])  # [V, 17, 2]
-    origins = np.stack([view.centre for view in views])
-    rays = np.stack([view.rays(marks) for view, marks in zip(views, pixels, strict=True)], 1)  # [17, V, 3]
-    middle = rays.mean(0) / np.linalg.norm(rays.mean(0), axis=1, keepdims=True)
-    if np.degrees(np.arccos(np.clip(middle @ middle.T, -1, 1))).max() < LEAST_DEG:
-        return None
-    across = np.eye(3) - rays[..., :, None] * rays[..., None, :]
-    weights = np.ones(rays.shape[:2])
-    for _ in range(ROUNDS):
-        weighted = across * weights[..., None, None]
-        points = np.linalg.solve(weighted.sum(1), np.einsum("nvij,vj->ni", weighted, origins)[..., None])[..., 0]
-        seen = [view.project(points) for view in views]
-        errors = np.stack([np.linalg.norm(xy - marks, axis=1) for (xy, _), marks in zip(seen, pixels, strict=True)], 1)
-        depth = np.stack([z for _, z in seen], 1)
-        if not np.isfinite(errors).all():
-            return None
-        width = max(ROBUST_PX, float(np.median(errors)))
-        weights = (width**2 / (width**2 + errors**2)) / depth**2
-    upper, lower = points[:9], points[[0, *range(9, 16), 8]]
-    radii = [eye.iris_radius * z / view.camera.mean_focal_length()
-             for view, eye, z in zip(views, eyes, depth[16], strict=True)]
-    return LidMarks(upper, lower, points[16], float(np.median(radii)), len(views))
+def _expected(one: EyeLook, caster: raster.RayCaster, first: int) -> np.ndarray:
+    """The ball's share [SIDE, SIDE] of the crop's pixels, of a head whose faces from `first` on are the ball."""
+    y, x = (np.mgrid[0:SIDE * OVER, 0:SIDE * OVER] + 0.5) / OVER
+    pixels = (np.stack([x.ravel(), y.ravel()], 1) - one.shares.move[:, 2]) @ np.linalg.inv(one.shares.move[:, :2]).T
+    rays = one.view.rays(pixels)
+    face, _, _ = caster.first_hits(np.repeat(one.view.centre[None], len(rays), 0), rays)
+    return (face >= first).reshape(SIDE, OVER, SIDE, OVER).mean((1, 3), dtype=np.float32)
+
+
+def _spread(edge: np.ndarray) -> np.ndarray:
+    """MARKS points, evenly spread along an edge [N, 3]."""
+    along = np.append(0, np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1)))
+    at = np.linspace(0, along[-1], MARKS)
+    return np.stack([np.interp(at, along, edge[:, axis]) for axis in range(3)], 1)

@@ -3,21 +3,21 @@
 """The colour of eyes that were open: what a frame shows of an iris, over what it shows of the skin around that eye,
 whose albedo the solve has found.
 
-So the white point, the exposure and most of the light divide out, frame by frame. Where the iris lies in a frame the
-eye network says. What is a highlight, a lash's shadow or a blink in some frames, or in a part of the iris, the median
-leaves out.
+So the white point, the exposure and most of the light divide out, frame by frame. The iris is what the eye reader sees
+of it where the fitted eyeball has it. What is a highlight, a lash's shadow or a blink in some frames, or in a part of
+the iris, the median leaves out.
 """
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from ..contract.capture import Capture
 from ..contract.eyes_record import SIDES, Colour, Eyeball, read_eyes, write_irises
 from ..contract.files import remove_file
 from ..contract.messages import Reporter
-from ..face import faces
+from ..face import lids
+from ..face.eye_reader import EyeShares, read_eye
 from ..face.head import Head
 from ..geometry import raster
 from ..geometry.views import View, read_views
@@ -30,6 +30,8 @@ RING = 0.55, 0.85
 FACING = 0.75
 """Least cosine between the gaze and the way to the camera: beyond 40 degrees the cornea's edge bends what is behind
 it."""
+SURE = 0.8
+"""Share of the iris in a pixel from which it is nothing else."""
 REACH = 2.6
 """Radii of the eyeball within which skin is lit as the eye is."""
 TURNED = 0.5
@@ -64,7 +66,7 @@ def iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: 
     """Linear albedo of the left (0) or the right iris, by the median over it and the frames that face it most; None
     where none shows it."""
     skin, known = _skin_around(head, eye, albedo)
-    if len(skin) < FEWEST:
+    if len(skin) < FEWEST or not eye.iris_radius:
         return None
     towards = np.array([view.centre for view in views]) - eye.centre
     facing = towards @ np.array(eye.gaze) / np.linalg.norm(towards, axis=1)
@@ -73,20 +75,27 @@ def iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: 
         report.check()
         if facing[i] < FACING:
             break
-        found.append(_in_frame(views[i], head, side, skin, known))
+        found.append(_in_frame(views[i], head, side, eye, skin, known))
     found = [colour for colour in found if colour is not None]
     return tuple(round(float(v), 4) for v in np.clip(np.median(found, 0), 0.001, 1)) if found else None
 
 
-def iris_pixels(shape: tuple[int, ...], eye: faces.Eye) -> np.ndarray:
-    """bool [H, W]: the iris between pupil and rim, as far as the lids leave it free, in a picture of that shape."""
-    height, width = shape[:2]
-    y, x = np.mgrid[0:height, 0:width] + 0.5
-    away = np.hypot(x - eye.iris[0], y - eye.iris[1]) / max(eye.iris_radius, 1e-6)
-    between = np.zeros((height, width), np.uint8)
-    outline = np.concatenate([eye.upper, eye.lower[::-1]])
-    cv2.fillPoly(between, [np.round((outline - 0.5) * 16).astype(np.int32)], 1, shift=4)
-    return (cv2.erode(between, np.ones((3, 3))) > 0) & (away > RING[0]) & (away < RING[1])
+def iris_pixels(view: View, eye: Eyeball, seen: EyeShares, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns [N] of the pixels of a view's picture of that shape that show the iris between pupil and rim:
+    where an eyeball has it, and the reader saw it, in the picture's pixels."""
+    shrink = np.array([shape[1] / view.width, shape[0] / view.height])
+    (middle,), (depth,) = view.project(np.array(eye.centre)[None])
+    reach = 1.5 * eye.radius * view.camera.mean_focal_length() / depth
+    low, high = (np.clip(np.round((middle + off) * shrink), 0, shape[1::-1]).astype(int) for off in (-reach, reach))
+    rows, columns = (part.ravel() for part in np.mgrid[low[1]:high[1], low[0]:high[0]])
+    pixels = np.stack([columns, rows], 1) + 0.5
+    rays, gaze = view.rays(pixels / shrink), np.array(eye.gaze)
+    disc = np.array(eye.centre) + np.sqrt(max(eye.radius**2 - eye.iris_radius**2, 0.0)) * gaze
+    along = (disc - view.centre) @ gaze / (rays @ gaze)
+    away = np.linalg.norm(view.centre + along[:, None] * rays - disc, axis=1) / max(eye.iris_radius, 1e-6)
+    share = raster.sample(seen.iris, pixels @ seen.move[:, :2].T + seen.move[:, 2])
+    ring = (away > RING[0]) & (away < RING[1]) & (share > SURE)
+    return rows[ring], columns[ring]
 
 
 def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -101,20 +110,20 @@ def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarr
     return rows, np.maximum(raster.sample(albedo, pixels[rows] * size), 1e-3)
 
 
-def _in_frame(view: View, head: Head, side: int, skin: np.ndarray, known: np.ndarray) -> np.ndarray | None:
+def _in_frame(view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray,
+              known: np.ndarray) -> np.ndarray | None:
     """The iris' albedo [3] by one frame; None where that does not show it, or not enough of the skin around."""
     frame = images.read_srgb(view.path)
-    face = faces.detect(frame)
-    if face is None or not faces.shows_eye(face.yaw_deg, side):
-        return None
     linear, whole = images.srgb_to_linear(frame), frame.max(-1)
-    ring = iris_pixels(frame.shape, faces.find_eyes(frame, face)[1 - side])  # the right eye stands first there
+    corners = view.project(head.mesh.vertices[list(lids.corners()[side])])[0]
+    seen = read_eye(frame, corners * [frame.shape[1] / view.width, frame.shape[0] / view.height], side == 0)
+    rows, columns = iris_pixels(view, eye, seen, frame.shape)
     at = np.flatnonzero(visible(view, head.caster, head.mesh.vertices[skin], head.normals[skin]))
-    if len(at) < FEWEST or ring.sum() < FEWEST:
+    if len(at) < FEWEST or len(rows) < FEWEST:
         return None
     pixels = view.project(head.mesh.vertices[skin[at]])[0] * [frame.shape[1] / view.width, frame.shape[0] / view.height]
     kept = raster.sample(whole, pixels) < BURNT
     if kept.sum() < FEWEST:
         return None
     light = np.median(raster.sample(linear, pixels[kept]) / known[at][kept], axis=0)
-    return np.median(linear[ring], axis=0) / np.maximum(light, 1e-6)
+    return np.median(linear[rows, columns], axis=0) / np.maximum(light, 1e-6)

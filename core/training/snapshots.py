@@ -84,7 +84,7 @@ def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np
         known = known * _ended(rng)
     picture, parts = cut(srgb, move), cut(shares, move)
     if augment:
-        picture = _spoilt(picture, rng)
+        picture = spoilt(picture, rng)
     total = parts.sum(-1, keepdims=True)
     known = known * (total[..., 0] > 0.99)
     parts = parts / np.maximum(total, 1e-3)
@@ -111,16 +111,17 @@ def _ended(rng: np.random.Generator) -> np.ndarray:
     return known
 
 
-def _spoilt(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Another white balance and gamma, less resolution, no colour, now and then."""
+def spoilt(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A square crop [S, S, 3] with another white balance and gamma, less resolution, no colour, now and then."""
+    side = len(picture)
     if rng.random() < 0.6:
         picture = np.clip(picture, 0,
                           1) ** np.float32(np.exp(rng.normal(0, 0.2))) * np.exp(rng.normal(0, 0.1, 3)
                                                                                 + rng.normal(0,
                                                                                              0.15)).astype(np.float32)
     if rng.random() < 0.35:
-        small = int(SIDE / np.exp(rng.uniform(np.log(1.2), np.log(4.0))))
-        picture = cv2.resize(cv2.resize(picture, (small, small), interpolation=cv2.INTER_AREA), (SIDE, SIDE),
+        small = int(side / np.exp(rng.uniform(np.log(1.2), np.log(4.0))))
+        picture = cv2.resize(cv2.resize(picture, (small, small), interpolation=cv2.INTER_AREA), (side, side),
                              interpolation=cv2.INTER_LINEAR)
     if rng.random() < 0.3:
         picture = picture + rng.normal(0, np.exp(rng.uniform(np.log(0.004), np.log(0.05))),

@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/results/eyes.md: open eyes that were found in frames, against the true ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..figures import Figures, markdown
+from ..open_eyes import ALONE, COLUMNS
+from ..pages import Sections, prose
+
+TITLE = "Open eyes"
+SAYS = "edges of the lids, eyeballs, gaze and irises, against people whose eyes are known"
+RECORDS = ("open_eyes",)
+
+
+def sections(found: Figures) -> Sections:
+    rows = found.rows
+    filmed = {name: row for name, row in rows.items() if not name[0].isdigit()}
+    fitted = {name: row for name, row in rows.items() if name[0].isdigit() and not name.endswith(ALONE)}
+    still = {name: row for name, row in rows.items() if name.endswith(ALONE)}
+    table = [["true heads, fitted", *_means(fitted)], ["true heads, by the head alone", *_means(still)]]
+    return [("", prose("""
+        Synthetic people with open eyes, by the eye reader (`core/face/eye_reader.py`) and the fit of
+        `core/registration/lid_marks.py`. *True heads*: six people in ten frames with true cameras, whose eyes are
+        fitted to their own heads, half a millimetre off. *By the head alone* is what such a head says of its eyes when
+        no frame is asked: next to nothing is wrong there, since these people's lids are the template's own and open as
+        it opens them. Real lids are not, so that row is no bound: it says what following the frames costs where there
+        is nothing to follow.
+        """, markdown(["mean over eyes", *COLUMNS[:7]], table))),
+        ("Eye by eye", markdown(["eye", *COLUMNS], [[name, *(_shown(row[column]) for column in COLUMNS)]
+                                                    for name, row in {**fitted, **filmed}.items()]))]
+
+
+def _means(rows: dict) -> list[str | None]:
+    """Mean ± deviation over eyes of the measured columns."""
+    told = []
+    for column in COLUMNS[:7]:
+        values = [row[column] for row in rows.values() if row[column] is not None]
+        told.append(f"{np.mean(values):.2f} ± {np.std(values, ddof=1):.2f}" if len(values) > 1 else None)
+    return told
+
+
+def _shown(value: float | None) -> str | None:
+    return None if value is None else f"{value:.2f}"
