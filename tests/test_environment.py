@@ -4,6 +4,7 @@
 
 import hashlib
 import os
+import shutil
 import sys
 import time
 import zipfile
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from core.contract.messages import Cancelled, Done, Failed, Problem, Progress
-from core.worker import index, installation, locks
+from core.worker import bare_environment, index, installation, locks
 from core.worker.background import BackgroundTask
 from core.worker.environment import answer, python_of, remove, verify
 
@@ -60,6 +61,26 @@ def local(tmp_path, monkeypatch) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory) -> Path:
+    """An environment with nothing but pip in it."""
+    folder = tmp_path_factory.mktemp("bare") / "env"
+    bare_environment.make(folder, installation.base_python(), REQUIREMENTS, BackgroundTask("bare", print).run)
+    return folder
+
+
+@pytest.fixture
+def made_before(bare, monkeypatch) -> None:
+    """An environment is not made, which takes seconds, but copied from one that was: for what comes after that. How
+    one is made from nothing, and made anew, is asked for by the tests without this, and by test_bare_environment.py."""
+    def make(folder: Path, base: Path, requirements: Path, run, wheels=None, wheel_only=False, keep="") -> Path:
+        bare_environment._empty(folder, keep)
+        shutil.copytree(bare, folder, symlinks=True, dirs_exist_ok=True)
+        return python_of(folder)
+
+    monkeypatch.setattr(bare_environment, "make", make)
+
+
 def follow(task: BackgroundTask, timeout_s: float = 120) -> list:
     messages, deadline = [], time.monotonic() + timeout_s
     while task.running:
@@ -101,7 +122,7 @@ def test_an_installation_from_nothing_through_a_failure_and_another_device_to_re
     remove(folder)
 
 
-def test_an_environment_of_an_older_wildcap_is_brought_up_to_date(local, tmp_path):
+def test_an_environment_of_an_older_wildcap_is_brought_up_to_date(local, made_before, tmp_path):
     folder = tmp_path / "env"
     assert isinstance(install(folder, local)[-1], Done)
     (folder / installation.COMPUTE_FILE).write_text("cpu")  # as 0.1.0 wrote it
@@ -112,7 +133,7 @@ def test_an_environment_of_an_older_wildcap_is_brought_up_to_date(local, tmp_pat
     assert verify(python_of(folder), local) == []
 
 
-def test_an_environment_whose_files_are_gone_is_repaired(local, tmp_path):
+def test_an_environment_whose_files_are_gone_is_repaired(local, made_before, tmp_path):
     folder = tmp_path / "env"
     assert isinstance(install(folder, local)[-1], Done)
     module, = folder.rglob("tinytorch.py")
@@ -123,7 +144,7 @@ def test_an_environment_whose_files_are_gone_is_repaired(local, tmp_path):
     assert verify(python_of(folder), local, importing=True) == []
 
 
-def test_a_package_that_is_another_file_is_refused(local, tmp_path):
+def test_a_package_that_is_another_file_is_refused(local, made_before, tmp_path):
     with zipfile.ZipFile(tmp_path / "wheels" / "tinynets-1.0-py3-none-any.whl", "a") as wheel:
         wheel.writestr("not_locked.py", "print('not what was locked')")
     final = install(tmp_path / "env", local)[-1]
@@ -131,7 +152,7 @@ def test_a_package_that_is_another_file_is_refused(local, tmp_path):
     assert not list((tmp_path / "env").rglob("not_locked.py"))
 
 
-def test_what_cannot_be_loaded_after_two_tries_is_told(local, tmp_path):
+def test_what_cannot_be_loaded_after_two_tries_is_told(local, made_before, tmp_path):
     with zipfile.ZipFile(tmp_path / "wheels" / "broken-1.0-py3-none-any.whl", "w") as wheel:
         wheel.writestr("broken.py", "raise OSError('no such library')")
         wheel.writestr("broken-1.0.dist-info/METADATA", "Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
@@ -157,7 +178,7 @@ def test_a_cancelled_installation_says_so(local, tmp_path):
     assert isinstance(follow(task)[-1], Cancelled)
 
 
-def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
+def test_what_an_installation_brings_is_known_before_it_begins(local, made_before, tmp_path):
     def work(task, run=None):
         return index.plan(local, installation.base_python(), "cpu", "pytorch", run or task.run, task.say)
 

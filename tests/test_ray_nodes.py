@@ -18,7 +18,7 @@ import pytest
 from core.batch import ray_task
 from core.batch.state import DONE
 
-from . import tiny_batch
+from . import tiny_batch, tiny_chain
 from .tiny_batch import core, make, states
 
 WAIT_S = 90
@@ -34,6 +34,7 @@ def code(tmp_path):
     text = lease.read_text(encoding="utf-8")
     assert "TERM_S = 30.0\n" in text
     lease.write_text(text.replace("TERM_S = 30.0\n", "TERM_S = 3.0\n"), encoding="utf-8")
+    tiny_chain.compile_once(code)
     return code
 
 

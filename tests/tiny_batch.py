@@ -34,6 +34,7 @@ def build(folder: Path) -> Path:
     tiny_chain.keep_pace(root)
     (root / "core" / "deliver").mkdir()
     (root / "core" / "deliver" / "__init__.py").write_text(DELIVER, encoding="utf-8")
+    tiny_chain.compile_once(root)
     return root
 
 

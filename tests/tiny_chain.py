@@ -6,11 +6,13 @@
 its outputs, in steps, and misbehaves as CAPTURE/mood.json ({stage: mood}) tells it to; the file is no stage's input.
 """
 
+import compileall
 import json
 import shutil
 import sys
 import time
 from pathlib import Path
+from py_compile import PycInvalidationMode
 
 from core.contract import stages
 from core.contract.capture import Capture
@@ -94,6 +96,7 @@ def build(folder: Path) -> Path:
         (core / stage.name / "__init__.py").write_text(ROOM, encoding="utf-8")
     shutil.copyfile(ROOT / "__main__.py", folder / "__main__.py")
     (core / "solve" / "device.py").write_text(DEVICE, encoding="utf-8")
+    compile_once(folder)
     return folder
 
 
@@ -106,6 +109,12 @@ def copy_ground(core: Path) -> None:
             shutil.copytree(path, core / name, ignore=shutil.ignore_patterns("__pycache__"))
         else:
             shutil.copyfile(path, core / name)
+
+
+def compile_once(root: Path) -> None:
+    """Leaves the byte code of a code tree beside it: no process that runs there writes any, and each of hundreds would
+    compile all of it again. Told by what a file holds, for a test may change one within the second."""
+    compileall.compile_dir(root, quiet=2, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
 
 
 def keep_pace(root: Path) -> None:

@@ -89,14 +89,17 @@ def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: boo
     # the camera as the head sees it
     seen = View(view.name, view.path, view.camera, view.rotation @ rotation, view.translation, True)
     face, bary, _ = raster.render_view(caster, seen, 2)
+    hit = face >= 0  # what lies beside the head need not be worked out
+    face, bary = face[hit], bary[hit]
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
-    at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(albedo)
-    colour = raster.sample(albedo, at).reshape(*face.shape, 3)
+    colour = raster.sample(albedo, np.stack([uv[:, 0], 1 - uv[:, 1]], -1) * len(albedo))
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary) @ rotation.T
-    shade = (np.full(face.shape, 0.9) if even
+    shade = (np.full(len(face), 0.9) if even
              else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1))
-    head = images.resize((colour * ((face >= 0) * shade * 1.6)[..., None]).astype(np.float32), view.width, view.height)
-    cover = images.resize((face >= 0).astype(np.float32), view.width, view.height)[..., None]
+    lit = np.zeros((*hit.shape, 3), np.float32)
+    lit[hit] = colour * (shade * 1.6)[:, None]
+    head = images.resize(lit, view.width, view.height)
+    cover = images.resize(hit.astype(np.float32), view.width, view.height)[..., None]
     return images.linear_to_srgb(head * (cover > 0) + (1 - cover) * (_wall(view) if wall else 0.3))
 
 
