@@ -21,8 +21,8 @@ from .views import View
 BENT_SIDE_SHARE = 0.01
 """Share of a picture's sides by which a lens may bend a mesh's edge out of the box of its vertices."""
 AT_ONCE = 60_000
-"""Texels that are rasterised in one go: of a small map many triangles', with which a call for each takes a hundred times
-as long; more than fit the processor's cache are no faster."""
+"""Texels that are rasterised in one go: in a small map those of many triangles, and one triangle after the other would
+take up to a hundred times as long; more than the processor's cache holds is no faster."""
 
 
 def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> tuple[np.ndarray, np.ndarray]:
