@@ -163,15 +163,3 @@ def batches(addon, monkeypatch, tmp_path):
     addon("paint.session").forget()
     # looked up again: where the add-on was disabled meanwhile, those of before are gone
     addon("preferences").get().python = ""
-
-
-@pytest.fixture(scope="session")
-def ict_fitted(tmp_path_factory):
-    """ICT-FaceKit's head laid over a built-in head of one person: the capture that holds it, and what was reported. Two
-    tests look at it."""
-    template = ROOT.parent / "shared" / "data" / "ict_facekit"
-    if not template.is_dir():
-        pytest.skip("needs ict_facekit in ../shared/data")
-    from . import own_heads
-
-    return own_heads.lay_over(template, tmp_path_factory.mktemp("ict"))

@@ -13,8 +13,10 @@ from core import registration
 from core.contract.capture import Capture
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
+from core.face import template as built_in
+from core.geometry import meshes
 from core.geometry.meshes import Mesh
-from core.registration import own_template, render_landmarks
+from core.registration import own_mesh, own_template, render_landmarks
 
 
 @cache
@@ -36,3 +38,21 @@ def lay_over(template: Path, folder: Path, steps: tuple[int, int] = (6, 3), **op
         settings = from_json({"registration": {"template": str(template), **options}, "transfer": {"size": 1024}})
         own_template.run(capture, settings, *person(), report)
     return capture, report
+
+
+def check_fitted(path: Path, capture: Capture, report: Reporter, shapes: int, median: float, p95: float) -> None:
+    """Holds what `lay_over` left against the artist's file; median and p95: most millimetres from the built-in head."""
+    own = own_mesh.read(str(path), report)
+    assert report.figures["own_shapes"] == shapes == len(own.shapes) and report.figures["own_uvs"] == "the artist's"
+    assert report.figures["own_to_head_median_mm"] < median and report.figures["own_to_head_p95_mm"] < p95
+    assert report.figures["own_flipped_triangles"] == 0
+
+    def lines(path, kind):
+        return [line.split()[1:] for line in path.read_text().splitlines() if line.startswith(kind)]
+
+    assert lines(capture.own_head, "vt ") == lines(own.path, "vt "), "the artist's UVs to the letter"
+    corners = [[corner.split("/")[:2] for corner in face] for face in lines(own.path, "f ")]
+    assert [[corner.split("/") for corner in face] for face in lines(capture.own_head, "f ")] == corners, "and polygons"
+    fitted = meshes.read_obj(capture.own_head).vertices
+    middle = built_in.landmark_points(person()[0]).mean(0)
+    assert fitted.shape == own.mesh.vertices.shape and np.linalg.norm(fitted - middle, axis=1).min() < 0.02

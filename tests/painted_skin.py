@@ -3,6 +3,7 @@
 """A capture small enough to solve in a second or two: the mean face of a known tone in a little light from the left,
 with a soft shadow on one cheek."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from core.geometry import meshes
 from core.imaging import images
 from core.solve import confidence, initial
 from core.solve.prior import load
+from core.solve.recipes import RECIPES
 from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
 
 SIZE = 128
@@ -30,6 +32,13 @@ def brief_confidence():
         patched.setattr(confidence, "RUNS", 2)
         patched.setattr(confidence, "STEPS", 2)
         yield
+
+
+@pytest.fixture
+def brief_light(monkeypatch):
+    """A sixth of the steps by which a solve fits its light, most of its time at this size: for tests in which the light
+    need not be found, only found alike."""
+    monkeypatch.setitem(RECIPES, "wildcap", replace(RECIPES["wildcap"], updates=RECIPES["wildcap"].updates // 6))
 
 
 def make(root: Path) -> Capture:

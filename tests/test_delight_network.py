@@ -247,9 +247,13 @@ def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
     monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
 
     def prepare(seeds, views, work, *rest):
-        return people.prepare_people(seeds, views, work, QUIET, processes=2)
+        for seed in seeds:
+            if not people.is_prepared(seed, views, work):
+                people._prepare_one((seed, views, work))
 
+    # here and of small maps; that processes of their own prepare people is tested in test_people_portraits.py
     monkeypatch.setattr(delighter, "prepare_people", prepare)
+    monkeypatch.setattr(people, "TEXELS", 256)
     with pytest.raises(Problem, match="There are no people in"):
         delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET,
                                   TrainingRun(growing=True, work=tmp_path / "work"))

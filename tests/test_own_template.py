@@ -10,14 +10,13 @@ import pytest
 import trimesh
 
 from core import registration
-from core.contract.capture import Capture
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.face import template
 from core.geometry import atlas, meshes
 from core.registration import alignment, carried, own_mesh, own_template, render_landmarks
 
-from .own_heads import lay_over, person
+from .own_heads import check_fitted, lay_over, person
 from .painted_egg import egg
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -92,33 +91,11 @@ def test_a_made_mesh_goes_where_its_vertices_belong(tmp_path):
     assert not capture.own_head.exists() and not capture.own_head_skin.exists()
 
 
-def test_ict_facekit_is_laid_over_ours(ict_fitted):
-    check_head_of_others(SHARED / "ict_facekit", *ict_fitted, shapes=11, median=0.15, p95=1.2)
-
-
 def test_the_head_of_the_valid_avatars_is_laid_over_ours(tmp_path):
     path = SHARED / "valid_skins" / "White_M_1_head.obj"
     if not path.exists():
         pytest.skip(f"needs {path.name} in ../shared/data")
-    check_head_of_others(path, *lay_over(path, tmp_path), shapes=0, median=0.2, p95=1.8)
-
-
-def check_head_of_others(path: Path, capture: Capture, report: Reporter, shapes: int, median: float,
-                         p95: float) -> None:
-    own = own_mesh.read(str(path), report)
-    assert report.figures["own_shapes"] == shapes == len(own.shapes) and report.figures["own_uvs"] == "the artist's"
-    assert report.figures["own_to_head_median_mm"] < median and report.figures["own_to_head_p95_mm"] < p95
-    assert report.figures["own_flipped_triangles"] == 0
-
-    def lines(path, kind):
-        return [line.split()[1:] for line in path.read_text().splitlines() if line.startswith(kind)]
-
-    assert lines(capture.own_head, "vt ") == lines(own.path, "vt "), "the artist's UVs to the letter"
-    corners = [[corner.split("/")[:2] for corner in face] for face in lines(own.path, "f ")]
-    assert [[corner.split("/") for corner in face] for face in lines(capture.own_head, "f ")] == corners, "and polygons"
-    fitted = meshes.read_obj(capture.own_head).vertices
-    middle = template.landmark_points(person()[0]).mean(0)
-    assert fitted.shape == own.mesh.vertices.shape and np.linalg.norm(fitted - middle, axis=1).min() < 0.02
+    check_fitted(path, *lay_over(path, tmp_path), shapes=0, median=0.2, p95=1.8)
 
 
 @pytest.mark.parametrize("up", [2, 7])

@@ -192,11 +192,13 @@ def test_a_little_training_beats_the_constant_answer(work):
     usual = (batch.shares * weight).sum((0, 2, 3)) / weight.sum()
     constant = -float((usual * usual.clamp_min(1e-9).log()).sum())
     optimiser = torch.optim.AdamW(network.parameters(), lr=1e-2)
-    for _ in range(60):
+    for _ in range(60):  # at most
         value = training.loss(network, batch, "cpu")
         optimiser.zero_grad()
         value.backward()
         optimiser.step()
+        if value.item() < 0.6 * constant:
+            break
     assert value.item() < 0.6 * constant
 
 

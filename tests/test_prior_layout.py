@@ -7,9 +7,7 @@ The head with other UVs is the built-in one with its chart turned and moved to w
 """
 
 import json
-import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,14 +28,12 @@ from core.solve.maps import Maps
 from core.solve.prior import WEIGHTS, load
 from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
 
-from .own_heads import person
 from .painted_skin import brief_confidence  # noqa: F401
 from .recorded import changed, record
 from .test_released_prior import weights_of, write
 
 SIZE = 128
 TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
-SHARED = Path(__file__).resolve().parents[2] / "shared"
 MODEL = {"depths": [1, 1], "channels": [32, 32], "self_attn_depths": [False, False], "mapping_out": 16,
          "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}
 
@@ -230,25 +226,6 @@ def test_another_checkpoint_or_head_makes_the_stage_stale_but_only_with_that_pri
     assert change("", lambda: put_own_head(capture, other_head(5.0))) == change("", edit_config) == ()
     assert change(authors, lambda: put_own_head(capture, other_head(6.0))) == ("own_head.obj",)
     assert change(authors, edit_config) == ("solve.prior",)
-
-
-def test_on_ict_facekit_with_random_weights_of_the_released_shape(capture, ict_fitted, monkeypatch):
-    weights = SHARED / "vectors" / "prior_v1_coord"
-    if not weights.is_dir():
-        pytest.skip(f"{weights} is missing")
-    meshes.write_obj(capture.head, person()[0])
-    for theirs, ours in ((ict_fitted[0].own_head, capture.own_head),
-                         (ict_fitted[0].own_head_skin, capture.own_head_skin)):
-        shutil.copyfile(theirs, ours)
-    kept = seen_layouts(monkeypatch)
-    solve.run(capture, settings(weights, steps=6), Reporter("solve"))
-    there = kept[0]
-    brows = there._there(torch.from_numpy(template.mask("brows", SIZE).copy())).numpy() > 0.5
-    rows = np.flatnonzero(brows.any(1)) * 768 / len(brows) + 64
-    assert 150 < rows.mean() < 260, "between the upper bound of the released face mask and the tone box under the eyes"
-    albedo, shading = (images.read_linear(capture.maps / f"{name}.exr") for name in ("diffuse_albedo", "shading"))
-    texture, face = images.read_linear(capture.texture), template.mask("face", SIZE) > 0.9
-    assert np.isfinite(albedo).all() and np.abs(albedo * shading - texture)[face].mean() < 0.06 * texture[face].mean()
 
 
 def test_our_weights_are_named_where_no_prior_is_chosen():

@@ -23,7 +23,7 @@ from core.solve.problem import albedo
 from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic.identities import reserved_seeds
 
-from .painted_skin import SIZE, TONE, as_setting, brief_confidence, make, settings  # noqa: F401
+from .painted_skin import SIZE, TONE, as_setting, brief_confidence, brief_light, make, settings  # noqa: F401
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def test_solve_writes_all_maps_of_the_asked_tone(capture):
     json.dumps(report.figures)
 
 
-def test_what_the_solve_is_compared_with_has_the_albedos_exposure(capture):
+def test_what_the_solve_is_compared_with_has_the_albedos_exposure(capture, brief_light):  # noqa: F811
     """The delit and the filmed texture in comparison/, whatever exposure they came in: the facial skin is as bright on
     average, its light still there."""
     texture = images.read_linear(capture.texture)
@@ -72,7 +72,7 @@ def test_what_the_solve_is_compared_with_has_the_albedos_exposure(capture):
 
 
 @pytest.mark.parametrize(("factor", "asked"), [(1.4, 1.0), (0.7, 0.7), (1.4, 1.4)])
-def test_the_tone_is_the_users_whatever_the_exposure_and_the_skin(capture, factor, asked):
+def test_the_tone_is_the_users_whatever_the_exposure_and_the_skin(capture, factor, asked, brief_light):  # noqa: F811
     """The same light on a skin of another albedo and that tone asked for; or only another exposure."""
     images.write_linear(capture.texture, images.read_linear(capture.texture) * factor)
     solve.run(capture, settings(steps=4, skin_tone=as_setting(TONE * asked)), Reporter("solve"))
@@ -81,19 +81,19 @@ def test_the_tone_is_the_users_whatever_the_exposure_and_the_skin(capture, facto
     assert np.abs((albedo * skin[..., None]).sum((0, 1)) / skin.sum() / (TONE * asked) - 1).max() < 0.01
 
 
-def test_cancel_then_run_again_gives_the_same_bytes(capture):
-    solve.run(capture, settings(guidance="dps"), Reporter("solve"))
+def test_cancel_then_run_again_gives_the_same_bytes(capture, brief_light):  # noqa: F811
+    options = settings(guidance="dps", steps=5)
+    solve.run(capture, options, Reporter("solve"))
     unbroken = maps_of(capture)
     steps = []
     report = Reporter("solve", emit=lambda message: steps.append(message),
-                      cancelled=lambda: any("step 5 of" in getattr(m, "text", "") for m in steps))
+                      cancelled=lambda: any("step 3 of" in getattr(m, "text", "") for m in steps))
     with pytest.raises(CancelledError):
-        solve.run(capture, settings(guidance="dps"), report)
+        solve.run(capture, options, report)
     assert (capture.checkpoints / "solve.safetensors").is_file()
     logged = []
-    solve.run(capture, settings(guidance="dps"),
-              Reporter("solve", emit=lambda message: logged.append(getattr(message, "text", ""))))
-    assert "Going on after step 4 of 8." in logged
+    solve.run(capture, options, Reporter("solve", emit=lambda message: logged.append(getattr(message, "text", ""))))
+    assert "Going on after step 2 of 5." in logged
     assert maps_of(capture) == unbroken
 
 
@@ -102,7 +102,7 @@ def test_the_artists_masks_win(capture):
     def albedo_under(**pictures):
         for name, value in pictures.items():
             images.write_data(getattr(capture, name), value)
-        solve.run(capture, settings(steps=6), Reporter("solve"))
+        solve.run(capture, settings(steps=4), Reporter("solve"))
         return images.read_linear(capture.maps / "diffuse_albedo.exr")
 
     proposal = images.read_mask(capture.shadow_mask_auto)

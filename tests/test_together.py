@@ -17,7 +17,7 @@ from core.face import template
 from core.geometry import meshes
 from core.imaging import images
 
-from .painted_skin import SIZE, brief_confidence, make, settings  # noqa: F401
+from .painted_skin import SIZE, brief_confidence, brief_light, make, settings  # noqa: F401
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def test_shade_that_another_capture_does_not_have_is_light(two):
     assert off < 0.06 * texture[skin].mean(), "albedo times shading is the texture still"
 
 
-def test_a_folder_of_captures_names_all_of_them_but_the_one_that_is_solved(two, tmp_path):
+def test_a_folder_of_captures_names_all_of_them_but_the_one_that_is_solved(two, tmp_path, brief_light):  # noqa: F811
     first, second, _ = two
     several = tmp_path / "several"
     for name, capture in (("a.wildcap", first), ("b.wildcap", second)):
@@ -91,7 +91,7 @@ def test_of_another_capture_only_what_is_read_counts(two):
     assert set(stages.by_name("solve").reads) <= {name.partition("/")[2] for name in told}
 
 
-def test_in_a_light_that_is_too_strong_to_be_told_the_others_are_left_out_and_it_is_said(two):
+def test_in_a_light_that_is_too_strong_to_be_told_the_others_are_left_out_and_it_is_said(two, brief_light):  # noqa: F811
     first, second, _ = two
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     images.write_linear(first.texture,

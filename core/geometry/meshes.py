@@ -63,7 +63,7 @@ def vertex_normals(mesh: Mesh) -> np.ndarray:
 def read_obj(path: Path) -> Mesh:
     """Triangles and triangulated polygons with their UVs. Raises Problem for a file without faces, and for one that is
     damaged: a line without its numbers, positions that are no numbers, faces with vertices that are not there."""
-    vertices, uvs, faces, face_uvs, polygons = [], [], [], [], []
+    vertices, uvs, faces, face_uvs, polygons, known = [], [], [], [], [], {}
     text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     for number, line in enumerate(text.replace("\\\n", " ").split("\n"), 1):
@@ -75,7 +75,8 @@ def read_obj(path: Path) -> Mesh:
             elif key == "vt":
                 uvs.append((words[0], words[1] if len(words) > 1 else "0"))
             elif key == "f":
-                corners = [_corner(word, len(vertices), len(uvs)) for word in words]
+                # most corners are written six times; what counts back depends on where it stands, and is not kept
+                corners = [known.get(word) or _corner(word, len(vertices), len(uvs), known) for word in words]
                 if len(corners) < 3:
                     raise ValueError
                 polygons.append(len(corners) - 2)
@@ -183,7 +184,7 @@ def _check_written(path: Path, mesh: Mesh) -> None:
                                       "stages are kept."))
 
 
-def _corner(word: str, vertices: int, uvs: int) -> tuple[int, int]:
+def _corner(word: str, vertices: int, uvs: int, known: dict[str, tuple[int, int]]) -> tuple[int, int]:
     """A corner of an OBJ's face, "3/7/1" or "-1//-1", as indices from zero of its vertex and UV (-1: it has none);
     `vertices` and `uvs` have been read so far, from which negative numbers count back. Raises ValueError for what is
     none."""
@@ -192,6 +193,8 @@ def _corner(word: str, vertices: int, uvs: int) -> tuple[int, int]:
              for text, count in ((vertex, vertices), (uv or "0", uvs))]
     if found[0] < 0 or uv and found[1] < 0:
         raise ValueError(word)
+    if "-" not in word:
+        known[word] = found[0], found[1]
     return found[0], found[1]
 
 

@@ -8,6 +8,8 @@ u = (column + 0.5) / S, v = 1 - (row + 0.5) / S.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import cv2
 import numpy as np
 import trimesh
@@ -18,6 +20,9 @@ from .views import View
 
 BENT_SIDE_SHARE = 0.01
 """Share of a picture's sides by which a lens may bend a mesh's edge out of the box of its vertices."""
+AT_ONCE = 60_000
+"""Texels that are rasterised in one go: in a small map those of many triangles, and one triangle after the other would
+take up to a hundred times as long; more than the processor's cache holds is no faster."""
 
 
 def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -35,15 +40,34 @@ def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> 
     high = np.minimum(np.floor(corners.max(1)), [size - 1, end - first - 1]).astype(int)
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
-    for f in np.flatnonzero((np.abs(area) > 1e-12) & (high >= low).all(1)):
-        y, x = np.mgrid[low[f, 1]:high[f, 1] + 1, low[f, 0]:high[f, 0] + 1]
-        wa = ((b[f, 0] - x) * (c[f, 1] - y) - (c[f, 0] - x) * (b[f, 1] - y)) / area[f]
-        wb = ((c[f, 0] - x) * (a[f, 1] - y) - (a[f, 0] - x) * (c[f, 1] - y)) / area[f]
+    used = np.flatnonzero((np.abs(area) > 1e-12) & (high >= low).all(1))
+    for f, x, y in _texels(used, low[used], high[used]):
+        (ax, ay), (bx, by), (cx, cy), twice = a[f].T, b[f].T, c[f].T, area[f]
+        wa = ((bx - x) * (cy - y) - (cx - x) * (by - y)) / twice
+        wb = ((cx - x) * (ay - y) - (ax - x) * (cy - y)) / twice
         wc = 1 - wa - wb
         inside = (wa >= -1e-9) & (wb >= -1e-9) & (wc >= -1e-9)
-        face[y[inside], x[inside]] = f
+        # of triangles that lie over each other the last counts, as NumPy writes what comes last
+        face[y[inside], x[inside]] = f[inside]
         bary[y[inside], x[inside]] = np.stack([wa, wb, wc], -1)[inside]
     return face, bary
+
+
+def _texels(triangles: np.ndarray, low: np.ndarray, high: np.ndarray
+            ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """All texels of the boxes [N, 2] of triangles [N], one box after the other: triangle, column and row of each, some
+    AT_ONCE at a time."""
+    sides = high - low + 1
+    ends = np.cumsum(sides.prod(1))
+    first, before = 0, 0
+    while first < len(triangles):
+        end = max(first + 1, int(np.searchsorted(ends, before + AT_ONCE, "right")))
+        count = np.diff(ends[first:end], prepend=before)
+        box = np.repeat(np.arange(first, end), count)
+        within = np.arange(before, ends[end - 1]) - np.repeat(ends[first:end] - count, count)
+        row, column = np.divmod(within, sides[box, 0])
+        yield triangles[box], column + low[box, 0], row + low[box, 1]
+        first, before = end, ends[end - 1]
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, face: np.ndarray, bary: np.ndarray) -> np.ndarray:

@@ -25,6 +25,8 @@ CANDIDATES = (8, 64)
 NEAR_SHARE = 0.25
 """The first rays start this share of `farthest` off the surface: most partners lie within, and farther ones cost a
 search."""
+MOST_CUTS = 12
+"""Passes in which edges are cut in two: those of a head of eight metres, and not of one in millimetres."""
 
 
 class Surface:
@@ -33,9 +35,8 @@ class Surface:
 
     def __init__(self, mesh: Mesh, spacing: float = 0.002):
         self.mesh, self.normals = mesh, vertex_normals(mesh)
-        dense, faces, self._parent = trimesh.remesh.subdivide_to_size(
-            mesh.vertices, mesh.faces, spacing, max_iter=12, return_index=True)
-        self._tree = cKDTree(dense[faces].mean(1))
+        corners, self._parent = _divided(mesh.vertices[mesh.faces], spacing)
+        self._tree = cKDTree(corners.mean(1))
         self._caster = RayCaster(mesh)
 
     def partners(self, points: np.ndarray, normals: np.ndarray, farthest: float,
@@ -91,6 +92,43 @@ class Surface:
     def _agree(self, face: np.ndarray, bary: np.ndarray, normals: np.ndarray, cosine: float) -> np.ndarray:
         own = interpolate(self.normals, self.mesh.faces, face, bary)
         return (face >= 0) & ((own * normals).sum(1) > cosine * np.linalg.norm(own, axis=1))
+
+
+def _divided(corners: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles [F, 3, 3] cut at the middles of their edges until none is longer than `longest`: their corners
+    [N, 3, 3], and of which triangle each is a part [N].
+
+    The pieces and their order are those of trimesh's `subdivide_to_size`, which numbers all edges anew in each pass and
+    takes several times as long.
+    """
+    parent = np.arange(len(corners))
+    for done in range(MOST_CUTS + 1):
+        following = corners[:, [1, 2, 0]]
+        cut = ((corners - following) ** 2).sum(2) ** 0.5 > longest  # edges a-b, b-c and c-a
+        if not cut.any():
+            return corners, parent
+        if done == MOST_CUTS:
+            raise ValueError(f"edges longer than {longest} after {MOST_CUTS} cuts")
+        middle, cuts = (corners + following) / 2, cut.sum(1)
+        none, one, two, three = (np.flatnonzero(cuts == count) for count in range(4))
+        # turned so that the edge that is cut is a-b
+        turn, at = cut[one].argmax(1), np.arange(len(one))
+        a, b, c = (corners[one, (turn + k) % 3] for k in range(3))
+        p = middle[one][at, turn]
+        halves = np.stack([a, p, c, p, b, c], 1).reshape(-1, 3, 3)
+        # turned so that the edge that stays is c-a: the corner at b, and the rest parted along its shorter diagonal
+        turn, at = (cut[two].argmin(1) + 1) % 3, np.arange(len(two))
+        a, b, c = (corners[two, (turn + k) % 3] for k in range(3))
+        p, q = middle[two][at, turn], middle[two][at, (turn + 1) % 3]
+        by_aq = (((a - q) ** 2).sum(1) <= ((p - c) ** 2).sum(1))[:, None, None]
+        thirds = np.concatenate([np.stack([p, b, q], 1),
+                                 np.where(by_aq, np.stack([a, p, q], 1), np.stack([a, p, c], 1)),
+                                 np.where(by_aq, np.stack([a, q, c], 1), np.stack([p, q, c], 1))])
+        (a, b, c), (p, q, r) = corners[three].swapaxes(0, 1), middle[three].swapaxes(0, 1)
+        fourths = np.stack([a, p, r, p, b, q, r, q, c, p, q, r], 1).reshape(-1, 3, 3)
+        corners = np.concatenate([corners[none], halves, thirds, fourths])
+        parent = np.concatenate([parent[none], np.repeat(parent[one], 2), np.tile(parent[two], 3),
+                                 np.repeat(parent[three], 4)])
 
 
 def welded(mesh: Mesh, tolerance: float = 1e-6) -> tuple[Mesh, np.ndarray]:
