@@ -109,8 +109,8 @@ def _subject(found: landmarks.Landmarks, report: Reporter) -> Subject:
 def _by_views(capture: Capture, settings: Settings, views: list[View], subject: Subject, report: Reporter) -> None:
     model, found = subject.model, subject.found
     fitted = unscanned.fit(model, _shown(capture, views, subject, report), report, 10, 0.9 * STEPS)
-    placed = model.mesh.moved(fitted.pose.apply(model.mesh.vertices))
-    aligned = model.mesh.moved(fitted.pose.apply(model.shape(fitted.coefficients)))
+    placed = _as_bust(model.mesh, fitted.pose.apply(model.mesh.vertices))
+    aligned = _as_bust(model.mesh, fitted.pose.apply(model.shape(fitted.coefficients)))
     head = model.mesh.moved(_finished(placed, aligned, fitted.vertices, report))
     quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), found,
                     subject.follow)
@@ -160,8 +160,7 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     chosen = [view for view in views if view.selected] or views
     vertices = unscanned.beyond_scan(model, vertices, on_scan, _shown(capture, chosen, subject, report), report,
                                      0.6 * STEPS, 0.9 * STEPS)
-    placed = model.mesh.moved(pose.apply(model.mesh.vertices))
-    aligned = model.mesh.moved(start)
+    placed, aligned = _as_bust(model.mesh, pose.apply(model.mesh.vertices)), _as_bust(model.mesh, start)
     vertices = _finished(placed, aligned, vertices, report)
 
     head = model.mesh.moved(vertices)
@@ -172,9 +171,15 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     return head
 
 
+def _as_bust(mesh: meshes.Mesh, vertices: np.ndarray) -> meshes.Mesh:
+    """A mesh of the template's whose neck ends well: the template's own edge has four triangles that are folded over,
+    and none is to be taken for what a head should be."""
+    return mesh.moved(bust.level_edge(mesh, vertices))
+
+
 def _finished(placed: meshes.Mesh, aligned: meshes.Mesh, vertices: np.ndarray, report: Reporter) -> np.ndarray:
-    """Vertices [V, 3] with the neck's edge in a plane and without folds. Smoothing a fold near the edge bends it again:
-    it is levelled once more where that folds nothing and turns no triangle over."""
+    """Vertices [V, 3] with the neck's edge in a plane, on a smooth outline and without folds. Smoothing a fold near the
+    edge bends it again: it is levelled once more where that folds nothing and turns no triangle over."""
     vertices = intersections.mended(placed, bust.level_edge(placed, vertices),
                                     lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
     levelled = bust.level_edge(placed, vertices)
