@@ -19,7 +19,6 @@ import cv2
 import numpy as np
 import torch
 from torch.nn import functional
-from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
 from ..face.eye_reader import CLASSES, SIDE, to_eye_crop
@@ -32,7 +31,7 @@ from ..synthetic.people.person import sample_person
 from . import command_line, descent
 from .release import TrainingCard, again, release
 from .seeds import named_subjects, panorama_names
-from .snapshots import spoilt
+from .snapshots import Echoed, Jitter, jittered, spoilt
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "eyes.safetensors"
 _MODEL = {"widths": [32, 48, 64, 96], "depths": [1, 1, 1, 2]}
@@ -49,8 +48,7 @@ VIEWS = 4
 HAIRY = 0.25
 """Share of the figures that keep their hair."""
 TEXELS = 512
-SHIFT, SCALE, TURN = 0.07, 0.13, 7.0
-"""Deviations of where a face's landmarks put the crop: in crops, as a logarithm, in degrees."""
+JITTER = Jitter(0.07, 0.13, 7.0)
 EDGE, REACH = 4.0, 5
 """What lies so many pixels of the crop from the ball counts so many times more: most of a crop is skin."""
 
@@ -88,7 +86,7 @@ def train_eyes(config: str, out: Path, report: Reporter, run: descent.TrainingRu
     recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 100, 0.02),
                                     betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"],
                                     save_every=150)
-    objective = descent.Objective(Steps(Eyes(data["seeds"], t["poses"], work, run.hdri), t),
+    objective = descent.Objective(Echoed(Eyes(data["seeds"], t["poses"], work, run.hdri), t),
                                   lambda batch, step, share: loss(network, batch, device),
                                   lambda average: figures(average, config, unseen, device))
     descent.descend(network, state, objective, recipe, work, device, report)
@@ -143,7 +141,7 @@ def example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, r
     """A photograph as the network sees it, and the shares of its classes."""
     move = to_eye_crop(sight.corners, sight.left)
     if augment:
-        move = _jittered(move, rng)
+        move = jittered(move, SIDE, JITTER, rng)
     seen = cut(picture, move, SIDE)
     if augment:
         seen = spoilt(seen, rng)
@@ -197,42 +195,13 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     return release(out, state, TrainingCard(config, told, command, {**state["history"][-1][2], "what": what}, more))
 
 
-class Steps(Dataset):
-    """The batch of each step: it depends on the step alone once all figures are prepared, so a resumed training draws
-    what an unbroken one would have."""
-
-    def __init__(self, eyes: Eyes, options: dict):
-        self.eyes, self.options = eyes, options
-        self.drawn: tuple[int, list[tuple]] = -1, []
-
-    def __getitem__(self, step: int) -> tuple:
-        torch.set_num_threads(1)
-        index, turn = divmod(step, self.options["echo"])
-        if self.drawn[0] != index:
-            self.drawn = index, self.eyes.draw(self.options["batch"], self.options["echo"],
-                                               np.random.default_rng((self.options["seed"], index)))
-        return self.drawn[1][turn]
-
-
-def _jittered(move: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    turn, scale = np.radians(rng.normal(0, TURN)), np.exp(rng.normal(0, SCALE))
-    c, s = scale * np.cos(turn), scale * np.sin(turn)
-    about = np.array([[c, s], [-s, c]])
-    middle = np.full(2, SIDE / 2)
-    shift = middle - about @ middle + rng.normal(0, SHIFT * SIDE, 2)
-    return np.concatenate([about @ move[:, :2], (about @ move[:, 2] + shift)[:, None]], 1)
-
-
 def _path(work: Path, seed: int, number: int) -> Path:
     return Path(work) / f"figure_{seed}" / f"{number}.npz"
 
 
 def main(arguments: list[str] | None = None) -> int:
     options = command_line.parser("eyes", __doc__, CONFIGS, WEIGHTS)
-    options.add_argument("--hdri", type=Path, metavar="FOLDER",
-                         help="panoramas whose licence lets weights trained with them be shipped")
-    options.add_argument("--growing", action="store_true", help="train on the figures that are there already")
-    options.add_argument("--prepare", action="store_true", help="make the figures' sights and stop")
+    command_line.add_sights(options, "figures")
     return command_line.carry_out(options, arguments, train_eyes, export, prepare_figures)
 
 

@@ -19,7 +19,6 @@ from pathlib import Path
 import numpy as np
 import torch
 from torch.nn import functional
-from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
 from ..face.parser_network import ParseNet
@@ -27,7 +26,7 @@ from ..face.parts import PARTS
 from . import command_line, descent
 from .release import TrainingCard, again, release
 from .seeds import named_subjects, panorama_names
-from .snapshots import SnapshotBatch, Snapshots, is_prepared, prepare
+from .snapshots import Echoed, SnapshotBatch, Snapshots, is_prepared, prepare
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "parser.safetensors"
 _MODEL = {"widths": [40, 64, 112, 144], "depths": [1, 1, 1, 2]}
@@ -83,7 +82,7 @@ def train_parser(config: str, out: Path, report: Reporter, run: descent.Training
     recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 100, 0.02),
                                     betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"],
                                     save_every=150)
-    objective = descent.Objective(Steps(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step,
+    objective = descent.Objective(Echoed(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step,
                                   share: loss(network, batch, device),
                                   lambda average: figures(average, config, unseen, device))
     descent.descend(network, state, objective, recipe, work, device, report)
@@ -142,29 +141,9 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     return release(out, state, TrainingCard(config, told, command, {**state["history"][-1][2], "what": what}, more))
 
 
-class Steps(Dataset):
-    """The batch of each step: it depends on the step alone once all figures are prepared, so a resumed training draws
-    what an unbroken one would have."""
-
-    def __init__(self, snapshots: Snapshots, options: dict):
-        self.snapshots, self.options = snapshots, options
-        self.drawn: tuple[int, list[SnapshotBatch]] = -1, []
-
-    def __getitem__(self, step: int) -> SnapshotBatch:
-        torch.set_num_threads(1)
-        index, turn = divmod(step, self.options["echo"])
-        if self.drawn[0] != index:
-            self.drawn = index, self.snapshots.draw(self.options["batch"], self.options["echo"],
-                                                    np.random.default_rng((self.options["seed"], index)))
-        return self.drawn[1][turn]
-
-
 def main(arguments: list[str] | None = None) -> int:
     options = command_line.parser("parser", __doc__, CONFIGS, WEIGHTS)
-    options.add_argument("--hdri", type=Path, metavar="FOLDER",
-                         help="panoramas whose licence lets weights trained with them be shipped")
-    options.add_argument("--growing", action="store_true", help="train on the figures that are there already")
-    options.add_argument("--prepare", action="store_true", help="make the figures' sights and stop")
+    command_line.add_sights(options, "figures")
     return command_line.carry_out(options, arguments, train_parser, export, prepare_figures)
 
 

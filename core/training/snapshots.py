@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
+from torch.utils.data import Dataset
 
 from ..contract.messages import Reporter
 from ..face.parser_network import network_input
@@ -24,8 +25,18 @@ from ..synthetic.people.figure import make_figure
 from ..synthetic.people.snapshot import photograph
 
 TEXELS = 512  # of a figure's maps: pixels of a crop are larger than theirs
-SHIFT, SCALE, TURN = 0.04, 0.09, 6.0
-"""Deviations of where the landmarks put the crop: in crops, as a logarithm, in degrees."""
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """Deviations of where the landmarks put a crop: shift in crops, scale as a logarithm, turn in degrees."""
+
+    shift: float
+    scale: float
+    turn_deg: float
+
+
+JITTER = Jitter(0.04, 0.09, 6.0)
 
 
 @dataclass(frozen=True)
@@ -70,6 +81,24 @@ class Snapshots:
                 for batch in batches]
 
 
+class Echoed(Dataset):
+    """The batch of each step: it depends on the step alone once all figures are prepared, so a resumed training draws
+    what an unbroken one would have. Every options["echo"] steps show the same photographs; source.draw(count, echo,
+    rng) gives their batches."""
+
+    def __init__(self, source, options: dict):
+        self.source, self.options = source, options
+        self.drawn: tuple[int, list] = -1, []
+
+    def __getitem__(self, step: int):
+        torch.set_num_threads(1)
+        index, turn = divmod(step, self.options["echo"])
+        if self.drawn[0] != index:
+            self.drawn = index, self.source.draw(self.options["batch"], self.options["echo"],
+                                                 np.random.default_rng((self.options["seed"], index)))
+        return self.drawn[1][turn]
+
+
 def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator,
             augment: bool = True) -> tuple[np.ndarray, ...]:
     """A photograph as the network sees it, the shares of its parts, and where they are known."""
@@ -78,7 +107,7 @@ def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np
         landmarks = landmarks * [-1, 1] + [srgb.shape[1], 0]
     move = to_crop(landmarks)  # of the bridge, the chin and the box, which a mirror leaves what they are
     if augment:
-        move = _jittered(move, rng)
+        move = jittered(move, SIDE, JITTER, rng)
     known = inside(srgb.shape, move)
     if augment and rng.random() < 0.35:
         known = known * _ended(rng)
@@ -91,12 +120,13 @@ def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np
     return network_input(picture, known), np.ascontiguousarray(parts.transpose(2, 0, 1)), known[None].astype(np.float32)
 
 
-def _jittered(move: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    turn, scale = np.radians(rng.normal(0, TURN)), np.exp(rng.normal(0, SCALE))
+def jittered(move: np.ndarray, side: int, spread: Jitter, rng: np.random.Generator) -> np.ndarray:
+    """A map [2, 3] to a crop of `side` pixels as if the landmarks that it goes by lay a little elsewhere."""
+    turn, scale = np.radians(rng.normal(0, spread.turn_deg)), np.exp(rng.normal(0, spread.scale))
     c, s = scale * np.cos(turn), scale * np.sin(turn)
     about = np.array([[c, s], [-s, c]])
-    middle = np.full(2, SIDE / 2)
-    shift = middle - about @ middle + rng.normal(0, SHIFT * SIDE, 2)
+    middle = np.full(2, side / 2)
+    shift = middle - about @ middle + rng.normal(0, spread.shift * side, 2)
     return np.concatenate([about @ move[:, :2], (about @ move[:, 2] + shift)[:, None]], 1)
 
 

@@ -220,11 +220,8 @@ class _TexelSteps(Dataset):
 
 def main(arguments: list[str] | None = None) -> int:
     options = command_line.parser("texels", __doc__, CONFIGS, WEIGHTS)
-    options.add_argument("--hdri", type=Path, metavar="FOLDER",
-                         help="panoramas whose licence lets weights trained with them be shipped")
+    command_line.add_sights(options, "people")
     options.add_argument("--start", type=Path, metavar="FILE", help="weights to begin with, in place of random ones")
-    options.add_argument("--growing", action="store_true", help="train on the people that are there already")
-    options.add_argument("--prepare", action="store_true", help="make the people and stop")
     return command_line.carry_out(options, arguments, train_texels, export, prepare)
 
 
