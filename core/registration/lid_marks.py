@@ -5,7 +5,7 @@ in all frames at once."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..geometry import raster
 from ..geometry.meshes import joined
 from .eye_looks import EyeLook
 from .irises import fit_iris
-from .lid_edges import fit_edges
+from .lid_edges import SEEN_SIGMA_M, fit_edges
 
 MARKS = 9
 """On each edge, from corner to corner."""
@@ -24,6 +24,12 @@ LEAST_TOLD = 0.5
 """Share of the edges' points that a view must tell of."""
 OVER = 2
 """Rays along the side of a pixel of the crop."""
+LEAST_SEEN_PX = 30
+"""Pixels of the crop that a ball must cover for its middle to be told."""
+OFFSET_SIGMA_M = np.array([0.004, 0.001, 0.004])
+"""How far a fitted head's eyes lie beside the true ones, at most, and before or behind them."""
+SLIP_M, ROUNDS = 0.0015, 8
+"""A miss of one view that counts a quarter."""
 
 
 @dataclass(frozen=True)
@@ -49,26 +55,54 @@ def mark(looks: list[EyeLook], opened: lids.OpenHead, side: int, report: Reporte
     if not looks:
         return None
     ball = opened.balls[side]
-    iris, radius, shift = fit_iris(looks, ball)
-    caster = raster.RayCaster(joined([part.moved(part.vertices + shift) for part in (opened.skin, ball.mesh)]))
-    expected = []
-    for one in looks:
-        report.check()
-        expected.append(_expected(one, caster, len(opened.skin.faces)))
+    off = _offset(looks, _all_expected(looks, opened, side, np.zeros(3), report), ball.centre)
+    iris, radius, shift = fit_iris(looks, replace(ball, centre=ball.centre + off))
+    shift = off + shift * [0, 1, 0]  # across the face the iris tells of the gaze as well
     begun = (edge + shift for edge in lids.edges(opened.skin.vertices, side))
+    expected = _all_expected(looks, opened, side, shift, report)
     upper, lower, told = fit_edges(looks, expected, *begun, ball.centre + shift)
     if told < LEAST_TOLD:
         return None
     return LidMarks(_spread(upper), _spread(lower), iris, radius, len(looks))
 
 
-def _expected(one: EyeLook, caster: raster.RayCaster, first: int) -> np.ndarray:
-    """The ball's share [SIDE, SIDE] of the crop's pixels, of a head whose faces from `first` on are the ball."""
+def _all_expected(looks: list[EyeLook], opened: lids.OpenHead, side: int, shift: np.ndarray,
+                  report: Reporter) -> list[np.ndarray]:
+    """For each look the ball's share [SIDE, SIDE] of the crop's pixels as a head shows it that is moved by `shift`
+    [3]."""
+    parts = [part.moved(part.vertices + shift) for part in (opened.skin, opened.balls[side].mesh)]
+    caster, first = raster.RayCaster(joined(parts)), len(opened.skin.faces)
     y, x = (np.mgrid[0:SIDE * OVER, 0:SIDE * OVER] + 0.5) / OVER
-    pixels = (np.stack([x.ravel(), y.ravel()], 1) - one.shares.move[:, 2]) @ np.linalg.inv(one.shares.move[:, :2]).T
-    rays = one.view.rays(pixels)
-    face, _, _ = caster.first_hits(np.repeat(one.view.centre[None], len(rays), 0), rays)
-    return (face >= first).reshape(SIDE, OVER, SIDE, OVER).mean((1, 3), dtype=np.float32)
+    expected = []
+    for one in looks:
+        report.check()
+        move = one.shares.move
+        rays = one.view.rays((np.stack([x.ravel(), y.ravel()], 1) - move[:, 2]) @ np.linalg.inv(move[:, :2]).T)
+        face, _, _ = caster.first_hits(np.repeat(one.view.centre[None], len(rays), 0), rays)
+        expected.append((face >= first).reshape(SIDE, OVER, SIDE, OVER).mean((1, 3), dtype=np.float32))
+    return expected
+
+
+def _offset(looks: list[EyeLook], expected: list[np.ndarray], centre: np.ndarray) -> np.ndarray:
+    """How far an eyeball expected at `centre` [3] lies from there [3], metres, by the middles of what is seen of it: an
+    edge tells little of a shift along it, and a head's lids may lie millimetres beside."""
+    y, x = np.mgrid[0:SIDE, 0:SIDE] + 0.5
+    axes, misses = [], []
+    for one, share in zip(looks, expected, strict=True):
+        seen, move = one.shares.ball, one.shares.move
+        if min(seen.sum(), share.sum()) < LEAST_SEEN_PX:
+            continue
+        middles = np.array([[(part * x).sum() / part.sum(), (part * y).sum() / part.sum()] for part in (share, seen)])
+        rays = one.view.rays((middles - move[:, 2]) @ np.linalg.inv(move[:, :2]).T)
+        axes.append(one.view.rotation[:2])
+        misses.append(axes[-1] @ (rays[1] - rays[0]) * np.linalg.norm(centre - one.view.centre))
+    off = np.zeros(3)
+    for _ in range(ROUNDS if axes else 0):
+        left = np.array(misses) - np.array(axes) @ off
+        weight = 1 / (1 + (left**2).sum(1) / SLIP_M**2) ** 2 / (len(axes) * SEEN_SIGMA_M**2)
+        matrix = np.einsum("v,vij,vik->jk", weight, axes, axes) + np.diag(1 / OFFSET_SIGMA_M**2)
+        off = np.linalg.solve(matrix, np.einsum("v,vij,vi->j", weight, axes, misses))
+    return off
 
 
 def _spread(edge: np.ndarray) -> np.ndarray:
