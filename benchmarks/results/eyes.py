@@ -20,14 +20,16 @@ def sections(found: Figures) -> Sections:
     filmed = {name: row for name, row in rows.items() if not name[0].isdigit()}
     fitted = {name: row for name, row in rows.items() if name[0].isdigit() and not name.endswith(ALONE)}
     still = {name: row for name, row in rows.items() if name.endswith(ALONE)}
-    table = [["true heads, fitted", *_means(fitted)], ["true heads, by the head alone", *_means(still)]]
+    table = [["true heads, fitted", *_means(fitted)], ["true heads, by the head alone", *_means(still)],
+             ["filmed", *_means(filmed)]]
     return [("", prose("""
         Synthetic people with open eyes, by the eye reader (`core/face/eye_reader.py`) and the fit of
         `core/registration/lid_marks.py`. *True heads*: six people in ten frames with true cameras, whose eyes are
         fitted to their own heads, half a millimetre off. *By the head alone* is what such a head says of its eyes when
         no frame is asked: next to nothing is wrong there, since these people's lids are the template's own and open as
         it opens them. Real lids are not, so that row is no bound: it says what following the frames costs where there
-        is nothing to follow.
+        is nothing to follow. *Filmed* are people whose head came from their film, too: a third of the stubbled man's
+        face is missing from his scan, so that his left eye lies on a face that is millimetres off.
         """, markdown(["mean over eyes", *COLUMNS[:7]], table))),
         ("Eye by eye", markdown(["eye", *COLUMNS], [[name, *(_shown(row[column]) for column in COLUMNS)]
                                                     for name, row in {**fitted, **filmed}.items()]))]
