@@ -11,7 +11,6 @@ upright crop of the eye.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -19,8 +18,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..contract import shipped_files
-from ..contract.messages import Problem
 from .parts import cut, inside
 
 if TYPE_CHECKING:
@@ -75,14 +72,6 @@ def read_eye(srgb: np.ndarray, corners: np.ndarray, left: bool, network: ParseNe
 def load(path: Path = WEIGHTS) -> ParseNet:
     """The shipped network, or that of another file. Raises Problem where the file or its card is missing, or the
     shipped one damaged."""
-    from safetensors.torch import load_file
+    from .parser_network import read_network
 
-    from .parser_network import ParseNet
-
-    card = path.with_suffix(".json")
-    if not (path.is_file() and card.is_file()):
-        raise Problem("The weights of the eye reader are missing.", "Install the add-on again.")
-    shipped_files.require_whole(path)
-    network = ParseNet(**json.loads(card.read_text(encoding="utf-8"))["model"], parts=len(CLASSES))
-    network.load_state_dict({name: value.float() for name, value in load_file(path).items()})
-    return network.eval()
+    return read_network(path, "eye reader", len(CLASSES))

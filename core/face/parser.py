@@ -12,7 +12,6 @@ only asks where faces are does without.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -20,8 +19,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..contract import shipped_files
-from ..contract.messages import Problem
 from .parts import PARTS, cut, inside, put_back, to_crop
 
 if TYPE_CHECKING:
@@ -81,14 +78,6 @@ def parse(srgb: np.ndarray, landmarks: np.ndarray, network: ParseNet | None = No
 def load(path: Path = WEIGHTS) -> ParseNet:
     """The shipped network, or that of another file. Raises Problem where the file or its card is missing, or the
     shipped one damaged."""
-    from safetensors.torch import load_file
+    from .parser_network import read_network
 
-    from .parser_network import ParseNet
-
-    card = path.with_suffix(".json")
-    if not (path.is_file() and card.is_file()):
-        raise Problem("The weights of the face parser are missing.", "Install the add-on again.")
-    shipped_files.require_whole(path)
-    network = ParseNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
-    network.load_state_dict({name: value.float() for name, value in load_file(path).items()})
-    return network.eval()
+    return read_network(path, "face parser", len(PARTS))

@@ -8,11 +8,17 @@ shuffled.
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import torch
+from safetensors.torch import load_file
 from torch import nn
 from torch.nn import functional
 
+from ..contract import shipped_files
+from ..contract.messages import Problem
 from .parts import PARTS
 
 CHANNELS = 4  # sRGB in [-1, 1], 0 beyond the picture, and where the picture is
@@ -32,6 +38,18 @@ def network_input(srgb: np.ndarray, known: np.ndarray) -> np.ndarray:
     layers[:3] = ((2 * np.clip(srgb * gain, 0, 1) - 1) * there[..., None]).transpose(2, 0, 1)
     layers[3] = there
     return layers
+
+
+def read_network(path: Path, reader: str, parts: int) -> ParseNet:
+    """The network of a file of weights and the card beside it, ready to be asked; reader: whose they are, in words.
+    Raises Problem where one of them is missing, or a shipped file damaged."""
+    card = path.with_suffix(".json")
+    if not (path.is_file() and card.is_file()):
+        raise Problem(f"The weights of the {reader} are missing.", "Install the add-on again.")
+    shipped_files.require_whole(path)
+    network = ParseNet(**json.loads(card.read_text(encoding="utf-8"))["model"], parts=parts)
+    network.load_state_dict({name: value.float() for name, value in load_file(path).items()})
+    return network.eval()
 
 
 class ParseNet(nn.Module):

@@ -72,8 +72,8 @@ def figures(report: Reporter, eyes: OpenEyes) -> None:
 
 
 def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: float) -> OpenEyes:
-    """head: closed, in the template's topology; rims of the left and the right eye, where they could be lifted;
-    opening: height over width of the eyes, for one that could not."""
+    """head: closed, in the template's topology; rims of the left and the right eye, where they were seen;
+    opening: height over width of the eyes, for one that was not."""
     head = _with_corners(head, rims)
     balls = tuple(_place(head, side, rims[side]) for side in (0, 1))
     clear = head.vertices

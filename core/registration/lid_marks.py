@@ -43,11 +43,6 @@ class LidMarks:
     iris_radius: float
     views: int
 
-    @property
-    def width(self) -> float:
-        """Distance of the eye's corners."""
-        return float(np.linalg.norm(self.upper[0] - self.upper[-1]))
-
 
 def mark(looks: list[EyeLook], opened: lids.OpenHead, side: int, report: Reporter) -> LidMarks | None:
     """The marks of the left (0) or the right eye that fit what was seen of it, beginning with a head whose lids are
