@@ -20,7 +20,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from ..contract.messages import Problem, Reporter
+from ..contract.messages import Reporter
 from ..face.eye_reader import CLASSES, SIDE, to_eye_crop
 from ..face.parser_network import ParseNet, network_input
 from ..face.parts import cut, inside
@@ -29,9 +29,8 @@ from ..synthetic.people import eye_sights, unlit
 from ..synthetic.people.figure import make_figure
 from ..synthetic.people.person import sample_person
 from . import command_line, descent
-from .release import TrainingCard, again, release
 from .seeds import named_subjects, panorama_names
-from .snapshots import Echoed, Jitter, jittered, spoilt
+from .snapshots import Echoed, Jitter, export_parsing, jittered, recipe_of, require_figures, spoilt
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "eyes.safetensors"
 _MODEL = {"widths": [32, 48, 64, 96], "depths": [1, 1, 1, 2]}
@@ -75,21 +74,16 @@ def train_eyes(config: str, out: Path, report: Reporter, run: descent.TrainingRu
     data = named_subjects(t["figures"], t["held_out"]) | {"panoramas": panorama_names(run.hdri)}
     if not run.growing:
         prepare_figures(config, work, report)
-    if not all(any(is_prepared(seed, t["poses"], work) for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
-        raise Problem(f"There are no figures in {work} yet.",
-                      "Wait for `train eyes --prepare`, or train without --growing.")
+    require_figures("eyes", data, lambda seed: is_prepared(seed, t["poses"], work), work)
     unseen = Eyes(data["held_out_seeds"], t["poses"], work, run.hdri).draw(
         32 * t["held_out"], 1, np.random.default_rng(1), augment=False)[0]
     torch.manual_seed(t["seed"])
     network = ParseNet(**CONFIGS[config]["model"], parts=len(CLASSES))
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 100, 0.02),
-                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"],
-                                    save_every=150)
     objective = descent.Objective(Echoed(Eyes(data["seeds"], t["poses"], work, run.hdri), t),
                                   lambda batch, step, share: loss(network, batch, device),
                                   lambda average: figures(average, config, unseen, device))
-    descent.descend(network, state, objective, recipe, work, device, report)
+    descent.descend(network, state, objective, recipe_of(t, run.minutes), work, device, report)
     return export(work, out)
 
 
@@ -180,19 +174,13 @@ def figures(average: dict, config: str, batch: tuple, device: str) -> dict[str, 
 
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:
-    """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
-    state = descent.read_state(work)
-    told = ("Photographs of synthetic people's eyes (core/synthetic/people) on the built-in head, which derives from "
-            "the MakeHuman base mesh (CC0)")
-    if state["data"]["panoramas"]:
-        told += f"; light from procedural environments, lamps and {len(state['data']['panoramas'])} panoramas (CC0)"
-    what = ("photographs of held-out figures' eyes: intersection over union of the ball and of the iris, where a class "
-            "is what most of a pixel is")
-    command = again("eyes", state) + (" --hdri hdri" if state["data"]["panoramas"] else "")
-    config, named = CONFIGS[state["config"]], state["data"]
-    ready = sum(is_prepared(seed, config["training"]["poses"], work) for seed in named["seeds"])
-    more = {"panoramas": named["panoramas"], "prepared": ready}
-    return release(out, state, TrainingCard(config, told, command, {**state["history"][-1][2], "what": what}, more))
+    """The averaged weights of a training folder, with their card."""
+    config = CONFIGS[descent.read_state(work)["config"]]
+    words = ("synthetic people's eyes",
+             "photographs of held-out figures' eyes: intersection over union of the ball and of the iris, "
+             "where a class is what most of a pixel is")
+    return export_parsing("eyes", work, out, config, words,
+                          lambda seed: is_prepared(seed, config["training"]["poses"], work))
 
 
 def _path(work: Path, seed: int, number: int) -> Path:

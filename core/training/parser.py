@@ -20,13 +20,21 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from ..contract.messages import Problem, Reporter
+from ..contract.messages import Reporter
 from ..face.parser_network import ParseNet
 from ..face.parts import PARTS
 from . import command_line, descent
-from .release import TrainingCard, again, release
 from .seeds import named_subjects, panorama_names
-from .snapshots import Echoed, SnapshotBatch, Snapshots, is_prepared, prepare
+from .snapshots import (
+    Echoed,
+    SnapshotBatch,
+    Snapshots,
+    export_parsing,
+    is_prepared,
+    prepare,
+    recipe_of,
+    require_figures,
+)
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "parser.safetensors"
 _MODEL = {"widths": [40, 64, 112, 144], "depths": [1, 1, 1, 2]}
@@ -71,21 +79,16 @@ def train_parser(config: str, out: Path, report: Reporter, run: descent.Training
     data = named_subjects(t["figures"], t["held_out"]) | {"panoramas": panorama_names(hdri)}
     if not run.growing:
         prepare_figures(config, work, report)
-    if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
-        raise Problem(f"There are no figures in {work} yet.",
-                      "Wait for `train parser --prepare`, or train without --growing.")
+    require_figures("parser", data, lambda seed: is_prepared(seed, t["views"], work), work)
     unseen = Snapshots(data["held_out_seeds"], t["views"], work,
                        hdri).draw(8 * t["held_out"], 1, np.random.default_rng(1), augment=False)[0]
     torch.manual_seed(t["seed"])
     network = ParseNet(**CONFIGS[config]["model"])
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 100, 0.02),
-                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"],
-                                    save_every=150)
     objective = descent.Objective(Echoed(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step,
                                   share: loss(network, batch, device),
                                   lambda average: figures(average, config, unseen, device))
-    descent.descend(network, state, objective, recipe, work, device, report)
+    descent.descend(network, state, objective, recipe_of(t, run.minutes), work, device, report)
     return export(work, out)
 
 
@@ -125,20 +128,13 @@ def figures(average: dict, config: str, batch: SnapshotBatch, device: str) -> di
 
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:
-    """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
-    state = descent.read_state(work)
-    told = ("Photographs of synthetic people (core/synthetic/people) on the built-in head, which derives from the "
-            "MakeHuman base mesh (CC0)")
-    if state["data"]["panoramas"]:
-        told += f"; light from procedural environments, lamps and {len(state['data']['panoramas'])} panoramas (CC0)"
-    what = ("photographs of held-out figures: intersection over union of each part, where a part is what most of a "
-            "pixel is")
-    command = again("parser", state) + (" --hdri hdri" if state["data"]["panoramas"] else "")
-    config, named = CONFIGS[state["config"]], state["data"]
-    # the others were not there yet
-    ready = sum(is_prepared(seed, config["training"]["views"], work) for seed in named["seeds"])
-    more = {"panoramas": named["panoramas"], "prepared": ready}
-    return release(out, state, TrainingCard(config, told, command, {**state["history"][-1][2], "what": what}, more))
+    """The averaged weights of a training folder, with their card."""
+    config = CONFIGS[descent.read_state(work)["config"]]
+    words = ("synthetic people",
+             "photographs of held-out figures: intersection over union of each part, "
+             "where a part is what most of a pixel is")
+    return export_parsing("parser", work, out, config, words,
+                          lambda seed: is_prepared(seed, config["training"]["views"], work))
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -8,6 +8,7 @@ What light does not change is made once per figure and kept in a work folder (so
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,13 +17,15 @@ import numpy as np
 import torch
 from torch.utils.data import Dataset
 
-from ..contract.messages import Reporter
+from ..contract.messages import Problem, Reporter
 from ..face.parser_network import network_input
 from ..face.parts import SIDE, cut, inside, to_crop
 from ..synthetic.environments import read_panoramas
 from ..synthetic.people import unlit
 from ..synthetic.people.figure import make_figure
 from ..synthetic.people.snapshot import photograph
+from . import descent
+from .release import TrainingCard, again, release
 
 TEXELS = 512  # of a figure's maps: pixels of a crop are larger than theirs
 
@@ -173,3 +176,34 @@ def _prepare_one(seed: int, views: int, work: Path) -> None:
     for view in range(views):
         rng = np.random.default_rng([seed, 91, view])
         unlit.save(_path(work, seed, view), unlit.see(scene, unlit.random_view(figure, rng), rng))
+
+
+def require_figures(training: str, data: dict, prepared: Callable[[int], bool], work: Path) -> None:
+    """Raises Problem where `work` has none of the figures that are learnt from, or of those kept from it."""
+    if not all(any(map(prepared, data[kind])) for kind in ("seeds", "held_out_seeds")):
+        raise Problem(f"There are no figures in {work} yet.",
+                      f"Wait for `train {training} --prepare`, or train without --growing.")
+
+
+def recipe_of(options: dict, minutes: float | None) -> descent.TrainingRecipe:
+    """How a network that parses pictures is trained."""
+    return descent.TrainingRecipe(minutes or options["minutes"], descent.cosine(options["rate"], 100, 0.02),
+                                  betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=options["workers"],
+                                  save_every=150)
+
+
+def export_parsing(training: str, work: Path, out: Path, config: dict, words: tuple[str, str],
+                   prepared: Callable[[int], bool]) -> dict:
+    """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from;
+    words: of whom the photographs are, and what its figures of held-out people mean."""
+    state = descent.read_state(work)
+    whom, what = words
+    named, panoramas = state["data"], state["data"]["panoramas"]
+    told = (f"Photographs of {whom} (core/synthetic/people) on the built-in head, which derives from the MakeHuman "
+            "base mesh (CC0)")
+    if panoramas:
+        told += f"; light from procedural environments, lamps and {len(panoramas)} panoramas (CC0)"
+    command = again(training, state) + (" --hdri hdri" if panoramas else "")
+    # the others were not there yet
+    more = {"panoramas": panoramas, "prepared": sum(map(prepared, named["seeds"]))}
+    return release(out, state, TrainingCard(config, told, command, {**state["history"][-1][2], "what": what}, more))
