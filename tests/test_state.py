@@ -244,3 +244,19 @@ def test_the_page_says_what_the_solve_adds():
         and "| solved | **+0.75 ± 0.25** |" in page["In the picture"]
         and "Features kept" not in page
     )
+
+
+def test_what_the_truth_shows_before_the_neck_is_no_facial_skin_of_the_head():
+    """A beard's strands before a neck: the head hits its neck there, which no picture may judge."""
+    side = 128
+    face = template.mask("face", side) > 0.5
+    y, x = (np.mgrid[0:side, 0:side] + 0.5) / side
+    look = HeadInView(AlbedoTruth(0, np.broadcast_to(images.linear_to_srgb(SKIN), (side, side, 3)),
+                                  np.ones((side, side), bool), None),
+                      np.ones((side, side), bool), np.stack([x.ravel(), 1 - y.ravel()], 1))
+    rows, columns = np.mgrid[0:side, 0:side]
+    tinted = SKIN * np.where((rows + columns)[..., None] % 2, 1.0, 0.8)
+    beside = np.where(face[..., None], SKIN, tinted).astype(np.float32)
+    within = np.where(face[..., None], tinted, SKIN).astype(np.float32)
+    scores = state_scores.in_pictures({NOTHING: beside, DELIT: within}, [look])
+    assert scores[NOTHING]["psnr"] > scores[DELIT]["psnr"] + 6
