@@ -37,8 +37,8 @@ from core import delight
 from core.contract.capture import Capture
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import Settings
-from core.delight import second_opinion
 from core.delight.contract import Delit
+from core.delight.second_opinion import Weighing
 from core.delight.whole_head import WEIGHTS, whole_head
 from core.imaging import images
 
@@ -156,7 +156,7 @@ def measure(chosen: Photographs, settings: Settings, features: bool = True, only
 
 def without_whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The delighter network as its frames and the fitted light alone would have it."""
-    with mock.patch.object(second_opinion, "WHOLE", 0.0):
+    with mock.patch.object(importlib.import_module("core.delight.network"), "WHOLE", Weighing(0.0, 1.0)):
         yield from delight.DELIGHTERS["network"](capture, settings, report)
 
 

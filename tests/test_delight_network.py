@@ -12,13 +12,13 @@ import pytest
 import torch
 
 from core.contract.messages import Problem, Reporter
-from core.delight.below_hair import without_hair
+from core.delight.below_hair import FITTED_SHARE, without_hair
 from core.delight.casts import without_casts
 from core.delight.evening import ShadingEstimate, even_out
 from core.delight.lift import lift, lift_share
 from core.delight.lit_head import LitHead
 from core.delight.network import WEIGHTS, crop, face_box, load
-from core.delight.second_opinion import FITTED, WHOLE, HeadInLook, beyond, of_both, with_whole_head
+from core.delight.second_opinion import Weighing, beyond, weigh_in
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.face import template
 from core.face.head import Head
@@ -195,36 +195,22 @@ def test_the_shipped_network_is_the_one_its_card_tells_of():
 
 def test_two_answers_are_weighed_where_they_agree_and_the_network_wins_where_they_do_not():
     face, skin = np.zeros((32, 32), int), np.ones((32, 32), np.float32)
-    look = ShadingEstimate((0, 0, 32), np.zeros((32, 32, 3), np.float32), skin, np.zeros((32, 32, 3), np.float32), face)
-    fitted = np.zeros((32, 32, 3), np.float32) + 5  # a level is no difference
-    fitted[:4] += 0.1
-    fitted[-4:] += 7
-    (both,) = of_both([look], [fitted], [skin])
-    assert both.shading[:4] == pytest.approx(FITTED * 0.1, rel=0.05)
-    assert both.shading[8:-8] == pytest.approx(0, abs=1e-6) and np.abs(both.shading[-4:]).max() < 0.15
-
-
-def test_the_whole_heads_answer_is_met_in_part_where_the_head_is_whatever_its_level():
-    face, skin = np.zeros((32, 32), int), np.ones((32, 32), np.float32)
     face[:, 28:] = -1
-    shadow = 0 * skin
-    shadow[20:26, 4:10] = 1
-    look = ShadingEstimate((0, 0, 32), np.zeros((32, 32, 3), np.float32), shadow, np.zeros((32, 32, 3), np.float32),
-                           face)
-    log = np.zeros((32, 32, 3), np.float32) + 5
-    log[:8] += 1
-    log[19:26] += 1
-    (both,) = with_whole_head([look], [HeadInLook(log, 0 * skin)], [skin])
-    assert both.shading[:8, :28] == pytest.approx(WHOLE, rel=1e-3)
-    assert both.shading[19:26, 16:28] == pytest.approx(WHOLE, rel=1e-3)
-    assert not both.shading[8:19].any() and not both.shading[:, 28:].any()
-    assert not both.shading[21:25, 5:9].any(), "a shadow of which the whole head does not know"
-    (knowing,) = with_whole_head([look], [HeadInLook(log, shadow)], [skin])
-    assert knowing.shading[21:25, 5:9] == pytest.approx(WHOLE, rel=1e-3)
-    assert with_whole_head([look], [HeadInLook(log, shadow)], [0 * skin]) == [look], "no skin tells the level"
+    look = ShadingEstimate((0, 0, 32), np.zeros((32, 32, 3), np.float32), skin, np.zeros((32, 32, 3), np.float32), face)
+    weighing = Weighing(share=0.6, doubt=0.2)
+    answer = np.zeros((32, 32, 3), np.float32) + 5  # a level is no difference
+    answer[:4] += 0.01
+    answer[4:8] += weighing.doubt
+    answer[-4:] += 7
+    (both,) = weigh_in([look], [answer], [skin], weighing)
+    assert both.shading[:4, :28] == pytest.approx(0.6 * 0.01, rel=0.01)
+    assert both.shading[4:8, :28] == pytest.approx(0.6 / 2 * weighing.doubt, rel=1e-3)
+    assert not both.shading[8:-4].any() and np.abs(both.shading[-4:]).max() < 0.01
+    assert not both.shading[:, 28:].any(), "off the head"
+    assert weigh_in([look], [answer], [0 * skin], weighing) == [look], "no skin tells the level"
 
 
-def test_below_hair_the_fitted_light_goes_on_at_the_level_of_the_skin_around():
+def test_below_hair_the_mean_of_both_answers_counts_at_the_level_of_the_skin_around():
     """A true shading that slopes; a beard that the network took for shadow; the fitted light is right but for its
     level."""
     y, x = np.mgrid[0:48, 0:48].astype(np.float32)
@@ -233,7 +219,8 @@ def test_below_hair_the_fitted_light_goes_on_at_the_level_of_the_skin_around():
     face = np.where(np.hypot(x - 24, y - 24) < 23, 0, -1)
     look = ShadingEstimate((0, 0, 48), true - 1.1 * hair[..., None], hair, true, face)
     told = without_hair(look, true + 0.4, hair)
-    assert np.abs(told.shading - true)[face >= 0].max() < 0.01 and told.shadow[face >= 0].max() < 1e-6
+    expected = true - (1 - FITTED_SHARE) * 1.1 * hair[..., None]
+    assert np.abs(told.shading - expected)[face >= 0].max() < 0.01 and told.shadow[face >= 0].max() < 1e-6
     assert np.array_equal(told.shading[face < 0], look.shading[face < 0])
     assert without_hair(look, true, 0 * hair) is look
     assert without_hair(look, true, 1 + 0 * hair) is look, "nothing is bare that would tell the level"

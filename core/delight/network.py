@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -38,7 +38,7 @@ from .contract import Delit
 from .evening import ShadingEstimate, even_out
 from .lift import lift, lift_share
 from .lit_head import BRIGHTEST, LitHead, lit_head
-from .second_opinion import beyond, coarse, of_both, with_whole_head
+from .second_opinion import FITTED, WHOLE, beyond, coarse, weigh_in
 from .shading import light_in_frame, light_seen
 from .unet import DARKEST, SIDE, DelightNet, network_input
 from .whole_head import READING, answers_in_looks
@@ -50,9 +50,35 @@ MARGIN = 1.35  # side of the square, in sides of the face's landmarks; training 
 FADE = 0.06  # of the square's side: along its border it gives way to the fitted light
 
 
+@dataclass(frozen=True)
+class Answers:
+    """What is told of a capture's selected frames: the head and its light; the views; looks: the network's answers,
+    evened out over the head; and for each look, [h, h, 3], the log-shading of the fitted light and of the whole head
+    (none, where the head is not the built-in one), and, [h, h], the bare skin and the hair in it."""
+
+    head: LitHead
+    views: list[View]
+    looks: list[ShadingEstimate]
+    fitted: list[np.ndarray]
+    whole: list[np.ndarray] | None
+    skins: list[np.ndarray]
+    hair: list[np.ndarray]
+
+
 def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see
     the head."""
+    answers = ask(capture, settings, report)
+    for i, (view, look) in enumerate(zip(answers.views, put_together(answers), strict=True)):
+        report.progress(7 * len(answers.views) + i, 8 * len(answers.views),
+                        f"Delighting frame {i + 1} of {len(answers.views)}")
+        srgb = images.read_srgb(view.path)
+        albedo, shadow = _divided(srgb, look, light_in_frame(view, answers.head, srgb))
+        yield Delit(view, albedo, shadow)
+
+
+def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
+    """All answers on a capture, before they are put together. Raises Problem as `network` does."""
     net, views = load(settings.compute_device), read_views(capture, selected_only=True)
     whole = load_whole_head(settings.compute_device)
     head = lit_head(read_head(capture), views, report)
@@ -63,19 +89,22 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
         looks.append(look)
         fitted.append(log)
     skins, hair = ([_seen(head, values, look) for look in looks] for values in (head.skin, head.hair))
-    looks = of_both(even_out(head, views, looks), fitted, skins)
-    if head.head.built_in:
-        def step(done: int, of: int) -> None:
-            report.progress(6 * of + done, 8 * of, READING)
 
-        looks = with_whole_head(looks, answers_in_looks(whole, head, views, looks, step), skins)
-    looks = [without_hair(look, log, share) for look, log, share in zip(looks, fitted, hair, strict=True)]
-    looks = without_casts(looks, skins)
-    for i, (view, look) in enumerate(zip(views, looks, strict=True)):
-        report.progress(7 * len(views) + i, 8 * len(views), f"Delighting frame {i + 1} of {len(views)}")
-        srgb = images.read_srgb(view.path)
-        albedo, shadow = _divided(srgb, look, light_in_frame(view, head, srgb))
-        yield Delit(view, albedo, shadow)
+    def step(done: int, of: int) -> None:
+        report.progress(6 * of + done, 8 * of, READING)
+
+    looks = even_out(head, views, looks)
+    heads = answers_in_looks(whole, head, views, looks, step) if head.head.built_in else None
+    return Answers(head, views, looks, fitted, heads, skins, hair)
+
+
+def put_together(answers: Answers) -> list[ShadingEstimate]:
+    """One shading for each frame out of all answers."""
+    looks = weigh_in(answers.looks, answers.fitted, answers.skins, FITTED)
+    if answers.whole is not None:
+        looks = weigh_in(looks, answers.whole, answers.skins, WHOLE)
+    looks = [without_hair(*told) for told in zip(looks, answers.fitted, answers.hair, strict=True)]
+    return without_casts(looks, answers.skins)
 
 
 def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, np.ndarray]:

@@ -3,9 +3,9 @@
 """In a capture there are three answers: the network's for each frame, that of the light fitted to all frames, and the
 whole head's. Their errors differ, so a mean is better than any.
 
-The fit holds over the whole head and knows the colours of sun and sky; the network knows what no fit explains. Where
-they are far apart the fit is wrong more often: a lamp it did not find, a lifted hand, hair. The whole head's answer
-follows little of the pigment, and takes a single small shadow for it.
+The fit holds over the whole head and knows the colours of sun and sky; the network knows what no fit explains. Where an
+answer lies far from the frames' own, it is wrong more often than they are: a lamp it did not find, a lifted hand, hair;
+a small shadow that the whole head takes for pigment. `benchmarks.delight_answers` measures both weights.
 """
 
 from __future__ import annotations
@@ -17,50 +17,31 @@ import numpy as np
 
 from .evening import ShadingEstimate
 
-FITTED = 0.8  # weight of the fitted light's answer where the two agree ...
-DOUBT = 1.0  # ... and natural log units of luminance between them at which it is half of that
-# on five captures of five synthetic people, by the PSNR and FLIP of their delit frames; nobody was left out
-WHOLE = 0.5  # weight of the whole head's answer ...
-MISSED = 0.25  # ... which is nothing where so much of the sun is lost of which it does not know ...
-MISSED_CELLS = 1.0  # ... on average over a Gaussian of that deviation: borders are not where a shadow is missed
-
 
 @dataclass(frozen=True)
-class HeadInLook:
-    """The whole head's answer where a look shows the head, 0 elsewhere: log [h, h, 3], its log-shading, and shadow [h,
-    h] in [0, 1]."""
+class Weighing:
+    """How far an answer counts beside the frames' own: `share` where the two agree, half of it where the luminance of
+    their shadings is `doubt` apart (natural log units)."""
 
-    log: np.ndarray
-    shadow: np.ndarray
+    share: float
+    doubt: float
 
 
-def of_both(looks: list[ShadingEstimate], fitted: list[np.ndarray], skins: list[np.ndarray]) -> list[ShadingEstimate]:
-    """The looks moved towards the fitted log-shading [h, h, 3] of each, brought to their level over bare skin (skins
-    [h, h], above 0.5 there)."""
-    apart = [(log - look.shading)[skin > 0.5] for look, log, skin in zip(looks, fitted, skins, strict=True)]
+FITTED = Weighing(share=0.5, doubt=0.2)
+"""Of the fitted light: the best over ten people in twelve captures (benchmarks/delight_answers.py)."""
+WHOLE = Weighing(share=0.3, doubt=0.05)
+"""Of the whole head's answer, by the same people; without it they are as well off."""
+
+
+def weigh_in(looks: list[ShadingEstimate], answers: list[np.ndarray], skins: list[np.ndarray],
+             weighing: Weighing) -> list[ShadingEstimate]:
+    """The looks moved towards another answer, log-shading [h, h, 3] for each, brought to their level over bare skin
+    (skins [h, h], above 0.5 there); as they are where no skin tells the level."""
+    apart = [(answer - look.shading)[skin > 0.5] for look, answer, skin in zip(looks, answers, skins, strict=True)]
     if not sum(map(len, apart)):
         return looks
     level = np.median(np.concatenate(apart), 0)
-    return [_towards(look, log - level) for look, log in zip(looks, fitted, strict=True)]
-
-
-def with_whole_head(looks: list[ShadingEstimate], heads: list[HeadInLook],
-                    skins: list[np.ndarray]) -> list[ShadingEstimate]:
-    """The looks moved by WHOLE towards the whole head's log-shading in each, brought to their level over bare skin
-    (skins [h, h], above 0.5 there). A shadow that a look shows and the whole head does not know is one that it took for
-    pigment: there the look keeps its own."""
-    apart = [(head.log - look.shading)[skin > 0.5] for look, head, skin in zip(looks, heads, skins, strict=True)]
-    if not sum(map(len, apart)):
-        return looks
-    level = np.median(np.concatenate(apart), 0)
-    return [_halfway(look, head, level) for look, head in zip(looks, heads, strict=True)]
-
-
-def _halfway(look: ShadingEstimate, head: HeadInLook, level: np.ndarray) -> ShadingEstimate:
-    missed = np.clip(look.shadow - head.shadow, 0, 1).astype(np.float32)
-    known = 1 - np.clip(cv2.GaussianBlur(missed, (0, 0), MISSED_CELLS) / MISSED, 0, 1)
-    weight = (WHOLE * known * (look.face >= 0))[..., None]
-    return replace(look, shading=(look.shading + weight * (head.log - level - look.shading)).astype(np.float32))
+    return [_towards(look, answer - level, weighing) for look, answer in zip(looks, answers, strict=True)]
 
 
 def beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice], light: np.ndarray,
@@ -85,7 +66,8 @@ def coarse(light: np.ndarray, side: int) -> np.ndarray:
                              1e-4))
 
 
-def _towards(look: ShadingEstimate, log: np.ndarray) -> ShadingEstimate:
-    apart = log - look.shading
-    weight = FITTED / (1 + (apart.mean(-1, keepdims=True) / DOUBT) ** 2) * (look.face >= 0)[..., None]
+def _towards(look: ShadingEstimate, answer: np.ndarray, weighing: Weighing) -> ShadingEstimate:
+    apart = answer - look.shading
+    weight = weighing.share / (1 + (apart.mean(-1, keepdims=True) / weighing.doubt) ** 2)
+    weight = weight * (look.face >= 0)[..., None]
     return replace(look, shading=(look.shading + weight * apart).astype(np.float32))

@@ -28,7 +28,6 @@ from .contract import Delit
 from .evening import ShadingEstimate
 from .lit_head import BRIGHTEST, LitHead, lit_head
 from .packed import unpack
-from .second_opinion import HeadInLook
 from .texel_net import TexelNet, maps_of, network_input
 from .texels import Texels, gather
 
@@ -68,17 +67,16 @@ def whole_head(capture: Capture, settings: Settings, report: Reporter, weights: 
 
 
 def answers_in_looks(net: TexelNet, head: LitHead, views: list[View], looks: list[ShadingEstimate],
-                     step: Callable[[int, int], None]) -> list[HeadInLook]:
-    """The whole head's answer in each look, as coarse as a look is. The head has the built-in UVs."""
-    found = tell_shading(net, gather(head, views, step))
-    coarse = images.resize(np.concatenate([np.exp(found.log), found.shadow[..., None]], -1), LOOKED_AT, LOOKED_AT)
-    maps = np.concatenate([np.log(coarse[..., :3]), coarse[..., 3:]], -1).astype(np.float32)
+                     step: Callable[[int, int], None]) -> list[np.ndarray]:
+    """The whole head's log-shading [h, h, 3] in each look, as coarse as a look is; 0 where a look does not show the
+    head, which has the built-in UVs."""
+    log = tell_shading(net, gather(head, views, step)).log
+    coarse = np.log(images.resize(np.exp(log), LOOKED_AT, LOOKED_AT)).astype(np.float32)
     answers = []
     for look in looks:
         uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
         at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * LOOKED_AT
-        seen = sample(maps, at).reshape(*look.face.shape, 4) * (look.face >= 0)[..., None]
-        answers.append(HeadInLook(seen[..., :3], seen[..., 3]))
+        answers.append(sample(coarse, at).reshape(*look.face.shape, 3) * (look.face >= 0)[..., None])
     return answers
 
 

@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each of the delighter's answers is worth in captures, and how far two of them are best believed beside the
+frames' own (core/delight/second_opinion.py), chosen by leaving one person out.
+
+    python -m benchmarks.delight_answers FOLDER [--truths FOLDER] [--only PREFIX ...] [--sample CAPTURE]
+    [--eyes FOLDER [--facekit FOLDER]] [--json PATH]
+
+FOLDER holds captures with a truth, as benchmarks/state.py reads them; --sample is what `make demo` leaves; --eyes those
+of benchmarks/eye_captures.py. FOLDER/answers keeps what the delighter was told on each capture (a minute or two), with
+the code that told it: delete it to ask anew. An error is the deviation, in natural log, of the picture less an answer
+from the true albedo, over bare facial skin in all frames, after one gain per channel and capture.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from core.contract.capture import Capture
+from core.contract.files import replacing
+from core.contract.messages import Reporter
+from core.contract.settings import Settings
+from core.delight import second_opinion
+from core.delight.evening import ShadingEstimate
+from core.delight.network import ask
+from core.delight.second_opinion import Weighing, weigh_in
+from core.face import template
+from core.geometry.raster import interpolate, sample
+from core.imaging import images
+from core.synthetic.people.figure import make_figure
+
+from . import figures
+from .eye_captures import EYES
+from .measures.references import TRUE
+from .state_captures import SIZE, Filmed, find
+
+COMMAND = ("python -m benchmarks.delight_answers FOLDER --sample .demo/sample.wildcap --eyes FOLDER "
+           "--json docs/figures/delight_answers.json")
+SHARES, DOUBTS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0), (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
+SAMPLE = figures.ROOT / "core" / "synthetic" / "sample"
+GRID = tuple(Weighing(share, doubt) for share, doubt in product(SHARES, DOUBTS))
+BARE = 0.5  # share of bare skin in a cell from which it counts, as in second_opinion.weigh_in
+DARKEST = 2e-3
+HAIRED = 0.3  # density of hair from which a map of skin is no truth of what is seen there
+
+
+ROWS = {"filmed": "doing nothing", "frames": "the frames' own", "fitted": "the fitted light",
+        "whole": "the whole head's",
+        "with_fitted": "frames and fitted light", "all": "all three"}
+"""What is told apart, and its heading."""
+ANSWERS = ("true", "frames", "fitted", "whole")
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A capture's answers on its cells of bare skin whose albedo is known, in natural log [N, 3] less their mean: the
+    true light, and that of the frames' own answer, of the fitted light and of the whole head."""
+
+    person: str
+    true: np.ndarray
+    frames: np.ndarray
+    fitted: np.ndarray
+    whole: np.ndarray
+
+    def error(self, light: np.ndarray) -> float:
+        """Deviation of a light [N, 3] from the true one."""
+        return float(np.sqrt(np.mean((light - light.mean(0) - self.true) ** 2)))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
+    parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
+    parser.add_argument("--sample", type=Path, help="the sample's capture")
+    parser.add_argument("--eyes", type=Path, help="what benchmarks/eye_captures.py made")
+    parser.add_argument("--facekit", type=Path, help="of --eyes, as it was given there")
+    parser.add_argument("--json", type=Path, help="where the figures go")
+    asked = parser.parse_args()
+    work = asked.folder.resolve() / "answers"
+    judged = {}
+    for name, person, capture, truth in known_captures(asked):
+        kept = work / f"{name}.npz"
+        if not kept.is_file():
+            keep(kept, capture, *truth())
+        with np.load(kept) as stored:
+            judged[name] = Judged(person, *(stored[key].astype(np.float32) for key in ANSWERS))
+        print(f"{name}: read", file=sys.stderr, flush=True)
+    rows, chosen = score(judged)
+    print(table(rows), "", choices(chosen), sep="\n")
+    if asked.json:
+        figures.write(asked.json, "delight_answers", COMMAND, {"rows": rows, "chosen": chosen})
+    return 0
+
+
+def known_captures(asked: argparse.Namespace) -> list[tuple[str, str, Capture, Callable]]:
+    """Name, person, capture, and what reads its true albedo, linear [S, S, 3], with where it is known, bool [SIZE,
+    SIZE], both in the head's UVs."""
+    folder = asked.folder.resolve()
+    filmed = [each for each in find(folder, (asked.truths or folder).resolve(), folder / "state")
+              if each.name.startswith(tuple(asked.only))]
+    if asked.sample:
+        filmed.append(Filmed("sample", "sample", Capture(asked.sample.resolve()), SAMPLE, folder / "state"))
+    captures = [(each.name, each.person, each.capture, lambda each=each: (each.answer(TRUE), each.where))
+                for each in filmed]
+    if asked.eyes:
+        captures += [(str(seed), str(seed), Capture(asked.eyes.resolve() / f"{seed}.wildcap"),
+                      lambda seed=seed: _bare_truth(seed, asked.facekit)) for seed in EYES]
+    return captures
+
+
+def _bare_truth(seed: int, facekit: Path | None) -> tuple[np.ndarray, np.ndarray]:
+    figure = make_figure(seed, 2 * SIZE, facekit)
+    haired = np.logical_or.reduce([images.resize(density, SIZE, SIZE) > HAIRED for density in figure.growth.values()])
+    return figure.seen, (template.mask("face", SIZE) > 0.5) & ~haired
+
+
+def keep(path: Path, capture: Capture, albedo: np.ndarray, known: np.ndarray) -> None:
+    """Asks the delighter and keeps its answers where the albedo is known."""
+    answers = ask(capture, Settings(device="cpu"), Reporter("delight", emit=lambda message: None))
+    if answers.whole is None:
+        raise SystemExit(f"{capture.root} has an own head: the whole head's answer knows the built-in one alone.")
+    albedo = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), SIZE, SIZE), DARKEST))
+    maps = np.concatenate([albedo, known[..., None]], -1).astype(np.float32)
+    mesh, cells = answers.head.mesh, {key: [] for key in ANSWERS}
+    for look, fitted, whole, skin in zip(answers.looks, answers.fitted, answers.whole, answers.skins, strict=True):
+        uv = interpolate(mesh.uvs, mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
+        seen = sample(maps, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * SIZE).reshape(*look.face.shape, 4)
+        where = (look.face >= 0) & (skin > BARE) & (seen[..., 3] > 0.99)
+        for key, light in zip(ANSWERS, (look.log - seen[..., :3], look.shading, fitted, whole), strict=True):
+            cells[key].append(light[where])
+    joined = {key: np.concatenate(parts) for key, parts in cells.items()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
+        with temporary.open("wb") as file:
+            np.savez(file, **{key: (light - light.mean(0)).astype(np.float16) for key, light in joined.items()})
+
+
+def weighed(light: np.ndarray, answer: np.ndarray, weighing: Weighing) -> np.ndarray:
+    """What `second_opinion.weigh_in` makes of two answers [N, 3] on bare skin."""
+    skin, face = np.ones((1, len(light))), np.zeros((1, len(light)), int)
+    look = ShadingEstimate((0, 0, 1), light[None], skin, light[None], face)
+    return weigh_in([look], [answer[None]], [skin], weighing)[0].shading[0]
+
+
+def score(judged: dict[str, Judged]) -> tuple[dict, dict]:
+    """The errors of each capture by ROWS, and for each of the two answers that are weighed in: what is shipped, the
+    best of GRID over people, and for each person the error with the best of the others', beside no such answer."""
+    rows, with_fitted = {}, {}
+    for name, each in judged.items():
+        with_fitted[name] = weighed(each.frames, each.fitted, second_opinion.FITTED)
+        together = weighed(with_fitted[name], each.whole, second_opinion.WHOLE)
+        rows[name] = {"person": each.person, "filmed": each.error(0 * each.true), "frames": each.error(each.frames),
+                      "fitted": each.error(each.fitted), "whole": each.error(each.whole),
+                      "with_fitted": each.error(with_fitted[name]), "all": each.error(together)}
+    before = {name: each.frames for name, each in judged.items()}
+    return rows, {"fitted": choose(judged, before, "fitted", second_opinion.FITTED),
+                  "whole": choose(judged, with_fitted, "whole", second_opinion.WHOLE)}
+
+
+def choose(judged: dict[str, Judged], before: dict[str, np.ndarray], answer: str, shipped: Weighing) -> dict:
+    """Which Weighing of GRID is best for an answer beside what there is `before`, over people, and with each person
+    left out of the choice."""
+    errors = {weighing: {name: each.error(weighed(before[name], getattr(each, answer), weighing))
+                         for name, each in judged.items()} for weighing in {*GRID, shipped}}
+    persons = sorted({each.person for each in judged.values()})
+
+    def of_person(weighing: Weighing, person: str) -> float:
+        return float(np.mean([errors[weighing][name] for name, each in judged.items() if each.person == person]))
+
+    def best(over: list[str]) -> Weighing:
+        return min(GRID, key=lambda weighing: np.mean([of_person(weighing, person) for person in over]))
+
+    over_all, none = best(persons), Weighing(0.0, DOUBTS[0])
+    left_out = [of_person(best([other for other in persons if other != person]), person) for person in persons]
+    return {"share": over_all.share, "doubt": over_all.doubt,
+            **{key: float(np.mean([of_person(weighing, person) for person in persons]))
+               for key, weighing in (("best", over_all), ("shipped", shipped), ("without", none))},
+            "left_out": float(np.mean(left_out)),
+            "people_better": sum(out < of_person(none, person) for out, person in zip(left_out, persons, strict=True)),
+            "people": len(persons)}
+
+
+def table(rows: dict[str, dict]) -> str:
+    """The errors in Markdown, and their mean over people."""
+    persons = dict.fromkeys(row["person"] for row in rows.values())
+    means = [float(np.mean([np.mean([row[key] for row in rows.values() if row["person"] == person])
+                            for person in persons])) for key in ROWS]
+    return figures.markdown(["capture", *ROWS.values()],
+                            [*([name, *(f"{row[key]:.3f}" for key in ROWS)] for name, row in rows.items()),
+                             ["**mean over people**", *(f"{mean:.3f}" for mean in means)]])
+
+
+def choices(chosen: dict[str, dict]) -> str:
+    """What was chosen, in Markdown."""
+    return figures.markdown(
+        ["answer", "best share", "best doubt", "without it", "as shipped", "best", "chosen by the others",
+         "people who gain"],
+        [[ROWS[name], f"{row['share']:.1f}", f"{row['doubt']:.2f}",
+          *(f"{row[key]:.4f}" for key in ("without", "shipped", "best", "left_out")),
+          f"{row['people_better']} of {row['people']}"] for name, row in chosen.items()])
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
