@@ -75,7 +75,8 @@ def test_pictures_with_values_that_are_no_numbers(tmp_path, value):
     stored.write(str(tmp_path / "texture.exr"))
     refused(lambda: images.read_linear(tmp_path / "texture.exr"), "texture.exr", "holds values")
     (tmp_path / "capture.json").write_text("{}")
-    assert refused(lambda: images.read_linear(tmp_path / "texture.exr")).remedy == "Run the stage texture again."
+    assert refused(lambda: images.read_linear(tmp_path / "texture.exr")).remedy.startswith(
+        "Run the stage Texture again")
     pixels = np.ones((4, 4, 3), np.float32)
     pixels[1, 2, 0] = value
     for write, name in ((images.write_srgb, "a.png"), (images.write_linear, "a.exr"), (images.write_data, "a.png"),
@@ -93,7 +94,7 @@ def test_what_a_stage_writes_is_named_by_its_stage(tmp_path):
     (tmp_path / "capture.json").write_text("{}")
     for name, stage in (("texture.exr", "texture"), ("maps/normal.png", "solve"), ("frames/00001.jpg", "frames"),
                         ("delit/shadow/00001.png", "delight")):
-        assert checks.advise_remaking(tmp_path / name, "") == f"Run the stage {stage} again."
+        assert checks.advise_remaking(tmp_path / name, "").endswith(f"in Stages (in a terminal: --from {stage}).")
     for theirs in (tmp_path / "shadow_mask.png", tmp_path / "a" / "frames" / "1.jpg"):
         assert checks.advise_remaking(theirs, "Mine.") == "Mine."
 

@@ -132,7 +132,7 @@ def test_older_and_newer_files_are_read(tmp_path):
 def test_a_damaged_file_is_a_problem(tmp_path, text):
     with pytest.raises(Problem, match="frames of this capture cannot be read") as problem:
         read_frames(capture_with(tmp_path, text))
-    assert problem.value.remedy == "Run the stage frames again."
+    assert problem.value.remedy.startswith("Run the stage Frames again")
 
 
 def test_a_missing_file_and_one_in_another_encoding_are_problems(tmp_path):

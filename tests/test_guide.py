@@ -5,11 +5,13 @@ exist."""
 
 import ast
 import re
+import shlex
 from functools import cache
 from pathlib import Path
 
 import pytest
 
+from core.__main__ import _parser
 from core.contract.settings import known_settings
 
 from .conftest import ROOT
@@ -21,6 +23,10 @@ PROSE = "\n".join(re.sub(r"^\| message.*?\n\n", "", text, flags=re.MULTILINE | r
                   for text in (*PAGES.values(), README))
 BUTTONS = sorted({name.rstrip(".,:") for name in re.findall(r"\*\*(.+?)\*\*", PROSE, flags=re.DOTALL)})
 NOT_BUTTONS = {"WildCap"}  # the tab
+COMMANDS = re.findall(r"^    .*?(?:-m core|--command wildcap) (.*)$",
+                      (ROOT / "docs" / "terminal.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+OF_BLENDER = {"contact_sheet", "relight", "turntable"}
+"""Words that the add-on alone knows; its others hand their options on."""
 
 
 @cache
@@ -56,6 +62,15 @@ def test_a_page_of_the_guide_is_short_and_has_a_picture(name):
     lines = PAGES[name].splitlines()
     assert len(lines) <= 80 and "](../pictures/" in PAGES[name]
     assert [line for line in lines if len(line) > 120 and not line.startswith("|")] == []
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_of_the_terminals_page_is_one_that_is_taken(command):
+    words = shlex.split(command)
+    if words[0] == "solve":
+        words[:1] = ["run", "-"]
+    if words[0] not in OF_BLENDER:
+        _parser().parse_args(words)
 
 
 def docs() -> list[Path]:

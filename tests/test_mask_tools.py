@@ -94,7 +94,7 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: start(tool=tool, **options))
     monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: start(**options))
     bpy.ops.wildcap.bring_in_head()
-    with pytest.raises(RuntimeError, match="Click Paint Mask first"):
+    with pytest.raises(RuntimeError, match="Click Paint on the Head"):
         bpy.ops.wildcap.snap_mask()
     bpy.ops.wildcap.paint_mask()
     with pytest.raises(RuntimeError, match="no snapped mask"):

@@ -238,4 +238,4 @@ def test_the_record_of_the_eyes_comes_back_and_a_damaged_one_is_refused(capture)
         capture.eyes.write_text(json.dumps(broken))
         with pytest.raises(Problem, match="eyes.json cannot be read") as problem:
             read_eyes(capture)
-        assert problem.value.remedy == "Run the stage registration again."
+        assert problem.value.remedy.startswith("Run the stage Head again")

@@ -148,7 +148,7 @@ def test_what_is_no_head_mesh_is_refused(tmp_path, content, match):
 def test_a_folder_needs_one_neutral_and_shapes_of_it(tmp_path):
     with pytest.raises(Problem, match="neutral"):
         own_mesh.read(str(tmp_path), Reporter("x"))
-    with pytest.raises(Problem, match="no template"):
+    with pytest.raises(Problem, match="no head mesh"):
         own_mesh.read(str(tmp_path / "gone.obj"), Reporter("x"))
     mesh = template.load()
     meshes.write_obj(tmp_path / "Neutral.obj", mesh)

@@ -59,7 +59,7 @@ def test_a_folder_of_wheels_is_made_and_installed_from(index, tmp_path, monkeypa
 def test_what_keeps_wheels_from_coming_is_said(index, tmp_path, capsys):
     (index / "tinytorch-1.0-py3-none-any.whl").unlink()
     assert main(["wheels", str(tmp_path / "wheels")]) == 2
-    assert f"Not all wheels for {HERE} could be had (No matching distribution" in capsys.readouterr().err
+    assert f"Not all wheels for {HERE} could be downloaded (No matching distribution" in capsys.readouterr().err
     assert main(["wheels", str(tmp_path / "wheels"), "--for", "macosx_arm64-3.13", "--compute", "cuda"]) == 2
     assert "no solver for cuda on macosx_arm64-3.13" in capsys.readouterr().err
     assert main(["install", str(tmp_path / "env"), "--compute", "cpu"]) == 2

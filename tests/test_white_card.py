@@ -79,6 +79,6 @@ def test_the_panel_says_where_the_tone_comes_from(addon, capture, item):
               "skin_tone_source": "white point"})
     assert words(item) == "tan, ± 2 L*, by white point"
     set_tone(root, {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_source": "texture"})
-    assert words(item) == "Told by the texture alone"
+    assert words(item) == "From the texture alone"
     item.skin_tone = (0.6, 0.4, 0.3)
     assert words(item) == "Chosen by you: this wins"

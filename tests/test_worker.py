@@ -129,7 +129,7 @@ def test_the_worker_ends_when_its_starter_is_gone(root, capture, video):
     ("bug", "An error inside WildCap stopped the stage scan (WC-"),
     ("memory", "There was not enough memory for the stage scan."),
     ("full", "The disk is full"),
-    ("module", "The worker's Python has no module named a_module_that_is_not_there"),
+    ("module", "The solver's Python has no module named a_module_that_is_not_there"),
     ("nothing", "An error inside WildCap stopped the stage scan (WC-"),
     ("die", "The worker ended unexpectedly during the stage scan (exit code 9)."),
 ])

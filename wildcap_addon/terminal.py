@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The add-on from a terminal, without a window:
 
-    blender --command wildcap run me.mp4 me.wildcap --quality high
+    blender --command wildcap run me.mp4 me.wildcap --quality film
     blender --command wildcap solve me.wildcap
     blender --command wildcap relight me.wildcap three_point sunset --resolution 1024
     blender --command wildcap turntable me.wildcap --light overcast --turns light --film

@@ -19,6 +19,7 @@ import pycolmap
 from ..contract.capture import Capture
 from ..contract.frame_records import FULL, PHOTOGRAPHS, VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
+from ..contract.stages import advise_again
 from ..geometry.models import read_model
 from ..imaging import images
 from . import skeleton
@@ -56,7 +57,7 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
             model = read_model(Path(job["output"])) if _follow(path, report) else None
         except (OSError, ValueError) as error:
             raise Problem(f"The camera solver left a model that cannot be used ({error}).",
-                          "Run the stage cameras again.") from error
+                          advise_again("cameras")) from error
         matches = read_matches(Path(job["database"]))
         sizes = {name: (group["width"], group["height"]) for group in groups for name in group["names"]}
         scales = {}

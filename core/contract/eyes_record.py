@@ -16,6 +16,7 @@ from .capture import Capture
 from .files import write_json
 from .json_files import is_number, read_json
 from .messages import Problem
+from .stages import advise_again
 
 SIDES = ("left", "right")
 Colour = tuple[float, float, float]
@@ -45,7 +46,7 @@ def read_eyes(capture: Capture) -> tuple[Eyeball, Eyeball]:
         told = read_json(capture.eyes)
         return tuple(_eyeball(told[side]) for side in SIDES)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise Problem(f"{capture.eyes} cannot be read ({error}).", "Run the stage registration again.") from error
+        raise Problem(f"{capture.eyes} cannot be read ({error}).", advise_again("registration")) from error
 
 
 def write_irises(path: Path, left: Colour, right: Colour) -> None:
@@ -65,7 +66,7 @@ def read_irises(capture: Capture) -> tuple[Colour, Colour] | None:
             raise ValueError("an iris has no such colour")
         return left, right
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise Problem(f"{capture.irises} cannot be read ({error}).", "Run the stage solve again.") from error
+        raise Problem(f"{capture.irises} cannot be read ({error}).", advise_again("solve")) from error
 
 
 def _eyeball(told: dict) -> Eyeball:

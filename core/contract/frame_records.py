@@ -17,6 +17,7 @@ from .capture import Capture
 from .files import write_json
 from .json_files import is_number, plain_name, read_json
 from .messages import Problem
+from .stages import advise_again
 
 VIDEO, PHOTOGRAPHS = "video", "photographs"
 FULL = "full"
@@ -82,7 +83,7 @@ def read_frames(capture: Capture) -> Frames:
         return Frames(tuple(_record(entry) for entry in told["frames"]), told.get("kind"))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Problem(f"The frames of this capture cannot be read ({capture.frames_json.name}: {error}).",
-                      "Run the stage frames again.") from error
+                      advise_again("frames")) from error
 
 
 def write_frames(folder: Path, frames: Frames) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from .capture import Capture
 from .json_files import read_json
 from .messages import Problem
+from .stages import advise_again
 
 
 def read_skin(capture: Capture, count: int) -> tuple[str, list[tuple[int, int]]]:
@@ -28,4 +29,4 @@ def read_skin(capture: Capture, count: int) -> tuple[str, list[tuple[int, int]]]
         return str(told.get("template", "")), runs
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise Problem(f"{capture.own_head_skin} cannot be read ({error}).",
-                      "Run the stage registration again.") from error
+                      advise_again("registration")) from error

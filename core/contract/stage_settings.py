@@ -110,7 +110,7 @@ class SolveSettings:
     """Side of the map that is solved"""
     recipe: str = setting("wildcap", choices=("wildcap", "paper", "released"))
     """wildcap is the default; paper and released follow the paper and its authors' code to the letter, with their own
-    600 steps, and are many times slower"""
+    600 and 599 steps, and are many times slower"""
     steps: int = setting(20, min=4, max=600)
     """Sampling steps"""
     guidance: str = setting("dps", choices=("dps", "proximal"))

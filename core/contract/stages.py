@@ -91,6 +91,11 @@ NAMES = tuple(stage.name for stage in STAGES)
 MASK_STAGE = "shadow_mask"  # in Blender the chain stops after it, for the artist
 
 
+def advise_again(name: str) -> str:
+    """To run a stage again, as the tab and as the command line call it."""
+    return f"Run the stage {LABELS[name]} again, by the arrow beside it in Stages (in a terminal: --from {name})."
+
+
 def advise_remaking(path: Path, otherwise: str) -> str:
     """What to do about a damaged file: have the stage that wrote it run again where it is an output in a capture;
     `otherwise` for a user's own file."""
@@ -101,7 +106,7 @@ def advise_remaking(path: Path, otherwise: str) -> str:
             while len(parts) > len(own) and name.endswith("/") and parts[-len(own):] != own:  # delit/shadow/00001.png
                 parts = parts[:-1]
             if parts[-len(own):] == own and Path(*parts[:-len(own)], "capture.json").is_file():
-                return f"Run the stage {stage.name} again."
+                return advise_again(stage.name)
     return otherwise
 
 

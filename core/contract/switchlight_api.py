@@ -89,6 +89,6 @@ def key() -> str:
                       f"Get one at {WEBSITE} and put it into the extension's preferences, or into the environment "
                       f"variable {KEY_VARIABLE}.")
     if not (found.isascii() and found.isprintable()) or " " in found:
-        raise Problem("The SwitchLight key is not one: it holds blanks or other characters that no key has.",
+        raise Problem("This is no key of SwitchLight: it holds spaces or other characters that no key has.",
                       f"Copy it again from {WEBSITE}.")
     return found

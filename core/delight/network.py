@@ -126,7 +126,7 @@ def load(device: str) -> DelightNet:
     card = WEIGHTS.with_suffix(".json")
     if not (WEIGHTS.is_file() and card.is_file()):
         raise Problem("The weights of the delighting network are missing.",
-                      "Install the add-on again, or choose the delighter 'shading'.")
+                      "Install the extension again, or choose the delighter Shading.")
     shipped_files.require_whole(WEIGHTS)
     net = DelightNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
     net.load_state_dict({name: value.float() for name, value in load_file(WEIGHTS).items()})

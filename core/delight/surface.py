@@ -66,7 +66,7 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
     count = np.isfinite(seen_colours[..., 0]).sum(0)
     if (count > 0).sum() < 100:
         raise Problem("The selected frames hardly see the registered head.",
-                      "Look at the pictures of the stages cameras and registration in report.html.")
+                      "Click Open Report, and look at the pictures of Cameras and Head (in a terminal: report.html).")
     colours = np.zeros((len(mesh.vertices), 3))
     colours[count > 0] = np.nanmedian(seen_colours[:, count > 0], 0)
     return colours, count, share[:, :-1].sum(1).clip(0, 1), share[:, -1]

@@ -51,7 +51,7 @@ def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
     """Has the frames of a plan answered, after everything that could forbid it was asked; the number of calls. Raises
     Problem."""
     if os.environ.get(service.OFFLINE_VARIABLE):
-        raise Problem("Blender is set to work offline, and SwitchLight is far away: nothing was sent.",
+        raise Problem("Blender is set to work offline, and SwitchLight is on the network: nothing was sent.",
                       "Allow online access (Preferences, System, Network), or choose another delighter.")
     consent.require(capture, plan)
     account = Account(service.base(), service.key())
@@ -61,7 +61,8 @@ def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
     if left is not None and left < plan.credits:
         raise Problem(f"{service.amount(plan.credits)} are needed, and your SwitchLight account has "
                       f"{service.amount(left)}: nothing was sent.",
-                      f"Buy some at {service.WEBSITE}, or have fewer frames chosen, or ask for previews.")
+                      f"Buy some at {service.WEBSITE}, lower Views under Reconstruction, Frames, or take small "
+                      "pictures at half the credits (--preview).")
     report.log("SwitchLight does not say how many credits are left." if left is None
                else f"Your account has {service.amount(left)}.")
     return send(account, [parcel(capture, name, content, plan.preview) for name, content in plan.frames.items()],
@@ -74,7 +75,7 @@ def parcel(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
     path = capture.frames / name
     if path.suffix.lower() not in KINDS:
         raise Problem(f"SwitchLight does not take pictures as {name} is.",
-                      "Run the stage frames again, which writes JPEG.")
+                      "Run the stage Frames again, which writes JPEG.")
     data = path.read_bytes()
     if hash_bytes(data) != content:
         raise Problem(f"The frame {name} changed after you agreed to send it: nothing more was sent.",

@@ -85,7 +85,7 @@ def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
     card = weights.with_suffix(".json")
     if not (weights.is_file() and card.is_file()):
         raise Problem("The weights of the delighting network are missing.",
-                      "Install the add-on again, or choose the delighter 'shading'.")
+                      "Install the extension again, or choose the delighter Shading.")
     if weights == WEIGHTS:
         shipped_files.require_whole(weights)
     net = TexelNet(**json.loads(card.read_text(encoding="utf-8"))["model"])

@@ -18,6 +18,7 @@ from ..contract.delivery_presets import HAIR, SCAN_MAPS, MapPicture
 from ..contract.files import replacing_folder, write_json
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
+from ..contract.stages import advise_again
 from ..face import template
 from ..face.head import read_head
 from ..geometry import meshes
@@ -109,7 +110,7 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
                              "clean": folder / "clean_albedo.png"}}
     found = {tile: {name: path for name, path in paths.items() if path.is_file()} for tile, paths in found.items()}
     if not all("albedo" in paths for paths in found.values()):
-        raise Problem("This capture has no albedo for that mesh.", "Run the stage Delivery again.")
+        raise Problem("This capture has no albedo for that mesh.", advise_again("transfer"))
     if plan.what == "head" and settings.deliver.clean and "clean" not in found[HEAD_TILE]:
         raise Problem("This capture has no albedo without hair.",
                       "Run the stage 4K Maps again, or deliver the albedo as it is.")

@@ -27,7 +27,7 @@ def check_stages(capture: Capture, what: str, settings: Settings, report: Report
         verdict = capture.verdict(stage, settings)
         if verdict.state == STALE:
             raise Problem(f"The stage {stage.label} is out of date: {verdict.reason()}.",
-                          f"Click Reconstruct, or run the stage {stage.name} and those after it again, then deliver.")
+                          f"Click Reconstruct, or run the stage {stage.label} and those after it again, then deliver.")
         older += [stage.label] if verdict.state == OLDER else []
     if older:
         report.log(f"Made by older code and delivered as it is: {', '.join(older)}. Run a stage again to have it made "

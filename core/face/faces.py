@@ -282,4 +282,4 @@ def _net(path: Path):
         return cv2.dnn.readNetFromTFLite(np.fromfile(path, np.uint8))
     except cv2.error as error:
         raise Problem(f"OpenCV {cv2.__version__} cannot read the network {path.name}.",
-                      "Press Install Solver again: it brings the OpenCV that can.") from error
+                      "Click Install Solver again: it brings the OpenCV that can.") from error

@@ -45,7 +45,7 @@ def read_network(path: Path, reader: str, parts: int) -> ParseNet:
     Raises Problem where one of them is missing, or a shipped file damaged."""
     card = path.with_suffix(".json")
     if not (path.is_file() and card.is_file()):
-        raise Problem(f"The weights of the {reader} are missing.", "Install the add-on again.")
+        raise Problem(f"The weights of the {reader} are missing.", "Install the extension again.")
     shipped_files.require_whole(path)
     network = ParseNet(**json.loads(card.read_text(encoding="utf-8"))["model"], parts=parts)
     network.load_state_dict({name: value.float() for name, value in load_file(path).items()})

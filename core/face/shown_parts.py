@@ -9,6 +9,7 @@ import numpy as np
 
 from ..contract.capture import Capture
 from ..contract.messages import Problem
+from ..contract.stages import advise_again
 from ..imaging import images
 from .parts import GROWTHS, keep_present
 
@@ -22,7 +23,7 @@ def read_parts(capture: Capture, size: int) -> np.ndarray | None:
     if parts.shape[2] != len(GROWTHS):
         raise Problem(f"{capture.texture_parts} has {parts.shape[2]} channels, and the parts of a face that grow hair "
                       f"are {len(GROWTHS)}.",
-                      "Run the stage texture again.")
+                      advise_again("texture"))
     return images.resize(parts, size, size).clip(0, 1)
 
 

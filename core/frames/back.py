@@ -9,6 +9,7 @@ from ..contract.capture import Capture
 from ..contract.frame_records import read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
+from ..contract.stages import advise_again
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
@@ -16,6 +17,6 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     records = read_frames(capture).records
     missing = [record.name for record in records if not (capture.frames / record.name).is_file()]
     if missing:
-        raise Problem(f"The frame {missing[0]} is not in this capture any more.", "Run the stage frames again.")
+        raise Problem(f"The frame {missing[0]} is not in this capture any more.", advise_again("frames"))
     report.figure("frames", len(records))
     report.figure("delit_views", len(list(capture.delit.glob("*.png"))))

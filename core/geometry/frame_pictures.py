@@ -15,6 +15,7 @@ import numpy as np
 from ..contract.capture import Capture
 from ..contract.frame_records import read_frames
 from ..contract.messages import Problem
+from ..contract.stages import advise_again
 from ..imaging import images
 from .views import View, read_views
 
@@ -69,5 +70,5 @@ def match(views: list[View], video_frames: dict[str, int], path: Path, what: str
     if not pairs:
         raise Problem(f"None of the {len(pictures)} pictures in {path} belongs to a registered frame.",
                       f"Name them like the frames (for example {Path(views[0].name).stem}.png)." if views
-                      else "Run the stage cameras again.")
+                      else advise_again("cameras"))
     return pairs

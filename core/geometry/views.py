@@ -17,6 +17,7 @@ from ..contract.capture import Capture
 from ..contract.frame_records import read_frames
 from ..contract.json_files import plain_name
 from ..contract.messages import Problem
+from ..contract.stages import advise_again
 from .models import pose_of, read_model
 
 
@@ -113,5 +114,5 @@ def _read_model(capture: Capture) -> pycolmap.Reconstruction:
             raise ValueError(f"{strange[0]!r} is no name of a frame")
     except (OSError, ValueError) as error:
         raise Problem(f"The cameras of this capture cannot be read ({error}).",
-                      "Run the stages frames and cameras again.") from error
+                      advise_again("frames")) from error
     return model

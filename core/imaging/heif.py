@@ -111,7 +111,7 @@ def _opened(path: Path):
     except ImportError as error:
         raise Problem(f"{Path(path).name} is a HEIC picture, and the package pillow-heif that reads them is not "
                       "installed.",
-                      "Press Install Solver in the add-on's preferences, or export the pictures as JPEG.") from error
+                      "Click Install Solver under Setup, or export the pictures as JPEG.") from error
     try:
         return pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
     except (ValueError, EOFError, SyntaxError, RuntimeError, OSError) as error:

@@ -39,8 +39,8 @@ def read(chosen: str, report: Reporter) -> OwnMesh:
     """Reads an OBJ or a folder. Raises Problem for what is no head mesh."""
     path = Path(chosen)
     if not path.exists():
-        raise Problem(f"There is no template at {path}.",
-                      "Choose an OBJ file or a folder of shapes, or leave the template empty.")
+        raise Problem(f"There is no head mesh at {path}.",
+                      "Choose an OBJ file or a folder of shapes under Head Mesh, or the built-in head alone.")
     neutral, others = _folder(path) if path.is_dir() else (path, [])
     mesh = meshes.read_obj(neutral)
     _check(mesh, neutral)
@@ -70,8 +70,8 @@ def with_usable_uvs(own: OwnMesh, skin: np.ndarray, allowed: bool, size: int) ->
         return own, "the artist's"
     if not allowed:
         raise Problem(f"Maps cannot be baked into the UVs of {own.path.name}. {' '.join(wrong)}",
-                      "Unwrap the mesh in your modelling program, or allow a new atlas in the settings of the stage "
-                      "Head (--new-atlas).")
+                      "Unwrap the mesh in your modelling program, or switch on New Atlas under Reconstruction, Head "
+                      "Mesh (--new-atlas).")
     return replace(own, mesh=atlas.unwrap(own.mesh, size)), "a new atlas"
 
 
@@ -128,7 +128,7 @@ def _folder(folder: Path) -> tuple[Path, list[Path]]:
             expressions = sum(not _is_identity(p) for p in shapes)
             identities = shapes[:len(shapes) - expressions][:max(MOST_SHAPES - expressions, MOST_SHAPES // 2)]
             return neutral[0], [*identities, *shapes[len(shapes) - expressions:]][:MOST_SHAPES]
-    raise Problem(f"{folder} holds no template: there is not exactly one OBJ with 'neutral' in its name.",
+    raise Problem(f"{folder} holds no head mesh: there is not exactly one OBJ with 'neutral' in its name.",
                   "Choose a folder with a neutral mesh and its shapes, or one OBJ file.")
 
 

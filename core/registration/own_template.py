@@ -162,8 +162,8 @@ def _require_laid(own: own_mesh.OwnMesh, distances: np.ndarray, drawn: int) -> N
     """Raises Problem where fewer than half of the `drawn` vertices have a distance [N] to the head, or it is large."""
     if len(distances) < 0.5 * drawn or not len(distances) or np.median(distances) > 0.002:
         raise Problem(f"{own.path.name} could not be laid over the head.",
-                      "Choose a head in a neutral pose with its mouth closed, or leave the template empty; the "
-                      "built-in head is not affected.")
+                      "Choose a head in a neutral pose with its mouth closed, or use the built-in head alone, "
+                      "which is not affected.")
 
 
 def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn,

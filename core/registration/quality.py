@@ -106,8 +106,8 @@ def judge_views(head: Mesh, fitted) -> None:
     if not fitted.miss_m["landmarks"] < MOST_MISS_WIDTH_SHARE * np.ptp(x):
         raise Problem(f"The head could not be laid over the face in these pictures: its features miss by "
                       f"{1e3 * fitted.miss_m['landmarks']:.0f} mm.",
-                      "Use pictures of one still face, neither cropped nor mirrored; or give the cameras of a program "
-                      "that can solve them.")
+                      "Use pictures of one still face, neither cropped nor mirrored; or import cameras that another "
+                      "program has solved.")
 
 
 def tell_draft(report: Reporter, views: list[View], head: Mesh) -> None:

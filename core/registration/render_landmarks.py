@@ -210,6 +210,6 @@ def _painted(mesh: Mesh, points: np.ndarray) -> np.ndarray:
 
 
 def _no_face() -> Problem:
-    return Problem("No face was found on the template mesh, seen from any side.",
-                   "Choose an OBJ of a head in a neutral pose, without hair or glasses over the face, or leave the "
-                   "template empty.")
+    return Problem("No face was found on your head mesh, seen from any side.",
+                   "Choose an OBJ of a head in a neutral pose, without hair or glasses over the face, or use the "
+                   "built-in head alone.")

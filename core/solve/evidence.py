@@ -13,6 +13,7 @@ import torch
 
 from ..contract.capture import Capture
 from ..contract.messages import Problem
+from ..contract.stages import advise_again
 from ..face import beard, template
 from ..face.head import Head
 from ..face.shown_parts import read_hidden_skin
@@ -93,20 +94,20 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     if texture.shape[:2] != confidence.shape or texture.shape[0] != texture.shape[1]:
         raise Problem(f"{capture.texture} is {texture.shape[1]} x {texture.shape[0]} pixels and "
                       f"{capture.texture_confidence.name} {confidence.shape[1]} x "
-                      f"{confidence.shape[0]}: they have to be alike and square.", "Run the texture stage again.")
+                      f"{confidence.shape[0]}: they have to be alike and square.", advise_again("texture"))
     confidence, texture = np.clip(confidence, 0, 1), np.clip(texture, 0, None)
     if confidence.max() < 1e-3:
         raise Problem("No texel of the texture was seen by any frame.",
-                      "Run the chain again from the cameras, and look at its report.")
+                      "Run the stage Cameras again and those after it, and look at the report.")
     hidden = read_hidden_skin(capture, size)
     seen, bearded = _sized(confidence, size), np.maximum(_sized(beard.seen_in(texture, confidence), size), hidden)
     # what nobody saw must not darken its neighbours
     texture = _sized(texture * confidence[..., None], size) / np.maximum(seen, 1e-4)[..., None]
     if head.mesh.uvs is None:
-        raise Problem("The head has no UV coordinates.", "Run the registration stage again.")
+        raise Problem("The head has no UV coordinates.", advise_again("registration"))
     covered = head.raster(size)[0] >= 0
     if not covered.any():
-        raise Problem("The head's UV coordinates cover no texel.", "Run the registration stage again.")
+        raise Problem("The head's UV coordinates cover no texel.", advise_again("registration"))
     normal = raster.bleed(head.interpolate(head.normals, size), covered)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     mask, asked = _shadow_mask(capture, size)

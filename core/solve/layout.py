@@ -37,9 +37,8 @@ FAR_M = 0.012
 """Farthest that the two fitted heads may lie apart."""
 FADE = 24.0
 """Texels of a 1024 map over which the solved maps end where the window does."""
-REMEDY = ("Choose ICT-FaceKit's folder with the neutral mesh as template (under Reconstruction, Head; or --template) "
-          "and run the stage registration again, "
-          "or leave the prior empty to use ours.")
+REMEDY = ("Choose ICT-FaceKit's folder with the neutral mesh under Reconstruction, Head Mesh (in a terminal: "
+          "--template) and run the stage Head again, or leave the prior empty to use ours.")
 
 
 @dataclass(frozen=True)

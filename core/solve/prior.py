@@ -213,7 +213,7 @@ def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = 
             prior = _load_ours(path)
         except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
             raise Problem(f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).",
-                          "Reinstall the extension.") from error
+                          "Install the extension again.") from error
     prior.network.lower(dtype or fast_dtype(device))
     return prior.to(device)
 

@@ -19,6 +19,7 @@ from ..contract.files import remove_file
 from ..contract.frame_records import read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
+from ..contract.stages import advise_again
 from ..face import template
 from ..face.head import Head, Unfolded, read_filmed_head
 from ..geometry.frame_pictures import check_shape
@@ -48,7 +49,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """
     head = read_filmed_head(capture)
     if head.mesh.uvs is None:
-        raise Problem("The registered head has no UVs.", "Run the stage registration again.")
+        raise Problem("The registered head has no UVs.", advise_again("registration"))
     size = settings.texture.size
     observations, surface, shown = observe_all(capture, head, min(size, OBSERVED), report)
     covered = surface.covered_at(size)
@@ -98,7 +99,7 @@ def observe_all(capture: Capture, head: Head, size: int,
              if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
     if not views:
         raise Problem("There is no delit frame of a registered view.",
-                      "Run the stage delight, or put pictures named like the frames into the delighter's folder.")
+                      "Run the stage Delight, or put pictures named like the frames into the delighter's folder.")
     report.progress(0, len(views) + 6, "unfolding the head")
     surface = head.unfold(size)
     best = max(frames[view.name].sharpness for view, _ in views) or 1.0

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..contract.messages import Problem
+from ..contract.stages import advise_again
 from ..imaging import images
 
 
@@ -41,5 +42,5 @@ def read_maps(folder: Path) -> HeadMaps:
         if pixels.shape[:2] != (side, side):
             raise Problem(f"{paths[name]} is {pixels.shape[1]} x {pixels.shape[0]} pixels, but {paths['diffuse'].name} "
                           f"is {found.diffuse.shape[1]} x {side}.",
-                          "Run the stage solve again.")
+                          advise_again("solve"))
     return found

@@ -70,7 +70,7 @@ class Worker:
                 self._process = subprocess.Popen(command, cwd=self.root, env=_environment(self._own),
                                                  stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, **_apart())
             except OSError as error:
-                raise Problem(f"The worker's Python {self.python} could not be started ({error.strerror or error}).",
+                raise Problem(f"The solver's Python {self.python} could not be started ({error.strerror or error}).",
                               "Install the solver again, or choose another Python.") from error
         threading.Thread(target=self._read, name="wildcap-worker-reader", daemon=True).start()
 

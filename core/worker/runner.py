@@ -190,8 +190,8 @@ def explained(error: Exception, stage: str, log: Path) -> Problem:
         return Problem(f"There was not enough memory for {during}.",
                        "Close other programs or choose a lower quality, then run again: finished stages are kept.")
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith(__package__.split(".")[0]):
-        return Problem(f"The worker's Python has no module named {error.name}, which {during} needs.",
-                       "Install the solver in WildCap's setup panel, or see what `python -m core doctor` says.")
+        return Problem(f"The solver's Python has no module named {error.name}, which {during} needs.",
+                       "Click Install Solver under Setup, or see what `python -m core doctor` says.")
     if isinstance(error, OSError) and error.filename and not isinstance(error, FileNotFoundError):
         return storage_problem(error, Path(os.fsdecode(error.filename)))
     return unforeseen.explain(error, during, log)
@@ -216,8 +216,8 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
     if not job.force and not capture.made_from(source):
         raise Problem(f"This capture was made from {known.name if known else 'another source'}, not from this "
                       f"{source.name}.",
-                      f"Choose another capture folder for another video, or run again from the stage {first.name} to "
-                      "replace everything but the painted masks.")
+                      f"Choose another capture folder for another video, or run the stage {first.label} again (in a "
+                      f"terminal: --from {first.name}) to replace everything but the painted masks.")
     capture.set_source(source)
 
 

@@ -34,7 +34,7 @@ def download(requirements: Path, name: str, compute: str, source: str, folder: P
         steps = [*pip_steps.steps(requirements, lock, compute, source, Path(scratch)), own_pip]
         code, error = pip_steps.carry_out(steps, lambda words: run([*pip, *words]))
     if code:
-        raise Problem(f"Not all wheels for {name} could be had "
+        raise Problem(f"Not all wheels for {name} could be downloaded "
                       f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
                       "Check the network connection and run the command again: it continues.")
     return sorted(folder.glob("*.whl"))

@@ -83,7 +83,7 @@ class _Toggle(_OnHead):
 
 
 class WILDCAP_OT_gaze(_Toggle, bpy.types.Operator):
-    """Have both eyes look at an empty before the face, to be moved and animated; again to have the sliders back"""
+    """Have both eyes look at an empty before the face, to be moved and animated; click again to get the sliders back"""
 
     bl_idname = "wildcap.gaze"
     bl_label = "Gaze"
@@ -91,8 +91,8 @@ class WILDCAP_OT_gaze(_Toggle, bpy.types.Operator):
 
 
 class WILDCAP_OT_close_up(_Toggle, bpy.types.Operator):
-    """Give the head eyes and a mouth worth a close-up, as objects of their own that go along with its face units; again
-    to have its plain ones back"""
+    """Give the head eyes and a mouth worth a close-up, as objects of their own that go along with its face units; click
+    again to get the plain ones back"""
 
     bl_idname = "wildcap.close_up"
     bl_label = "Close-Up Eyes"

@@ -23,7 +23,7 @@ class AllFaces(BaseOperator):
     @classmethod
     def poll(cls, context):
         many = batches.current() is not None or len(context.scene.wildcap.captures) > 1
-        return (cls.allowed(many, "There are no two captures in the list: work on one by its own buttons")
+        return (cls.allowed(many, "The list has no two captures: use the buttons of the one")
                 and cls.allowed(not running.running(), "A batch is running: wait for it, or cancel it")
                 and cls.allowed(not jobs.elsewhere(""), "A job is running: wait for it, or click Cancel"))
 
@@ -35,7 +35,7 @@ class AllFaces(BaseOperator):
             each()
         batch, left_out = planning.prepare(context)
         if left_out:
-            self.report({'WARNING'}, rpt_("Left out, for there is no video of them: {}").format(", ".join(left_out)))
+            self.report({'WARNING'}, rpt_("Left out, as they have no video: {}").format(", ".join(left_out)))
         return batch
 
 
@@ -181,7 +181,7 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
         if following is not None:
             walking.go(context, following)
         else:
-            self.report({'INFO'}, rpt_("All masks are looked at: click Solve All"))
+            self.report({'INFO'}, rpt_("All masks have been looked at: click Solve All"))
 
 
 CLASSES = (WILDCAP_OT_reconstruct_all, WILDCAP_OT_solve_all, WILDCAP_OT_cancel_batch, WILDCAP_OT_open_batch,

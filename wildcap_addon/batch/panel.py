@@ -40,7 +40,7 @@ class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
             return
         problems.draw_text(layout, count_words(known), width)
         if not batches.waiting() and batches.ready() and not running.running():
-            layout.label(text="All masks are looked at", icon='CHECKMARK')
+            layout.label(text="All masks have been looked at", icon='CHECKMARK')
             layout.operator("wildcap.solve_all", icon='LIGHT')
         else:
             column = layout.column(align=True)

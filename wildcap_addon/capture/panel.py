@@ -70,7 +70,7 @@ class WILDCAP_PT_frames(CapturePanel, bpy.types.Panel):
             column.template_icon(icon_value=frame.icon, scale=3.5)
             column.alert = frame.blurred
             column.label(text=f"{frame.sharpness:.0%}")
-        layout.label(text="Sharpness, in parts of the sharpest frame's")
+        layout.label(text="Sharpness, against the sharpest frame")
 
 
 CLASSES = (WILDCAP_UL_captures, WILDCAP_PT_capture, WILDCAP_PT_frames)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
-from ...core.contract.stages import STRANDS
+from ...core.contract.stages import STRANDS, advise_again
 from .. import captures, status
 from ..base_operator import BaseOperator
 from . import curves
@@ -19,7 +19,7 @@ BEARD_MM = 6.0
 """Length to which the worker grows a beard; how long one is, its albedo does not tell."""
 MOST_BYTES = 256 << 20
 """A million hairs; more is no beard, and would take the memory before it is seen to be damaged."""
-AGAIN = "Run the stage 4K Maps again."
+AGAIN = advise_again("upscale")
 
 
 class WILDCAP_OT_grow_hair(BaseOperator, bpy.types.Operator):

@@ -36,7 +36,7 @@ def _of_run(kind) -> None:
 def _of_solve(kind) -> None:
     kind.add_argument("capture", help="the face's folder, usually NAME.wildcap")
     kind.add_argument("options", nargs=argparse.REMAINDER,
-                      help="as `python -m core run --help` tells them, --quality high among them")
+                      help="as `python -m core run --help` tells them, --quality film among them")
 
 
 COMMANDS = (

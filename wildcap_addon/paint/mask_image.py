@@ -84,7 +84,8 @@ def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
                    else np.zeros_like(mask_values(image)))
     colours.as_data(image)
     if not image.size[0]:
-        raise Problem("The mask that was being painted is gone.", "Click Paint Mask: it is looked for again.")
+        raise Problem("The mask that was being painted is gone.",
+                      "Click Paint on the Head, under Masks: it is looked for again.")
 
 
 def mask_values(image: bpy.types.Image) -> np.ndarray:

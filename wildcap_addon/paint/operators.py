@@ -50,7 +50,7 @@ class WILDCAP_OT_finish_mask(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.allowed(session.active(), "No mask is being painted: click Paint Mask first")
+        return cls.allowed(session.active(), "No mask is being painted: click Paint on the Head, under Masks, first")
 
     def work(self, context):
         session.end(context)
@@ -78,7 +78,8 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.allowed(session.active(), "Click Paint Mask first: the mask is changed while it is painted")
+        return cls.allowed(session.active(),
+                           "Click Paint on the Head, under Masks, first: the mask is changed while it is painted")
 
     def work(self, context):
         capture = Capture(session.root())
@@ -106,7 +107,8 @@ class ToolOperator(BaseOperator):
     @classmethod
     def poll(cls, context):
         return (cls.allowed(session.painted_kind() == 'SHADOW',
-                            "Click Paint Mask first, and choose Shadow: it is the shadow mask that is found by itself")
+                            "Click Paint on the Head, under Masks, and choose Shadow: only the shadow mask is found "
+                            "by itself")
                 and jobs.can_start(cls, context))
 
 

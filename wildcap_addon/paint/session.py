@@ -70,7 +70,8 @@ def mask() -> bpy.types.Image:
     """The image that is painted. Raises Problem when it is gone."""
     image = bpy.data.images.get(_session.mask) if _session else None
     if image is None:
-        raise Problem("The mask is not in this file any more.", "Leave the painting, and click Paint Mask again.")
+        raise Problem("The mask is not in this file any more.",
+                      "Leave the painting, and click Paint on the Head, under Masks, again.")
     return image
 
 

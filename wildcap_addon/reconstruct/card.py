@@ -30,7 +30,7 @@ def draw(layout, item, width: int) -> None:
     problems.draw_text(box, card.what, width)
     _draw_facts(box, card, width, folded=False)
     header, more = layout.panel("wildcap_card", default_closed=True)
-    header.label(text="More of It")
+    header.label(text="More About It")
     if more:
         _draw_facts(more, card, width, folded=True)
     column = layout.column()
@@ -47,7 +47,7 @@ def lacks(item, name: str) -> list[str]:
     """Why a delighter cannot run as things are, one sentence each, {} for the service's website; asks no disk."""
     found = list(delighter_cards.missing(item.delight, name))
     if name == "switchlight" and not preferences.has_switchlight_key():
-        found.append("There is no key. Get one at {}, and put it in above.")
+        found.append("There is no key. Get one at {}, and enter it above.")
     if name == "switchlight" and not bpy.app.online_access:
         found.append("Blender is set to work offline (Preferences, System, Network).")
     return found

@@ -15,6 +15,7 @@ from mathutils import Matrix, Quaternion
 
 from ...core.contract.json_files import plain_name
 from ...core.contract.messages import Problem
+from ...core.contract.stages import advise_again
 
 PARAMETERS = {0: 3, 1: 4, 2: 4, 3: 5, 4: 8, 5: 8, 6: 12, 7: 5, 8: 4, 9: 5, 10: 12}
 """Number of parameters of each camera model, by COLMAP's number for it"""
@@ -50,7 +51,7 @@ def read(folder: Path) -> list[FrameCamera]:
                       "Click Reconstruct: they are found from the frames.") from error
     except (OSError, struct.error, KeyError, UnicodeDecodeError, ValueError) as error:
         raise Problem(f"The cameras in {folder} cannot be read ({type(error).__name__}: {error}).",
-                      "Do the stage Cameras again.") from error
+                      advise_again("cameras")) from error
 
 
 def _check(camera: FrameCamera) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
+from ...core.contract.stages import advise_again
 from .. import colours
 
 SIDE = 256
@@ -39,7 +40,7 @@ def show(capture: Capture, which: int, wipe: float) -> None:
     name = found[which % len(found)]
     before = next((path for path in capture.frames.glob(f"{name}.*")), None)
     if before is None:
-        raise Problem(f"The frame {name} is not in this capture any more.", "Do the stage Frames again.")
+        raise Problem(f"The frame {name} is not in this capture any more.", advise_again("frames"))
     _pair = str(capture.root), name, _read(before), _read(capture.delit / f"{name}.png")
     move(wipe)
 

@@ -13,6 +13,7 @@ import bpy
 from ...core.contract.capture import Capture
 from ...core.contract.frame_records import read_frames
 from ...core.contract.messages import Problem
+from ...core.contract.stages import advise_again
 from .. import captures, local_view
 from . import colmap_cameras
 
@@ -57,7 +58,7 @@ def bring_in_scan(context, item) -> bpy.types.Object:
     if len(new) != 1 or new[0].type != 'MESH':
         for thing in new:
             bpy.data.objects.remove(thing)
-        raise Problem(f"{capture.scan} cannot be read.", "Do the stage Scan again.")
+        raise Problem(f"{capture.scan} cannot be read.", advise_again("scan"))
     _remove(item, 'scan')
     scan = new[0]
     scan.name = scan.data.name = f"{item.name} Scan"

@@ -14,6 +14,7 @@ from ...core.contract import artist_landmarks
 from ...core.contract.capture import Capture
 from ...core.contract.json_files import read_json
 from ...core.contract.messages import Problem
+from ...core.contract.stages import advise_again
 from .. import captures, local_view
 
 COLLECTION = "WildCap Landmarks"
@@ -91,5 +92,5 @@ def _known(capture: Capture) -> dict[int, list[float]]:
                       "Click Reconstruct first: they are found in the frames.") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Problem(f"{capture.landmarks} cannot be read ({type(error).__name__}: {error}).",
-                      "Do the stage Head again.") from error
+                      advise_again("registration")) from error
     return points | {index: list(point) for index, point in artist_landmarks.read(capture.landmarks_artist).items()}

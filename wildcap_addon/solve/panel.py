@@ -63,7 +63,7 @@ def tone_words(item) -> str:
     if max(abs(a - b) for a, b in zip(item.skin_tone, item.estimated_tone, strict=True)) > 1e-4:
         return iface_("Chosen by you: this wins")
     if not item.tone_group:
-        return iface_("Told by the texture alone")
+        return iface_("From the texture alone")
     # a sidebar is narrow
     return iface_("{}, ± {} L*, by {}").format(iface_(item.tone_group), round(item.tone_deviation),
                                                iface_(item.tone_source))
