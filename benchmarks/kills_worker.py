@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.contract import lease, stages
+from core.contract.code_key import code_key
 from core.contract.messages import FINAL, Message, from_line
 
 LIMIT_S = 300.0
@@ -49,9 +50,12 @@ class Moment:
 
 
 def warm_up() -> None:
-    """Imports all that a worker comes to import, and starts no thread."""
+    """Imports all that a worker comes to import, reads what every worker reads of the code, and starts no thread."""
     for step in (*stages.STAGES, *stages.TOOLS):
         importlib.import_module(step.module)
+    for stage in stages.STAGES:
+        code_key(stage.module)
+    importlib.import_module("core.face.template").load()
     importlib.import_module("core.worker.__main__")
     importlib.import_module("torch").set_num_threads(1)
     importlib.import_module("cv2").setNumThreads(1)

@@ -194,6 +194,27 @@ def test_unusual_objs_are_read(tmp_path):
     assert meshes.read_obj(path).faces.tolist() == [[0, 1, 2], [4, 5, 6]]
 
 
+def test_an_obj_of_our_own_is_read_in_blocks_as_it_is_line_by_line(tmp_path):
+    """What is written has six decimals and a UV at every corner; a comment sends it to the other reader."""
+    path = tmp_path / "head.obj"
+    corners = RNG.integers(0, 40, (2, 50, 3))
+    meshes.write_obj(path, Mesh(RNG.normal(0, 0.1, (40, 3)), corners[0], RNG.random((40, 2)), corners[1]))
+    text = path.read_text()
+    assert meshes.OWN_OBJ.fullmatch(text)
+    blocks = meshes.read_obj(path)
+    path.write_text(text + "# more\n")
+    lines = meshes.read_obj(path)
+    for name in ("vertices", "faces", "uvs", "face_uvs"):
+        one, other = getattr(blocks, name), getattr(lines, name)
+        assert one.dtype == other.dtype and np.array_equal(one, other), name
+    for last, words in (("0/1 1/1 2/2", "line 131"), ("1/0 1/1 2/2", "line 131"), ("1/1 41/1 2/2", "not in it"),
+                        ("1/1 3/41 2/2", "not in it"), ("1/1 2", "line 131")):
+        path.write_text(f"{text}f {last}\n")
+        refused(lambda: meshes.read_obj(path), "head.obj", words)
+    path.write_text("v 9999999999.000000 0.000000 0.000000\n" + text)
+    refused(lambda: meshes.read_obj(path), "head.obj", "no numbers")
+
+
 HEADER = ("ply\nformat {form} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float "
           "z\nelement face {faces}\n"
           "property list uchar int vertex_indices\nend_header\n")

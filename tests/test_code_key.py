@@ -7,6 +7,8 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,10 +28,10 @@ print(sys.version_info[:2], {{s.name: code_key.code_key(s.module) for s in stage
 """
 
 
-@pytest.fixture
-def copy(tmp_path) -> Path:
-    """core/ with its sources to be edited; its data are links."""
-    copied = tmp_path / "core"
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory) -> Path:
+    """core/ with its sources; its data are links."""
+    copied = tmp_path_factory.mktemp("tree") / "core"
 
     def data(folder, names):
         return [name for name in names if not (name.endswith(".py") or (Path(folder) / name).is_dir())]
@@ -39,6 +41,19 @@ def copy(tmp_path) -> Path:
         shutil.rmtree(copied / name)
         (copied / name).symlink_to(CORE / name)
     return copied
+
+
+@pytest.fixture
+def copy(tree) -> Iterator[Path]:
+    """The tree, of which each test edits a file or two: they are put back with their times, so that the next test finds
+    the rest of it read already."""
+    yield tree
+    for path in tree.rglob("*.py"):
+        if path.read_bytes() != (CORE / path.relative_to(tree)).read_bytes():
+            shutil.copy2(CORE / path.relative_to(tree), path)
+    if not (tree / "weights").is_symlink():
+        shutil.rmtree(tree / "weights")
+        (tree / "weights").symlink_to(CORE / "weights")
 
 
 @pytest.fixture(autouse=True)
@@ -130,17 +145,21 @@ def test_modules_that_read_shipped_files_name_them():
     parser waits for its first stage."""
     seen = set(code_key.data_files("core.face.parser"))
     for stage in stages.STAGES:
-        for file in code_key.modules(stage.module):
-            text = (CORE / file).read_text(encoding="utf-8")
-            named = code_key._closure(stage.module, CORE)[file].data
-            paths = [node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)
-                     and isinstance(node.value, str)
-                     and re.fullmatch(r"(weights|assets)(/\S*)?", node.value)]
+        for file, module in code_key._closure(stage.module, CORE).items():
+            paths, named = shipped_paths(file), module.data
             assert bool(paths) == bool(named), f"{file} speaks of {paths} and names {named}"
             assert all((CORE / name).exists() for name in named), file
             seen |= set(named)
     weights = {f"weights/{path.name}" for path in (CORE / "weights").glob("*.safetensors")}
     assert {name for name in seen if name.endswith(".safetensors")} == weights
+
+
+@cache  # most modules are imported by most stages
+def shipped_paths(file: str) -> list[str]:
+    """The paths of shipped files that a module speaks of."""
+    tree = ast.parse((CORE / file).read_text(encoding="utf-8"))
+    return [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)
+            and re.fullmatch(r"(weights|assets)(/\S*)?", node.value)]
 
 
 WORDS = ('"""Another docstring."""', "# a comment",

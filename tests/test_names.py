@@ -15,9 +15,9 @@ FILES = sorted(path for folder in ("core", "benchmarks", "wildcap_addon", "tests
 def missing_names(path: Path, text: str) -> list[str]:
     """`from .room import name` and `room.name` in a file's text, where the repository's file `room` has no such
     name."""
-    tree = ast.parse(text)
     missing, modules = [], {}
-    for node in (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)):
+    nodes = list(ast.walk(ast.parse(text)))
+    for node in (node for node in nodes if isinstance(node, ast.ImportFrom)):
         base = base_of(path, node)
         if base is None:
             continue
@@ -31,10 +31,9 @@ def missing_names(path: Path, text: str) -> list[str]:
                 and alias.name not in names_of(outer)
             ):
                 missing.append(f"{node.lineno}: {alias.name} of {outer.relative_to(ROOT)}")
-    rebound = {name.id for name in ast.walk(tree) if isinstance(name, ast.Name) and not isinstance(name.ctx, ast.Load)}
-    rebound |= {argument.arg for argument in ast.walk(tree) if isinstance(argument, ast.arg)}
-    for node in (node for node in ast.walk(tree) if isinstance(node, ast.Attribute)
-                 and isinstance(node.value, ast.Name)):
+    rebound = {name.id for name in nodes if isinstance(name, ast.Name) and not isinstance(name.ctx, ast.Load)}
+    rebound |= {argument.arg for argument in nodes if isinstance(argument, ast.arg)}
+    for node in (node for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)):
         module = modules.get(node.value.id)
         if module is None or node.value.id in rebound or node.attr.startswith("__"):
             continue
@@ -52,6 +51,7 @@ def base_of(path: Path, node: ast.ImportFrom) -> Path | None:
     return base if module_at(base) is not None or base.is_dir() and base.parent == ROOT else None
 
 
+@cache
 def module_at(path: Path) -> Path | None:
     return next((file for file in (path.with_suffix(".py"), path / "__init__.py") if file.is_file()), None)
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which capture the panel and the operators mean: that of the active head, or the one chosen in the scene's list."""
 
+from functools import lru_cache
 from pathlib import Path
 
 import bpy
@@ -43,7 +44,12 @@ def require(context) -> bpy.types.PropertyGroup:
 def folder(item) -> Capture:
     """The item's capture; `links` sees to it that the path leads there. Asks no disk: panels call this when they
     draw."""
-    return Capture(Path(bpy.path.abspath(item.path)))
+    return _at(bpy.path.abspath(item.path))
+
+
+@lru_cache(maxsize=64)  # a drawing of all panels asks some thirty times, and each would name fifty files anew
+def _at(path: str) -> Capture:
+    return Capture(Path(path))
 
 
 def root(item) -> str:

@@ -51,25 +51,36 @@ def data_files(module: str, core: Path = CORE) -> list[str]:
     return sorted({name for read in _closure(module, core).values() for name in read.data})
 
 
-def write_canonically(node, text: list[str]) -> None:
+def write_canonically(node, text: list[str], met: list[ast.AST] | None = None) -> None:
     """Appends a syntax tree, or a part of one, to `text`: the same pieces under every Python that can parse it.
-    Statements that are only a string are left out, and fields that are empty, for every version brings new ones."""
+    Statements that are only a string are left out, and fields that are empty, for every version brings new ones. `met`
+    takes the nodes by which a module names another."""
+    kind = type(node)
     if isinstance(node, ast.AST):
-        text.append("(" + type(node).__name__)
-        for name in node._fields:
+        if met is not None and kind in (ast.ImportFrom, ast.JoinedStr):
+            met.append(node)
+        text.append("(" + kind.__name__)
+        for name, words in _written_fields(kind):
             value = getattr(node, name, None)
-            if value is None or value == [] or name in IGNORED_FIELDS:
-                continue
-            text.append(" " + name + ":")
-            write_canonically(_merge_constants(value) if isinstance(node, ast.JoinedStr) else value, text)
+            if type(value) is str:  # of most nodes the one field: the call is saved
+                text.append(words + ascii(value))
+            elif value is not None and value != []:
+                text.append(words)
+                write_canonically(_merge_constants(value) if kind is ast.JoinedStr else value, text, met)
         text.append(")")
-    elif isinstance(node, list):
+    elif kind is list:
         for item in node:
             if not _is_text(item):
-                write_canonically(item, text)
+                write_canonically(item, text, met)
                 text.append(",")
     else:
         text.append(ascii(node))
+
+
+@cache
+def _written_fields(kind: type[ast.AST]) -> list[tuple[str, str]]:
+    """The fields of a kind of node that count, and how each is announced."""
+    return [(name, f" {name}:") for name in kind._fields if name not in IGNORED_FIELDS]
 
 
 @cache
@@ -92,17 +103,18 @@ def _read_module(core: Path, file: str, changed: int) -> Module:
     package = file.split("/")[:-1]
     # importing a module runs its packages first
     imports = [_file_of(core, package[:depth]) for depth in range(1, len(package) + 1)]
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.level:
+    text: list[str] = []
+    met: list[ast.AST] = []
+    write_canonically(tree, text, met)
+    for node in met:
+        if isinstance(node, ast.JoinedStr):
+            imports.append(_run_module(core, package, node))
+        elif node.level:
             base = package[:len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
             imports += [_file_of(core, [*base, alias.name]) or _file_of(core, base) for alias in node.names]
-        elif isinstance(node, ast.JoinedStr):
-            imports.append(_run_module(core, package, node))
     named = [node.value for node in tree.body if isinstance(node, ast.Assign)
-             and ast.unparse(node.targets[0]) == DATA_CONSTANT]
+             and getattr(node.targets[0], "id", "") == DATA_CONSTANT]
     data = ast.literal_eval(named[0]) if named else ()
-    text: list[str] = []
-    write_canonically(tree, text)
     return Module(hashlib.blake2b("".join(text).encode(), digest_size=16).hexdigest(),
                   tuple(dict.fromkeys(filter(None, imports))), data)
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import io
+import re
 import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +17,10 @@ from ..contract.files import replacing
 from ..contract.messages import Problem
 from ..contract.stages import advise_remaking
 from .mesh_checks import MOST_OBJ_BYTES, MOST_PLY_BYTES, check_ply, damaged, find_fault, open_mesh
+
+OWN_OBJ = re.compile(r"((?:v(?: -?[0-9]+\.[0-9]+){3}\n)++)((?:vt(?: -?[0-9]+\.[0-9]+){2}\n)++)"
+                     r"((?:f(?: [0-9]{1,9}/[0-9]{1,9}){3}\n)++)")
+"""What `write_obj` makes of a mesh with UVs."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,8 @@ def read_obj(path: Path) -> Mesh:
     vertices, uvs, faces, face_uvs, polygons, known = [], [], [], [], [], {}
     text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
     text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if (own := _read_own(text)) is not None:
+        return _sound(Path(path), own)
     for number, line in enumerate(text.replace("\\\n", " ").split("\n"), 1):
         key, *words = line.split() or [""]
         try:
@@ -182,6 +189,21 @@ def _check_written(path: Path, mesh: Mesh) -> None:
                       advise_remaking(Path(path),
                                       "Run again, and if it stays, report it with the logs of this capture. Finished "
                                       "stages are kept."))
+
+
+def _read_own(text: str) -> Mesh | None:
+    """The mesh of an OBJ as `write_obj` makes it, which each stage reads once: three times faster than line by line.
+    None for any other text."""
+    written = OWN_OBJ.fullmatch(text)
+    if written is None:
+        return None
+    vertices, uvs = (np.array(list(map(float, block.replace(key, "").split()))).reshape(-1, width)
+                     for block, key, width in ((written[1], "v", 3), (written[2], "vt", 2)))
+    corners = np.array(list(map(int, written[3].replace("f", "").replace("/", " ").split())), np.int64) - 1
+    if corners.min() < 0:
+        return None  # an index from zero: the other reader tells its line
+    faces, face_uvs = np.moveaxis(corners.reshape(-1, 3, 2), 2, 0).copy()
+    return Mesh(vertices, faces, uvs, face_uvs)
 
 
 def _corner(word: str, vertices: int, uvs: int, known: dict[str, tuple[int, int]]) -> tuple[int, int]:
