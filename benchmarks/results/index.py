@@ -16,7 +16,7 @@ RECORDS = ("state", "demo", "relit", "relit_people", "scan_albedo", "whole_chain
 GROUPS = {
     "The albedo": ("sample", "relit", "state", "split", "scan", "gallery", "comparison", "rerender", "controlled",
                    "ablation", "prior", "confidence"),
-    "Before the solve": ("geometry", "eyes", "delighters", "photographs", "shadows", "skin_tone"),
+    "Before the solve": ("geometry", "eyes", "delighters", "answers", "photographs", "shadows", "skin_tone"),
     "After the solve": ("upscale", "whole_head", "hair", "even_light", "engines", "delivery",
                         "reimported"),
     "Time and memory": ("costs", "solver_speed", "png_levels", "blender"),
