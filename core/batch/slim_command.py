@@ -15,6 +15,7 @@ from ..contract.deletion import megabytes
 from ..contract.messages import Problem
 from ..contract.settings import Settings
 from ..worker import terminal
+from ..worker.commands import add_command
 from ..worker.job import read_job, write_job
 from .record import NAME, Batch, read_batch
 from .state import DONE, derive_state
@@ -23,14 +24,13 @@ from .task import ROOT
 
 def add_commands(commands) -> None:
     """Adds `slim` to the subparsers of `python -m core`."""
-    slim = commands.add_parser("slim",
-                               help="remove what the video gives again in a minute, of a face that is done, or of a "
-                                    "batch's; without --yes, list it")
+    slim = add_command(commands, "slim", _slim,
+                       "remove what the video gives again in a minute, of a face that is done, or of a batch's; "
+                       "without --yes, list it")
     slim.add_argument("folder", metavar="CAPTURE|BATCH", type=Path)
     what = slim.add_mutually_exclusive_group()
     what.add_argument("--yes", action="store_true", help="remove it; a stage that needs it later has it made again")
     what.add_argument("--undo", action="store_true", help="have it made again now")
-    slim.set_defaults(command=_slim)
 
 
 def _slim(options: argparse.Namespace) -> int:
