@@ -32,7 +32,7 @@ from .contract.capture import Capture
 from .contract.messages import Problem
 from .worker import capture_commands, command_settings, read_only, self_test, setup_commands, terminal
 from .worker.commands import add_command
-from .worker.job import read_job, write_job
+from .worker.job import last_settings, write_job
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -147,9 +147,7 @@ def _deliver(options: argparse.Namespace) -> int:
     if not wanted["whole"]:
         raise Problem("A delivery without its mesh (deliver.whole off) is ended by Blender.",
                       "Leave deliver.whole on, or deliver from the add-on's panel.")
-    # job.json is also what `status` judges the stages by
-    before = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()
-    chosen = {**settings.to_json(before), "deliver": wanted}
+    chosen = {**settings.to_json(last_settings(capture)), "deliver": wanted}
     with read_only.stand_in(capture, wanted.get("folder", "")) as writable:
         plan = delivery_plan.plan(writable, settings.from_json(chosen).deliver)
         delivery_plan.check_target(plan)

@@ -9,11 +9,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..contract import artist_landmarks, deletion, report, settings, stages
+from ..contract import artist_landmarks, deletion, report, stages
 from ..contract.capture import Capture
 from ..contract.messages import Problem
 from .commands import add_command
-from .job import read_job
+from .job import last_settings
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -54,7 +54,7 @@ def _status(options: argparse.Namespace) -> int:
         raise Problem(f"There is no capture at {capture.root}.",
                       "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
     record = capture.read()
-    chosen = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()
+    chosen = last_settings(capture)
     print(f"source        {capture.source or 'none yet'}")
     for stage in stages.STAGES:
         finished, verdict = record["stages"].get(stage.name), capture.verdict(stage, chosen)
