@@ -13,7 +13,6 @@ fitted to all frames, which is all that is believed below hair, and with one ans
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -21,14 +20,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
-from safetensors.torch import load_file
 
-from ..contract import shipped_files
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import DelightSettings, Settings
 from ..face import faces, parser, template
 from ..face.head import read_head
+from ..face.networks import has_files, read_network
 from ..geometry.raster import interpolate, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
@@ -94,14 +92,10 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
 
 def load(device: str) -> DelightNet:
     """The shipped network. Raises Problem where its file or its card is missing."""
-    card = WEIGHTS.with_suffix(".json")
-    if not (WEIGHTS.is_file() and card.is_file()):
+    if not has_files(WEIGHTS):
         raise Problem("The weights of the delighting network are missing.",
                       "Install the add-on again, or choose the delighter 'shading'.")
-    shipped_files.require_whole(WEIGHTS)
-    net = DelightNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
-    net.load_state_dict({name: value.float() for name, value in load_file(WEIGHTS).items()})
-    return net.eval().to(torch.device(device), memory_format=torch.channels_last)
+    return read_network(DelightNet, WEIGHTS).to(torch.device(device), memory_format=torch.channels_last)
 
 
 def face_box(points: np.ndarray) -> tuple[float, float, float]:

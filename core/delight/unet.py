@@ -13,6 +13,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from ..face.networks import Ladder
 from ..imaging import images
 
 SIDE = 256  # of the picture it looks at
@@ -46,35 +47,16 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     return layers, middle
 
 
-class Trunk(nn.Module):
-    """A U-Net over levels of these `widths`, each of `depths` blocks and half as fine as the one before; the coarsest
-    attends to all of itself."""
+class Trunk(Ladder):
+    """A U-Net whose coarsest level attends to all of itself."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__()
-        self.down, self.up, self.halve, self.narrow = nn.ModuleList(), nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
-        for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
-            self.down.append(nn.Sequential(*(Block(width) for _ in range(depth))))
-            if level + 1 < len(widths):
-                self.halve.append(nn.Conv2d(width, widths[level + 1], 2, stride=2))
-                self.narrow.append(nn.Conv2d(widths[level + 1], width, 1))
-                self.up.append(nn.Sequential(*(Block(width) for _ in range(depth))))
+        self.add_levels(widths, depths)
         self.attention = Attention(widths[-1])
 
-    def transform(self, x: torch.Tensor) -> torch.Tensor:
-        """[N, widths[0], H, W] down to the coarsest level and back."""
-        kept = []
-        for level, blocks in enumerate(self.down):
-            x = blocks(x)
-            if level < len(self.halve):
-                kept.append(x)
-                x = self.halve[level](x)
-        x = self.attention(x)
-        for level in reversed(range(len(self.halve))):
-            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear",
-                                                     align_corners=False)
-            x = self.up[level](x)
-        return x
+    def look_at_all(self, x: torch.Tensor) -> torch.Tensor:
+        return self.attention(x)
 
 
 class DelightNet(Trunk):
@@ -96,24 +78,6 @@ class DelightNet(Trunk):
         x = torch.cat([fine, functional.pixel_shuffle(self.leave(x), 2)], 1)
         out = self.out(functional.gelu(self.last(x))).float()
         return out[:, :3], out[:, 3:]
-
-
-class Block(nn.Module):
-    """x + conv(gelu(conv(norm(x)))), and a gate per channel from the whole map's mean: exposure and light are matters
-    of the whole picture."""
-
-    def __init__(self, width: int):
-        super().__init__()
-        self.norm = nn.GroupNorm(max(1, width // 16), width)
-        self.first, self.second = nn.Conv2d(width, width, 3, padding=1), nn.Conv2d(width, width, 3, padding=1)
-        self.gate = nn.Linear(width, width)
-        nn.init.zeros_(self.second.weight)
-        nn.init.zeros_(self.second.bias)
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        inner = functional.gelu(self.first(self.norm(x)))
-        inner = inner * (2 * torch.sigmoid(self.gate(inner.mean((2, 3)))))[:, :, None, None]
-        return x + self.second(inner)
 
 
 class Attention(nn.Module):

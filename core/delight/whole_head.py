@@ -6,21 +6,19 @@ delighter *network* asks it beside its own answers; alone, every frame is divide
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import load_file
 
-from ..contract import shipped_files
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import template
 from ..face.head import read_head
+from ..face.networks import has_files, read_network
 from ..geometry.raster import bleed, interpolate, render_view, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
@@ -84,15 +82,10 @@ def answers_in_looks(net: TexelNet, head: LitHead, views: list[View], looks: lis
 
 def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
     """The shipped network. Raises Problem where its file or its card is missing."""
-    card = weights.with_suffix(".json")
-    if not (weights.is_file() and card.is_file()):
+    if not has_files(weights):
         raise Problem("The weights of the delighting network are missing.",
                       "Install the add-on again, or choose the delighter 'shading'.")
-    if weights == WEIGHTS:
-        shipped_files.require_whole(weights)
-    net = TexelNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
-    net.load_state_dict(unpack(load_file(weights)))
-    return net.eval().to(torch.device(device), memory_format=torch.channels_last)
+    return read_network(TexelNet, weights, unpack).to(torch.device(device), memory_format=torch.channels_last)
 
 
 @torch.inference_mode()
