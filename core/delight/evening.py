@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from ..face.head import Unfolded
-from ..geometry.raster import interpolate, sample, visible_from
+from ..geometry.raster import interpolate, sample, sample_uv, visible_from
 from ..geometry.views import View
 from .lit_head import LitHead
 from .texels import exposures, robust_mean
@@ -77,10 +77,9 @@ def _opinion(surface: Unfolded, view: View, look: ShadingEstimate) -> tuple[np.n
 
 def _agreeing(head: LitHead, look: ShadingEstimate, albedo: np.ndarray, known: np.ndarray) -> ShadingEstimate:
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
-    at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * UV_SIDE
-    weight = sample(known, at).reshape(look.face.shape) * (look.face >= 0)
+    weight = sample_uv(known, uv).reshape(look.face.shape) * (look.face >= 0)
     weight = np.where(weight > 0.99, weight, 0).astype(np.float32)
-    off = (look.log - look.shading - sample(albedo, at).reshape(*look.face.shape, 3)) * weight[..., None]
+    off = (look.log - look.shading - sample_uv(albedo, uv).reshape(*look.face.shape, 3)) * weight[..., None]
     carried = cv2.GaussianBlur(weight, (0, 0), COARSE)
     off = cv2.GaussianBlur(off.astype(np.float32), (0, 0), COARSE) / np.maximum(carried, 0.02)[..., None]
     mean = off[weight > 0].mean(0) if (weight > 0).any() else np.zeros(3, np.float32)

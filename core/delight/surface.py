@@ -12,8 +12,8 @@ from ..contract.messages import Problem, Reporter
 from ..face import parser, template
 from ..face.head import Head
 from ..face.parts import keep_present
-from ..geometry.meshes import Mesh
-from ..geometry.raster import sample, visible_from
+from ..geometry.meshes import Mesh, vertex_uvs
+from ..geometry.raster import sample, sample_uv, visible_from
 from ..geometry.views import View
 from ..imaging import images
 
@@ -103,7 +103,5 @@ def skin_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     skin = template.mask("skin", 512)
     for name in NOT_SKIN:
         skin = skin * (1 - template.mask(name, 512))
-    uv = np.zeros((len(mesh.vertices), 2))
-    uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
-    texels = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512
-    return sample(skin, texels), sample(template.mask("brows", 512), texels)
+    uvs = vertex_uvs(mesh)
+    return sample_uv(skin, uvs), sample_uv(template.mask("brows", 512), uvs)

@@ -19,7 +19,7 @@ from ..contract.settings import Settings
 from ..face import template
 from ..face.head import read_head
 from ..face.networks import has_files, read_network
-from ..geometry.raster import bleed, interpolate, render_view, sample
+from ..geometry.raster import bleed, interpolate, render_view, sample_uv
 from ..geometry.views import View, read_views
 from ..imaging import images
 from .contract import Delit
@@ -74,8 +74,7 @@ def answers_in_looks(net: TexelNet, head: LitHead, views: list[View], looks: lis
     answers = []
     for look in looks:
         uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
-        at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * LOOKED_AT
-        seen = sample(maps, at).reshape(*look.face.shape, 4) * (look.face >= 0)[..., None]
+        seen = sample_uv(maps, uv).reshape(*look.face.shape, 4) * (look.face >= 0)[..., None]
         answers.append(HeadInLook(seen[..., :3], seen[..., 3]))
     return answers
 
@@ -115,10 +114,9 @@ def _delit(view: View, head: LitHead, found: Shading) -> Delit:
     face, bary, _ = render_view(head.caster, view)
     here = face >= 0
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, face[here], bary[here])
-    at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(found.log)
     maps = np.concatenate([found.log, found.shadow[..., None]], -1).astype(np.float32)
     seen = np.zeros((*here.shape, 4), np.float32)
-    seen[here] = sample(maps, at)
+    seen[here] = sample_uv(maps, uv)
     seen = bleed(seen, here)
     albedo = images.srgb_to_linear(srgb) / np.exp(seen[..., :3])
     return Delit(view, images.linear_to_srgb(albedo).clip(0, 1), np.clip(seen[..., 3] * here, 0, 1))

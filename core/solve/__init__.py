@@ -31,7 +31,7 @@ from .draft import restored
 from .edited import solve_edited
 from .evidence import REFERENCE, Evidence, read_evidence
 from .memory import sample_within_memory, spare_memory
-from .prior import WEIGHTS, ConditionedPrior, Prior, load
+from .prior import ConditionedPrior, Prior, load_chosen
 from .problem import State, unexplained
 from .recipes import RECIPES, Recipe, free
 from .sampler import Sampler, seeded
@@ -55,7 +55,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     divergence.
     """
     options = settings.solve
-    prior = load(Path(options.prior).expanduser() if options.prior else WEIGHTS, settings.compute_device)
+    prior = load_chosen(settings)
     if options.low_memory:
         spare_memory(prior)
     recipe = recipe_of(settings, prior)

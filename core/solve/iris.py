@@ -20,6 +20,7 @@ from ..face import lids
 from ..face.eye_reader import EyeShares, read_eye
 from ..face.head import Head
 from ..geometry import raster
+from ..geometry.meshes import vertex_uvs
 from ..geometry.views import View, read_views
 from ..imaging import images
 from .look import BURNT, skin_weight
@@ -100,14 +101,11 @@ def iris_pixels(view: View, eye: Eyeball, seen: EyeShares, shape: tuple[int, ...
 
 def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The vertices [N] of plain skin about an eye that are turned as it is, and their linear albedo [N, 3]."""
-    mesh, size = head.mesh, len(albedo)
-    uv = np.zeros((len(mesh.vertices), 2))
-    uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
-    pixels = np.stack([uv[:, 0], 1 - uv[:, 1]], 1)
-    plain = raster.sample(skin_weight(512, np.zeros((8, 8))), pixels * 512) > 0.5
+    mesh, uvs = head.mesh, vertex_uvs(head.mesh)
+    plain = raster.sample_uv(skin_weight(512, np.zeros((8, 8))), uvs) > 0.5
     near = np.linalg.norm(mesh.vertices - eye.centre, axis=1) < REACH * eye.radius
     rows = np.flatnonzero(plain & near & (head.normals @ np.array(eye.gaze) > TURNED))
-    return rows, np.maximum(raster.sample(albedo, pixels[rows] * size), 1e-3)
+    return rows, np.maximum(raster.sample_uv(albedo, uvs[rows]), 1e-3)
 
 
 def _in_frame(view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray,

@@ -19,6 +19,7 @@ from ..contract.messages import Problem, Reporter
 from ..face import faces, template
 from ..face.head import Head
 from ..geometry import raster
+from ..geometry.meshes import vertex_uvs
 from ..geometry.views import View, read_views
 from ..imaging import images
 from ..light.spherical_harmonics import sh_basis
@@ -71,9 +72,7 @@ def capture_look(capture: Capture, head: Head, shadow: np.ndarray, report: Repor
     if not views or not head.built_in:
         return None
     mesh, normals = head.mesh, head.normals
-    uv = np.zeros((len(mesh.vertices), 2))
-    uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
-    weight = raster.sample(skin_weight(512, shadow), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
+    weight = raster.sample_uv(skin_weight(512, shadow), vertex_uvs(mesh))
     points = np.flatnonzero(weight > 0.05)
     seen = np.full((len(views), len(points), 3), np.nan)
     around = []

@@ -19,6 +19,7 @@ from safetensors import safe_open
 
 from ..contract import shipped_files
 from ..contract.messages import Problem
+from ..contract.settings import Settings
 from . import released
 from .network import Condition, UNet, UNetLayout, denoise, from_state
 from .skin_tone import SkinTone
@@ -216,6 +217,12 @@ def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = 
                           "Reinstall the extension.") from error
     prior.network.lower(dtype or fast_dtype(device))
     return prior.to(device)
+
+
+def load_chosen(settings: Settings) -> Prior:
+    """The authors' prior where the settings name one, else ours, on the device of the settings."""
+    chosen = settings.solve.prior
+    return load(Path(chosen).expanduser() if chosen else WEIGHTS, settings.compute_device)
 
 
 def fast_dtype(device: str) -> torch.dtype:

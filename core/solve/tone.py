@@ -8,8 +8,6 @@ whose light the delighter took out.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import torch
 
@@ -21,7 +19,7 @@ from .evidence import Evidence, read_evidence
 from .initial import lit_skin
 from .look import capture_look
 from .population import estimate_skin_tone
-from .prior import WEIGHTS, load
+from .prior import load_chosen
 from .skin_tone import TEXTURE, SkinTone, parse_skin_tone
 from .white_point import given_white
 
@@ -40,8 +38,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     evidence = read_evidence(capture, head, SIZE)
     tone = estimate_from_frames(capture, head, settings, evidence, report)
     if tone is None:
-        prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS,
-                     settings.compute_device)
+        prior = load_chosen(settings)
         tone = estimate_from_texture(evidence.texture, lit_skin(evidence), prior.tones)
     tell_skin_tone(tone, report)
 

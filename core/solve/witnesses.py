@@ -11,7 +11,8 @@ import numpy as np
 from ..contract.capture import Capture
 from ..face.head import Head
 from ..geometry import raster
-from ..geometry.views import View, read_views
+from ..geometry.frame_pictures import delit_views
+from ..geometry.views import View
 from ..imaging import images
 from .marks import Mark
 
@@ -26,14 +27,12 @@ def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> lis
     cameras or no delit views."""
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return marks
-    pictures = [(view, path) for view in read_views(capture)
-                if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
     covered = head.raster(size)[0] >= 0
     points, normals = (head.interpolate(values, size) for values in (head.mesh.vertices, head.normals))
     at = tuple(np.round([[mark.row, mark.column] for mark in marks]).astype(int).clip(0, size - 1).T)
     there = points[at], normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
     seen, agreed = np.zeros(len(marks), int), np.zeros(len(marks), int)
-    for view, path in pictures:
+    for view, path in delit_views(capture):
         shown = visible(view, head.caster, *there) & covered[at]
         if not shown.any():
             continue
