@@ -156,7 +156,7 @@ def measure(chosen: Photographs, settings: Settings, features: bool = True, only
 
 def without_whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The delighter network as its frames and the fitted light alone would have it."""
-    with mock.patch.object(second_opinion, "WHOLE", 0.0):
+    with mock.patch.object(second_opinion, "WHOLE_HEAD_WEIGHT", 0.0):
         yield from delight.DELIGHTERS["network"](capture, settings, report)
 
 

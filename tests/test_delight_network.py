@@ -18,7 +18,7 @@ from core.delight.evening import ShadingEstimate, even_out
 from core.delight.lift import lift, lift_share
 from core.delight.lit_head import LitHead
 from core.delight.network import WEIGHTS, crop, face_box, load
-from core.delight.second_opinion import FITTED, WHOLE, HeadInLook, beyond, of_both, with_whole_head
+from core.delight.second_opinion import FITTED_WEIGHT, WHOLE_HEAD_WEIGHT, HeadInLook, beyond, of_both, with_whole_head
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.face import template
 from core.face.head import Head
@@ -200,7 +200,7 @@ def test_two_answers_are_weighed_where_they_agree_and_the_network_wins_where_the
     fitted[:4] += 0.1
     fitted[-4:] += 7
     (both,) = of_both([look], [fitted], [skin])
-    assert both.shading[:4] == pytest.approx(FITTED * 0.1, rel=0.05)
+    assert both.shading[:4] == pytest.approx(FITTED_WEIGHT * 0.1, rel=0.05)
     assert both.shading[8:-8] == pytest.approx(0, abs=1e-6) and np.abs(both.shading[-4:]).max() < 0.15
 
 
@@ -215,12 +215,12 @@ def test_the_whole_heads_answer_is_met_in_part_where_the_head_is_whatever_its_le
     log[:8] += 1
     log[19:26] += 1
     (both,) = with_whole_head([look], [HeadInLook(log, 0 * skin)], [skin])
-    assert both.shading[:8, :28] == pytest.approx(WHOLE, rel=1e-3)
-    assert both.shading[19:26, 16:28] == pytest.approx(WHOLE, rel=1e-3)
+    assert both.shading[:8, :28] == pytest.approx(WHOLE_HEAD_WEIGHT, rel=1e-3)
+    assert both.shading[19:26, 16:28] == pytest.approx(WHOLE_HEAD_WEIGHT, rel=1e-3)
     assert not both.shading[8:19].any() and not both.shading[:, 28:].any()
     assert not both.shading[21:25, 5:9].any(), "a shadow of which the whole head does not know"
     (knowing,) = with_whole_head([look], [HeadInLook(log, shadow)], [skin])
-    assert knowing.shading[21:25, 5:9] == pytest.approx(WHOLE, rel=1e-3)
+    assert knowing.shading[21:25, 5:9] == pytest.approx(WHOLE_HEAD_WEIGHT, rel=1e-3)
     assert with_whole_head([look], [HeadInLook(log, shadow)], [0 * skin]) == [look], "no skin tells the level"
 
 
@@ -276,7 +276,7 @@ def _emptied(work):
 
 def _prepared(seeds, work):
     """Sights of subjects with plain skin: what `prepare` makes in seconds, in tenths of one."""
-    from core.delight.unet import SIDE
+    from core.delight.unet import SIDE_PX
     from core.synthetic import olat, sight
     from core.synthetic.identities import subject_mesh
 
@@ -290,6 +290,6 @@ def _prepared(seeds, work):
                                 np.ones((len(mesh.vertices), olat.LIGHTS), bool))
         np.save(place / "visible.npy", np.packbits(stage.visible, axis=1))
         plain = np.broadcast_to(np.float32([0, 0, 1]), (64, 64, 3))
-        view = random_camera(sight.landmarks_of(stage), SIDE, np.random.default_rng(seed))
+        view = random_camera(sight.landmarks_of(stage), SIDE_PX, np.random.default_rng(seed))
         diffuse, gloss = np.full((64, 64, 3), 0.3, np.float32), np.full((64, 64), 0.03, np.float32)
         sight.save(place / "0.npz", sight.look(stage, view, diffuse, gloss, plain, np.random.default_rng(seed)))

@@ -17,11 +17,11 @@ import numpy as np
 
 from .evening import ShadingEstimate
 
-FITTED = 0.8  # weight of the fitted light's answer where the two agree ...
-DOUBT = 1.0  # ... and natural log units of luminance between them at which it is half of that
+FITTED_WEIGHT = 0.8  # weight of the fitted light's answer where the two agree ...
+DOUBT_LOG = 1.0  # ... and natural log units of luminance between them at which it is half of that
 # on five captures of five synthetic people, by the PSNR and FLIP of their delit frames; nobody was left out
-WHOLE = 0.5  # weight of the whole head's answer ...
-MISSED = 0.25  # ... which is nothing where so much of the sun is lost of which it does not know ...
+WHOLE_HEAD_WEIGHT = 0.5  # weight of the whole head's answer ...
+MISSED_SHARE = 0.25  # ... which is nothing where so much of the sun is lost of which it does not know ...
 MISSED_CELLS = 1.0  # ... on average over a Gaussian of that deviation: borders are not where a shadow is missed
 
 
@@ -46,9 +46,9 @@ def of_both(looks: list[ShadingEstimate], fitted: list[np.ndarray], skins: list[
 
 def with_whole_head(looks: list[ShadingEstimate], heads: list[HeadInLook],
                     skins: list[np.ndarray]) -> list[ShadingEstimate]:
-    """The looks moved by WHOLE towards the whole head's log-shading in each, brought to their level over bare skin
-    (skins [h, h], above 0.5 there). A shadow that a look shows and the whole head does not know is one that it took for
-    pigment: there the look keeps its own."""
+    """The looks moved by WHOLE_HEAD_WEIGHT towards the whole head's log-shading in each, brought to their level over
+    bare skin (skins [h, h], above 0.5 there). A shadow that a look shows and the whole head does not know is one that
+    it took for pigment: there the look keeps its own."""
     apart = [(head.log - look.shading)[skin > 0.5] for look, head, skin in zip(looks, heads, skins, strict=True)]
     if not sum(map(len, apart)):
         return looks
@@ -58,8 +58,8 @@ def with_whole_head(looks: list[ShadingEstimate], heads: list[HeadInLook],
 
 def _halfway(look: ShadingEstimate, head: HeadInLook, level: np.ndarray) -> ShadingEstimate:
     missed = np.clip(look.shadow - head.shadow, 0, 1).astype(np.float32)
-    known = 1 - np.clip(cv2.GaussianBlur(missed, (0, 0), MISSED_CELLS) / MISSED, 0, 1)
-    weight = (WHOLE * known * (look.face >= 0))[..., None]
+    known = 1 - np.clip(cv2.GaussianBlur(missed, (0, 0), MISSED_CELLS) / MISSED_SHARE, 0, 1)
+    weight = (WHOLE_HEAD_WEIGHT * known * (look.face >= 0))[..., None]
     return replace(look, shading=(look.shading + weight * (head.log - level - look.shading)).astype(np.float32))
 
 
@@ -87,5 +87,5 @@ def coarse(light: np.ndarray, side: int) -> np.ndarray:
 
 def _towards(look: ShadingEstimate, log: np.ndarray) -> ShadingEstimate:
     apart = log - look.shading
-    weight = FITTED / (1 + (apart.mean(-1, keepdims=True) / DOUBT) ** 2) * (look.face >= 0)[..., None]
+    weight = FITTED_WEIGHT / (1 + (apart.mean(-1, keepdims=True) / DOUBT_LOG) ** 2) * (look.face >= 0)[..., None]
     return replace(look, shading=(look.shading + weight * apart).astype(np.float32))

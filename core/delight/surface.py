@@ -17,7 +17,7 @@ from ..geometry.raster import sample, sample_uv, visible_from
 from ..geometry.views import View
 from ..imaging import images
 
-GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
+MIN_FACING_COSINE = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
 NOT_SKIN = ("lips", "brows", "eyes")
 HAIRY = ("beard", "hair", "eyes", "clothes")
 """Parts of a picture whose own colour says nothing of the light on the skin. Brows are told apart from them: they are
@@ -54,7 +54,7 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
         cosine = (towards * normals).sum(1) / np.linalg.norm(towards, axis=1)
         pixels, _ = view.project(mesh.vertices)
         inside = ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
-        candidates = np.flatnonzero(inside & (cosine > GRAZING))
+        candidates = np.flatnonzero(inside & (cosine > MIN_FACING_COSINE))
         candidates = candidates[visible_from(head.caster, mesh.vertices[candidates], normals[candidates], view.centre)]
         picture = images.read_srgb(view.path)
         srgb = sample(picture, pixels[candidates])

@@ -16,11 +16,11 @@ from torch.nn import functional
 from ..face.networks import Ladder
 from ..imaging import images
 
-SIDE = 256  # of the picture it looks at
+SIDE_PX = 256  # of the picture it looks at
 CHANNELS = 16
 FINE = 24  # features at half the picture's resolution
-DARKEST = 0.004  # linear; below is noise
-MULTIPLE = 32  # of pixels, to be halved so often
+MIN_LINEAR = 0.004  # linear; below is noise
+MULTIPLE_PX = 32  # of pixels, to be halved so often
 
 
 def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: np.ndarray | None = None,
@@ -31,7 +31,7 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     fitted sky alone and with the fitted sun, normal [S, S, 3] in camera coordinates, head [S, S] where they hold.
     Without it these channels are 0, and so is the last, which says so.
     """
-    log = np.log(np.maximum(images.srgb_to_linear(srgb), DARKEST))
+    log = np.log(np.maximum(images.srgb_to_linear(srgb), MIN_LINEAR))
     side = len(log)
     inner = slice(side // 4, 3 * side // 4)
     middle = float(log[inner, inner].mean())
@@ -40,7 +40,7 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     layers[3:6] = (log - middle).transpose(2, 0, 1)
     if ambient is not None:
         for first, light in ((6, ambient), (9, sunlit)):
-            layers[first:first + 3] = (np.clip(log - np.log(np.maximum(light, DARKEST / 4)), -2.5, 2.5)
+            layers[first:first + 3] = (np.clip(log - np.log(np.maximum(light, MIN_LINEAR / 4)), -2.5, 2.5)
                                        * head[..., None]).transpose(2, 0, 1)
         layers[12:15] = (normal * head[..., None]).transpose(2, 0, 1)
         layers[15] = head
@@ -61,7 +61,7 @@ class Trunk(Ladder):
 
 class DelightNet(Trunk):
     """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2].
-    S is a multiple of MULTIPLE."""
+    S is a multiple of MULTIPLE_PX."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__(widths, depths)

@@ -24,7 +24,7 @@ from ..geometry.views import View, read_views
 from ..imaging import images
 from .contract import Delit
 from .evening import ShadingEstimate
-from .lit_head import BRIGHTEST, LitHead, lit_head
+from .lit_head import MAX_ALBEDO, LitHead, lit_head
 from .packed import unpack
 from .second_opinion import HeadInLook
 from .texel_net import TexelNet, maps_of, network_input
@@ -32,7 +32,7 @@ from .texels import Texels, gather
 
 DATA_FILES = ("weights/texels.safetensors", "weights/texels.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
-LOOKED_AT = 128
+LOOK_TEXELS = 128
 """Texels along a side that are as coarse as a pixel of a look at a face."""
 READING = "Reading the whole head"
 
@@ -69,7 +69,7 @@ def answers_in_looks(net: TexelNet, head: LitHead, views: list[View], looks: lis
                      step: Callable[[int, int], None]) -> list[HeadInLook]:
     """The whole head's answer in each look, as coarse as a look is. The head has the built-in UVs."""
     found = tell_shading(net, gather(head, views, step))
-    coarse = images.resize(np.concatenate([np.exp(found.log), found.shadow[..., None]], -1), LOOKED_AT, LOOKED_AT)
+    coarse = images.resize(np.concatenate([np.exp(found.log), found.shadow[..., None]], -1), LOOK_TEXELS, LOOK_TEXELS)
     maps = np.concatenate([np.log(coarse[..., :3]), coarse[..., 3:]], -1).astype(np.float32)
     answers = []
     for look in looks:
@@ -106,7 +106,7 @@ def _exposure(texels: Texels, found: Shading) -> float:
     if not where.any():
         return 1.0
     albedo = np.exp(texels.log[where] - found.log[where]).max(-1)
-    return max(1.0, float(np.quantile(albedo, 0.75)) / BRIGHTEST)
+    return max(1.0, float(np.quantile(albedo, 0.75)) / MAX_ALBEDO)
 
 
 def _delit(view: View, head: LitHead, found: Shading) -> Delit:

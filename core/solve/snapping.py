@@ -21,7 +21,7 @@ from .recipes import RECIPES
 from .skin_tone import parse_skin_tone
 from .tone import estimate_from_texture
 
-CELL = 8.0
+CELL_TEXELS = 8.0
 """Texels of a 1024 map per light of the grid: none is fitted here, but a start lays them out."""
 
 
@@ -35,7 +35,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
     tone = parse_skin_tone(settings.solve.skin_tone)
     tone = tone or estimate_from_texture(evidence.texture, initial.lit_skin(evidence), prior.tones)
-    found = initial.start(prior, evidence, tone, CELL, recipe)
+    found = initial.start(prior, evidence, tone, CELL_TEXELS, recipe)
     snapped = np.clip(images.resize(found.alpha.numpy(), width, height), 0, 1)
     images.write_data(capture.shadow_mask_edges, snapped)
     painted = images.resize(evidence.alpha.numpy(), width, height)

@@ -16,10 +16,10 @@ from ..geometry.views import View
 from ..imaging import images
 from .marks import Mark
 
-FACING = 0.35  # least cosine between the surface and the way to the camera
-SHOWN = 0.4  # of the texture's contrast that a view must show
-AGREED = 0.6  # share of the views that see the place
-FEWEST = 2  # views; where fewer saw it the texture alone decides
+MIN_FACING_COSINE = 0.35  # least cosine between the surface and the way to the camera
+MIN_SHOWN_SHARE = 0.4  # of the texture's contrast that a view must show
+MIN_AGREED_SHARE = 0.6  # share of the views that see the place
+MIN_VIEWS = 2  # views; where fewer saw it the texture alone decides
 
 
 def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
@@ -40,14 +40,14 @@ def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> lis
         for k in np.flatnonzero(shown):
             contrast = _contrast(view, picture, points, covered, marks[k])
             seen[k] += contrast is not None
-            agreed[k] += contrast is not None and contrast > SHOWN * marks[k].contrast
-    return [mark for mark, s, a in zip(marks, seen, agreed, strict=True) if s < FEWEST or a >= AGREED * s]
+            agreed[k] += contrast is not None and contrast > MIN_SHOWN_SHARE * marks[k].contrast
+    return [mark for mark, s, a in zip(marks, seen, agreed, strict=True) if s < MIN_VIEWS or a >= MIN_AGREED_SHARE * s]
 
 
 def visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """bool [N] of surface points [N, 3] with unit normals [N, 3]."""
     towards = view.centre - points
-    facing = (towards * normals).sum(1) > FACING * np.linalg.norm(towards, axis=1)
+    facing = (towards * normals).sum(1) > MIN_FACING_COSINE * np.linalg.norm(towards, axis=1)
     pixels, _ = view.project(points)
     inside = ((pixels > 2) & (pixels < [view.width - 2, view.height - 2])).all(1)
     return facing & inside & raster.visible_from(caster, points, normals, view.centre)
