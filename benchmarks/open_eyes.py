@@ -30,7 +30,7 @@ from core.geometry import meshes
 from core.geometry.views import read_views
 from core.imaging import images
 from core.registration import eye_looks, eyeballs, landmarks
-from core.solve.iris import RING
+from core.solve.iris import RING_SHARES
 from core.synthetic.people import eyes
 from core.synthetic.people.figure import make_figure
 
@@ -125,7 +125,7 @@ def true_iris(person: dict, radius: float) -> np.ndarray:
     y, x = (np.mgrid[0:size, 0:size] + 0.5) / size - 0.5
     angle = np.pi * (2 * np.hypot(x, y)).clip(0, 1) ** (1 / 0.6)
     share = np.sin(angle) * 1000 * radius / eyes.IRIS_MM
-    return np.median(picture[(share > RING[0]) & (share < RING[-1]) & (angle < 1)], axis=0)
+    return np.median(picture[(share > RING_SHARES[0]) & (share < RING_SHARES[-1]) & (angle < 1)], axis=0)
 
 
 def apart(a: np.ndarray, b: np.ndarray) -> float:

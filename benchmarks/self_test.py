@@ -20,7 +20,7 @@ import torch
 from core.contract.files import write_json
 from core.contract.messages import Reporter
 from core.solve import prior
-from core.solve.self_test import EXPECTED, measure
+from core.solve.self_test import EXPECTED_FILE, measure
 from core.worker import self_test
 from core.worker.job import read_job
 
@@ -32,7 +32,7 @@ def main() -> None:
     scores = {name: [score(seed, dtype) for seed in range(1, 1 + int(sys.argv[1] if sys.argv[1:] else SEEDS))]
               for name, dtype in PRECISIONS.items()}
     every = np.concatenate(list(scores.values()))
-    write_json(EXPECTED,
+    write_json(EXPECTED_FILE,
                {"mean_db": round(float(every.mean()), 3), "deviation_db": round(float(every.std(ddof=1)), 3),
                 "scores_db": scores})
 

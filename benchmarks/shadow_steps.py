@@ -24,7 +24,7 @@ from core.contract.settings import Settings
 from core.face.head import read_filmed_head
 from core.imaging import images
 from core.solve import border, initial
-from core.solve.evidence import REFERENCE, read_evidence
+from core.solve.evidence import REFERENCE_TEXELS, read_evidence
 from core.solve.prior import load
 from core.solve.recipes import OURS
 from core.solve.skin_tone import parse_skin_tone
@@ -60,11 +60,11 @@ def measure(filmed: Filmed) -> dict:
     """Mean and deviation of each kind of step along M's border, and the slope of the true ones on those that are
     seen."""
     capture = filmed.capture
-    evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE)
+    evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
     tone = parse_skin_tone(people.skin_tone(filmed.truth))
     begun = initial.start(load(), evidence, tone, evidence.cell_side(Settings().solve.grid_cells), OURS)
-    luminance = {name: np.log(np.maximum(images.resize(np.ascontiguousarray(image, np.float32), REFERENCE,
-                                                       REFERENCE).mean(-1), 1e-3))
+    luminance = {name: np.log(np.maximum(images.resize(np.ascontiguousarray(image, np.float32), REFERENCE_TEXELS,
+                                                       REFERENCE_TEXELS).mean(-1), 1e-3))
                  for name, image in (("filmed", images.read_linear(capture.texture_filmed)),
                                      ("delit", images.read_linear(capture.texture)), ("true", filmed.answer(TRUE)))}
     seen = np.log(initial.remaining_light(evidence, begun).numpy().clip(0.05, 4)).mean(0)

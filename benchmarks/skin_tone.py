@@ -29,10 +29,10 @@ from core.face.head import read_head
 from core.imaging import images
 from core.solve.evidence import read_evidence
 from core.solve.look import Look
-from core.solve.population import GROUPS, estimate_skin_tone, group, lab
+from core.solve.population import TYPOLOGY_GROUPS, estimate_skin_tone, group, lab
 from core.solve.prior import WEIGHTS
 from core.solve.skin_tone import SkinTone
-from core.solve.tone import SIZE, estimate_from_frames, estimate_from_texture
+from core.solve.tone import TONE_SIDE_TEXELS, estimate_from_frames, estimate_from_texture
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.pigment import reflectance
 from core.synthetic.sample import RESERVED
@@ -54,7 +54,7 @@ def main() -> None:
     asked = parser.parse_args()
     known = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))["tones"]
     rows: dict[str, list] = {"before": [], "scene": [], "measured": []}
-    subjects = dict.fromkeys((name for _, name in GROUPS), 0)
+    subjects = dict.fromkeys((name for _, name in TYPOLOGY_GROUPS), 0)
     for seed in (*sorted(RESERVED["seeds"]), *range(HELD_OUT_SEED, HELD_OUT_SEED + MOST)):
         if min(subjects.values()) >= asked.each:
             break
@@ -135,7 +135,7 @@ def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> dict:
     returns them with its true L*."""
     truth = images.srgb_to_linear(srgb)
     head = read_head(capture)
-    evidence, settings = read_evidence(capture, head, SIZE), from_json({}, Settings())
+    evidence, settings = read_evidence(capture, head, TONE_SIDE_TEXELS), from_json({}, Settings())
     lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
     by_row = {"before": estimate_from_texture(evidence.texture, lit, known),
               "scene": estimate_from_frames(capture, head, settings, evidence, Reporter("skin_tone"))}

@@ -143,7 +143,7 @@ def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, di
             if others:
                 answers |= {TOGETHER: divided(shapes[filmed.name], split.split([shapes[filmed.name], *others]), True)}
             for name, factor in ((LESS, 0.5), (MORE, 2.0)):
-                typical = split.Scales(*(factor * value for value in split.TYPICAL))
+                typical = split.Scales(*(factor * value for value in split.TYPICAL_SCALES))
                 answers |= {name: divided(shapes[filmed.name], split.split([shapes[filmed.name]], typical), False)}
             maps.append(small({method: answer for method, answer in answers.items() if answer is not None}))
             print(f"{filmed.name}: split", file=sys.stderr, flush=True)

@@ -31,7 +31,8 @@ from .contract import (
 from .contract.capture import Capture
 from .contract.messages import Problem
 from .worker import capture_commands, command_settings, read_only, self_test, setup_commands, terminal
-from .worker.job import read_job, write_job
+from .worker.commands import add_command
+from .worker.job import last_settings, write_job
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -70,13 +71,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_chain(commands)
     capture_commands.add_commands(commands)
     _add_white(commands)
-    doctor = commands.add_parser("doctor", help="say what is installed, what is missing and what to do")
-    doctor.set_defaults(command=_doctor)
-    test = commands.add_parser(
-        "self-test", help="solve the sample head again on this machine, and compare it with what it should be"
-    )
+    add_command(commands, "doctor", _doctor, "say what is installed, what is missing and what to do")
+    test = add_command(commands, "self-test", _self_test,
+                       "solve the sample head again on this machine, and compare it with what it should be")
     test.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto")
-    test.set_defaults(command=_self_test)
     batch_commands.add_commands(commands)
     setup_commands.add_commands(commands)
     commands.add_parser("train",
@@ -87,7 +85,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_chain(commands) -> None:
     """The chain, what it delivers, and what there is to choose from."""
-    run = commands.add_parser("run", help="run the chain; a second run continues where the first stopped")
+    run = add_command(commands, "run", _run, "run the chain; a second run continues where the first stopped")
     run.add_argument("source", metavar="SOURCE",
                      help="a video, or a folder of photographs; - for the one the capture was made from")
     run.add_argument("capture", metavar="CAPTURE", type=Path,
@@ -100,41 +98,31 @@ def _add_chain(commands) -> None:
                      help="you agree that SwitchLight gets the selected frames, a person's face, and charges you; "
                           "without it, the run stops before")
     command_settings.add_options(run, "run")
-    run.set_defaults(command=_run)
-
-    deliver = commands.add_parser("deliver",
-                                  help="the maps as another program wants them, with the mesh as OBJ; other files and "
-                                       "shape keys need the add-on")
-    deliver.add_argument("capture", metavar="CAPTURE", type=Path)
+    deliver = add_command(commands, "deliver", _deliver,
+                          "the maps as another program wants them, with the mesh as OBJ; other files and shape keys "
+                          "need the add-on", "CAPTURE")
     command_settings.add_options(deliver, "deliver")
-    deliver.set_defaults(command=_deliver)
-    commands.add_parser(
-        "settings", help="list every setting: its default, what it may be, its flag, what it does"
-    ).set_defaults(command=_settings)
-    table = commands.add_parser("presets",
-                                help="say how each program gets its maps, and what each format drops: the tables of "
-                                     "docs/guide/deliver.md")
-    table.set_defaults(command=_presets)
-    commands.add_parser("stages", help="list the stages of the chain").set_defaults(command=_stages)
-    cards = commands.add_parser("delighters",
-                                help="say of each way to take the light out where it runs, what leaves the machine and "
-                                     "what it costs")
+    add_command(commands, "settings", _settings,
+                "list every setting: its default, what it may be, its flag, what it does")
+    add_command(commands, "presets", _presets,
+                "say how each program gets its maps, and what each format drops: the tables of docs/guide/deliver.md")
+    add_command(commands, "stages", _stages, "list the stages of the chain")
+    cards = add_command(commands, "delighters", _delighters,
+                        "say of each way to take the light out where it runs, what leaves the machine and what it "
+                        "costs")
     cards.add_argument("--markdown", action="store_true", help="as docs/delighters.md has it")
-    cards.set_defaults(command=_delighters)
 
 
 def _add_white(commands) -> None:
-    white = commands.add_parser("white",
-                                help="measure the white point on a ColorChecker, a grey card or white paper in the "
-                                     "frames")
-    white.add_argument("capture", metavar="CAPTURE", type=Path)
+    white = add_command(commands, "white", _white,
+                        "measure the white point on a ColorChecker, a grey card or white paper in the frames",
+                        "CAPTURE")
     white.add_argument("--frame", metavar="NAME",
                        help="the frame with the card, as in the capture's frames folder; without it a ColorChecker is "
                             "looked for")
     white.add_argument("--at", metavar=("X", "Y"), nargs=2, type=float,
                        help="a pixel of the card, from the frame's upper left")
     white.add_argument("--card", choices=settings.CARDS, default="grey")
-    white.set_defaults(command=_white)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -159,9 +147,7 @@ def _deliver(options: argparse.Namespace) -> int:
     if not wanted["whole"]:
         raise Problem("A delivery without its mesh (deliver.whole off) is ended by Blender.",
                       "Leave deliver.whole on, or deliver from the add-on's panel.")
-    # job.json is also what `status` judges the stages by
-    before = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()
-    chosen = {**settings.to_json(before), "deliver": wanted}
+    chosen = {**settings.to_json(last_settings(capture)), "deliver": wanted}
     with read_only.stand_in(capture, wanted.get("folder", "")) as writable:
         plan = delivery_plan.plan(writable, settings.from_json(chosen).deliver)
         delivery_plan.check_target(plan)

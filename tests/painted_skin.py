@@ -29,8 +29,8 @@ def brief_confidence():
     """In a module that imports this the short runs behind the confidence map are shorter still: at this size they would
     take longer than the solve."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(confidence, "RUNS", 2)
-        patched.setattr(confidence, "STEPS", 2)
+        patched.setattr(confidence, "SHORT_RUNS", 2)
+        patched.setattr(confidence, "SHORT_RUN_STEPS", 2)
         yield
 
 

@@ -23,8 +23,9 @@ from benchmarks import same_maps
 from core import __version__
 from core.__main__ import main
 from core.batch import local, ray_cluster, ray_connection, ray_task
+from core.batch.groups import group_named
 from core.batch.record import NAME, read_batch
-from core.batch.state import DONE, STOPPED, TO_DO, WAITING
+from core.batch.state import DONE, STOPPED, TO_DO, WAITING, FaceState
 from core.contract import lease, stages
 from core.contract.hashes import hash_file
 from core.contract.messages import Problem
@@ -177,7 +178,7 @@ def test_what_a_node_lacks(code, tmp_path, monkeypatch):
 def test_a_task_whose_result_is_not_what_was_asked_for(code, tmp_path, monkeypatch):
     batch = make(code, tmp_path, "a")
     monkeypatch.setattr("core.batch.task.ROOT", code)
-    monkeypatch.setattr(ray_task, "is_left", lambda *task: True)
+    monkeypatch.setattr(local, "derive_state", lambda *task: FaceState(TO_DO, group_named("head")))
     assert "not what was asked for" in ray_task.do_task(str(batch.root), "a", "head", 1, "", lambda line: None)["words"]
 
 

@@ -60,7 +60,7 @@ def test_steps_that_differ_more_than_a_delighter_leaves_are_mostly_the_skins_own
         seen, sure = border.border_steps(value, mask.numpy(), np.ones((SIZE, SIZE), np.float32), TEXEL)
         share, found = border.share_of_light(seen, sure), border.missing(beard_inside, mask, torch.ones(SIZE, SIZE),
                                                                          TEXEL).numpy()
-        assert share == pytest.approx(min(1, border.LEFT**2 / border.spread(seen, sure)[1] ** 2))
+        assert share == pytest.approx(min(1, border.LEFT_LOG**2 / border.spread(seen, sure)[1] ** 2))
         steps.append((share, found[128, int(430 / TEXEL)]))
     (least, alike), _, (most, unlike) = steps
     assert least == 1 and most < 0.2, steps

@@ -263,7 +263,7 @@ def _emptied(work):
 
 def _prepared(seeds, work):
     """Sights of subjects with plain skin: what `prepare` makes in seconds, in tenths of one."""
-    from core.delight.unet import SIDE
+    from core.delight.unet import SIDE_PX
     from core.synthetic import olat, sight
     from core.synthetic.identities import subject_mesh
 
@@ -277,6 +277,6 @@ def _prepared(seeds, work):
                                 np.ones((len(mesh.vertices), olat.LIGHTS), bool))
         np.save(place / "visible.npy", np.packbits(stage.visible, axis=1))
         plain = np.broadcast_to(np.float32([0, 0, 1]), (64, 64, 3))
-        view = random_camera(sight.landmarks_of(stage), SIDE, np.random.default_rng(seed))
+        view = random_camera(sight.landmarks_of(stage), SIDE_PX, np.random.default_rng(seed))
         diffuse, gloss = np.full((64, 64, 3), 0.3, np.float32), np.full((64, 64), 0.03, np.float32)
         sight.save(place / "0.npz", sight.look(stage, view, diffuse, gloss, plain, np.random.default_rng(seed)))

@@ -130,7 +130,7 @@ def frames(monkeypatch, folder, pictures):
         images.write_srgb(folder / f"{i:05d}.png", picture)
     views = [replace(camera(0), name=f"{i:05d}.png", path=folder / f"{i:05d}.png") for i in range(len(pictures))]
     monkeypatch.setattr(room, "read_views", lambda capture, selected_only: views)
-    monkeypatch.setattr(room, "SIZE", 64)
+    monkeypatch.setattr(room, "CROP_PX", 64)
 
 
 def run(folder, checkpoint, report):
@@ -165,7 +165,7 @@ def test_a_cancel_is_heard_inside_a_frame(tmp_path, monkeypatch, checkpoint, por
 
 
 def test_a_photograph_alone(monkeypatch, checkpoint, portrait):
-    monkeypatch.setattr(room, "SIZE", 64)
+    monkeypatch.setattr(room, "CROP_PX", 64)
     image, shadow = room.delight_photograph(portrait, DelightSettings(checkpoint=str(checkpoint)))
     assert image.shape == portrait.shape and shadow is None and np.abs(image - portrait).max() > 0.05
     with pytest.raises(Problem, match="no face in the photograph"):

@@ -32,7 +32,7 @@ def test_a_solve_shows_pictures_that_change_and_how_its_loss_falls(tmp_path, mon
     losses, steps = drawn[-1]
     assert [step for step, _ in losses] == list(range(1, losses[-1][0] + 1)) and losses[-1][0] <= steps
     assert losses[-1][1] < 0.7 * losses[0][1]
-    assert images.read_data(capture.preview / "loss.png").shape[:2] == drawing.CURVE
+    assert images.read_data(capture.preview / "loss.png").shape[:2] == drawing.CURVE_PX
 
 
 def test_the_loss_curve_falls_from_the_upper_left_to_the_lower_right():

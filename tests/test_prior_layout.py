@@ -161,7 +161,7 @@ def test_a_smooth_map_survives_both_ways(carried):
 def test_the_prior_is_asked_in_its_own_window_and_coordinates(carried):
     there, position, _ = carried
     assert there.there.covered.shape == (192, 192)
-    bridge = layout._box(layout.TONE, 192) > 0
+    bridge = layout._box(layout.TONE_BOX, 192) > 0
     assert bridge.sum() == pytest.approx(110 * 84 * (192 / 768) ** 2, rel=0.05)
     at = there._there(torch.from_numpy(position.transpose(2, 0, 1).copy()))[:, bridge].mean(1)
     face, bary = template.landmarks()

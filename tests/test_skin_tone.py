@@ -49,7 +49,7 @@ def test_with_a_measured_white_a_tone_is_what_it_is(reflects):
     """Of light and dark skin alike: neither exposure nor the light's colour reaches the tone."""
     known = population.population()
     true = known.tones[np.abs(known.tones[:, 0] - reflects).argmin()]
-    shown = (true + population.SHEEN) * BRIGHT
+    shown = (true + population.SHEEN_REFLECTANCE) * BRIGHT
     found = [population.estimate_skin_tone(look.Look(gain * shown, gain * shown), white=gain * BRIGHT)
              for gain in (0.2, 0.7)]
     assert np.allclose(found[0].linear, found[1].linear, rtol=1e-3)

@@ -145,7 +145,7 @@ def test_auto_tone_ignores_what_is_masked_and_stays_human():
     weight = torch.ones(20, 20)
     texture[:, :5], weight[:5] = 0.01, 0.0
     assert np.allclose(tone.estimate_from_texture(texture, weight, []).linear, TONE, atol=1e-4)
-    assert tone.estimate_from_texture(texture * 10, weight, []).linear[1] <= tone.HUMAN_GREEN[1] + 1e-6
+    assert tone.estimate_from_texture(texture * 10, weight, []).linear[1] <= tone.HUMAN_GREEN_LINEAR[1] + 1e-6
 
 
 def test_a_hard_mask_gets_a_soft_border():

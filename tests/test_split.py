@@ -14,7 +14,17 @@ from core.geometry import raster
 from core.geometry.meshes import vertex_normals
 from core.light.spherical_harmonics import sh_basis
 from core.solve import split as skin_or_light
-from core.solve.split import AXES, Scales, Shapes, cells_of, enlarged, infer, log_probability, seen_together, split
+from core.solve.split import (
+    COLOUR_AXES,
+    Scales,
+    Shapes,
+    cells_of,
+    enlarged,
+    infer,
+    log_probability,
+    seen_together,
+    split,
+)
 
 SIZE = 384
 TONE = torch.tensor([0.4, 0.25, 0.2])[:, None, None]
@@ -38,7 +48,7 @@ def face():
 def lamp(seed, amount):
     """Log shading [3, S, S] of a second-order light that varies by `amount` over the face, a little coloured."""
     rng, (normal, skin) = np.random.default_rng(seed), face()
-    coefficients = rng.standard_normal(9) * skin_or_light.OF_ORDERS
+    coefficients = rng.standard_normal(9) * skin_or_light.ORDER_DEVIATIONS
     field = np.tensordot(coefficients, sh_basis(normal.numpy().astype(np.float64), axis=0), 1)
     field *= amount / field[skin.numpy() > 0].std()
     return torch.from_numpy(np.multiply.outer([1.1, 1.0, 0.9], field)).float()
@@ -54,8 +64,8 @@ def drawn(seed, scales, parts=("traits",)):
     for part in parts:
         lower = np.linalg.cholesky(getattr(model, part) + 1e-6 * np.eye(len(cells.places)))
         drawn = (lower @ rng.standard_normal((len(cells.places), 3))).T
-        values += getattr(scales, part) * skin_or_light.OF_AXES[:, None] * drawn
-    return enlarged(torch.from_numpy(skin_or_light._spread(AXES.T @ values, cells.covered)), SIZE)
+        values += getattr(scales, part) * skin_or_light.AXIS_DEVIATIONS[:, None] * drawn
+    return enlarged(torch.from_numpy(skin_or_light._spread(COLOUR_AXES.T @ values, cells.covered)), SIZE)
 
 
 def shapes(log, weight=1.0):
@@ -112,7 +122,7 @@ def test_the_probability_is_the_gaussians():
     cells = cells_of(shapes(lamp(1, 0.1)), 12)
     seen, values = seen_together([cells])
     together = skin_or_light.model(seen, seen)
-    scales = skin_or_light.TYPICAL
+    scales = skin_or_light.TYPICAL_SCALES
     by_scipy = 0
     for axis in range(3):
         normal = multivariate_normal(cov=together.covariance(scales, axis), allow_singular=True)
@@ -141,4 +151,4 @@ def test_little_seen_tells_little_of_the_light():
     corner = torch.zeros_like(skin)
     corner[160:180, 180:200] = 1
     cells = cells_of(shapes(lamp(0, 0.2), corner), 48)
-    assert deviation(infer([cells], skin_or_light.TYPICAL).light(normal).log()) < 0.2
+    assert deviation(infer([cells], skin_or_light.TYPICAL_SCALES).light(normal).log()) < 0.2

@@ -182,7 +182,7 @@ def test_a_training_goes_on_where_it_stopped_and_its_weights_are_read_again(work
     monkeypatch.setitem(training.CONFIGS, "cpu",
                         {"model": MODEL, "training": {"pairs": 1, "fine_every": 10**9, "rate": 1e-3, "minutes": 1,
                                                       "people": 1, "props": 2, "held_out": 1, "seed": 0}})
-    monkeypatch.setattr(training, "SIDE", 128)
+    monkeypatch.setattr(training, "SIDE_TEXELS", 128)
     named = training.named_subjects
     monkeypatch.setattr(training, "named_subjects",
                         lambda count, held_out: named(1, 1) | {"seeds": [9100], "held_out_seeds": [9100]})

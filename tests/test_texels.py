@@ -59,7 +59,7 @@ def test_the_border_of_the_sun_is_a_signed_distance():
     lit_here = np.zeros((64, 64), bool)
     lit_here[:, 20:] = True
     distance = texels.border_distance(lit_here)
-    expected = np.tanh((np.arange(64) - 19.5 + 0.5 * np.sign(np.arange(64) - 19.5)) * texels.SIDE / 64
+    expected = np.tanh((np.arange(64) - 19.5 + 0.5 * np.sign(np.arange(64) - 19.5)) * texels.SIDE_TEXELS / 64
                        / texels.BORDER_TEXELS)
     assert np.abs(distance - expected).max() < 0.02
     assert not texels.border_distance(lit_here | True).any() and not texels.border_distance(lit_here & False).any()
@@ -135,8 +135,9 @@ def evenly_lit(tmp_path_factory):
 def test_what_the_views_of_a_head_agree_on_is_its_colour_whatever_their_exposures(evenly_lit):
     head, views, albedo = evenly_lit
     found = texels.gather(head, views)
-    truth = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), texels.SIDE, texels.SIDE), 1e-3))
-    where = (found.seen > 0.5) & (template.mask("skin", texels.SIDE) > 0.9)
+    side = texels.SIDE_TEXELS
+    truth = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), side, side), 1e-3))
+    where = (found.seen > 0.5) & (template.mask("skin", texels.SIDE_TEXELS) > 0.9)
     error = (found.log - truth)[where]
     error = error - np.median(error, 0)
     assert where.sum() > 10_000 and np.median(np.abs(error)) < 0.02 and found.spread[where].mean() < 0.05
@@ -147,7 +148,7 @@ def test_a_look_is_told_what_the_whole_head_says_of_what_it_shows(evenly_lit, mo
     """A network that says the fitted light, here an even one with a ramp across the map: it is there in the look, at
     the pixels that show the head."""
     head, views, _ = evenly_lit
-    u = (np.mgrid[0:texels.SIDE, 0:texels.SIDE][1] + 0.5) / texels.SIDE
+    u = (np.mgrid[0:texels.SIDE_TEXELS, 0:texels.SIDE_TEXELS][1] + 0.5) / texels.SIDE_TEXELS
     ramp = np.repeat((1.5 * (u - 0.5))[..., None], 3, 2).astype(np.float32)
     monkeypatch.setattr(whole_head, "tell_shading",
                         lambda net, known: whole_head.Shading(ramp, ramp[..., 0], ramp[..., 0]))

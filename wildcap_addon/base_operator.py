@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core.contract import unforeseen
 from ..core.contract.messages import Problem
-from . import captures, problems, status
+from . import captures, jobs, problems, status
 
 WIDTH = 460
 """Of a dialog, pixels"""
@@ -70,6 +70,38 @@ class BaseOperator:
         problems.show(root, problem)
         self.report({'ERROR'}, f"{rpt_(problem.problem)} {rpt_(problem.remedy)}")
         return {'CANCELLED'}
+
+
+class CaptureOperator(BaseOperator):
+    """Mixin: an operator that works on the active capture."""
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context)
+
+
+class HeadOperator(BaseOperator):
+    """Mixin: an operator that makes or changes what the active capture has in the scene."""
+
+    @classmethod
+    def poll(cls, context):
+        return cls.in_object_mode(context) and cls.with_capture(context)
+
+
+class JobOperator(BaseOperator):
+    """Mixin: an operator that starts a job on the active capture."""
+
+    @classmethod
+    def poll(cls, context):
+        return jobs.can_start(cls, context)
+
+
+class FileOperator(BaseOperator):
+    """Mixin: an operator that asks for a file or folder first."""
+
+    def invoke(self, context, event):
+        context.window_manager.fileselect_add(self)
+        return {'RUNNING_MODAL'}
 
 
 class Dialog(BaseOperator):

@@ -97,7 +97,7 @@ def poll() -> bool:
     global _shown
     if _watch is None:
         _replace_watch(None)
-    _watch.listed = frozenset(captures.root(item) for scene in bpy.data.scenes for item in scene.wildcap.captures)
+    _watch.listed = frozenset(map(captures.root, captures.listed()))
     if _watch.root is None and _watch.found is not None:
         choose(_watch.found)
     known = view()

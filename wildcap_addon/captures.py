@@ -57,6 +57,11 @@ def root(item) -> str:
     return str(folder(item).root) if item is not None else ""
 
 
+def listed() -> list:
+    """The captures of all scenes of this file."""
+    return [item for scene in bpy.data.scenes for item in scene.wildcap.captures]
+
+
 def add(context, path: Path) -> bpy.types.PropertyGroup:
     """The list's item for a folder, made if need be, and now the active one."""
     props = context.scene.wildcap

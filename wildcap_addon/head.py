@@ -9,7 +9,7 @@ import bpy
 
 from ..core.contract.capture import Capture
 from ..core.contract.messages import Problem
-from . import captures, colours, node_trees
+from . import captures, colours, data_blocks, node_trees
 
 PREVIEW = "WildCap Preview"
 """Name of the image node by which a running solve is shown on the head."""
@@ -64,11 +64,7 @@ def _in_place(head, mesh) -> bpy.types.Mesh:
     if any(follow(head, mesh) for follow in FOLLOWERS):
         bpy.data.meshes.remove(mesh)
         return head.data
-    old, head.data = head.data, mesh
-    for material in old.materials:
-        mesh.materials.append(material)
-    if old.users == 0:
-        bpy.data.meshes.remove(old)
+    data_blocks.replace_data(head, mesh, bpy.data.meshes)
     return mesh
 
 

@@ -41,7 +41,7 @@ def find(item) -> Path | None:
     """A missing capture where it is likely to be: beside the .blend or one folder further down, among the captures of
     the preferences, where 0.1.0 put them, or beside another one of the scene. None where there is none of its name."""
     name = Path(item.path).name
-    parents = [captures.folder(other).root.parent for scene in bpy.data.scenes for other in scene.wildcap.captures]
+    parents = [captures.folder(other).root.parent for other in captures.listed()]
     parents += [preferences.captures_folder(saved=False), preferences.CAPTURES_0_1]
     if bpy.data.filepath:
         blend = Path(bpy.data.filepath).parent
@@ -51,16 +51,14 @@ def find(item) -> Path | None:
 
 def missing() -> list:
     """The items of all scenes whose folder is not there."""
-    return [item for scene in bpy.data.scenes for item in scene.wildcap.captures
-            if not captures.folder(item).root.is_dir()]
+    return [item for item in captures.listed() if not captures.folder(item).root.is_dir()]
 
 
 @bpy.app.handlers.persistent
 def note_on_saving(path, *_):
     """How each capture is reached from the file that is about to be written."""
-    for scene in bpy.data.scenes:
-        for item in scene.wildcap.captures:
-            item.from_blend = _relative(captures.folder(item), Path(path).parent) if path else ""
+    for item in captures.listed():
+        item.from_blend = _relative(captures.folder(item), Path(path).parent) if path else ""
 
 
 @bpy.app.handlers.persistent
@@ -70,14 +68,13 @@ def follow_on_opening(*_):
     if not bpy.data.filepath:
         return
     blend = Path(bpy.data.filepath).parent
-    for scene in bpy.data.scenes:
-        for item in scene.wildcap.captures:
-            here = Path(os.path.normpath(blend / item.from_blend)) if item.from_blend else None
-            beside = blend / Path(item.path).name
-            if here is not None and here.is_dir():
-                _follow(item, here)
-            elif not captures.folder(item).root.is_dir() and is_capture(beside):
-                _follow(item, beside)
+    for item in captures.listed():
+        here = Path(os.path.normpath(blend / item.from_blend)) if item.from_blend else None
+        beside = blend / Path(item.path).name
+        if here is not None and here.is_dir():
+            _follow(item, here)
+        elif not captures.folder(item).root.is_dir() and is_capture(beside):
+            _follow(item, beside)
 
 
 def _follow(item, path: Path) -> None:

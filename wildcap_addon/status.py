@@ -181,16 +181,15 @@ def _tick() -> float:
         _looking.discard(root)
         _known[root] = (stamp, status)
         redraw()
-    for scene in bpy.data.scenes:
-        for item in scene.wildcap.captures:
-            root = captures.root(item)
-            if root not in _wanted or root in _looking:
-                continue
-            capture, stamp = _stamp(item)
-            if root not in _known or _known[root][0] != stamp:
-                _looking.add(root)
-                threading.Thread(target=_look_aside, args=(root, stamp, capture, properties.settings(item)),
-                                 name="wildcap-status", daemon=True).start()
+    for item in captures.listed():
+        root = captures.root(item)
+        if root not in _wanted or root in _looking:
+            continue
+        capture, stamp = _stamp(item)
+        if root not in _known or _known[root][0] != stamp:
+            _looking.add(root)
+            threading.Thread(target=_look_aside, args=(root, stamp, capture, properties.settings(item)),
+                             name="wildcap-status", daemon=True).start()
     return INTERVAL_S
 
 

@@ -17,6 +17,7 @@ from ..contract import lease, settings
 from ..contract.files import storage_problem
 from ..contract.messages import Cancelled, Failed, Problem
 from ..worker import command_settings
+from ..worker.commands import add_command
 from ..worker.terminal import ProgressLine, print_message
 from . import slim_command
 from .gate import accept_mask
@@ -43,38 +44,30 @@ def add_commands(commands) -> None:
     many = many.add_subparsers(required=True, metavar="plan|run|status|retry|accept|review|commands|task")
     _add_plan(many)
     _add_runs(many)
-    status = many.add_parser("status", help="say how far each face is")
-    status.add_argument("batch", metavar="BATCH", type=Path)
-    status.set_defaults(command=_status)
-    accept = many.add_parser("accept", help="solve with the shadow mask as it is, where the batch waits for that")
-    accept.add_argument("batch", metavar="BATCH", type=Path)
+    add_command(many, "status", _status, "say how far each face is", "BATCH")
+    accept = add_command(many, "accept", _accept,
+                         "solve with the shadow mask as it is, where the batch waits for that", "BATCH")
     accept.add_argument("names", metavar="NAME", nargs="+")
-    accept.set_defaults(command=_accept)
-    review = many.add_parser("review", help="write the page that shows all faces, those to look at first in front")
-    review.add_argument("batch", metavar="BATCH", type=Path)
-    review.set_defaults(command=_review)
-    lines = many.add_parser(
-        "commands", help="one line for each task that is left: its name, the task it waits for, and the command"
-    )
-    lines.add_argument("batch", metavar="BATCH", type=Path)
+    add_command(many, "review", _review, "write the page that shows all faces, those to look at first in front",
+                "BATCH")
+    lines = add_command(many, "commands", _commands,
+                        "one line for each task that is left: its name, the task it waits for, and the command",
+                        "BATCH")
     lines.add_argument("--python", default=sys.executable,
                        help="the solver's Python on the machines that will run them")
     lines.add_argument("--wildcap", metavar="FOLDER", default=ROOT,
                        help="WildCap's folder on those machines, the one that holds core")
     lines.add_argument("--flamenco", action="store_true",
                        help="a line of JSON for each face instead: a job to submit to Flamenco (docs/farm.md)")
-    lines.set_defaults(command=_commands)
-    task = many.add_parser("task", help="do one task of one face, as a scheduler asks for it")
-    task.add_argument("batch", metavar="BATCH", type=Path)
+    task = add_command(many, "task", _task, "do one task of one face, as a scheduler asks for it", "BATCH")
     task.add_argument("name", metavar="NAME")
     task.add_argument("group", metavar="TASK", help=", ".join(group.name for group in GROUPS))
-    task.set_defaults(command=_task)
 
 
 def _add_plan(many) -> None:
-    plan = many.add_parser("plan",
-                           help="make a batch of a table of videos, or of a folder of them; planned again, it takes in "
-                                "what is new")
+    plan = add_command(many, "plan", _plan,
+                       "make a batch of a table of videos, or of a folder of them; planned again, it takes in what is "
+                       "new")
     plan.add_argument("shots", metavar="SHOTS", type=Path,
                       help=f"a CSV with the columns {', '.join(HEADINGS)}, of which video alone is needed; or a folder")
     plan.add_argument("batch", metavar="BATCH", type=Path, help="the batch's folder, with a capture for each face")
@@ -91,14 +84,12 @@ def _add_plan(many) -> None:
     plan.add_argument("--blender", metavar="PROGRAM",
                       help="a Blender with the extension, which renders a contact sheet of each face; none: no more")
     command_settings.add_assignments(plan, "run")
-    plan.set_defaults(command=_plan)
 
 
 def _add_runs(many) -> None:
     for word, words in (("run", "do what is left; what has stopped with a problem stays"),
                         ("retry", "the same, and what has stopped is tried again")):
-        run = many.add_parser(word, help=words)
-        run.add_argument("batch", metavar="BATCH", type=Path)
+        run = add_command(many, word, _run, words, "BATCH")
         run.add_argument("names", metavar="NAME", nargs="*", help="faces; without one, all")
         run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
         run.add_argument("--address",
@@ -113,7 +104,7 @@ def _add_runs(many) -> None:
             help="cores of a node of Ray's that a task takes, else 2: the same number gives the same bytes",
         )
         run.add_argument("--until", choices=[group.name for group in GROUPS], help="end each face with this task")
-        run.set_defaults(command=_run, retry=word == "retry")
+        run.set_defaults(retry=word == "retry")
 
 
 def _plan(options: argparse.Namespace) -> int:

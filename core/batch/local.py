@@ -170,16 +170,16 @@ def _run(batch: Batch, face: BatchFace, group: StageGroup, board: Board, cancell
     began = time.monotonic()
     board.tally.worked.add(face.name)
     final = run_task(batch, face, group, lambda message: board.hear(face, message), cancelled, threads)
+    final = check_result(batch, face, group, final)
     if isinstance(final, Done):
-        if not is_left(batch, face, group):
-            board.say(face, f"{group.label.lower()} done in {time.monotonic() - began:.0f} s")
-        else:  # the next look would send it here again, for ever
-            final = Failed("", f"The task {group.name} ended well, and its result is not what was asked for.",
-                           "Look whether another program writes there.")
+        board.say(face, f"{group.label.lower()} done in {time.monotonic() - began:.0f} s")
     return final
 
 
-def is_left(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
-    """Whether the task that has just ended well is still, or again, to be done."""
-    state = derive_state(batch, face)
-    return state.state == TO_DO and state.group is group
+def check_result(batch: Batch, face: BatchFace, group: StageGroup, final: Message) -> Message:
+    """How a task has ended: not well where it is still, or again, to be done, for the next look would send it here
+    again, for ever."""
+    if isinstance(final, Done) and derive_state(batch, face) == FaceState(TO_DO, group):
+        return Failed("", f"The task {group.name} ended well, and its result is not what was asked for.",
+                      "Look whether another program writes there.")
+    return final

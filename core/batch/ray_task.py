@@ -25,7 +25,7 @@ from ..contract.capture import Capture
 from ..contract.hashes import hash_file
 from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progress, StageDone, to_line
 from .groups import group_named
-from .local import CANCELLED, EVERY_S, is_left
+from .local import CANCELLED, EVERY_S, check_result
 from .record import NAME, Batch, read_batch
 from .state import DONE, STOPPED, WAITING, FaceState, waits
 from .task import run_task
@@ -71,9 +71,7 @@ def do_task(root: str, name: str, group_name: str, threads: int, stranger: str, 
             return {**outcome, "state": WAITING, "words": FaceState(WAITING, group).words(), "seconds": 0.0}
         _outlast(face.capture, stranger, stopped)
         final = run_task(batch, face, group, _listener(batch, name, say), lambda: bool(stopped), threads)
-        if isinstance(final, Done) and is_left(batch, face, group):
-            final = Failed("", f"The task {group.name} ended well, and its result is not what was asked for.",
-                           "Look whether another program writes there.")
+        final = check_result(batch, face, group, final)
     except Problem as problem:
         final = Failed("", problem.problem, problem.remedy)
     finally:

@@ -13,9 +13,9 @@ from ..contract import settings, slimmed, slimming
 from ..contract.capture import Capture
 from ..contract.deletion import megabytes
 from ..contract.messages import Problem
-from ..contract.settings import Settings
 from ..worker import terminal
-from ..worker.job import read_job, write_job
+from ..worker.commands import add_command
+from ..worker.job import last_settings, write_job
 from .record import NAME, Batch, read_batch
 from .state import DONE, derive_state
 from .task import ROOT
@@ -23,14 +23,13 @@ from .task import ROOT
 
 def add_commands(commands) -> None:
     """Adds `slim` to the subparsers of `python -m core`."""
-    slim = commands.add_parser("slim",
-                               help="remove what the video gives again in a minute, of a face that is done, or of a "
-                                    "batch's; without --yes, list it")
+    slim = add_command(commands, "slim", _slim,
+                       "remove what the video gives again in a minute, of a face that is done, or of a batch's; "
+                       "without --yes, list it")
     slim.add_argument("folder", metavar="CAPTURE|BATCH", type=Path)
     what = slim.add_mutually_exclusive_group()
     what.add_argument("--yes", action="store_true", help="remove it; a stage that needs it later has it made again")
     what.add_argument("--undo", action="store_true", help="have it made again now")
-    slim.set_defaults(command=_slim)
 
 
 def _slim(options: argparse.Namespace) -> int:
@@ -42,7 +41,7 @@ def _slim(options: argparse.Namespace) -> int:
     capture = Capture(options.folder)
     if options.undo:
         return _undo([capture])
-    found = (slimming.slim if options.yes else slimming.plan)(capture, _chosen(capture))
+    found = (slimming.slim if options.yes else slimming.plan)(capture, last_settings(capture))
     print(*slimming.lines(found, capture), sep="\n")
     if not options.yes:
         print("Nothing was removed; --yes does it.")
@@ -75,13 +74,8 @@ def _undo(captures: list[Capture]) -> int:
     for capture in captures:
         if not slimmed.hashes_of(capture.read()):
             print(f"{capture.root.stem}: nothing was slimmed away.")
-        elif code := terminal.follow(ROOT, capture,
-                                     write_job(capture, tool="bring_back", settings=settings.to_json(_chosen(capture))),
-                                     {}):
+            continue
+        job = write_job(capture, tool="bring_back", settings=settings.to_json(last_settings(capture)))
+        if code := terminal.follow(ROOT, capture, job, {}):
             return code
     return 0
-
-
-def _chosen(capture: Capture) -> Settings:
-    """The settings of the capture's last job, by which its stages are judged."""
-    return read_job(capture.job).settings if capture.job.is_file() else Settings()

@@ -91,10 +91,7 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
     model = import_cameras(path, frames, capture.frames, report)
     names = {image.name for image in model.images.values()}
     records = [record for record in frames.records if record.name in names and record.yaw_deg is not None]
-    records = ([records[i]
-                for i in np.unique(np.linspace(0, len(records) - 1, min(MOST_FACES, len(records))).round().astype(int))]
-               if records else [])
-    found = find_landmarks(records, capture.frames, report)
+    found = find_landmarks(coverage.spread_evenly(records, MOST_FACES), capture.frames, report)
     width = float(np.median([face.box[2] - face.box[0] for face in found.values()] or [1.0]))
 
     def checked(model) -> tuple[HeadFrame, float]:

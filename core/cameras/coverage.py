@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 SIDE_DEG = 35.0
@@ -12,6 +14,12 @@ WANTED_DEG = 60.0
 GAP_DEG = 30.0
 """Wider steps between neighbouring cameras than this leave holes and tear matching."""
 LEVEL_DEG = 5.0
+
+
+def spread_evenly(members: Sequence, most: int) -> list:
+    """At most that many of them, the first and the last among them."""
+    return [members[i] for i in np.unique(np.linspace(0, len(members) - 1, min(most, len(members))).round().astype(int))
+            ] if members else []
 
 
 def angles(centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
 import pycolmap
 
 from ..contract.capture import Capture
@@ -18,6 +17,7 @@ from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import faces
 from . import skeleton
+from .coverage import spread_evenly
 from .joint import holds_every_frame, refine
 from .landmarks import find_landmarks
 from .matches import Matches
@@ -227,8 +227,7 @@ def _mirrored(frames: Frames, rest: list[str], model: pycolmap.Reconstruction, f
     if not rest or frames.kind == VIDEO or len(rest) > 2 * FEW_PHOTOGRAPHS:
         return []
     trusted = sorted(image.name for image in model.images.values() if image.has_pose)
-    some = [trusted[i] for i in np.unique(np.linspace(0, len(trusted) - 1, min(8, len(trusted))).round().astype(int))]
-    return find_mirrored(rest, some, capture.frames, report, found)
+    return find_mirrored(rest, spread_evenly(trusted, 8), capture.frames, report, found)
 
 
 def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
@@ -236,8 +235,7 @@ def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
     seen = [record for record in records if record.yaw_deg is not None]
     frontal = [record for record in seen if abs(record.yaw_deg) < 45]
     seen = frontal if len(frontal) >= 4 else seen
-    return ([seen[i] for i in np.unique(np.linspace(0, len(seen) - 1, min(MOST_FACES, len(seen))).round().astype(int))]
-            if seen else [])
+    return spread_evenly(seen, MOST_FACES)
 
 
 def _explained(frames: Frames, faults: list[str], found: dict, moved: bool, stood: bool, capture: Capture,

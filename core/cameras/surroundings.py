@@ -14,6 +14,7 @@ import numpy as np
 from ..contract.frame_records import FrameRecord
 from ..face import faces
 from ..imaging import images
+from .coverage import spread_evenly
 from .motion import LEAST_MATCHES, STILL_DIAGONAL_SHARE, TURNED_DEG
 
 LONG_SIDE_PX = 480
@@ -41,7 +42,7 @@ def surroundings_stay(found: dict[str, faces.Face], folder: Path) -> bool:
 
 def spread_over(records: Sequence[FrameRecord]) -> tuple[FrameRecord, ...]:
     """MOST_FRAMES of a film's frames, evenly spread, and beside them those that the texture is made from."""
-    even = set(np.unique(np.linspace(0, len(records) - 1, min(MOST_FRAMES, len(records))).round().astype(int)).tolist())
+    even = set(spread_evenly(range(len(records)), MOST_FRAMES))
     return tuple(record for i, record in enumerate(records) if i in even or record.selected)
 
 

@@ -11,13 +11,11 @@ ones names them in its constant DATA_FILES, relative to core/. Standard library 
 from __future__ import annotations
 
 import ast
-import hashlib
-import json
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from .hashes import hash_tree
+from .hashes import hash_bytes, hash_tree, hash_value
 
 CORE = Path(__file__).resolve().parents[1]
 DATA_CONSTANT = "DATA_FILES"
@@ -38,7 +36,7 @@ class Module:
 @cache
 def code_key(module: str, core: Path = CORE) -> str:
     """Hash of all code and data that the module `core.NAME...` depends on. Computed once per process."""
-    return _digest([modules(module, core), {name: hash_tree(core / name) for name in data_files(module, core)}])
+    return hash_value([modules(module, core), {name: hash_tree(core / name) for name in data_files(module, core)}])
 
 
 def modules(module: str, core: Path = CORE) -> dict[str, str]:
@@ -115,7 +113,7 @@ def _read_module(core: Path, file: str, changed: int) -> Module:
     named = [node.value for node in tree.body if isinstance(node, ast.Assign)
              and getattr(node.targets[0], "id", "") == DATA_CONSTANT]
     data = ast.literal_eval(named[0]) if named else ()
-    return Module(hashlib.blake2b("".join(text).encode(), digest_size=16).hexdigest(),
+    return Module(hash_bytes("".join(text).encode()),
                   tuple(dict.fromkeys(filter(None, imports))), data)
 
 
@@ -151,7 +149,3 @@ def _merge_constants(values: list) -> list:
 
 def _is_text(node) -> bool:
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-
-
-def _digest(value) -> str:
-    return hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=16).hexdigest()

@@ -10,8 +10,6 @@ have come lie in switchlight/, named by what was sent.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import time
 from collections.abc import Collection
@@ -22,7 +20,7 @@ from . import switchlight_api as service
 from .capture import Capture
 from .files import storage_problem, write_json
 from .frame_records import read_frames
-from .hashes import hash_file
+from .hashes import hash_file, hash_value
 from .json_files import read_json
 from .messages import Problem
 
@@ -78,8 +76,7 @@ def selected(capture: Capture) -> list[str]:
 
 def answer(capture: Capture, content: str, preview: bool) -> Path:
     """Where the answer to a picture of that content hash is kept: named by the hash of all that was sent."""
-    sent = json.dumps([content, service.form(preview)], sort_keys=True)
-    return capture.switchlight / f"{hashlib.blake2b(sent.encode(), digest_size=16).hexdigest()}.png"
+    return capture.switchlight / f"{hash_value([content, service.form(preview)])}.png"
 
 
 def lines(plan: Sending, translated=str) -> list[str]:

@@ -21,8 +21,8 @@ from pathlib import Path
 from .capture import Capture
 from .delivery_presets import FORMATS, PICTURES, PRESETS, DeliveryPreset, Format
 from .files import storage_problem
-from .messages import Problem
-from .ownership import remove_empty_folders
+from .messages import Problem, name_some
+from .ownership import free_place, remove_empty_folders
 from .settings import DeliverSettings
 
 PROVENANCE = "provenance.json"
@@ -151,14 +151,14 @@ def check_target(plan: DeliveryPlan) -> None:
     changed = [name for name, digest in delivered.items() if (target / name).is_file()
                and not is_as_delivered(target / name, digest)]
     if changed and not plan.replace:
-        raise Problem(f"{_listed(changed)} in {target} changed since the last delivery, which would be replaced.",
+        raise Problem(f"{name_some(changed)} in {target} changed since the last delivery, which would be replaced.",
                       "Move what you want to keep to another folder, or deliver again with Replace Changed Files "
                       "(--replace) to give it up.")
     new = ({path.relative_to(plan.staged).as_posix() for path in plan.staged.rglob("*") if path.is_file()}
            if plan.staged.is_dir() else set())
     blocked = sorted(name for name in new - delivered.keys() if (target / name).exists())
     if blocked:
-        raise Problem(f"{_listed(blocked)} in {target} is in the way: no delivery has put it there.",
+        raise Problem(f"{name_some(blocked)} in {target} is in the way: no delivery has put it there.",
                       "Move it to another folder, or deliver to another one.")
 
 
@@ -179,9 +179,7 @@ def _recover(target: Path, old: Path) -> None:
             file.unlink()
             continue
         place = target / name  # taken where somebody put another of that name into the new one since
-        free = next(free
-                    for free in (place, *(place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000)))
-                    if not os.path.lexists(free))
+        free = free_place(place)
         free.parent.mkdir(parents=True, exist_ok=True)
         os.replace(file, free)
     (old / PROVENANCE).unlink(missing_ok=True)  # last: it says which files are whose
@@ -203,7 +201,3 @@ def is_as_delivered(path: Path, digest: str) -> bool:
         return True
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest() == digest
-
-
-def _listed(names: list[str], most: int = 4) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

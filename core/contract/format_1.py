@@ -9,13 +9,12 @@ inputs and settings are still the same. Standard library only.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
-from .hashes import hash_tree
+from .hashes import hash_tree, hash_value
 from .settings import Settings
 from .slimmed import hash_artefact
 from .stages import Stage
@@ -52,8 +51,7 @@ def matches(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
             parts += [[name, hash_tree(root / name)] for name in ("own_head.obj", "own_head.json")]
     parts += [[name, hash_artefact(root, record, name)] for name in made["inputs"]]
     parts += made["data"]
-    text = json.dumps(parts, sort_keys=True)
-    return finished.get("key") == hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+    return finished.get("key") == hash_value(parts)
 
 
 @cache

@@ -10,14 +10,12 @@ has it run again. Standard library only.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from . import format_1
 from .code_key import code_key
-from .hashes import hash_source, hash_tree, same_source, sample_file
+from .hashes import hash_source, hash_tree, hash_value, same_source, sample_file
 from .portable_paths import read_portable
 from .settings import Settings, result_paths, result_settings
 from .slimmed import hash_artefact
@@ -129,5 +127,4 @@ def _changed_settings(finished: dict, stage: Stage, settings: Settings) -> list[
 
 def _digest(tree: str | dict) -> str:
     """One hash for a folder's many; '' stays what it is: nothing there."""
-    return (hashlib.blake2b(json.dumps(tree, sort_keys=True).encode(), digest_size=16).hexdigest()
-            if isinstance(tree, dict) else tree)
+    return hash_value(tree) if isinstance(tree, dict) else tree

@@ -8,6 +8,7 @@ Standard library only.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -39,6 +40,11 @@ def hash_bytes(content: bytes) -> str:
     digest = _hasher()
     digest.update(content)
     return digest.hexdigest()
+
+
+def hash_value(value) -> str:
+    """Of what can be written as JSON, whatever the order of its keys."""
+    return hash_bytes(json.dumps(value, sort_keys=True).encode())
 
 
 def sample_file(path: Path) -> str:

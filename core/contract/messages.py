@@ -29,6 +29,11 @@ def out_of_memory(error: BaseException) -> bool:
     return isinstance(error, MemoryError) or any(words in str(error).lower() for words in NO_MEMORY)
 
 
+def name_some(names: list[str], most: int = 4) -> str:
+    """The first of the names, and how many more there are."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
 class CancelledError(Exception):
     """Raised by `Reporter` inside a stage once the user has asked to stop."""
 

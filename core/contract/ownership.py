@@ -90,10 +90,15 @@ def keep_aside(root: Path, path: Path, was: str = "") -> Path:
     with a number where that is taken. Returns its new place."""
     place = root / KEPT / (was or path_inside(root, path))
     place.parent.mkdir(parents=True, exist_ok=True)
-    free = next(free for free in (place, *(place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000)))
-                if not free.exists())
+    free = free_place(place)
     os.replace(path, free)
     return free
+
+
+def free_place(place: Path) -> Path:
+    """The place, with a number where it is taken."""
+    numbered = (place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000))
+    return next(free for free in (place, *numbered) if not os.path.lexists(free))
 
 
 def clear_replaced(root: Path, old: Path, path: Path) -> None:

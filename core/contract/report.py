@@ -17,6 +17,7 @@ from . import stages
 from .capture import Capture
 from .files import replacing
 from .freshness import STALE
+from .messages import name_some
 from .settings import Settings, tooltips
 
 
@@ -62,18 +63,13 @@ def _doctor(record: dict) -> str:
 
 def _finding(finding: dict) -> str:
     stage = html.escape(stages.by_name(finding["stage"]).label)
-    frames = _ranges([Path(name).stem for name in finding["frames"]])
+    frames = name_some([Path(name).stem for name in finding["frames"]], 12)
     return (
         f'<li{" class=stopped" if finding["stopped"] else ""}>{html.escape(finding["problem"])} '
         f'<b>{html.escape(finding["remedy"])}</b> '
         f'<small>{"Stopped at: " if finding["stopped"] else ""}{stage}'
         f'{f"; frames {html.escape(frames)}" if frames else ""}</small></li>'
     )
-
-
-def _ranges(names: list[str], most: int = 12) -> str:
-    """A short list of names: the first `most`, and how many more there are."""
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _summary(record: dict) -> str:

@@ -22,16 +22,16 @@ from scipy.sparse.linalg import spsolve
 from .evening import ShadingEstimate
 
 FEATURES = ("brows", "eyes")
-SURE = 0.3  # share of a cell from which it is not asked what its shading is
-REACH = 1  # cells around them: the network's answer is as coarse as that
+MIN_HAIR_SHARE = 0.3  # share of a cell from which it is not asked what its shading is
+REACH_CELLS = 1  # cells around them: the network's answer is as coarse as that
 FITTED_SHARE = 0.5
 """How far the fitted light counts below hair. On a full beard whose strands' albedo is known (-0.90 in natural log
 against the skin) it leaves -0.41 too much and the network +0.48; a second beard errs alike."""
 
 
 def without_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Log-shading [h, h, C] with that of cells whose `share` [h, h] of FEATURES is SURE, and of those around them,
-    carried over from the skin."""
+    """Log-shading [h, h, C] with that of cells whose `share` [h, h] of FEATURES is MIN_HAIR_SHARE, and of those around
+    them, carried over from the skin."""
     return completed(shading, _covered(share)).astype(np.float32)
 
 
@@ -50,8 +50,8 @@ def without_hair(look: ShadingEstimate, fitted: np.ndarray, share: np.ndarray) -
 
 
 def _covered(share: np.ndarray) -> np.ndarray:
-    """bool [h, h]: the cells whose share of hair is SURE, and those around them."""
-    return cv2.dilate((share > SURE).astype(np.uint8), np.ones((2 * REACH + 1,) * 2, np.uint8)) > 0
+    """bool [h, h]: the cells whose share of hair is MIN_HAIR_SHARE, and those around them."""
+    return cv2.dilate((share > MIN_HAIR_SHARE).astype(np.uint8), np.ones((2 * REACH_CELLS + 1,) * 2, np.uint8)) > 0
 
 
 def completed(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:

@@ -16,15 +16,15 @@ import numpy as np
 
 from .evening import ShadingEstimate
 
-RIDGE = 0.01  # of the features' mean square, against pictures whose light hardly varies
-USUAL = 0.08  # natural log units of hue from which skin is something else: lips, make-up, a burnt highlight
-LEAST = 200  # cells of skin below which nothing is said
+RIDGE_SHARE = 0.01  # of the features' mean square, against pictures whose light hardly varies
+USUAL_HUE_LOG = 0.08  # natural log units of hue from which skin is something else: lips, make-up, a burnt highlight
+MIN_SKIN_CELLS = 200  # cells of skin below which nothing is said
 
 
 def without_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[ShadingEstimate]:
     """The looks with one hue of skin in light and shade. skins: [h, h] each, above 0.5 where a look shows bare skin."""
     where = [skin > 0.5 for skin in skins]
-    if sum(int(w.sum()) for w in where) < LEAST:
+    if sum(int(w.sum()) for w in where) < MIN_SKIN_CELLS:
         return looks
     middle = np.mean(np.concatenate([look.shading.mean(-1)[w] for look, w in zip(looks, where, strict=True)]))
     features = [_features(look, middle) for look in looks]
@@ -35,9 +35,9 @@ def without_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list
         centre, level = np.average(x, axis=0, weights=trust), np.average(y, axis=0, weights=trust)
         weighted = (x - centre) * trust[:, None]
         # [4, 3]
-        slopes = np.linalg.solve(weighted.T @ (x - centre) + RIDGE * len(x) * np.eye(x.shape[1]),
+        slopes = np.linalg.solve(weighted.T @ (x - centre) + RIDGE_SHARE * len(x) * np.eye(x.shape[1]),
                                  weighted.T @ (y - level))
-        trust = 1 / (1 + ((y - level - (x - centre) @ slopes) ** 2).sum(1) / USUAL**2)
+        trust = 1 / (1 + ((y - level - (x - centre) @ slopes) ** 2).sum(1) / USUAL_HUE_LOG**2)
     return [replace(look, shading=(look.shading + (f - centre) @ slopes).astype(np.float32))
             for look, f in zip(looks, features, strict=True)]
 

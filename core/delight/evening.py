@@ -14,14 +14,14 @@ import cv2
 import numpy as np
 
 from ..face.head import Unfolded
-from ..geometry.raster import interpolate, sample, visible_from
+from ..geometry.raster import interpolate, sample, sample_uv, visible_from
 from ..geometry.views import View
 from .lit_head import LitHead
 from .texels import exposures, robust_mean
 
-UV_SIDE = 256
-COARSE = 3.0  # cells of the network's map below which nothing is moved
-LEAST = 0.05  # weight from which a texel is known
+UV_TEXELS = 256
+COARSE_CELLS = 3.0  # cells of the network's map below which nothing is moved
+MIN_WEIGHT = 0.05  # weight from which a texel is known
 
 
 @dataclass(frozen=True)
@@ -42,17 +42,17 @@ def even_out(head: LitHead, views: list[View], looks: list[ShadingEstimate]) -> 
     """The looks of these views with shadings that agree about the head's albedo."""
     if head.mesh.uvs is None or len(looks) < 2:
         return looks
-    surface = head.head.unfold(UV_SIDE)
+    surface = head.head.unfold(UV_TEXELS)
     texel = np.flatnonzero(surface.covered)
     found = [_opinion(surface, view, look) for view, look in zip(views, looks, strict=True)]
     opinions, weights = (np.stack(part) for part in zip(*found, strict=True))
     level = exposures(opinions, weights)
     mean = robust_mean(opinions - level[:, None], weights)
-    known = np.zeros(UV_SIDE**2, np.float32)
-    known[texel] = np.minimum(weights.sum(0) / LEAST, 1) * (weights.sum(0) > LEAST)
-    albedo = np.zeros((UV_SIDE**2, 3), np.float32)
+    known = np.zeros(UV_TEXELS**2, np.float32)
+    known[texel] = np.minimum(weights.sum(0) / MIN_WEIGHT, 1) * (weights.sum(0) > MIN_WEIGHT)
+    albedo = np.zeros((UV_TEXELS**2, 3), np.float32)
     albedo[texel] = mean
-    albedo, known = albedo.reshape(UV_SIDE, UV_SIDE, 3), known.reshape(UV_SIDE, UV_SIDE)
+    albedo, known = albedo.reshape(UV_TEXELS, UV_TEXELS, 3), known.reshape(UV_TEXELS, UV_TEXELS)
     return [_agreeing(head, replace(look, shading=look.shading + off), albedo, known)
             for look, off in zip(looks, level, strict=True)]
 
@@ -77,12 +77,11 @@ def _opinion(surface: Unfolded, view: View, look: ShadingEstimate) -> tuple[np.n
 
 def _agreeing(head: LitHead, look: ShadingEstimate, albedo: np.ndarray, known: np.ndarray) -> ShadingEstimate:
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
-    at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * UV_SIDE
-    weight = sample(known, at).reshape(look.face.shape) * (look.face >= 0)
+    weight = sample_uv(known, uv).reshape(look.face.shape) * (look.face >= 0)
     weight = np.where(weight > 0.99, weight, 0).astype(np.float32)
-    off = (look.log - look.shading - sample(albedo, at).reshape(*look.face.shape, 3)) * weight[..., None]
-    carried = cv2.GaussianBlur(weight, (0, 0), COARSE)
-    off = cv2.GaussianBlur(off.astype(np.float32), (0, 0), COARSE) / np.maximum(carried, 0.02)[..., None]
+    off = (look.log - look.shading - sample_uv(albedo, uv).reshape(*look.face.shape, 3)) * weight[..., None]
+    carried = cv2.GaussianBlur(weight, (0, 0), COARSE_CELLS)
+    off = cv2.GaussianBlur(off.astype(np.float32), (0, 0), COARSE_CELLS) / np.maximum(carried, 0.02)[..., None]
     mean = off[weight > 0].mean(0) if (weight > 0).any() else np.zeros(3, np.float32)
     share = np.clip(carried / 0.3, 0, 1)[..., None]
     return replace(look, shading=look.shading + share * off + (1 - share) * mean)

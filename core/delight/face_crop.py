@@ -19,10 +19,10 @@ EYES = ((33, 160, 158, 133, 153, 144), (362, 385, 387, 263, 373, 380))
 written for."""
 MOUTH = (61, 291)
 BROWS = (105, 334)
-FOREHEAD = 0.3
+FOREHEAD_RATIO = 0.3
 """How much farther than the landmarks, which end below the hairline, the forehead reaches over the brows."""
-FEATHER = 16  # pixels of the crop over which a face runs out
-MOST_DETAIL = 4.0
+FEATHER_PX = 16  # pixels of the crop over which a face runs out
+MAX_DETAIL_RATIO = 4.0
 """By what factor a pixel may differ from the crop's blur of it."""
 
 
@@ -49,7 +49,7 @@ def face_mask(face: Face, to_crop: np.ndarray, size: int, growth: float = 1.0) -
     """[size, size] in {0, 1}: the hull of the landmarks, carried on over the forehead and enlarged by a factor."""
     points = face.landmarks[:, :2] @ to_crop[:, :2].T + to_crop[:, 2]
     brow = points[list(BROWS), 1].mean()
-    points[:, 1] += FOREHEAD * np.minimum(points[:, 1] - brow, 0)  # upright in the crop
+    points[:, 1] += FOREHEAD_RATIO * np.minimum(points[:, 1] - brow, 0)  # upright in the crop
     middle = (points.min(0) + points.max(0)) / 2
     hull = cv2.convexHull((middle + growth * (points - middle)).astype(np.float32))
     mask = np.zeros((size, size), np.uint8)
@@ -70,10 +70,10 @@ def put_back(frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask: np.
     # 0 along the crop's border too
     inside = cv2.distanceTransform(np.pad(mask[2:-2, 2:-2], 2).astype(np.uint8), cv2.DIST_L2, 5)
     alpha, through, made = (cv2.warpAffine(picture.astype(np.float32), inverse, (width, height), flags=cv2.INTER_CUBIC)
-                            for picture in (np.clip(inside / FEATHER, 0, 1), before, after))
+                            for picture in (np.clip(inside / FEATHER_PX, 0, 1), before, after))
     through, made, linear = (np.maximum(images.srgb_to_linear(np.clip(picture, 0, 1)), 1e-4)
                              for picture in (through, made, frame))
-    sharp = images.linear_to_srgb(made * np.clip(linear / through, 1 / MOST_DETAIL, MOST_DETAIL))
+    sharp = images.linear_to_srgb(made * np.clip(linear / through, 1 / MAX_DETAIL_RATIO, MAX_DETAIL_RATIO))
     return (frame + np.clip(alpha, 0, 1)[..., None] * (sharp - frame)).astype(np.float32)
 
 

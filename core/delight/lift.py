@@ -12,10 +12,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-WINDOW = 1  # radius, in cells of the coarse map
-STIFF = 0.02  # natural log units: what varies less in a window is skin and not an edge
+WINDOW_CELLS = 1  # radius, in cells of the coarse map
+EDGE_LOG = 0.02  # natural log units: what varies less in a window is skin and not an edge
 # of the picture's side, and in log units: what is finer and fainter is left out of the guide
-PORE_PX, PORE_LOG = 0.006, 0.25
+PORE_SHARE, PORE_LOG = 0.006, 0.25
 
 
 def lift(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
@@ -38,7 +38,7 @@ def lift_share(share: np.ndarray, log: np.ndarray) -> np.ndarray:
 
 def without_pores(log: np.ndarray) -> np.ndarray:
     """A log picture [H, W, C] smoothed where it varies finely and faintly; edges stay."""
-    reach = max(1.0, PORE_PX * max(log.shape[:2]))
+    reach = max(1.0, PORE_SHARE * max(log.shape[:2]))
     channels = (np.ascontiguousarray(log[..., k], np.float32) for k in range(log.shape[-1]))
     return np.stack([cv2.bilateralFilter(channel, -1, PORE_LOG, reach) for channel in channels], -1)
 
@@ -47,9 +47,9 @@ def _affine(guide: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """Per channel the slope and offset [h, w, C] that carry guide to values in each window, averaged over the windows a
     cell is in."""
     def mean(x: np.ndarray) -> np.ndarray:
-        return cv2.blur(np.ascontiguousarray(x, np.float32), (2 * WINDOW + 1,) * 2).reshape(x.shape)
+        return cv2.blur(np.ascontiguousarray(x, np.float32), (2 * WINDOW_CELLS + 1,) * 2).reshape(x.shape)
 
     middle, level = mean(guide), mean(values)
     variance, covariance = mean(guide * guide) - middle**2, mean(guide * values) - middle * level
-    slope = np.clip(covariance / (variance + STIFF**2), -0.2, 1.2)
+    slope = np.clip(covariance / (variance + EDGE_LOG**2), -0.2, 1.2)
     return mean(slope), mean(level - slope * middle)

@@ -18,7 +18,7 @@ from ..light.skylight import radiance_transfer
 from ..light.sunlight import Light, fit_light
 from .surface import skin_weights, smooth_normals, vertex_colours
 
-BRIGHTEST = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed
+MAX_ALBEDO = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed
 FIT_POINTS = 6000
 
 
@@ -105,4 +105,4 @@ def _best_lit(light, normals, transfer, reached, count) -> np.ndarray:
     seen = count > 0
     lit = (light.ambient(transfer) + reached[:, None] * light.direct(normals))[seen]
     tone = lit[lit.mean(1) >= np.quantile(lit.mean(1), 0.9)].mean(0)
-    return tone * min(1.0, BRIGHTEST / tone.max())
+    return tone * min(1.0, MAX_ALBEDO / tone.max())

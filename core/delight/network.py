@@ -13,7 +13,6 @@ fitted to all frames, which is all that is believed below hair, and with one ans
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,14 +20,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
-from safetensors.torch import load_file
 
-from ..contract import shipped_files
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import DelightSettings, Settings
 from ..face import faces, parser, template
 from ..face.head import read_head
+from ..face.networks import has_files, read_network
 from ..geometry.raster import interpolate, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
@@ -37,17 +35,17 @@ from .casts import without_casts
 from .contract import Delit
 from .evening import ShadingEstimate, even_out
 from .lift import lift, lift_share
-from .lit_head import BRIGHTEST, LitHead, lit_head
+from .lit_head import MAX_ALBEDO, LitHead, lit_head
 from .second_opinion import FITTED, WHOLE, beyond, coarse, weigh_in
 from .shading import light_in_frame, light_seen
-from .unet import DARKEST, SIDE, DelightNet, network_input
+from .unet import MIN_LINEAR, SIDE_PX, DelightNet, network_input
 from .whole_head import READING, answers_in_looks
 from .whole_head import load as load_whole_head
 
 DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
-MARGIN = 1.35  # side of the square, in sides of the face's landmarks; training shows 1.25 to 2
-FADE = 0.06  # of the square's side: along its border it gives way to the fitted light
+FACE_MARGIN = 1.35  # side of the square, in sides of the face's landmarks; training shows 1.25 to 2
+FADE_SHARE = 0.06  # of the square's side: along its border it gives way to the fitted light
 
 
 @dataclass(frozen=True)
@@ -115,7 +113,7 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
         raise Problem("No face was found in the photograph.",
                       "Choose a photograph that shows the face from the front or half from the side.")
     box = face_box(face.landmarks[:, :2])
-    look = _look(load("cpu"), box, crop(srgb, box, SIDE))
+    look = _look(load("cpu"), box, crop(srgb, box, SIDE_PX))
     share = crop(parser.parse(srgb, face.landmarks).of(*FEATURES), box, len(look.shading))
     look = replace(look, shading=without_features(look.shading, share))
     return _divided(srgb, without_casts([look], [_hull(face.landmarks[:, :2], look)])[0])
@@ -123,20 +121,16 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
 
 def load(device: str) -> DelightNet:
     """The shipped network. Raises Problem where its file or its card is missing."""
-    card = WEIGHTS.with_suffix(".json")
-    if not (WEIGHTS.is_file() and card.is_file()):
+    if not has_files(WEIGHTS):
         raise Problem("The weights of the delighting network are missing.",
                       "Install the extension again, or choose the delighter Shading.")
-    shipped_files.require_whole(WEIGHTS)
-    net = DelightNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
-    net.load_state_dict({name: value.float() for name, value in load_file(WEIGHTS).items()})
-    return net.eval().to(torch.device(device), memory_format=torch.channels_last)
+    return read_network(DelightNet, WEIGHTS).to(torch.device(device), memory_format=torch.channels_last)
 
 
 def face_box(points: np.ndarray) -> tuple[float, float, float]:
     """Left, top and side of the square around a face's landmarks [N, 2] in pixels."""
     low, high = points.min(0), points.max(0)
-    side = MARGIN * float((high - low).max())
+    side = FACE_MARGIN * float((high - low).max())
     left, top = (low + high) / 2 - side / 2
     return float(left), float(top), side
 
@@ -158,17 +152,17 @@ def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEs
     """What the network says of a frame, and the log-shading of the fitted light at the same size."""
     pixels, _ = view.project(_landmarks(head))
     box = face_box(pixels[np.isfinite(pixels).all(1)])
-    y, x = np.mgrid[0:SIDE, 0:SIDE]
-    rays = view.rays((np.stack([x.ravel(), y.ravel()], -1) + 0.5) * box[2] / SIDE + box[:2])
+    y, x = np.mgrid[0:SIDE_PX, 0:SIDE_PX]
+    rays = view.rays((np.stack([x.ravel(), y.ravel()], -1) + 0.5) * box[2] / SIDE_PX + box[:2])
     face, bary, _ = head.caster.first_hits(np.repeat(view.centre[None], len(rays), 0), rays)
-    face, bary = face.reshape(SIDE, SIDE), bary.reshape(SIDE, SIDE, 3)
+    face, bary = face.reshape(SIDE_PX, SIDE_PX), bary.reshape(SIDE_PX, SIDE_PX, 3)
     ambient, direct, free, normal = head.at(face, bary)
     geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, (face >= 0).astype(np.float32))
-    picture = crop(images.read_srgb(view.path), box, SIDE)
+    picture = crop(images.read_srgb(view.path), box, SIDE_PX)
     look = _look(net, box, picture, geometry)
     light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary,
-                          round(max(view.width, view.height) * SIDE / box[2]))
-    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), coarse(light, SIDE // 2)
+                          round(max(view.width, view.height) * SIDE_PX / box[2]))
+    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), coarse(light, SIDE_PX // 2)
 
 
 @torch.inference_mode()
@@ -183,8 +177,8 @@ def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
     shading, shadow = net(both)
     shading, shadow = ((part[0] + part[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2
                        for part in (shading, shadow.sigmoid()))
-    small = cv2.resize(images.srgb_to_linear(picture), (SIDE // 2, SIDE // 2), interpolation=cv2.INTER_AREA)
-    return ShadingEstimate(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, DARKEST)))
+    small = cv2.resize(images.srgb_to_linear(picture), (SIDE_PX // 2, SIDE_PX // 2), interpolation=cv2.INTER_AREA)
+    return ShadingEstimate(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, MIN_LINEAR)))
 
 
 def _seen(head: LitHead, values: np.ndarray, look: ShadingEstimate) -> np.ndarray:
@@ -207,7 +201,7 @@ def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = Non
     taken; without it the shading is that of the square's border, and nothing is said of shadows."""
     linear = images.srgb_to_linear(srgb)
     size = round(look.box[2])
-    log = np.log(np.maximum(crop(linear, look.box, size), DARKEST))
+    log = np.log(np.maximum(crop(linear, look.box, size), MIN_LINEAR))
     shading, shadow = lift(look.shading, log), lift_share(look.shadow, log)
     y, x = np.mgrid[0:srgb.shape[0], 0:srgb.shape[1]]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]
@@ -216,11 +210,12 @@ def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = Non
     shading, shadow = (sample(part, at).reshape(*srgb.shape[:2], *part.shape[2:]) for part in (shading, shadow))
     shadow = shadow * inside
     if fitted is not None:
-        shading, shadow = beyond(shading, shadow, np.clip(within / (FADE * size), 0, 1).astype(np.float32), *fitted)
+        share = np.clip(within / (FADE_SHARE * size), 0, 1).astype(np.float32)
+        shading, shadow = beyond(shading, shadow, share, *fitted)
     albedo = linear / np.exp(shading)
     bright = float(np.quantile(albedo[inside].max(-1), 0.75)) if inside.any() else 0.0
     return images.linear_to_srgb(albedo
-                                 * min(1.0, BRIGHTEST / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(np.float32)
+                                 * min(1.0, MAX_ALBEDO / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(np.float32)
 
 
 def _landmarks(head: LitHead) -> np.ndarray:

@@ -14,11 +14,11 @@ import numpy as np
 
 from ..light.sunlight import log_likelihood
 
-ALBEDO_PX = 0.03  # scale over which skin's albedo is taken for even, as a share of the frame's longer side
-COHERENCE = 3.0  # weight of the neighbourhood's opinion, in log odds
-BAND_PX = 0.004  # half width of the band along an edge
-ZONE_PX = 0.008  # and of the zone about it that must be no darker or lighter than its surroundings
-FINE_PX = 0.0025  # skin's detail below this scale is kept even there
+ALBEDO_SHARE = 0.03  # scale over which skin's albedo is taken for even, as a share of the frame's longer side
+COHERENCE_LOG_ODDS = 3.0  # weight of the neighbourhood's opinion, in log odds
+BAND_SHARE = 0.004  # half width of the band along an edge
+ZONE_SHARE = 0.008  # and of the zone about it that must be no darker or lighter than its surroundings
+FINE_SHARE = 0.0025  # skin's detail below this scale is kept even there
 
 
 def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, skin: np.ndarray,
@@ -41,12 +41,13 @@ def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free:
                                   12) + prior
         for _ in range(4):
             around = _mean_over(share, head, 0.004 * side)
-            share = (1 / (1 + np.exp(-np.clip(evidence + COHERENCE * (2 * around - 1), -30, 30)))).astype(np.float32)
+            odds = np.clip(evidence + COHERENCE_LOG_ODDS * (2 * around - 1), -30, 30)
+            share = (1 / (1 + np.exp(-odds))).astype(np.float32)
         sharp = (share > 0.5)[..., None]
         deviation = np.clip(log - np.where(sharp, sunlit, shaded), -0.8, 0.8)
-        albedo = _mean_over(deviation, head, ALBEDO_PX * side)
+        albedo = _mean_over(deviation, head, ALBEDO_SHARE * side)
     return _soften((share > 0.5) & head, log, np.where(sharp, sunlit, shaded), ambient, direct, head,
-                   max(1.5, BAND_PX * side))
+                   max(1.5, BAND_SHARE * side))
 
 
 def seamless(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
@@ -58,10 +59,10 @@ def seamless(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, side: 
     """
     lit = (share > 0.5).astype(np.uint8)
     distance = cv2.distanceTransform(lit, cv2.DIST_L2, 5) + cv2.distanceTransform(1 - lit, cv2.DIST_L2, 5)
-    zone = ZONE_PX * side
+    zone = ZONE_SHARE * side
     sure = head & (distance > zone)
     known = cv2.GaussianBlur(sure.astype(np.float32), (0, 0), 0.7 * zone)
-    excess = _mean_over(log_albedo, head, FINE_PX * side) - _mean_over(log_albedo, sure, 0.7 * zone)
+    excess = _mean_over(log_albedo, head, FINE_SHARE * side) - _mean_over(log_albedo, sure, 0.7 * zone)
     ramp = np.clip(2 * (1 - distance / zone), 0, 1) * np.clip(known / 0.05, 0, 1)
     return np.clip(excess, -0.7, 0.7) * ramp[..., None]
 

@@ -26,9 +26,9 @@ from .face_crop import alignment, cut, face_mask, put_back
 from .opendelight_checkpoint import Checkpoint, load
 from .opendelight_network import delit
 
-SIZE = 512
-MARGIN = 0.85  # of FFHQ's square, which the checkpoint was trained on
-RIM = 1.14  # how far beyond the landmarks there is skin, where there is a person at all
+CROP_PX = 512
+FFHQ_MARGIN = 0.85  # of FFHQ's square, which the checkpoint was trained on
+FACE_RIM = 1.14  # how far beyond the landmarks there is skin, where there is a person at all
 
 
 def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
@@ -68,10 +68,10 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
 def delight_face(srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu",
                  step: Callable[[], None] = lambda: None) -> np.ndarray:
     """A frame sRGB [H, W, 3] with the albedo of one face in it."""
-    to_crop = alignment(face, SIZE, MARGIN)
-    crop = cut(srgb, to_crop, SIZE)
-    mask = np.maximum(face_mask(face, to_crop, SIZE),
-                      face_mask(face, to_crop, SIZE, RIM) * (segment_person(crop) > 0.5))
+    to_crop = alignment(face, CROP_PX, FFHQ_MARGIN)
+    crop = cut(srgb, to_crop, CROP_PX)
+    mask = np.maximum(face_mask(face, to_crop, CROP_PX),
+                      face_mask(face, to_crop, CROP_PX, FACE_RIM) * (segment_person(crop) > 0.5))
     picture = torch.from_numpy((crop * mask[..., None]).transpose(2, 0, 1)[None].astype(np.float32)).to(device)
     albedo = delit(checkpoint.base, checkpoint.enhancer, picture, step)[0].permute(1, 2, 0).cpu().numpy()
     return put_back(srgb, crop, albedo, mask, to_crop)

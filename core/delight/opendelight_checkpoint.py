@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from ..contract.messages import Problem
-from .opendelight_network import HEAD, base_shapes, enhancer_shapes
+from .opendelight_network import HEAD_WIDTH, base_shapes, enhancer_shapes
 
 BASE, ENHANCER = "base_delight_network.pth", "unet_enhancer.pth"
 CHOOSE = (f"Choose the folder with {BASE} and {ENHANCER}, as the authors of OpenDelight publish them, or another "
@@ -71,7 +71,7 @@ def _fits_the_crop(state: dict[str, Tensor]) -> str:
     doublings = sum(name.startswith("decoder.deconv_layers.") for name in state)
     if 2**doublings != patch:
         return f"its {doublings} doublings do not undo patches of {patch} pixels"
-    return "" if width % HEAD == 0 else f"its width of {width} is no multiple of {HEAD}"
+    return "" if width % HEAD_WIDTH == 0 else f"its width of {width} is no multiple of {HEAD_WIDTH}"
 
 
 def _size(shape: tuple) -> str:

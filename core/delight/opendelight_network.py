@@ -14,10 +14,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-HEAD = 64  # width of an attention head
-SOURCE = 0  # which set of register tokens: 0 the studio scans' albedo, as the authors' test does; 1 FaceOLAT's
+HEAD_WIDTH = 64  # width of an attention head
+REGISTER_SET = 0  # which set of register tokens: 0 the studio scans' albedo, as the authors' test does; 1 FaceOLAT's
 MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-STRIP = 8  # rows of a wide layer that are worked on at once
+STRIP_ROWS = 8  # rows of a wide layer that are worked on at once
 
 State = dict[str, Tensor]
 Step = Callable[[], None]
@@ -77,12 +77,12 @@ def _encoded(state: State, picture: Tensor, step: Step) -> Tensor:
     width, side = patches.shape[1:3]
     x = patches.flatten(2).transpose(1, 2) + _positions(side, width).to(picture)
     # the class token's position is zero
-    x = torch.cat([state["encoder.cls_token"], state["encoder.reg_token"][SOURCE:SOURCE + 1], x], 1)
+    x = torch.cat([state["encoder.cls_token"], state["encoder.reg_token"][REGISTER_SET:REGISTER_SET + 1], x], 1)
     for i in range(_count(state, "encoder.blocks.{}.norm1.weight", 1)):
         at = f"encoder.blocks.{i}."
         query, key, value = _linear(state, at + "attn.qkv",
-                                    _norm(state, at + "norm1", x)).view(1, -1, 3, width // HEAD,
-                                                                        HEAD).permute(2, 0, 3, 1, 4)
+                                    _norm(state, at + "norm1", x)).view(1, -1, 3, width // HEAD_WIDTH,
+                                                                        HEAD_WIDTH).permute(2, 0, 3, 1, 4)
         seen = functional.scaled_dot_product_attention(query, key, value).transpose(1, 2).reshape(x.shape)
         x = x + _linear(state, at + "attn.proj", seen)
         step()
@@ -98,8 +98,8 @@ def _decoded(state: State, x: Tensor, step: Step) -> Tensor:
         x = _activated(_doubled(x, state[f"decoder.deconv_layers.{3 * i}.weight"], step), step)
     for i in range(_count(state, "decoder.conv_layers.{}.weight", 3)):
         weight, bias = (state[f"decoder.conv_layers.{3 * i}.{kind}"] for kind in ("weight", "bias"))
-        for top in range(0, x.shape[2], 4 * STRIP):
-            x[:, :, top:top + 4 * STRIP] = functional.conv2d(x[:, :, top:top + 4 * STRIP], weight, bias)
+        for top in range(0, x.shape[2], 4 * STRIP_ROWS):
+            x[:, :, top:top + 4 * STRIP_ROWS] = functional.conv2d(x[:, :, top:top + 4 * STRIP_ROWS], weight, bias)
             step()
         x = _activated(x, step)
     return torch.sigmoid(functional.conv2d(x, state["decoder.cls_conv.weight"], state["decoder.cls_conv.bias"]))
@@ -110,8 +110,8 @@ def _doubled(x: Tensor, weight: Tensor, step: Step) -> Tensor:
     neighbours."""
     height, width = x.shape[2:]
     out = x.new_empty(1, weight.shape[1], 2 * height, 2 * width)
-    for top in range(0, height, STRIP):
-        end = min(top + STRIP, height)
+    for top in range(0, height, STRIP_ROWS):
+        end = min(top + STRIP_ROWS, height)
         above, below = max(top - 1, 0), min(end + 1, height)
         strip = functional.conv_transpose2d(x[:, :, above:below], weight, stride=2, padding=1)
         out[:, :, 2 * top:2 * end] = strip[:, :, 2 * (top - above):2 * (end - above)]

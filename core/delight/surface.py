@@ -12,12 +12,12 @@ from ..contract.messages import Problem, Reporter
 from ..face import parser, template
 from ..face.head import Head
 from ..face.parts import keep_present
-from ..geometry.meshes import Mesh
-from ..geometry.raster import sample, visible_from
+from ..geometry.meshes import Mesh, vertex_uvs
+from ..geometry.raster import sample, sample_uv, visible_from
 from ..geometry.views import View
 from ..imaging import images
 
-GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
+MIN_FACING_COSINE = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
 NOT_SKIN = ("lips", "brows", "eyes")
 HAIRY = ("beard", "hair", "eyes", "clothes")
 """Parts of a picture whose own colour says nothing of the light on the skin. Brows are told apart from them: they are
@@ -54,7 +54,7 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
         cosine = (towards * normals).sum(1) / np.linalg.norm(towards, axis=1)
         pixels, _ = view.project(mesh.vertices)
         inside = ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
-        candidates = np.flatnonzero(inside & (cosine > GRAZING))
+        candidates = np.flatnonzero(inside & (cosine > MIN_FACING_COSINE))
         candidates = candidates[visible_from(head.caster, mesh.vertices[candidates], normals[candidates], view.centre)]
         picture = images.read_srgb(view.path)
         srgb = sample(picture, pixels[candidates])
@@ -103,7 +103,5 @@ def skin_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     skin = template.mask("skin", 512)
     for name in NOT_SKIN:
         skin = skin * (1 - template.mask(name, 512))
-    uv = np.zeros((len(mesh.vertices), 2))
-    uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
-    texels = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512
-    return sample(skin, texels), sample(template.mask("brows", 512), texels)
+    uvs = vertex_uvs(mesh)
+    return sample_uv(skin, uvs), sample_uv(template.mask("brows", 512), uvs)

@@ -26,7 +26,7 @@ from ..contract.settings import Settings
 from ..geometry.views import View, read_views
 from ..imaging import images
 from .contract import Delit
-from .switchlight_calls import KINDS, Account, balance
+from .switchlight_calls import MEDIA_TYPES, Account, balance
 from .switchlight_line import Parcel, Patience, send
 
 PATIENCE = Patience()
@@ -73,7 +73,7 @@ def parcel(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
     """A frame as it is sent: its file as it is, and as it was agreed to. Raises Problem where it has changed, and for a
     kind that the service does not take."""
     path = capture.frames / name
-    if path.suffix.lower() not in KINDS:
+    if path.suffix.lower() not in MEDIA_TYPES:
         raise Problem(f"SwitchLight does not take pictures as {name} is.",
                       "Run the stage Frames again, which writes JPEG.")
     data = path.read_bytes()

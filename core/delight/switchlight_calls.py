@@ -26,8 +26,8 @@ from .. import __version__
 from ..contract import switchlight_api as service
 from ..contract.messages import Problem
 
-KINDS = {".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".png": "image/png", ".webp": "image/webp"}
-BUSY = (408, 425, 429, 500, 502, 503, 504)
+MEDIA_TYPES = {".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".png": "image/png", ".webp": "image/webp"}
+BUSY_STATUSES = (408, 425, 429, 500, 502, 503, 504)
 
 
 class AgainError(Exception):
@@ -118,7 +118,7 @@ def _multipart(boundary: str, data: bytes, suffix: str, fields: dict[str, str]) 
              for name, value in fields.items()]
     head = (f'--{boundary}\r\nContent-Disposition: form-data; name="{service.PICTURE_FIELD}"; '
             f'filename="frame{suffix}"\r\n'
-            f"Content-Type: {KINDS[suffix]}\r\n\r\n").encode()
+            f"Content-Type: {MEDIA_TYPES[suffix]}\r\n\r\n").encode()
     return b"".join([*parts, head, data, f"\r\n--{boundary}--\r\n".encode()])
 
 
@@ -140,7 +140,7 @@ def _answer(account: Account, request: urllib.request.Request, silence_s: float,
     except urllib.error.HTTPError as error:
         with error:
             body = _start(error)
-        if error.code in BUSY:
+        if error.code in BUSY_STATUSES:
             raise AgainError(f"it is busy ({error.code})", _after(error.headers.get("Retry-After"))) from None
         raise _refusal(account, error.code, body) from None
     except urllib.error.URLError as error:

@@ -21,16 +21,16 @@ from torch import nn
 from torch.nn import functional
 
 from ..face import template
-from .texels import DARKEST, Texels, border_distance
+from .texels import MIN_LINEAR, Texels, border_distance
 from .unet import Trunk
 
 CHANNELS = 23
-MOST_LOG = 2.5
+MAX_LOG = 2.5
 """Natural log units beyond which a colour has nothing to do with the skin under the fitted light."""
 
-BANDS = (1, 8, 40)
+BAND_TEXELS = (1, 8, 40)
 """Texels of a map of 512 over which an error is alike: of each band the network says how large it is."""
-DARKEST_LIGHT = 0.03
+MIN_LIGHT_SHARE = 0.03
 """Share of the brightest light below which a fit says nothing."""
 FINE, FINEST = 24, 12
 """Features at half the map's size, and at its own."""
@@ -76,7 +76,7 @@ def network_input(maps: UnfoldedMaps) -> tuple[torch.Tensor, torch.Tensor, torch
     lit = sun / (maps.ambient.amax(1, keepdim=True) + sun).clamp_min(1e-6)
     border = np.stack([border_distance(each) for each in (lit[:, 0] > 1e-3).cpu().numpy()])
     fitted = (maps.ambient, maps.ambient + maps.direct * maps.free)
-    against = [(maps.log - light.clamp_min(DARKEST / 4).log()).clamp(-MOST_LOG, MOST_LOG) * there for light in fitted]
+    against = [(maps.log - light.clamp_min(MIN_LINEAR / 4).log()).clamp(-MAX_LOG, MAX_LOG) * there for light in fitted]
     layers = [(maps.log - middle) * there, maps.spread, seen, maps.normal, maps.open, *against, lit,
               torch.from_numpy(border)[:, None].to(device), place.expand(len(seen), -1, -1, -1)]
     whole = on_face(maps.ambient + maps.direct).clamp_min(1e-6)
@@ -97,14 +97,14 @@ def _place(side: int, device: torch.device) -> tuple[torch.Tensor, torch.Tensor]
 class TexelNet(Trunk):
     """[N, CHANNELS, S, S] and the fitted light [N, 6, S, S] (network_input) -> log-shading less the face's mean
     log colour [N, 3, S, S], logits of shadow [N, 1, S, S], and the log of the expected error [N, 3, S / 4, S / 4], one
-    for each of BANDS, in natural log units. S is a multiple of 32 that the widths can halve."""
+    for each of BAND_TEXELS, in natural log units. S is a multiple of 32 that the widths can halve."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__(widths, depths)
         self.begin = nn.Conv2d(CHANNELS, FINEST, 3, padding=1)
         self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2,
                                           padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
-        self.level, self.spread = nn.Conv2d(widths[0], 3, 1), nn.Conv2d(widths[0], len(BANDS), 1)
+        self.level, self.spread = nn.Conv2d(widths[0], 3, 1), nn.Conv2d(widths[0], len(BAND_TEXELS), 1)
         self.leave, self.last = nn.Conv2d(widths[0], 4 * FINE, 1), nn.Conv2d(2 * FINE, 4 * FINEST, 3, padding=1)
         self.finish, self.out = nn.Conv2d(2 * FINEST, 2 * FINEST, 3, padding=1), nn.Conv2d(2 * FINEST, 1, 3, padding=1)
         for layer, bias in ((self.level, 0.0), (self.out, 0.0), (self.spread, -2.0)):
@@ -120,4 +120,4 @@ class TexelNet(Trunk):
         x = torch.cat([finest, functional.pixel_shuffle(functional.gelu(self.last(x)), 2)], 1)
         blocked = self.out(functional.gelu(self.finish(x))).float()
         lit = light[:, :3] + torch.sigmoid(-blocked) * light[:, 3:]
-        return torch.log(lit.clamp_min(DARKEST_LIGHT)) + level, blocked, spread
+        return torch.log(lit.clamp_min(MIN_LIGHT_SHARE)) + level, blocked, spread

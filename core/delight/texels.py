@@ -22,17 +22,17 @@ from ..imaging import images
 from ..light.skylight import ambient_occlusion
 from .lit_head import LitHead
 
-SIDE = 512
+SIDE_TEXELS = 512
 """Of the maps: a texel is some 0.8 mm of the face."""
-DARKEST = 0.004
+MIN_LINEAR = 0.004
 """Linear values below this are noise to a logarithm."""
-GRAZING = 0.2
+MIN_FACING_COSINE = 0.2
 """Cosine of the steepest angle under which a view counts."""
-DISAGREED = 0.12
+HALF_WEIGHT_LOG = 0.12
 """Natural log units from the others' mean at which what a view says counts half."""
 BORDER_TEXELS = 24.0
 """Distance from the border of the sun's light at which it does not matter any more."""
-EVERY = 16
+EXPOSURE_STRIDE = 16
 """Of so many texels one tells how the views' exposures differ."""
 
 
@@ -56,12 +56,12 @@ class Texels:
 
 def gather(head: LitHead, views: list[View], step: Callable[[int, int], None] = lambda done, of: None) -> Texels:
     """What these views say of the head. The head has the built-in UVs; step(done, of) is told of each view."""
-    surface = head.head.unfold(SIDE)
+    surface = head.head.unfold(SIDE_TEXELS)
     colours, weights = (np.zeros((len(views), len(surface.points), n), np.float32) for n in (3, 1))
     for i, view in enumerate(views):
         step(i, len(views))
         colours[i], weights[i, :, 0] = _colours_seen(surface.points, surface.normals, surface.caster, view)
-    some = np.s_[:, ::EVERY]
+    some = np.s_[:, ::EXPOSURE_STRIDE]
     colours -= exposures(colours[some], weights[..., 0][some])[:, None]
     mean = robust_mean(colours, weights[..., 0])
     total = np.maximum(weights.sum(0)[:, 0], 1e-6)
@@ -82,12 +82,13 @@ def _colours_seen(points: np.ndarray, normals: np.ndarray, caster: raster.RayCas
     cosine = (towards * normals).sum(1) / lengths(towards)
     pixels, _ = view.project(points)
     inside = ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)  # nan is not
-    seen = np.flatnonzero((cosine > GRAZING) & inside)
+    seen = np.flatnonzero((cosine > MIN_FACING_COSINE) & inside)
     seen = seen[raster.visible_from(caster, points[seen], normals[seen], view.centre)]
     srgb = raster.sample(images.read_srgb(view.path), pixels[seen])
     log, weight = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
-    log[seen] = np.log(np.maximum(images.srgb_to_linear(srgb), DARKEST))
-    weight[seen] = (cosine[seen] - GRAZING) / (1 - GRAZING) * np.clip((1 - srgb.max(1)) / 0.02, 0.01, 1)
+    log[seen] = np.log(np.maximum(images.srgb_to_linear(srgb), MIN_LINEAR))
+    facing = (cosine[seen] - MIN_FACING_COSINE) / (1 - MIN_FACING_COSINE)
+    weight[seen] = facing * np.clip((1 - srgb.max(1)) / 0.02, 0.01, 1)
     return log, weight
 
 
@@ -108,7 +109,7 @@ def robust_mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Over the first axis of [V, N, 3] with weights [V, N]; views far from the others count less (a Cauchy weight)."""
     mean = (values * weights[..., None]).sum(0) / np.maximum(weights.sum(0), 1e-6)[:, None]
     for _ in range(4):
-        trust = weights / (1 + ((values - mean) ** 2).mean(-1) / DISAGREED**2)
+        trust = weights / (1 + ((values - mean) ** 2).mean(-1) / HALF_WEIGHT_LOG**2)
         mean = (values * trust[..., None]).sum(0) / np.maximum(trust.sum(0), 1e-6)[:, None]
     return mean
 
@@ -119,4 +120,4 @@ def border_distance(lit: np.ndarray) -> np.ndarray:
     if not lit.any() or lit.all():
         return np.zeros(lit.shape, np.float32)
     within, beyond = (cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (lit, ~lit))
-    return np.tanh(np.where(lit, within, -beyond) * SIDE / len(lit) / BORDER_TEXELS).astype(np.float32)
+    return np.tanh(np.where(lit, within, -beyond) * SIDE_TEXELS / len(lit) / BORDER_TEXELS).astype(np.float32)

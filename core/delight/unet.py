@@ -13,13 +13,14 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from ..face.networks import Ladder
 from ..imaging import images
 
-SIDE = 256  # of the picture it looks at
+SIDE_PX = 256  # of the picture it looks at
 CHANNELS = 16
 FINE = 24  # features at half the picture's resolution
-DARKEST = 0.004  # linear; below is noise
-MULTIPLE = 32  # of pixels, to be halved so often
+MIN_LINEAR = 0.004  # linear; below is noise
+MULTIPLE_PX = 32  # of pixels, to be halved so often
 
 
 def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: np.ndarray | None = None,
@@ -30,7 +31,7 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     fitted sky alone and with the fitted sun, normal [S, S, 3] in camera coordinates, head [S, S] where they hold.
     Without it these channels are 0, and so is the last, which says so.
     """
-    log = np.log(np.maximum(images.srgb_to_linear(srgb), DARKEST))
+    log = np.log(np.maximum(images.srgb_to_linear(srgb), MIN_LINEAR))
     side = len(log)
     inner = slice(side // 4, 3 * side // 4)
     middle = float(log[inner, inner].mean())
@@ -39,47 +40,28 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     layers[3:6] = (log - middle).transpose(2, 0, 1)
     if ambient is not None:
         for first, light in ((6, ambient), (9, sunlit)):
-            layers[first:first + 3] = (np.clip(log - np.log(np.maximum(light, DARKEST / 4)), -2.5, 2.5)
+            layers[first:first + 3] = (np.clip(log - np.log(np.maximum(light, MIN_LINEAR / 4)), -2.5, 2.5)
                                        * head[..., None]).transpose(2, 0, 1)
         layers[12:15] = (normal * head[..., None]).transpose(2, 0, 1)
         layers[15] = head
     return layers, middle
 
 
-class Trunk(nn.Module):
-    """A U-Net over levels of these `widths`, each of `depths` blocks and half as fine as the one before; the coarsest
-    attends to all of itself."""
+class Trunk(Ladder):
+    """A U-Net whose coarsest level attends to all of itself."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__()
-        self.down, self.up, self.halve, self.narrow = nn.ModuleList(), nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
-        for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
-            self.down.append(nn.Sequential(*(Block(width) for _ in range(depth))))
-            if level + 1 < len(widths):
-                self.halve.append(nn.Conv2d(width, widths[level + 1], 2, stride=2))
-                self.narrow.append(nn.Conv2d(widths[level + 1], width, 1))
-                self.up.append(nn.Sequential(*(Block(width) for _ in range(depth))))
+        self.add_levels(widths, depths)
         self.attention = Attention(widths[-1])
 
-    def transform(self, x: torch.Tensor) -> torch.Tensor:
-        """[N, widths[0], H, W] down to the coarsest level and back."""
-        kept = []
-        for level, blocks in enumerate(self.down):
-            x = blocks(x)
-            if level < len(self.halve):
-                kept.append(x)
-                x = self.halve[level](x)
-        x = self.attention(x)
-        for level in reversed(range(len(self.halve))):
-            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear",
-                                                     align_corners=False)
-            x = self.up[level](x)
-        return x
+    def look_at_all(self, x: torch.Tensor) -> torch.Tensor:
+        return self.attention(x)
 
 
 class DelightNet(Trunk):
     """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2].
-    S is a multiple of MULTIPLE."""
+    S is a multiple of MULTIPLE_PX."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__(widths, depths)
@@ -96,24 +78,6 @@ class DelightNet(Trunk):
         x = torch.cat([fine, functional.pixel_shuffle(self.leave(x), 2)], 1)
         out = self.out(functional.gelu(self.last(x))).float()
         return out[:, :3], out[:, 3:]
-
-
-class Block(nn.Module):
-    """x + conv(gelu(conv(norm(x)))), and a gate per channel from the whole map's mean: exposure and light are matters
-    of the whole picture."""
-
-    def __init__(self, width: int):
-        super().__init__()
-        self.norm = nn.GroupNorm(max(1, width // 16), width)
-        self.first, self.second = nn.Conv2d(width, width, 3, padding=1), nn.Conv2d(width, width, 3, padding=1)
-        self.gate = nn.Linear(width, width)
-        nn.init.zeros_(self.second.weight)
-        nn.init.zeros_(self.second.bias)
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        inner = functional.gelu(self.first(self.norm(x)))
-        inner = inner * (2 * torch.sigmoid(self.gate(inner.mean((2, 3)))))[:, :, None, None]
-        return x + self.second(inner)
 
 
 class Attention(nn.Module):

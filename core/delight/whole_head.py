@@ -6,34 +6,32 @@ delighter *network* asks it beside its own answers; alone, every frame is divide
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import load_file
 
-from ..contract import shipped_files
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import template
 from ..face.head import read_head
-from ..geometry.raster import bleed, interpolate, render_view, sample
+from ..face.networks import has_files, read_network
+from ..geometry.raster import bleed, interpolate, render_view, sample_uv
 from ..geometry.views import View, read_views
 from ..imaging import images
 from .contract import Delit
 from .evening import ShadingEstimate
-from .lit_head import BRIGHTEST, LitHead, lit_head
+from .lit_head import MAX_ALBEDO, LitHead, lit_head
 from .packed import unpack
 from .texel_net import TexelNet, maps_of, network_input
 from .texels import Texels, gather
 
 DATA_FILES = ("weights/texels.safetensors", "weights/texels.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
-LOOKED_AT = 128
+LOOK_TEXELS = 128
 """Texels along a side that are as coarse as a pixel of a look at a face."""
 READING = "Reading the whole head"
 
@@ -71,26 +69,20 @@ def answers_in_looks(net: TexelNet, head: LitHead, views: list[View], looks: lis
     """The whole head's log-shading [h, h, 3] in each look, as coarse as a look is; 0 where a look does not show the
     head, which has the built-in UVs."""
     log = tell_shading(net, gather(head, views, step)).log
-    coarse = np.log(images.resize(np.exp(log), LOOKED_AT, LOOKED_AT)).astype(np.float32)
+    coarse = np.log(images.resize(np.exp(log), LOOK_TEXELS, LOOK_TEXELS)).astype(np.float32)
     answers = []
     for look in looks:
         uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
-        at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * LOOKED_AT
-        answers.append(sample(coarse, at).reshape(*look.face.shape, 3) * (look.face >= 0)[..., None])
+        answers.append(sample_uv(coarse, uv).reshape(*look.face.shape, 3) * (look.face >= 0)[..., None])
     return answers
 
 
 def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
     """The shipped network. Raises Problem where its file or its card is missing."""
-    card = weights.with_suffix(".json")
-    if not (weights.is_file() and card.is_file()):
+    if not has_files(weights):
         raise Problem("The weights of the delighting network are missing.",
                       "Install the extension again, or choose the delighter Shading.")
-    if weights == WEIGHTS:
-        shipped_files.require_whole(weights)
-    net = TexelNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
-    net.load_state_dict(unpack(load_file(weights)))
-    return net.eval().to(torch.device(device), memory_format=torch.channels_last)
+    return read_network(TexelNet, weights, unpack).to(torch.device(device), memory_format=torch.channels_last)
 
 
 @torch.inference_mode()
@@ -112,7 +104,7 @@ def _exposure(texels: Texels, found: Shading) -> float:
     if not where.any():
         return 1.0
     albedo = np.exp(texels.log[where] - found.log[where]).max(-1)
-    return max(1.0, float(np.quantile(albedo, 0.75)) / BRIGHTEST)
+    return max(1.0, float(np.quantile(albedo, 0.75)) / MAX_ALBEDO)
 
 
 def _delit(view: View, head: LitHead, found: Shading) -> Delit:
@@ -120,10 +112,9 @@ def _delit(view: View, head: LitHead, found: Shading) -> Delit:
     face, bary, _ = render_view(head.caster, view)
     here = face >= 0
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, face[here], bary[here])
-    at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(found.log)
     maps = np.concatenate([found.log, found.shadow[..., None]], -1).astype(np.float32)
     seen = np.zeros((*here.shape, 4), np.float32)
-    seen[here] = sample(maps, at)
+    seen[here] = sample_uv(maps, uv)
     seen = bleed(seen, here)
     albedo = images.srgb_to_linear(srgb) / np.exp(seen[..., :3])
     return Delit(view, images.linear_to_srgb(albedo).clip(0, 1), np.clip(seen[..., 3] * here, 0, 1))

@@ -14,7 +14,7 @@ from skimage.measure import blur_effect
 
 from ..contract.frame_records import FrameRecord
 from ..contract.messages import Problem, Reporter
-from .select import turns
+from .select import inside_box, turns
 
 UNMEASURED = {"blur": 1.0, "brightness": 0.0, "clipped": 0.0, "noise": 0.0}
 """Of what is too small to be measured, as a picture of one pixel."""
@@ -40,9 +40,7 @@ in which it is so."""
 def examine(srgb: np.ndarray, box: tuple | None) -> dict:
     """blur (Crete et al., "The Blur Effect", 2007: 0 sharp, 1 blurred), and of the inside of the face's box (the middle
     of the picture where there is none) brightness and noise in sRGB and the clipped share."""
-    height, width = srgb.shape[:2]
-    x0, y0, x1, y1 = box or (width / 4, height / 4, 3 * width / 4, 3 * height / 4)
-    inside = srgb[max(0, int(y0)):max(1, int(y1)), max(0, int(x0)):max(1, int(x1))]
+    inside = inside_box(srgb, box)
     if min(inside.shape[:2]) < 24:
         inside = srgb
     luma = inside @ np.array([0.299, 0.587, 0.114], np.float32)

@@ -35,6 +35,12 @@ def pictures_of(capture: Capture, folder: str, what: str) -> list[tuple[View, Pa
                  Path(folder), what, bool(folder))
 
 
+def delit_views(capture: Capture) -> list[tuple[View, Path]]:
+    """The registered views that were delit, with what came out."""
+    return [(view, path) for view in read_views(capture)
+            if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
+
+
 def read_picture(path: Path, view: View, what: str) -> np.ndarray:
     """sRGB [H, W, 3] at the frame's size. Raises Problem where the picture has another shape than its frame."""
     image = images.read_srgb(path)

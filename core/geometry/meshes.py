@@ -49,6 +49,13 @@ def joined(meshes: list[Mesh]) -> Mesh:
                 np.concatenate([mesh.faces + k for mesh, k in zip(meshes, first, strict=True)]))
 
 
+def vertex_uvs(mesh: Mesh) -> np.ndarray:
+    """[V, 2]: of each vertex one of its UVs."""
+    uvs = np.zeros((len(mesh.vertices), 2))
+    uvs[mesh.faces] = mesh.uvs[mesh.face_uvs]
+    return uvs
+
+
 def face_normals(mesh: Mesh) -> np.ndarray:
     """Unit normals [F, 3]; zero for a degenerate triangle."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))

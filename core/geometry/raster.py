@@ -163,3 +163,8 @@ def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
                      cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
            for i in range(0, len(xy), 32000)]  # cv2.remap takes fewer than 32767 rows
     return np.concatenate(out)[:, 0] if out else np.zeros((0, *image.shape[2:]), np.float32)
+
+
+def sample_uv(image: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """As `sample` of a square map [S, S, ...], at UVs [N, 2]."""
+    return sample(image, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(image))

@@ -209,8 +209,7 @@ def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficien
     uv = np.zeros((len(face), 2))
     uv[there] = (surface.mesh.uvs[surface.mesh.face_uvs[face[there]]] * bary[there, :, None]).sum(1)
     for name, least in (("ears", LOOSE_EARS_SHARE), *((("eyes", 0.0),) if eyes else ())):
-        masked = raster.sample(template.mask(name, 512), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
-        follow *= 1 - (1 - least) * masked
+        follow *= 1 - (1 - least) * raster.sample_uv(template.mask(name, 512), uv)
     return follow
 
 

@@ -29,9 +29,9 @@ from .checkpoint import Solution
 from .confidence import spread
 from .draft import restored
 from .edited import solve_edited
-from .evidence import REFERENCE, Evidence, read_evidence
+from .evidence import REFERENCE_TEXELS, Evidence, read_evidence
 from .memory import sample_within_memory, spare_memory
-from .prior import WEIGHTS, ConditionedPrior, Prior, load
+from .prior import ConditionedPrior, Prior, load_chosen
 from .problem import State, unexplained
 from .recipes import RECIPES, Recipe, free
 from .sampler import Sampler, seeded
@@ -41,7 +41,7 @@ from .tone import resolve_skin_tone
 from .window import coarse
 from .witnesses import confirmed
 
-FAINT = 2.0
+FAINT_WEIGHT = 2.0
 """After any delighter little of a shadow is left, and what M takes along of dark skin and beards is not to be explained
 by local light (Recipe.faint)."""
 
@@ -55,7 +55,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     divergence.
     """
     options = settings.solve
-    prior = load(Path(options.prior).expanduser() if options.prior else WEIGHTS, settings.compute_device)
+    prior = load_chosen(settings)
     if options.low_memory:
         spare_memory(prior)
     recipe = recipe_of(settings, prior)
@@ -148,7 +148,7 @@ def recipe_of(settings: Settings, prior: Prior) -> Recipe:
         recipe = replace(recipe, sigma_min=prior.sigmas[0], sigma_max=prior.sigmas[1])
     if settings.solve.recipe != "wildcap":
         return recipe
-    faint = 0.0 if settings.delight.delighter == "none" else FAINT
+    faint = 0.0 if settings.delight.delighter == "none" else FAINT_WEIGHT
     return replace(recipe, steps=settings.solve.steps, guidance=settings.solve.guidance, faint=faint)
 
 
@@ -187,7 +187,7 @@ def _leave_figures(capture: Capture, evidence: Evidence, result: maps.Maps, tone
     report.figure("mask_share_of_face_percent",
                   round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1))
     report.figure("skin_tone_srgb", [round(float(v), 3) for v in tone.srgb])
-    side = min(evidence.size, REFERENCE // 2)
+    side = min(evidence.size, REFERENCE_TEXELS // 2)
     small = [images.resize(image, side, side) for image in (texture.transpose(1, 2, 0), result.diffuse, result.shading)]
     small[0] = small[0] * (small[1].mean() / max(small[0].mean(), 1e-6))
     small[2] = small[2] * (0.6 / max(np.percentile(small[2], 95), 1e-6))

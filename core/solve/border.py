@@ -7,8 +7,8 @@ Inside a shadow a darker skin and a lesser light look the same; at its edge they
 say holds for some way inwards, less the farther in and the shorter the border is that says it.
 
 But a border may run along a beard, whose steps are of all sizes. Those that a delighter left differ along a border by
-LEFT, whatever the capture; what they differ by more than that is skin's own, and with both taken for Gaussians the
-light's share of each step is LEFT^2 over the variance (Wiener 1949).
+LEFT_LOG, whatever the capture; what they differ by more than that is skin's own, and with both taken for Gaussians the
+light's share of each step is LEFT_LOG^2 over the variance (Wiener 1949).
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from ..light.shadow_edges import signed_distance
 # in texels of a 1024 map
 # the two sides are compared over bands about this distance from the border: a penumbra lies between; half width of a
 # band
-AWAY, BAND = 9.0, 8.0
-REACH = 14.0  # how far from the border a step is read
-WINDOW = 8.0  # deviation of the windows over which a side is averaged
-INWARDS = 40.0  # deviation over which a step holds for what is around it
-LITTLE = 0.05  # share of a window of INWARDS that border must fill, for its step to hold by half
-DARKEST = 0.9  # more of the light than this never goes
+SIDE_TEXELS, BAND_TEXELS = 9.0, 8.0
+REACH_TEXELS = 14.0  # how far from the border a step is read
+WINDOW_TEXELS = 8.0  # deviation of the windows over which a side is averaged
+INWARDS_TEXELS = 40.0  # deviation over which a step holds for what is around it
+MIN_BORDER_SHARE = 0.05  # share of a window of INWARDS_TEXELS that border must fill, for its step to hold by half
+MAX_MISSING_SHARE = 0.9  # more of the light than this never goes
 # deviation, along M's border, of the step in the light that a delighter left, natural log: benchmarks/shadow_steps.py
-LEFT = 0.14
+LEFT_LOG = 0.14
 
 
 def missing(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texel: float) -> torch.Tensor:
-    """The share [S, S] in [0, DARKEST] of the light that is missing under M = 1, by the steps along M's border; 0 where
-    no border is near.
+    """The share [S, S] in [0, MAX_MISSING_SHARE] of the light that is missing under M = 1, by the steps along M's
+    border; 0 where no border is near.
 
     light [3, S, S]: texture over (reference albedo x global shading), linear, about 1 where lit; alpha [S, S]: M;
     weight [S, S]: how far a texel tells of light, 0 off the facial skin, so that the outline of the face is no border;
@@ -42,9 +42,9 @@ def missing(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texe
     """
     value = np.log(np.clip(light.numpy(), 0.05, 4)).mean(0).astype(np.float32)
     steps, sure = border_steps(value, alpha.numpy(), weight.numpy(), texel)
-    step = _blurred(-sure * steps, INWARDS / texel) / (_blurred(sure, INWARDS / texel) + LITTLE)
+    step = _blurred(-sure * steps, INWARDS_TEXELS / texel) / (_blurred(sure, INWARDS_TEXELS / texel) + MIN_BORDER_SHARE)
     share = 1 - np.exp(-np.maximum(share_of_light(steps, sure) * step, 0))
-    return torch.from_numpy(share.clip(0, DARKEST).astype(np.float32))
+    return torch.from_numpy(share.clip(0, MAX_MISSING_SHARE).astype(np.float32))
 
 
 def border_steps(value: np.ndarray, alpha: np.ndarray, weight: np.ndarray,
@@ -55,19 +55,19 @@ def border_steps(value: np.ndarray, alpha: np.ndarray, weight: np.ndarray,
     if not inside.any() or inside.all():
         return np.zeros_like(value), np.zeros_like(value)
     depth = signed_distance(inside) * texel  # negative inside
-    near = weight * np.clip(1.5 - np.abs(np.abs(depth) - AWAY) / BAND, 0, 1) * (np.abs(depth) > 2)
+    near = weight * np.clip(1.5 - np.abs(np.abs(depth) - SIDE_TEXELS) / BAND_TEXELS, 0, 1) * (np.abs(depth) > 2)
     sides, known = [], []
     for side in (depth < 0, depth > 0):
-        share = _blurred(near * side, WINDOW / texel)
-        sides.append(_blurred(near * side * value, WINDOW / texel) / np.maximum(share, 1e-4))
+        share = _blurred(near * side, WINDOW_TEXELS / texel)
+        sides.append(_blurred(near * side * value, WINDOW_TEXELS / texel) / np.maximum(share, 1e-4))
         known.append(share)
-    sure = np.minimum(*known) * (np.abs(depth) < REACH)
+    sure = np.minimum(*known) * (np.abs(depth) < REACH_TEXELS)
     return sides[0] - sides[1], np.where(sure > 0.02, sure / max(float(sure.max()), 1e-6), 0)
 
 
 def share_of_light(steps: np.ndarray, sure: np.ndarray) -> float:
     """The share in (0, 1] of the steps of `border_steps` that is light, and no skin."""
-    return LEFT**2 / max(spread(steps, sure)[1] ** 2, LEFT**2)
+    return LEFT_LOG**2 / max(spread(steps, sure)[1] ** 2, LEFT_LOG**2)
 
 
 def spread(values: np.ndarray, weight: np.ndarray) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from ..contract.files import replacing_folder
 from ..imaging import images
 from .evidence import Evidence
 
-LUMINANCE = np.float32([0.2126, 0.7152, 0.0722])
+LUMINANCE_WEIGHTS = np.float32([0.2126, 0.7152, 0.0722])
 """Of linear sRGB (Rec. 709)."""
 
 
@@ -36,4 +36,4 @@ def write(capture: Capture, evidence: Evidence, albedo: np.ndarray) -> None:
 
 def _mean(linear: np.ndarray, weight: np.ndarray) -> float:
     """Mean luminance of [S, S, 3] under the weights [S, S]."""
-    return float(np.average(linear @ LUMINANCE, weights=weight + 1e-9))
+    return float(np.average(linear @ LUMINANCE_WEIGHTS, weights=weight + 1e-9))

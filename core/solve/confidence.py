@@ -20,19 +20,20 @@ from .problem import Observation, State, albedo
 from .recipes import Recipe
 from .sampler import Sampler, seeded
 
-PER_SHARE, PER_UNLIKE, PER_SPREAD = 0.015, 0.55, 0.5
+ERROR_PER_SHARE, ERROR_PER_DIFFERENCE, ERROR_PER_SPREAD = 0.015, 0.55, 0.5
 """Error of the albedo in sRGB that is expected per share explained as light, per difference from the mean face, per
 spread of the short runs: what the observation says against all expectation is a feature of this face, or light that was
 taken for one."""
-ERROR = 0.03
+HALF_CONFIDENCE_ERROR = 0.03
 """Expected error at which a texel that was well seen has a confidence of a half."""
-RUNS, STEPS = 3, 8
+SHORT_RUNS, SHORT_RUN_STEPS = 3, 8
 """Short runs, and the steps of each: closed form, on a map of a quarter of the size."""
 
 
 def confidence(seen: torch.Tensor, explained: torch.Tensor, found: torch.Tensor, reference: torch.Tensor,
                spread: torch.Tensor | None) -> torch.Tensor:
-    """[S, S] in [0, 1]: 1 for a texel that was well seen and where no error is expected, a half where ERROR is.
+    """[S, S] in [0, 1]: 1 for a texel that was well seen and where no error is expected, a half where
+    HALF_CONFIDENCE_ERROR is.
 
     seen [S, S]: how far a texel's observation counts; explained [S, S]: the share of light that the grid took away;
     found, reference [3, S, S]: the albedo as delivered and the mean face of the tone, linear; spread: `spread`'s, of
@@ -40,17 +41,17 @@ def confidence(seen: torch.Tensor, explained: torch.Tensor, found: torch.Tensor,
     """
     unlike = (shown(found) - shown(reference)).abs().mean(0)
     varied = 0.0 if spread is None else enlarged(spread, seen.shape)
-    expected = PER_SHARE * explained + PER_UNLIKE * unlike + PER_SPREAD * varied
-    return (seen / (1 + expected / ERROR)).clamp(0, 1)
+    expected = ERROR_PER_SHARE * explained + ERROR_PER_DIFFERENCE * unlike + ERROR_PER_SPREAD * varied
+    return (seen / (1 + expected / HALF_CONFIDENCE_ERROR)).clamp(0, 1)
 
 
 def spread(prior: ConditionedPrior, o: Observation, reference: torch.Tensor, lights: Lights, recipe: Recipe, seed: int,
            check: Callable[[], None] = lambda: None) -> torch.Tensor:
     """Deviation [H, W] of the albedo's lightness over short runs on a coarse map `o`, which begin at the reference face
     [1, 7, H, W], each with a seed of its own, under the light that was solved. `check` may raise to cancel."""
-    short = replace(recipe, steps=STEPS, guidance="proximal", coarse=(), candidates=1, phases=())
+    short = replace(recipe, steps=SHORT_RUN_STEPS, guidance="proximal", coarse=(), candidates=1, phases=())
     device, runs = prior.device, []
-    for run in range(RUNS):
+    for run in range(SHORT_RUNS):
         begun = State(0, None, reference.clone(), lights).to(device)
         sampler = Sampler(prior, short, seeded(seed + 7919 * (run + 1), device))
         state = sampler.sample({1: o.to(device)}, begun, lambda state, steps: check())

@@ -18,10 +18,10 @@ import torch
 from .prior import WEIGHTS, coordinates, load
 from .skin_tone import GIVEN, SkinTone
 
-SIZE = 128
+TRIAL_TEXELS = 128
 """Side of the map that is tried, in texels: small enough for any card, and large enough that a card shows what it can
 do."""
-ALIKE = 0.05
+MAX_DIFFERENCE = 0.05
 """The largest difference between two devices' results, in units of the map's range; bfloat16 differs from float32 by
 0.01."""
 
@@ -49,7 +49,7 @@ def prove() -> Proof:
             reasons.append(f"{device} does not run the network ({type(error).__name__}: "
                            f"{str(error).partition(chr(10))[0][:120].rstrip('.')}).")
             continue
-        if not torch.isfinite(result).all() or (result - expected).abs().max() > ALIKE:
+        if not torch.isfinite(result).all() or (result - expected).abs().max() > MAX_DIFFERENCE:
             reasons.append(f"{device} computes something else than the CPU.")
         elif seconds >= cpu_s:
             reasons.append(f"{device} is slower than the CPU: {seconds:.2f} s against {cpu_s:.2f} s for one pass of "
@@ -66,13 +66,13 @@ def candidates() -> list[str]:
 
 
 def run_pass(device: str) -> tuple[torch.Tensor, float]:
-    """A pass of the shipped prior over a fixed map [1, 7, SIZE, SIZE] and back to its input, twice: the gradient, on
-    the CPU, and the second one's seconds."""
+    """A pass of the shipped prior over a fixed map [1, 7, TRIAL_TEXELS, TRIAL_TEXELS] and back to its input, twice: the
+    gradient, on the CPU, and the second one's seconds."""
     generator = torch.Generator().manual_seed(0)
     prior = load(WEIGHTS, device).of_tone(SkinTone((0.45, 0.3, 0.22), GIVEN))
-    noisy, weights = (torch.randn(1, 7, SIZE, SIZE, generator=generator).to(device) for _ in range(2))
-    weights = weights / (7 * SIZE * SIZE) ** 0.5
-    middle = slice(512 - SIZE // 2, 512 + SIZE // 2)
+    noisy, weights = (torch.randn(1, 7, TRIAL_TEXELS, TRIAL_TEXELS, generator=generator).to(device) for _ in range(2))
+    weights = weights / (7 * TRIAL_TEXELS * TRIAL_TEXELS) ** 0.5
+    middle = slice(512 - TRIAL_TEXELS // 2, 512 + TRIAL_TEXELS // 2)
     coords = coordinates(1024, middle, middle).to(device)
     for _ in range(2):  # the first one brings kernels and memory
         started = time.perf_counter()

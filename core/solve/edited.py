@@ -17,7 +17,7 @@ from ..face.head import Head
 from . import checkpoint, initial, maps
 from .checkpoint import Solution
 from .confidence import spread
-from .evidence import REFERENCE, Evidence, grid_cells
+from .evidence import REFERENCE_TEXELS, Evidence, grid_cells
 from .lighting import Lights
 from .prior import ConditionedPrior, Prior
 from .problem import State
@@ -40,7 +40,7 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     try:
         if earlier is None:
             raise ValueError(obstacle or "What the last solve left behind is damaged.")
-        part = window(earlier.painted, evidence.alpha, grid_cells(cell), prior.multiple, REFERENCE)
+        part = window(earlier.painted, evidence.alpha, grid_cells(cell), prior.multiple, REFERENCE_TEXELS)
     except ValueError as reason:
         report.log(f"The whole map is solved. {reason}")
         return None

@@ -24,25 +24,25 @@ from .prior import coordinates
 from .problem import Observation, blurred
 from .recipes import Recipe
 
-REFERENCE = 1024  # lengths in texels are given for maps of this size
-TRUSTED = 0.2  # confidence from which a texel counts in full: below, it was seen at a glancing angle only
+REFERENCE_TEXELS = 1024  # lengths in texels are given for maps of this size
+FULL_CONFIDENCE = 0.2  # confidence from which a texel counts in full: below, it was seen at a glancing angle only
 # of brows, lips, lids and hair: they vary between people more than skin does, and light must not explain them away
 FEATURE_TRUST = 0.2
 BEARD_TRUST = 0.1  # of skin under a beard: the shade of a shaven one is as soft as a light's
-MASK_FADE = 2.0  # deviation in texels over which a hard mask's border fades
-# texels of REFERENCE over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels
-FACE_CROP = 768
+MASK_FADE_TEXELS = 2.0  # deviation in texels over which a hard mask's border fades
+# texels of REFERENCE_TEXELS over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels
+FACE_CROP_TEXELS = 768
 
 
 @dataclass(frozen=True)
 class Extent:
-    """Which part of the UV square the maps cover, in texels of REFERENCE: `side` rows from `top` on and as many columns
-    from `left` on. The prior is told the coordinates of texel centres, or of their upper left corners (not `centred`),
-    and knows maps that are coarser by `factors`."""
+    """Which part of the UV square the maps cover, in texels of REFERENCE_TEXELS: `side` rows from `top` on and as many
+    columns from `left` on. The prior is told the coordinates of texel centres, or of their upper left corners (not
+    `centred`), and knows maps that are coarser by `factors`."""
 
     top: int = 0
     left: int = 0
-    side: int = REFERENCE
+    side: int = REFERENCE_TEXELS
     centred: bool = True
     factors: tuple[int, ...] = (1, 2, 4)
 
@@ -77,13 +77,13 @@ class Evidence:
 
     @property
     def texel(self) -> float:
-        """Side of a texel in texels of REFERENCE."""
+        """Side of a texel in texels of REFERENCE_TEXELS."""
         return self.extent.side / self.size
 
     def cell_side(self, grid_cells: int) -> float:
-        """The side of a cell of V, in texels where the whole map has REFERENCE, when settings.solve.grid_cells of them
-        are asked for."""
-        return FACE_CROP / grid_cells * REFERENCE / self.extent.side
+        """The side of a cell of V, in texels where the whole map has REFERENCE_TEXELS, when settings.solve.grid_cells
+        of them are asked for."""
+        return FACE_CROP_TEXELS / grid_cells * REFERENCE_TEXELS / self.extent.side
 
 
 def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
@@ -116,7 +116,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     alpha = softened(mask) * (1 - protected)
     skin = template.mask("skin", size) * template.mask("face", size)
     skin = skin * (1 - template.mask("eyes", size)) * (1 - hidden)
-    weight = np.where(covered, np.clip(seen / TRUSTED, 0, 1), 0)
+    weight = np.where(covered, np.clip(seen / FULL_CONFIDENCE, 0, 1), 0)
     tensors = [np.ascontiguousarray(a, np.float32)
                for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
     unlike_skin = np.maximum.reduce([template.mask(name, size)
@@ -139,22 +139,22 @@ def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:
 def softened(mask: np.ndarray) -> np.ndarray:
     """A mask [S, S] in [0, 1] whose hard borders fade over a few texels, as the light's do; faint remains become
     zero."""
-    faded = cv2.GaussianBlur(mask, (0, 0), max(MASK_FADE * len(mask) / REFERENCE, 0.3))
+    faded = cv2.GaussianBlur(mask, (0, 0), max(MASK_FADE_TEXELS * len(mask) / REFERENCE_TEXELS, 0.3))
     return np.clip((faded - 0.02) / 0.96, 0, 1)
 
 
 def observations(evidence: Evidence, exposure: float, cell: float, multiple: int,
                  recipe: Recipe) -> dict[int, Observation]:
     """The evidence as the sampler takes it, per coarsening factor. The texture is multiplied by `exposure`; `cell` is a
-    grid cell where the map has REFERENCE texels.
+    grid cell where the map has REFERENCE_TEXELS texels.
 
-    Maps coarser than a quarter of REFERENCE are left out: the prior has not seen them.
+    Maps coarser than a quarter of REFERENCE_TEXELS are left out: the prior has not seen them.
     """
     cells, extent = grid_cells(cell), evidence.extent
     found = {}
     for factor in extent.factors:
         size = evidence.size // factor
-        if factor > 1 and (size < REFERENCE // 4 or size % multiple or evidence.size % factor):
+        if factor > 1 and (size < REFERENCE_TEXELS // 4 or size % multiple or evidence.size % factor):
             continue
         maps = (evidence.weight, evidence.alpha, evidence.trust, evidence.edge, evidence.protected)
         weight, alpha, trust, edge, protected = (torch.from_numpy(_sized(a.numpy(), size)) for a in maps)
@@ -167,8 +167,8 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         ring &= edge.numpy() < 0.5  # a border that lies on a shadow's edge shall not be seamless
         modulation = (torch.from_numpy(support.astype(np.float32)) if recipe.hard_mask
                       else alpha + recipe.open * (1 - alpha) * (1 - protected))
-        whole = size * REFERENCE // extent.side
-        top, left = (start * whole // REFERENCE for start in (extent.top, extent.left))
+        whole = size * REFERENCE_TEXELS // extent.side
+        top, left = (start * whole // REFERENCE_TEXELS for start in (extent.top, extent.left))
         coords = coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
         held = 1.0 if evidence.asked is None else 1 - torch.from_numpy(_sized(evidence.asked.numpy(), size))
@@ -180,7 +180,7 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
 
 def grid_cells(cell: float) -> tuple[int, int]:
     """Cells (rows, columns) of the light grid over the whole map."""
-    count = max(1, round(REFERENCE / cell))
+    count = max(1, round(REFERENCE_TEXELS / cell))
     return count, count
 
 

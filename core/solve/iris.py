@@ -20,24 +20,25 @@ from ..face import lids
 from ..face.eye_reader import EyeShares, read_eye
 from ..face.head import Head
 from ..geometry import raster
+from ..geometry.meshes import vertex_uvs
 from ..geometry.views import View, read_views
 from ..imaging import images
-from .look import BURNT, skin_weight
+from .look import BURNT_SRGB, skin_weight
 from .witnesses import visible
 
-RING = 0.55, 0.85
+RING_SHARES = 0.55, 0.85
 """Shares of the iris' radius between which it is iris: a pupil is seldom wider than half, and the rim is darker."""
-FACING = 0.75
+MIN_FACING_COSINE = 0.75
 """Least cosine between the gaze and the way to the camera: beyond 40 degrees the cornea's edge bends what is behind
 it."""
-SURE = 0.8
+MIN_IRIS_SHARE = 0.8
 """Share of the iris in a pixel from which it is nothing else."""
-REACH = 2.6
+REACH_RADII = 2.6
 """Radii of the eyeball within which skin is lit as the eye is."""
-TURNED = 0.5
+MIN_SKIN_COSINE = 0.5
 """Least cosine between the normals of such skin and the gaze."""
-FEWEST = 12  # points of skin, or pixels of the iris, that a frame must show
-MOST_VIEWS = 10
+MIN_POINTS = 12  # points of skin, or pixels of the iris, that a frame must show
+MAX_VIEWS = 10
 
 
 def measure(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) -> None:
@@ -66,14 +67,14 @@ def iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: 
     """Linear albedo of the left (0) or the right iris, by the median over it and the frames that face it most; None
     where none shows it."""
     skin, known = _skin_around(head, eye, albedo)
-    if len(skin) < FEWEST or not eye.iris_radius:
+    if len(skin) < MIN_POINTS or not eye.iris_radius:
         return None
     towards = np.array([view.centre for view in views]) - eye.centre
     facing = towards @ np.array(eye.gaze) / np.linalg.norm(towards, axis=1)
     found = []
-    for i in np.argsort(-facing, kind="stable")[:MOST_VIEWS]:
+    for i in np.argsort(-facing, kind="stable")[:MAX_VIEWS]:
         report.check()
-        if facing[i] < FACING:
+        if facing[i] < MIN_FACING_COSINE:
             break
         found.append(_in_frame(views[i], head, side, eye, skin, known))
     found = [colour for colour in found if colour is not None]
@@ -94,20 +95,17 @@ def iris_pixels(view: View, eye: Eyeball, seen: EyeShares, shape: tuple[int, ...
     along = (disc - view.centre) @ gaze / (rays @ gaze)
     away = np.linalg.norm(view.centre + along[:, None] * rays - disc, axis=1) / max(eye.iris_radius, 1e-6)
     share = raster.sample(seen.iris, pixels @ seen.move[:, :2].T + seen.move[:, 2])
-    ring = (away > RING[0]) & (away < RING[1]) & (share > SURE)
+    ring = (away > RING_SHARES[0]) & (away < RING_SHARES[1]) & (share > MIN_IRIS_SHARE)
     return rows[ring], columns[ring]
 
 
 def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The vertices [N] of plain skin about an eye that are turned as it is, and their linear albedo [N, 3]."""
-    mesh, size = head.mesh, len(albedo)
-    uv = np.zeros((len(mesh.vertices), 2))
-    uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
-    pixels = np.stack([uv[:, 0], 1 - uv[:, 1]], 1)
-    plain = raster.sample(skin_weight(512, np.zeros((8, 8))), pixels * 512) > 0.5
-    near = np.linalg.norm(mesh.vertices - eye.centre, axis=1) < REACH * eye.radius
-    rows = np.flatnonzero(plain & near & (head.normals @ np.array(eye.gaze) > TURNED))
-    return rows, np.maximum(raster.sample(albedo, pixels[rows] * size), 1e-3)
+    mesh, uvs = head.mesh, vertex_uvs(head.mesh)
+    plain = raster.sample_uv(skin_weight(512, np.zeros((8, 8))), uvs) > 0.5
+    near = np.linalg.norm(mesh.vertices - eye.centre, axis=1) < REACH_RADII * eye.radius
+    rows = np.flatnonzero(plain & near & (head.normals @ np.array(eye.gaze) > MIN_SKIN_COSINE))
+    return rows, np.maximum(raster.sample_uv(albedo, uvs[rows]), 1e-3)
 
 
 def _in_frame(view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray,
@@ -119,11 +117,11 @@ def _in_frame(view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray,
     seen = read_eye(frame, corners * [frame.shape[1] / view.width, frame.shape[0] / view.height], side == 0)
     rows, columns = iris_pixels(view, eye, seen, frame.shape)
     at = np.flatnonzero(visible(view, head.caster, head.mesh.vertices[skin], head.normals[skin]))
-    if len(at) < FEWEST or len(rows) < FEWEST:
+    if len(at) < MIN_POINTS or len(rows) < MIN_POINTS:
         return None
     pixels = view.project(head.mesh.vertices[skin[at]])[0] * [frame.shape[1] / view.width, frame.shape[0] / view.height]
-    kept = raster.sample(whole, pixels) < BURNT
-    if kept.sum() < FEWEST:
+    kept = raster.sample(whole, pixels) < BURNT_SRGB
+    if kept.sum() < MIN_POINTS:
         return None
     light = np.median(raster.sample(linear, pixels[kept]) / known[at][kept], axis=0)
     return np.median(linear[rows, columns], axis=0) / np.maximum(light, 1e-6)

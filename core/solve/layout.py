@@ -22,20 +22,20 @@ from ..contract.messages import Problem, Reporter
 from ..contract.own_head import read_skin
 from ..face.head import Head
 from ..geometry import atlas, baking, meshes
-from .evidence import REFERENCE, Evidence, Extent
+from .evidence import REFERENCE_TEXELS, Evidence, Extent
 from .lighting import Lights, shading_basis
-from .maps import DARKEST, Maps, picture_of
+from .maps import MIN_ALBEDO, Maps, picture_of
 from .prior import Prior, load, mean_at
 from .skin_tone import SkinTone
 
 WINDOW = Extent(64, 128, 768, centred=False, factors=(1,))
 Box = tuple[int, int, int, int]
-TONE, FACE, SHADOW = (289, 399, 470, 554), (131, 764, 177, 842), (225, 594, 248, 778)
+TONE_BOX, FACE_BOX, SHADOW_BOX = (289, 399, 470, 554), (131, 764, 177, 842), (225, 594, 248, 778)
 """First and last row, first and last column at 1024, ends excluded: where the released code takes the skin tone, where
 its face mask and the mask that bounds shadows have their support."""
-FAR_M = 0.012
+MAX_DISTANCE_M = 0.012
 """Farthest that the two fitted heads may lie apart."""
-FADE = 24.0
+FADE_TEXELS = 24.0
 """Texels of a 1024 map over which the solved maps end where the window does."""
 REMEDY = ("Choose ICT-FaceKit's folder with the neutral mesh under Reconstruction, Head Mesh (in a terminal: "
           "--template) and run the stage Head again, or leave the prior empty to use ours.")
@@ -68,7 +68,7 @@ class Layout:
                   "normal": torch.nn.functional.normalize(found["normal"], dim=0),
                   "covered": torch.from_numpy(self.there.known)}
         if boxes:
-            tone, face, shadow = (_box(box, len(weight)) for box in (TONE, FACE, SHADOW))
+            tone, face, shadow = (_box(box, len(weight)) for box in (TONE_BOX, FACE_BOX, SHADOW_BOX))
             found |= {"skin": tone, "weight": weight * face, "alpha": found["alpha"] * shadow}
         return replace(e, **found)
 
@@ -81,7 +81,7 @@ class Layout:
         mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone.tensor[None])[0]
         light = torch.einsum("ck,khw->chw", lights.glob, shading_basis(e.normal)).clamp_min(1e-2)
         light = light / exposure / solved.gain[:, None, None]
-        seen = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(DARKEST, 1)
+        seen = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(MIN_ALBEDO, 1)
 
         def joined(baked: np.ndarray, beyond: np.ndarray) -> np.ndarray:
             share = inside.reshape(inside.shape + (1,) * (baked.ndim - 2))
@@ -99,11 +99,11 @@ class Layout:
     def _inside(self) -> np.ndarray:
         """[S, S]: 1 within the window's reach, falling to 0 at its border. Small holes, as in the folds of lids and
         lips, are no border: they are bled over."""
-        texel = len(self.back.known) / REFERENCE
+        texel = len(self.back.known) / REFERENCE_TEXELS
         missing = (self.back.covered & ~self.back.known).astype(np.uint8)
-        missing = cv2.morphologyEx(missing, cv2.MORPH_OPEN,
-                                   cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(FADE / 2 * texel) + 1,) * 2))
-        return np.clip(cv2.distanceTransform(1 - missing, cv2.DIST_L2, 5) / (FADE * texel), 0, 1)
+        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(FADE_TEXELS / 2 * texel) + 1,) * 2)
+        missing = cv2.morphologyEx(missing, cv2.MORPH_OPEN, disc)
+        return np.clip(cv2.distanceTransform(1 - missing, cv2.DIST_L2, 5) / (FADE_TEXELS * texel), 0, 1)
 
     def fits(self, facial: np.ndarray) -> bool:
         """Whether this is how the prior's UVs show a face: upright, not mirrored, all but the rim of it in the window,
@@ -112,7 +112,7 @@ class Layout:
         row, column = np.indices(known.shape)
         u, v = self.there.uv[known].T
         upright = len(u) > 2 and np.corrcoef(u, column[known])[0, 1] > 0.7 and np.corrcoef(v, -row[known])[0, 1] > 0.7
-        box = _box(TONE, len(known)).numpy() > 0
+        box = _box(TONE_BOX, len(known)).numpy() > 0
         return bool(upright and self.back.known[facial > 0.5].mean() > 0.8
                     and baking.bake(facial, self.there)[box].mean() > 0.5)
 
@@ -157,12 +157,12 @@ def between(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, fa
             tick: Callable[[float], None]) -> Layout:
     """The layout of `own`, which lies on `head`, for maps of size x size. skin bool [F]: its triangles that count;
     face: Layout's."""
-    there = baking.places(own, (0, 0), baking.Source(head), size, FAR_M, tick, skin)
-    top, left, side = (v * size // REFERENCE for v in (WINDOW.top, WINDOW.left, WINDOW.side))
+    there = baking.places(own, (0, 0), baking.Source(head), size, MAX_DISTANCE_M, tick, skin)
+    top, left, side = (v * size // REFERENCE_TEXELS for v in (WINDOW.top, WINDOW.left, WINDOW.side))
     part = np.s_[top:top + side, left:left + side]
     there = baking.TexelPartners(there.uv[part], there.turn[part], there.mirrored[part], there.covered[part])
     source = baking.Source(replace(own, faces=own.faces[skin], face_uvs=own.face_uvs[skin]))
-    back = baking.places(head, (0, 0), source, size, FAR_M, tick)
+    back = baking.places(head, (0, 0), source, size, MAX_DISTANCE_M, tick)
     uv = np.stack([(back.uv[..., 0] * size - left) / side, 1 - ((1 - back.uv[..., 1]) * size - top) / side], -1)
     uv[~((uv >= 0) & (uv <= 1)).all(-1)] = np.nan
     return Layout(there, replace(back, uv=uv.astype(np.float32)), face)

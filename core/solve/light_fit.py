@@ -12,8 +12,8 @@ from .lighting import Lights, fit_around_constant
 from .problem import Observation, State, albedo, photometric
 from .recipes import Recipe
 
-BETAS = 0.9, 0.999
-MOVING = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1,)}
+ADAM_BETAS = 0.9, 0.999
+PHASE_PARAMETERS = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1,)}
 """Which of Lights.parameters() a phase moves."""
 
 
@@ -31,7 +31,8 @@ def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: 
         if first <= step < last:
             per_step = max(1, round(recipe.updates / (last - first)))
             for k in range(per_step):
-                _adam(state, denoised, o, recipe, MOVING[phase], (step - first) * per_step + k, loss or light_loss)
+                before = (step - first) * per_step + k
+                _adam(state, denoised, o, recipe, PHASE_PARAMETERS[phase], before, loss or light_loss)
 
 
 def _refit(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> None:
@@ -88,7 +89,7 @@ def _adam(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, 
         if gradient is None:
             continue
         mean, square = state.moments[2 * k], state.moments[2 * k + 1]
-        mean.lerp_(gradient, 1 - BETAS[0])
-        square.lerp_(gradient * gradient, 1 - BETAS[1])
-        mean_hat, square_hat = mean / (1 - BETAS[0] ** (before + 1)), square / (1 - BETAS[1] ** (before + 1))
+        mean.lerp_(gradient, 1 - ADAM_BETAS[0])
+        square.lerp_(gradient * gradient, 1 - ADAM_BETAS[1])
+        mean_hat, square_hat = mean / (1 - ADAM_BETAS[0] ** (before + 1)), square / (1 - ADAM_BETAS[1] ** (before + 1))
         parameters[k].sub_(rate * mean_hat / (square_hat.sqrt() + 1e-8))

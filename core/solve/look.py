@@ -19,26 +19,27 @@ from ..contract.messages import Problem, Reporter
 from ..face import faces, template
 from ..face.head import Head
 from ..geometry import raster
+from ..geometry.meshes import vertex_uvs
 from ..geometry.views import View, read_views
 from ..imaging import images
 from ..light.spherical_harmonics import sh_basis
 from .witnesses import visible
 
 FRONT = np.array([0.0, -1.0, 0.0])
-QUANTILE = 0.3  # over the views: below the median, as every highlight brightens and nothing but shadow darkens
+VIEW_QUANTILE = 0.3  # over the views: below the median, as every highlight brightens and nothing but shadow darkens
 # quantiles of luminance between which skin is best lit; what is above is highlights that stood still
-BEST_LIT = 0.75, 0.95
-BURNT = 0.98  # sRGB from which a channel has lost its value
-FEWEST = 60  # points of skin
-PERSON = 0.2  # sureness from which a pixel may be the person
-SURROUNDED = 0.05  # least share of the frame that is surroundings
-SMOOTHED = 0.003  # of the frame's longer side: what noise and a head that is off by a pixel amount to
-LIKE = 0.75, 1.35  # brightness over that of evenly lit skin outside of which a point is shadow, mark or highlight
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-RIDGE = np.array([1e-6, *[0.03] * 3, 1.5, 1.5, 1.125, 1.5, 0.375]) / (4 * np.pi)
+BEST_LIT_QUANTILES = 0.75, 0.95
+BURNT_SRGB = 0.98  # sRGB from which a channel has lost its value
+MIN_SKIN_POINTS = 60  # points of skin
+PERSON_SHARE = 0.2  # sureness from which a pixel may be the person
+MIN_SURROUNDINGS_SHARE = 0.05  # least share of the frame that is surroundings
+SMOOTHING_SHARE = 0.003  # of the frame's longer side: what noise and a head that is off by a pixel amount to
+LIKE_RATIOS = 0.75, 1.35  # brightness over that of evenly lit skin, beyond which a point is shadow, mark or highlight
+LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
+SH_RIDGE = np.array([1e-6, *[0.03] * 3, 1.5, 1.5, 1.125, 1.5, 0.375]) / (4 * np.pi)
 # Per point, on the harmonics' coefficients: 1e-6, 0.01 and 0.1 on those of 1, of x, y, z and of xy, yz, z^2 - 1/3, xz,
 # x^2 - y^2
-BEARD = 0.42  # v of the texture below which a beard may grow, whose colour is not the skin's
+BEARD_TOP_V = 0.42  # v of the texture below which a beard may grow, whose colour is not the skin's
 
 
 @dataclass(frozen=True)
@@ -54,10 +55,10 @@ class Look:
 def look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray, surroundings: np.ndarray | None = None) -> Look:
     """From linear colours [N, 3] of facial skin with unit normals [N, 3] and weights [N] in [0, 1], 0 for what is
     shadowed or no skin."""
-    brightness = colours @ LUMINANCE
+    brightness = colours @ LUMINANCE_WEIGHTS
     order = np.argsort(brightness)
     rank = np.cumsum(weight[order]) / weight.sum()
-    best = order[(rank >= BEST_LIT[0]) & (rank <= BEST_LIT[1])]
+    best = order[(rank >= BEST_LIT_QUANTILES[0]) & (rank <= BEST_LIT_QUANTILES[1])]
     return Look(np.average(colours[best], axis=0, weights=weight[best] + 1e-9), _facing_front(colours, normals, weight),
                 surroundings)
 
@@ -71,9 +72,7 @@ def capture_look(capture: Capture, head: Head, shadow: np.ndarray, report: Repor
     if not views or not head.built_in:
         return None
     mesh, normals = head.mesh, head.normals
-    uv = np.zeros((len(mesh.vertices), 2))
-    uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
-    weight = raster.sample(skin_weight(512, shadow), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
+    weight = raster.sample_uv(skin_weight(512, shadow), vertex_uvs(mesh))
     points = np.flatnonzero(weight > 0.05)
     seen = np.full((len(views), len(points), 3), np.nan)
     around = []
@@ -83,7 +82,7 @@ def capture_look(capture: Capture, head: Head, shadow: np.ndarray, report: Repor
         seen[i] = _seen(view, frame, head.caster, mesh.vertices[points], normals[points])
         around.append(_surroundings(frame))
     known = np.isfinite(seen[..., 0]).sum(0) >= min(2, len(views))
-    if known.sum() < FEWEST:
+    if known.sum() < MIN_SKIN_POINTS:
         return None
     colours = _low_quantile(seen[:, known])
     around = [each for each in around if each is not None]
@@ -96,7 +95,7 @@ def skin_weight(size: int, shadow: np.ndarray) -> np.ndarray:
     skin = template.mask("skin", size) * template.mask("face", size)
     for name in ("lips", "brows", "eyes", "nostrils"):
         skin = skin * (1 - template.mask(name, size))
-    skin[round(size * (1 - BEARD)):] = 0
+    skin[round(size * (1 - BEARD_TOP_V)):] = 0
     shadow = cv2.dilate(images.resize(shadow.astype(np.float32), size, size), np.ones((3, 3)))
     return skin * np.clip(1 - 3 * shadow, 0, 1)  # half a shadow is none of the skin's own brightness either
 
@@ -109,10 +108,10 @@ def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) 
     kept = np.ones(len(colours))
     for _ in range(5):
         weighted = basis * (weight * kept)[:, None]
-        ridge = np.diag(RIDGE) * (weight * kept).sum()
+        ridge = np.diag(SH_RIDGE) * (weight * kept).sum()
         light = np.linalg.solve(basis.T @ weighted + ridge, weighted.T @ colours)
-        ratio = (colours @ LUMINANCE) / np.maximum(basis @ light @ LUMINANCE, 1e-6)
-        kept = ((ratio > LIKE[0]) & (ratio < LIKE[1])).astype(float)
+        ratio = (colours @ LUMINANCE_WEIGHTS) / np.maximum(basis @ light @ LUMINANCE_WEIGHTS, 1e-6)
+        kept = ((ratio > LIKE_RATIOS[0]) & (ratio < LIKE_RATIOS[1])).astype(float)
         if (weight * kept).sum() < 0.1 * weight.sum():
             break
     return np.maximum(there @ light, 1e-4)
@@ -125,8 +124,8 @@ def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.nd
     facing = np.flatnonzero(visible(view, caster, points, normals))
     if len(facing):
         pixels, _ = view.project(points[facing])
-        smooth = cv2.GaussianBlur(images.srgb_to_linear(frame), (0, 0), SMOOTHED * max(frame.shape[:2]))
-        whole = raster.sample(frame.max(-1), pixels) < BURNT
+        smooth = cv2.GaussianBlur(images.srgb_to_linear(frame), (0, 0), SMOOTHING_SHARE * max(frame.shape[:2]))
+        whole = raster.sample(frame.max(-1), pixels) < BURNT_SRGB
         found[facing[whole]] = raster.sample(smooth, pixels[whole])
     return found
 
@@ -137,14 +136,15 @@ def _surroundings(frame: np.ndarray) -> np.ndarray | None:
     side = max(frame.shape[:2])
     small = images.resize(frame, round(256 * frame.shape[1] / side), round(256 * frame.shape[0] / side))
     try:
-        away = faces.segment_person(small) < PERSON
+        away = faces.segment_person(small) < PERSON_SHARE
     except Problem:  # the networks are not installed: the skin alone must do
         return None
-    return images.srgb_to_linear(small)[away].mean(0) if away.mean() > SURROUNDED else None
+    return images.srgb_to_linear(small)[away].mean(0) if away.mean() > MIN_SURROUNDINGS_SHARE else None
 
 
 def _low_quantile(seen: np.ndarray) -> np.ndarray:
-    """[N, 3]: the QUANTILE over the views of [V, N, 3], whose nan do not count; each point has at least one value."""
+    """[N, 3]: the VIEW_QUANTILE over the views of [V, N, 3], whose nan do not count; each point has at least one
+    value."""
     count = np.isfinite(seen[..., 0]).sum(0)
-    at = np.floor(QUANTILE * (count - 1)).astype(int)
+    at = np.floor(VIEW_QUANTILE * (count - 1)).astype(int)
     return np.take_along_axis(np.sort(seen, 0), at[None, :, None], 0)[0]  # sort puts nan last

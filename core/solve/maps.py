@@ -22,7 +22,7 @@ from .marks import cover
 from .problem import Observation, State, albedo
 from .split import enlarged
 
-DARKEST = 0.004  # linear albedo below which no skin or hair lies
+MIN_ALBEDO = 0.004  # linear albedo below which no skin or hair lies
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tenso
     if start.marks:  # what is known to be no light is the skin's, be it ever so unlikely to the prior
         kept = torch.from_numpy(cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
         diffuse = torch.lerp(diffuse, evidence.texture / shading, kept)
-    diffuse = diffuse.clamp_min(DARKEST)
+    diffuse = diffuse.clamp_min(MIN_ALBEDO)
     if gain is None:
         gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone.tensor, start.recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
@@ -65,7 +65,7 @@ def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tenso
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
     each = gain[:, None, None]
     trusted = confidence(evidence.weight, explained, diffuse * each, albedo(start.reference), spread)
-    return Maps(picture_of((diffuse * each).clamp(DARKEST, 1)), specular, picture_of(normal),
+    return Maps(picture_of((diffuse * each).clamp(MIN_ALBEDO, 1)), specular, picture_of(normal),
                 picture_of(shading / each), trusted.numpy(), gain)
 
 

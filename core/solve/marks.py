@@ -20,18 +20,18 @@ import torch
 from ..geometry import raster
 from .evidence import Evidence
 
-RADII = tuple(np.geomspace(2.0, 8.0, 6))
-DISC = 2 / np.e  # of a disc's contrast the normalised Laplacian shows at its middle, at the deviation radius / sqrt 2
-LEAST = 0.3  # contrast, natural log units: a fainter one is a freckle, or nothing
+RADII_TEXELS = tuple(np.geomspace(2.0, 8.0, 6))
+DISC_RESPONSE = 2 / np.e  # of a disc's contrast, what the normalised Laplacian of deviation radius / sqrt 2 has amid it
+MIN_CONTRAST_LOG = 0.3  # contrast, natural log units: a fainter one is a freckle, or nothing
 # of the usual response of such a blob within that distance: in stubble and on rough skin more is asked for
-STANDING_OUT = 4.5, 32.0
-COMPACT = 0.45  # least ratio of the two curvatures: an edge has 0, a disc 1
-SURROUNDED = 0.45  # of the contrast that every direction must show
+STANDING_OUT_RATIO, STANDING_OUT_TEXELS = 4.5, 32.0
+MIN_COMPACTNESS = 0.45  # least ratio of the two curvatures: an edge has 0, a disc 1
+MIN_SURROUNDED_SHARE = 0.45  # of the contrast that every direction must show
 # more others of that share of its contrast, within that distance, make it one of a crowd of freckles
-NEIGHBOURS, REACH, LIKE = 2, 64.0, 0.4
-UNLIKE = 0.16  # distance of a mark's colour from the shadow's, in shares of its contrast
+MAX_NEIGHBOURS, NEIGHBOUR_REACH_TEXELS, LIKE_SHARE = 2, 64.0, 0.4
+MIN_COLOUR_DISTANCE = 0.16  # distance of a mark's colour from the shadow's, in shares of its contrast
 SECTORS = 8
-MARGIN = 12.0  # distance to brows, lips, lids, nostrils and scalp
+FEATURE_MARGIN_TEXELS = 12.0  # distance to brows, lips, lids, nostrils and scalp
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def with_marks(evidence: Evidence, witness: Callable[[list[Mark]], list[Mark]] =
     that the views confirm."""
     if not (evidence.alpha > 0).any():
         return evidence, []
-    feature = cv2.blur(1 - evidence.trust.numpy(), (2 * round(MARGIN / evidence.texel) + 1,) * 2)
+    feature = cv2.blur(1 - evidence.trust.numpy(), (2 * round(FEATURE_MARGIN_TEXELS / evidence.texel) + 1,) * 2)
     where = (evidence.skin.numpy() > 0.5) & (evidence.weight.numpy() > 0.5) & (feature < 0.02)
     alpha, taken = evidence.alpha.numpy(), np.array(evidence.taken)
     marks = [mark for mark in find(evidence.texture.permute(1, 2, 0).numpy(), where, evidence.texel)
@@ -90,7 +90,7 @@ def find(texture: np.ndarray, where: np.ndarray, texel: float) -> list[Mark]:
     for mark in measured:
         if all(_apart(mark, other) > mark.radius + other.radius for other in kept):
             kept.append(mark)
-    return [mark for mark in kept if _alone(mark, candidates, REACH / texel)]
+    return [mark for mark in kept if _alone(mark, candidates, NEIGHBOUR_REACH_TEXELS / texel)]
 
 
 def unlike_shadow(mark: Mark, taken: np.ndarray) -> bool:
@@ -100,7 +100,8 @@ def unlike_shadow(mark: Mark, taken: np.ndarray) -> bool:
     change = np.array(mark.change)
     share = 1 - np.exp(change.mean())
     shadow = np.log(np.maximum(1 - taken * share, 0.02))
-    return float(np.abs((change - change.mean()) - (shadow - shadow.mean())).max()) > UNLIKE * mark.contrast
+    distance = float(np.abs((change - change.mean()) - (shadow - shadow.mean())).max())
+    return distance > MIN_COLOUR_DISTANCE * mark.contrast
 
 
 def cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
@@ -116,17 +117,17 @@ def cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
 
 def _blobs(value: np.ndarray, where: np.ndarray, texel: float) -> list[_Blob]:
     """Dark blobs: maxima of the normalised Laplacian over place and scale with two like curvatures. value [S, S]."""
-    radii = [r / texel for r in RADII if r / texel >= 0.9]
+    radii = [r / texel for r in RADII_TEXELS if r / texel >= 0.9]
     responses, compact, usual = [], [], []
     known = where.astype(np.float32)
-    reach = STANDING_OUT[1] / texel
+    reach = STANDING_OUT_TEXELS / texel
     share = np.maximum(_usual(known, reach), 1e-3)
     for radius in radii:
         sigma = radius / 2**0.5
         smooth = cv2.GaussianBlur(value, (0, 0), sigma)
         xx, yy, xy = (cv2.filter2D(smooth, -1, kernel) for kernel in _CURVATURES)
         mean, spread = (xx + yy) / 2, np.sqrt(((xx - yy) / 2) ** 2 + xy**2)
-        responses.append(sigma**2 * (xx + yy) / DISC)
+        responses.append(sigma**2 * (xx + yy) / DISC_RESPONSE)
         usual.append(np.sqrt(np.maximum(_usual(known * responses[-1] ** 2, reach), 0) / share))
         compact.append((mean - spread) / np.maximum(mean + spread, 1e-9))
     stack = np.stack(responses)
@@ -134,8 +135,9 @@ def _blobs(value: np.ndarray, where: np.ndarray, texel: float) -> list[_Blob]:
     around = highest.copy()
     around[1:] = np.maximum(around[1:], highest[:-1])
     around[:-1] = np.maximum(around[:-1], highest[1:])
-    stands_out = (stack > 0.7 * LEAST) & (stack > STANDING_OUT[0] * np.stack(usual))
-    found = np.nonzero((stack >= around) & (stack > LIKE * LEAST) & (np.stack(compact) > COMPACT) & where[None])
+    stands_out = (stack > 0.7 * MIN_CONTRAST_LOG) & (stack > STANDING_OUT_RATIO * np.stack(usual))
+    is_blob = (stack >= around) & (stack > LIKE_SHARE * MIN_CONTRAST_LOG) & (np.stack(compact) > MIN_COMPACTNESS)
+    found = np.nonzero(is_blob & where[None])
     return [_Blob(r, c, radii[k], float(stack[k, r, c]), bool(stands_out[k, r, c]))
             for k, r, c in zip(*(i.tolist() for i in found), strict=True)]
 
@@ -164,7 +166,7 @@ def _measured(log: np.ndarray, row: int, column: int, radius: float) -> Mark | N
                       if (ring & (sector == k)).any()])
     change = disc - np.median(sides, 0)
     contrast = -change.mean()
-    if contrast < LEAST or (sides.mean(-1) - disc.mean()).min() < SURROUNDED * contrast:
+    if contrast < MIN_CONTRAST_LOG or (sides.mean(-1) - disc.mean()).min() < MIN_SURROUNDED_SHARE * contrast:
         return None
     return Mark(float(row), float(column), float(radius), tuple(float(v) for v in change))
 
@@ -175,5 +177,5 @@ def _apart(a: Mark, b: Mark | _Blob) -> float:
 
 def _alone(mark: Mark, blobs: list[_Blob], reach: float) -> bool:
     """Not one of a crowd."""
-    return sum(2 * mark.radius < _apart(mark, other) < reach and other.strength > LIKE * mark.contrast
-               for other in blobs) <= NEIGHBOURS
+    return sum(2 * mark.radius < _apart(mark, other) < reach and other.strength > LIKE_SHARE * mark.contrast
+               for other in blobs) <= MAX_NEIGHBOURS

@@ -23,9 +23,9 @@ from .problem import Observation, State
 from .sampler import Sampler
 
 # glibc's name for it, and the bytes from which on memory is asked of the system and given back to it
-MMAP_THRESHOLD, LARGE = -3, 8 << 20
-SAYS = ("There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is slower and "
-        "gives the same maps.")
+MMAP_THRESHOLD, MMAP_BYTES = -3, 8 << 20
+RETRY_MESSAGE = ("There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is "
+                 "slower and gives the same maps.")
 
 
 def sample_within_memory(sampler: Sampler, observations: dict[int, Observation], state: State,
@@ -62,7 +62,7 @@ def sample_within_memory(sampler: Sampler, observations: dict[int, Observation],
                 "Close other programs, choose a smaller map size for the solve, or the quality draft.",
             ) from error
     # past the except block, which holds on to all that the step had computed
-    log(SAYS.format(begun.step + 1, sampler.recipe.steps))
+    log(RETRY_MESSAGE.format(begun.step + 1, sampler.recipe.steps))
     spare_memory(sampler.denoiser)
     return sample_within_memory(sampler, observations, begun, on_step, log)
 
@@ -75,7 +75,7 @@ def spare_memory(prior: Prior | ConditionedPrior) -> None:
         torch.cuda.empty_cache()
     # glibc keeps freed maps for later, in pieces that others do not fit into; others do not
     with contextlib.suppress(OSError, AttributeError, TypeError):
-        ctypes.CDLL(None).mallopt(MMAP_THRESHOLD, LARGE)
+        ctypes.CDLL(None).mallopt(MMAP_THRESHOLD, MMAP_BYTES)
 
 
 def _copied(state: State) -> State:

@@ -15,7 +15,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from .network_blocks import LAYOUT, Down, Fourier, Residual, SelfAttention, Up, run_layers
+from .network_blocks import MEMORY_FORMAT, Down, Fourier, Residual, SelfAttention, Up, run_layers
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class UNet(nn.Module):
     def lower(self, dtype: torch.dtype) -> UNet:
         """Everything that works on maps in `dtype`, channels last; the noise level's few numbers stay as they are."""
         for part in (self.proj_in, self.proj_out, self.u_net):
-            part.to(dtype=dtype, memory_format=LAYOUT)
+            part.to(dtype=dtype, memory_format=MEMORY_FORMAT)
         return self
 
     def forward(self, x: torch.Tensor, sigma: torch.Tensor,
@@ -135,7 +135,7 @@ class UNet(nn.Module):
         mapped, x = self.mapping(mapped).to(dtype), x.to(dtype)
         if self.patch_size > 1:
             x = functional.pixel_unshuffle(x, self.patch_size)
-        x = self.proj_in(x.contiguous(memory_format=LAYOUT))
+        x = self.proj_in(x.contiguous(memory_format=MEMORY_FORMAT))
         skips = []
         for blocks in self.u_net["d_blocks"][self.skip_stages:]:
             x = run_layers(blocks, x, mapped, self.low_memory)

@@ -11,11 +11,11 @@ from torch import nn
 from torch.nn import functional
 from torch.utils.checkpoint import checkpoint
 
-LAYOUT = torch.channels_last
+MEMORY_FORMAT = torch.channels_last
 """Of all maps inside the network: channels first takes longer, in convolutions and in this normalisation
 (benchmarks/solver_speed.py)."""
 
-STRIP = 64
+STRIP_ROWS = 64
 """Rows of a map inside the network that are shaped at once where that can be done in pieces."""
 
 
@@ -103,7 +103,7 @@ class Norm(nn.Module):
 
     def strips(self, x: torch.Tensor) -> list[slice]:
         """The rows of x that can be normalised at once without the others."""
-        step = STRIP if self.kind == "pixel" else x.shape[2]
+        step = STRIP_ROWS if self.kind == "pixel" else x.shape[2]
         return [slice(row, row + step) for row in range(0, x.shape[2], step)]
 
 
@@ -140,7 +140,7 @@ class Down(nn.Module):
     """Half the size by the separable kernel [1, 3, 3, 1] / 8, reflected at the border: the triangle filter."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=LAYOUT)
+        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=MEMORY_FORMAT)
         kernel = (2 - (torch.arange(4, device=x.device) - 1.5).abs()).to(x.dtype) / 4
         return functional.conv2d(x, torch.outer(kernel, kernel).expand(x.shape[1], 1, 4, 4), stride=2,
                                  groups=x.shape[1])
@@ -150,5 +150,5 @@ class Up(nn.Module):
     """Twice the size by the same kernel transposed, which is bilinear interpolation; reflected at the border."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=LAYOUT)
+        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=MEMORY_FORMAT)
         return functional.interpolate(x, scale_factor=2.0, mode="bilinear", align_corners=False)[..., 2:-2, 2:-2]

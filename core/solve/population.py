@@ -20,21 +20,21 @@ import numpy as np
 from skimage import color
 
 from ..imaging import images
-from .look import LUMINANCE, Look
+from .look import LUMINANCE_WEIGHTS, Look
 from .skin_tone import DECIMALS, SCENE, WHITE_POINT, SkinTone
 
 DATA_FILES = ("weights/tones.json",)
-FILE = Path(__file__).parents[1] / DATA_FILES[0]
+MODEL_FILE = Path(__file__).parents[1] / DATA_FILES[0]
 # of a white surface's brightness: what skin of any tone reflects without taking colour, and no view is free of
-SHEEN = 0.015
-SHINE = 0.5  # deviation of the sheen in log units: oily and dry skin
-STRETCH = 2.0  # at most
+SHEEN_REFLECTANCE = 0.015
+SHEEN_SIGMA_LOG = 0.5  # deviation of the sheen in log units: oily and dry skin
+MAX_STRETCH = 2.0  # at most
 # deviations in log units of a measured white: of its level (the face may be lit otherwise), and of its colour
-MEASURED = 0.10, 0.025
+MEASURED_SIGMA_LOG = 0.10, 0.025
 # deviation of L* that is always stated: faces differ from their tone's mean in more ways than the model has
-LEAST = 1.5
-BETWEEN = 0.02  # log units between the population's tones: they stand for what lies between them, too
-GROUPS = ((55, "very light"), (41, "light"), (28, "intermediate"), (10, "tan"), (-30, "brown"), (-91, "dark"))
+MIN_SIGMA_L = 1.5
+TONE_SPACING_LOG = 0.02  # log units between the population's tones: they stand for what lies between them, too
+TYPOLOGY_GROUPS = ((55, "very light"), (41, "light"), (28, "intermediate"), (10, "tan"), (-30, "brown"), (-91, "dark"))
 """Individual typology angle in degrees above which a tone is of a group (Chardon et al. 1991; Del Bino and Bernerd
 2013)."""
 
@@ -51,7 +51,7 @@ class Population:
     covariance: np.ndarray
 
 
-BEST, SURROUNDINGS, OVER_WHITE = [0, 1, 2], [3, 4, 5], [6, 7, 8]  # rows of the model
+BEST_ROWS, SURROUNDINGS_ROWS, OVER_WHITE_ROWS = [0, 1, 2], [3, 4, 5], [6, 7, 8]  # rows of the model
 
 
 def estimate_skin_tone(look: Look, white: np.ndarray | None = None) -> SkinTone:
@@ -59,25 +59,25 @@ def estimate_skin_tone(look: Look, white: np.ndarray | None = None) -> SkinTone:
     surface that faces as the face does, or None. Its sRGB is rounded to DECIMALS, as a tone that is typed has no
     more."""
     if white is not None:
-        return _posterior(OVER_WHITE, coordinates(look.front) - coordinates(white),
-                          np.square([MEASURED[0], MEASURED[1], MEASURED[1]]), WHITE_POINT)
+        return _posterior(OVER_WHITE_ROWS, coordinates(look.front) - coordinates(white),
+                          np.square([MEASURED_SIGMA_LOG[0], MEASURED_SIGMA_LOG[1], MEASURED_SIGMA_LOG[1]]), WHITE_POINT)
     if look.surroundings is None:
-        return _posterior(BEST, coordinates(look.best), np.zeros(3), SCENE)
-    return _posterior(BEST + SURROUNDINGS, np.concatenate([coordinates(look.best), coordinates(look.surroundings)]),
-                      np.zeros(6), SCENE)
+        return _posterior(BEST_ROWS, coordinates(look.best), np.zeros(3), SCENE)
+    shown = np.concatenate([coordinates(look.best), coordinates(look.surroundings)])
+    return _posterior(BEST_ROWS + SURROUNDINGS_ROWS, shown, np.zeros(6), SCENE)
 
 
 def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray, source: str) -> SkinTone:
     """The estimate from these rows of the model, as they are `shown`; `variance` is added to the model's own."""
     known = population()
-    of_tones = coordinates(known.tones + SHEEN)
+    of_tones = coordinates(known.tones + SHEEN_REFLECTANCE)
     away = shown - of_tones @ known.slope[rows].T - known.offset[rows]
     # [N, R]: on dark skin sheen is much of what is seen
-    shiny = (coordinates(known.tones + SHEEN * np.exp(SHINE)) - of_tones) @ known.slope[rows].T
+    shiny = (coordinates(known.tones + SHEEN_REFLECTANCE * np.exp(SHEEN_SIGMA_LOG)) - of_tones) @ known.slope[rows].T
     covariance = (
         known.covariance[np.ix_(rows, rows)]
         + np.diag(variance)
-        + BETWEEN**2 * np.eye(len(rows))
+        + TONE_SPACING_LOG**2 * np.eye(len(rows))
         + shiny[:, :, None] * shiny[:, None, :]
     )
     likelihood = -0.5 * (np.einsum("ni,nij,nj->n", away, np.linalg.inv(covariance), away)
@@ -89,7 +89,7 @@ def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray, source:
 def coordinates(linear: np.ndarray) -> np.ndarray:
     """Linear colours [..., 3] -> ln luminance, ln R/G, ln B/G [..., 3]."""
     log = np.log(np.maximum(linear, 1e-4))
-    return np.stack([np.log(np.maximum(linear @ LUMINANCE, 1e-4)), log[..., 0] - log[..., 1],
+    return np.stack([np.log(np.maximum(linear @ LUMINANCE_WEIGHTS, 1e-4)), log[..., 0] - log[..., 1],
                      log[..., 2] - log[..., 1]], -1)
 
 
@@ -107,12 +107,12 @@ def group(linear: np.ndarray) -> str:
     """The name of a tone's group, by its typology angle."""
     lightness, _, yellow = lab(linear)
     angle = np.degrees(np.arctan2(lightness - 50, yellow))
-    return next(name for least, name in GROUPS if angle > least)
+    return next(name for least, name in TYPOLOGY_GROUPS if angle > least)
 
 
 @cache
 def population() -> Population:
-    stored = json.loads(FILE.read_text(encoding="utf-8"))
+    stored = json.loads(MODEL_FILE.read_text(encoding="utf-8"))
     return Population(*(np.array(stored[name]) for name in Population.__dataclass_fields__))
 
 
@@ -124,11 +124,11 @@ def _stretched(tones: np.ndarray, weight: np.ndarray, source: str) -> SkinTone:
     prior, mean = values.mean(0), weight @ values
     covariance = (values - mean).T @ ((values - mean) * weight[:, None])
     variance, before = max(covariance[0, 0], 1e-6), values[:, 0].var()
-    factor = min(before / max(before - variance, 1e-6), STRETCH)
+    factor = min(before / max(before - variance, 1e-6), MAX_STRETCH)
     lightness = np.clip(prior[0] + factor * (mean[0] - prior[0]), values[:, 0].min(), values[:, 0].max())
     moved = mean + covariance[:, 0] / variance * (lightness - mean[0])
     linear = from_lab(moved)
     error = weight @ color.deltaE_ciede2000(values, np.broadcast_to(lab(linear), values.shape))
-    deviation = float(np.hypot(np.sqrt(factor * variance), LEAST))
+    deviation = float(np.hypot(np.sqrt(factor * variance), MIN_SIGMA_L))
     rounded = [round(float(value), DECIMALS) for value in images.linear_to_srgb(linear)]
     return SkinTone.from_srgb(rounded, source, deviation=deviation, error=float(error), group=group(linear))

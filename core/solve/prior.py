@@ -19,12 +19,13 @@ from safetensors import safe_open
 
 from ..contract import shipped_files
 from ..contract.messages import Problem
+from ..contract.settings import Settings
 from . import released
 from .network import Condition, UNet, UNetLayout, denoise, from_state
 from .skin_tone import SkinTone
 
-BLIND = 80.0  # noise level of a channel of which nothing is seen
-CLEAR = 0.01  # ... and of one that is known
+BLIND_SIGMA = 80.0  # noise level of a channel of which nothing is seen
+CLEAR_SIGMA = 0.01  # ... and of one that is known
 DATA_FILES = ("weights/prior.safetensors", "weights/prior.json")
 WEIGHTS = Path(__file__).parent.parent / DATA_FILES[0]
 
@@ -86,9 +87,9 @@ class Prior:
         """`ConditionedPrior.respond` for a skin of tone [1, 3]."""
         known = condition(coords, self.octaves, self.mean_face, self.spread, tone,
                           blind=torch.ones(1, device=self.device))
-        levels = torch.tensor([CLEAR] * 3 + [BLIND] * 4, device=self.device)[None, :, None, None]
-        x = torch.where(levels < BLIND, maps, known.mean) + levels * noise
-        out = denoise(self.network, x, torch.full((1,), CLEAR, device=self.device), known, levels)
+        levels = torch.tensor([CLEAR_SIGMA] * 3 + [BLIND_SIGMA] * 4, device=self.device)[None, :, None, None]
+        x = torch.where(levels < BLIND_SIGMA, maps, known.mean) + levels * noise
+        out = denoise(self.network, x, torch.full((1,), CLEAR_SIGMA, device=self.device), known, levels)
         return torch.cat([maps[:, :3], out[:, 3:]], 1)
 
 
@@ -181,7 +182,7 @@ def unpacked(levels: torch.Tensor, limits: torch.Tensor) -> torch.Tensor:
 def condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor, tone: torch.Tensor,
               blind: torch.Tensor | None) -> Condition:
     """What our network is told of maps at coords [N, 2, H, W] of skins of tone [N, 3]. blind [N] is 1 where the normals
-    and specular it gets are pure noise (`denoise`'s `levels` are BLIND there) and follow from the diffuse alone."""
+    and specular it gets are pure noise (`denoise`'s `levels` are BLIND_SIGMA there): they follow from the diffuse."""
     texel = 512 * (coords[:, 0, 0, 1] - coords[:, 0, 0, 0]).abs()  # side of a texel in texels of a 1024 map
     scale = torch.cat([spread[:3] * tone, spread[3:].expand(len(tone), -1)], 1)
     mapping = torch.cat([texel.log2()[:, None], tone.clamp_min(1e-3).log() / 2 + 0.6], 1)  # logarithms of about -1 to 1
@@ -216,6 +217,12 @@ def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = 
                           "Install the extension again.") from error
     prior.network.lower(dtype or fast_dtype(device))
     return prior.to(device)
+
+
+def load_chosen(settings: Settings) -> Prior:
+    """The authors' prior where the settings name one, else ours, on the device of the settings."""
+    chosen = settings.solve.prior
+    return load(Path(chosen).expanduser() if chosen else WEIGHTS, settings.compute_device)
 
 
 def fast_dtype(device: str) -> torch.dtype:

@@ -20,8 +20,8 @@ from ..face import template
 from ..imaging import images
 
 DATA_FILES = ("assets/self_test.json",)
-EXPECTED = Path(__file__).parents[1] / DATA_FILES[0]
-DEVIATIONS = 6
+EXPECTED_FILE = Path(__file__).parents[1] / DATA_FILES[0]
+MAX_DEVIATIONS = 6
 """How many of its own deviations the score may lie below what it was on average: every device draws other noise, and
 rounds otherwise."""
 
@@ -29,8 +29,8 @@ rounds otherwise."""
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """A copy of the sample head, which is solved anew in its place -> the figures score_db, expected_db and seconds.
     Raises Problem for a score that no sound machine has."""
-    expected = json.loads(EXPECTED.read_text(encoding="utf-8"))
-    least = expected["mean_db"] - DEVIATIONS * expected["deviation_db"]
+    expected = json.loads(EXPECTED_FILE.read_text(encoding="utf-8"))
+    least = expected["mean_db"] - MAX_DEVIATIONS * expected["deviation_db"]
     score, seconds = measure(capture, settings, report)
     for name, value in (("score_db", round(score, 2)), ("expected_db", round(least, 2)),
                         ("seconds", round(seconds, 1))):

@@ -6,7 +6,6 @@ its first step."""
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -17,26 +16,26 @@ from ..face.head import read_filmed_head
 from ..imaging import images
 from . import initial
 from .evidence import read_evidence
-from .prior import WEIGHTS, load
+from .prior import load_chosen
 from .recipes import RECIPES
 from .skin_tone import parse_skin_tone
 from .tone import estimate_from_texture
 
-CELL = 8.0
+CELL_TEXELS = 8.0
 """Texels of a 1024 map per light of the grid: none is fitted here, but a start lays them out."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """The artist's mask, or the proposal -> shadow_mask_edges.png, 8 bit grey, of the texture's size."""
     report.progress(0, 2, "reading the texture, the head and the masks")
-    prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS, settings.compute_device)
+    prior = load_chosen(settings)
     height, width = images.read_linear(capture.texture).shape[:2]
     evidence = read_evidence(capture, read_filmed_head(capture), max(min(height, 1024) // 32, 4) * 32)
     report.progress(1, 2, "looking for the shadow's edges")
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
     tone = parse_skin_tone(settings.solve.skin_tone)
     tone = tone or estimate_from_texture(evidence.texture, initial.lit_skin(evidence), prior.tones)
-    found = initial.start(prior, evidence, tone, CELL, recipe)
+    found = initial.start(prior, evidence, tone, CELL_TEXELS, recipe)
     snapped = np.clip(images.resize(found.alpha.numpy(), width, height), 0, 1)
     images.write_data(capture.shadow_mask_edges, snapped)
     painted = images.resize(evidence.alpha.numpy(), width, height)

@@ -5,16 +5,17 @@
 In the logarithm a texture is the mean face of the tone, plus this person's traits, plus light, plus noise, and each of
 these is taken for a Gaussian:
 
-    traits         broad (REACH_M) and mostly alike on the face's two sides (ALIKE), whichever way the skin faces
+    traits         broad (TRAIT_REACH_M) and mostly alike on the face's two sides (MIRROR_CORRELATION), whichever way
+    the skin faces
     global light   second-order spherical harmonics of the normal, their level free
     local light    what a light leaves that the normal does not tell (a soft shadow, a delighter's mistake): nearly as
     broad as traits, but of one side noise          narrow: fine detail, and what the frames' registration leaves of it
 
 So the split is linear algebra (Gaussian process regression; Rasmussen and Williams 2006, chapter 2). How large each of
 the four is on this face is not known: the most probable scales are taken, by the evidence of the texture itself (ibid.,
-section 5.4) and by what they usually are (TYPICAL). No delighter is asked for by name: where one leaves much light,
-much of its texture is explained by light. Of several captures of a person the traits are the same and the lights are
-not, which tells them apart far better, local light included. benchmarks/split.py measures the constants and the
+section 5.4) and by what they usually are (TYPICAL_SCALES). No delighter is asked for by name: where one leaves much
+light, much of its texture is explained by light. Of several captures of a person the traits are the same and the lights
+are not, which tells them apart far better, local light included. benchmarks/split.py measures the constants and the
 outcome.
 """
 
@@ -35,25 +36,25 @@ from ..light.spherical_harmonics import sh_basis
 CELLS, FIRST_CELLS = 48, 24
 """Cells along the map's side by which a capture is split, and by which the scales are found: some 4 and 8 mm of the
 face each."""
-CELL_TEXELS = 8
+MIN_CELL_TEXELS = 8
 """Fewest texels along a cell's side: a small map has fewer cells."""
-REACH_M, ALIKE = 0.022, 0.8
+TRAIT_REACH_M, MIRROR_CORRELATION = 0.022, 0.8
 """Distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of
 painted skins (benchmarks/split.py)."""
 LOCAL_REACH_M, NOISE_REACH_M = 0.020, 0.005
-AXES = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
+COLOUR_AXES = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
 """Axes of a log colour along which the parts are taken for independent: brightness, red against blue, green against
 both."""
-OF_AXES = np.array([1.0, 0.3, 0.1])
+AXIS_DEVIATIONS = np.array([1.0, 0.3, 0.1])
 """Deviations along these axes over that of brightness, of skins and of light alike."""
-OF_ORDERS = np.array([0.0, 1, 1, 1, 0.6, 0.6, 0.6, 0.6, 0.6])
-"""Deviations of the global light's coefficients over that of a first-order one; the level's own is LEVEL: exposure is
-free."""
-LEVEL = 0.5
-VISIBLE = np.sqrt(4 * np.pi)
+ORDER_DEVIATIONS = np.array([0.0, 1, 1, 1, 0.6, 0.6, 0.6, 0.6, 0.6])
+"""Deviations of the global light's coefficients over that of a first-order one; the level's own is LEVEL_DEVIATION:
+exposure is free."""
+LEVEL_DEVIATION = 0.5
+SH_SCALE = np.sqrt(4 * np.pi)
 """The functions of the normal are scaled to a mean square of one over the sphere."""
-DARKEST = 1e-3
-FULL = 0.5
+MIN_LINEAR = 1e-3
+MIN_SEEN_SHARE = 0.5
 """Share of a cell that has to be seen skin outside of M."""
 
 
@@ -71,7 +72,7 @@ class Scales:
         return (getattr(self, field.name) for field in fields(self))
 
 
-TYPICAL, VARIED = Scales(0.20, 0.08, 0.08, 0.07), 0.6
+TYPICAL_SCALES, SCALES_DEVIATION = Scales(0.20, 0.08, 0.08, 0.07), 0.6
 """The scales' own prior: log-normal about these, with this deviation of the logarithm."""
 
 
@@ -105,7 +106,8 @@ class Split:
 @dataclass(frozen=True)
 class Cells:
     """places [N, 3] in metres on the built-in head and normal [N, 3] of all cells of a head; seen [K]: which of them
-    tell of the skin; values [K, 3] there: log(texture / reference) along AXES; covered [C, C]: where the N lie."""
+    tell of the skin; values [K, 3] there: log(texture / reference) along COLOUR_AXES; covered [C, C]: where the N
+    lie."""
 
     places: np.ndarray
     normal: np.ndarray
@@ -135,17 +137,17 @@ class Covariances:
 
     def covariance(self, scales: Scales, axis: int) -> np.ndarray:
         """Of all parts together, along an axis."""
-        sizes = np.square(OF_AXES[axis] * np.array(tuple(scales)))
+        sizes = np.square(AXIS_DEVIATIONS[axis] * np.array(tuple(scales)))
         parts = sum(size * part
                     for size, part in zip(sizes, (self.traits, self.light, self.local, self.noise), strict=True))
-        return parts + LEVEL**2 * self.level + 1e-6 * np.eye(*self.level.shape)
+        return parts + LEVEL_DEVIATION**2 * self.level + 1e-6 * np.eye(*self.level.shape)
 
 
-def split(captures: list[Shapes], typical: Scales = TYPICAL) -> Split:
+def split(captures: list[Shapes], typical: Scales = TYPICAL_SCALES) -> Split:
     """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the
     scales' prior."""
     fewer = len(captures) ** -0.5
-    most = captures[0].weight.shape[0] // CELL_TEXELS
+    most = captures[0].weight.shape[0] // MIN_CELL_TEXELS
     seen, values = seen_together([cells_of(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures])
     scales = find_scales(model(seen, seen), values, typical)
     return infer([cells_of(shapes, round(min(CELLS, most) * fewer)) for shapes in captures], scales)
@@ -154,14 +156,15 @@ def split(captures: list[Shapes], typical: Scales = TYPICAL) -> Split:
 def cells_of(shapes: Shapes, count: int) -> Cells:
     """A capture as count x count cells."""
     weight = shapes.weight.numpy().astype(np.float32)
-    ratio = np.log(np.maximum(shapes.texture.numpy(), DARKEST)) - np.log(np.maximum(shapes.reference.numpy(), DARKEST))
+    texture, reference = (np.log(np.maximum(part.numpy(), MIN_LINEAR)) for part in (shapes.texture, shapes.reference))
+    ratio = texture - reference
     share = _shrunk(weight, count)
     mean = _shrunk(ratio.transpose(1, 2, 0) * weight[..., None], count) / np.maximum(share, 1e-4)[..., None]
     places, covered = places_of(count)
     normal = _shrunk(shapes.normal.numpy().transpose(1, 2, 0), count)[covered].astype(np.float64)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
-    seen = np.flatnonzero(share[covered] > FULL)
-    return Cells(places, normal, seen, mean[covered][seen].astype(np.float64) @ AXES.T, covered)
+    seen = np.flatnonzero(share[covered] > MIN_SEEN_SHARE)
+    return Cells(places, normal, seen, mean[covered][seen].astype(np.float64) @ COLOUR_AXES.T, covered)
 
 
 @cache
@@ -186,14 +189,16 @@ def model(these: Places, others: Places) -> Covariances:
     apart = np.linalg.norm(these.at[:, None] - others.at[None], axis=-1)
     mirrored = np.linalg.norm(these.at[:, None] * [-1, 1, 1] - others.at[None], axis=-1)
     # higher where a place is its own mirror image
-    variances = [1 + ALIKE * np.exp(-2 * np.abs(places.at[:, 0]) / REACH_M) for places in (these, others)]
-    traits = (np.exp(-apart / REACH_M) + ALIKE * np.exp(-mirrored / REACH_M)) / np.sqrt(np.multiply.outer(*variances))
-    light = (VISIBLE**2 * sh_basis(these.normal) * OF_ORDERS**2) @ sh_basis(others.normal).T
+    variances = [1 + MIRROR_CORRELATION * np.exp(-2 * np.abs(places.at[:, 0]) / TRAIT_REACH_M)
+                 for places in (these, others)]
+    traits = np.exp(-apart / TRAIT_REACH_M) + MIRROR_CORRELATION * np.exp(-mirrored / TRAIT_REACH_M)
+    traits = traits / np.sqrt(np.multiply.outer(*variances))
+    light = (SH_SCALE**2 * sh_basis(these.normal) * ORDER_DEVIATIONS**2) @ sh_basis(others.normal).T
     return Covariances(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same,
                        np.exp(-apart / NOISE_REACH_M) * same, same)
 
 
-def find_scales(together: Covariances, values: np.ndarray, typical: Scales = TYPICAL) -> Scales:
+def find_scales(together: Covariances, values: np.ndarray, typical: Scales = TYPICAL_SCALES) -> Scales:
     """The most probable scales, by a search along one of them after the other."""
     best, most = typical, log_probability(together, values, typical, typical)
     for step in (2.0, 1.4, 1.2):
@@ -209,9 +214,11 @@ def find_scales(together: Covariances, values: np.ndarray, typical: Scales = TYP
     return best
 
 
-def log_probability(together: Covariances, values: np.ndarray, scales: Scales, typical: Scales = TYPICAL) -> float:
+def log_probability(together: Covariances, values: np.ndarray, scales: Scales,
+                    typical: Scales = TYPICAL_SCALES) -> float:
     """Of values [K, 3] under the scales, and of the scales themselves, but for a constant."""
-    total = -0.5 * sum((np.log(found / usual) / VARIED) ** 2 for found, usual in zip(scales, typical, strict=True))
+    total = -0.5 * sum((np.log(scale / usual) / SCALES_DEVIATION) ** 2
+                       for scale, usual in zip(scales, typical, strict=True))
     for axis in range(3):
         lower, column = cholesky(together.covariance(scales, axis), lower=True), values[:, axis]
         white = solve_triangular(lower, column, lower=True)
@@ -224,15 +231,16 @@ def infer(captures: list[Cells], scales: Scales) -> Split:
     first, (seen, values) = captures[0], seen_together(captures)
     among = model(seen, seen)
     beyond = model(Places(first.places, first.normal, np.zeros(len(first.places), int)), seen)
-    basis = VISIBLE * sh_basis(first.normal[first.seen])
+    basis = SH_SCALE * sh_basis(first.normal[first.seen])
     traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
-    for axis, size in enumerate(OF_AXES):
+    for axis, size in enumerate(AXIS_DEVIATIONS):
         told = cho_solve(cho_factor(among.covariance(scales, axis)), values[:, axis])
         traits[axis] = (scales.traits * size) ** 2 * beyond.traits @ told
         local[axis] = (scales.local * size) ** 2 * beyond.local @ told
-        prior = (scales.light * size * OF_ORDERS) ** 2 + LEVEL**2 * (OF_ORDERS == 0)
-        coefficients[axis] = VISIBLE * prior * (basis.T @ told[seen.own == 0])
-    return Split(AXES.T @ coefficients, *(_spread(AXES.T @ part, first.covered) for part in (traits, local)), scales)
+        prior = (scales.light * size * ORDER_DEVIATIONS) ** 2 + LEVEL_DEVIATION**2 * (ORDER_DEVIATIONS == 0)
+        coefficients[axis] = SH_SCALE * prior * (basis.T @ told[seen.own == 0])
+    maps = (_spread(COLOUR_AXES.T @ part, first.covered) for part in (traits, local))
+    return Split(COLOUR_AXES.T @ coefficients, *maps, scales)
 
 
 def enlarged(field: torch.Tensor, size: int) -> torch.Tensor:

@@ -11,7 +11,7 @@ from ..contract.together import captures_in
 from ..face.head import read_filmed_head
 from .evidence import Evidence, read_evidence
 
-SIZE = 512
+SIDE_TEXELS = 512
 """Side at which they are read: what they tell is larger than a cell of split.py."""
 
 
@@ -37,5 +37,5 @@ def read_others(capture: Capture, settings: Settings, report: Reporter) -> list[
         if not head.built_in:
             raise Problem(f"{root.name} has a head in other UVs.",
                           "Solve together only captures whose head is the built-in one.")
-        others.append(read_evidence(other, head, SIZE))
+        others.append(read_evidence(other, head, SIDE_TEXELS))
     return others

@@ -8,8 +8,6 @@ whose light the delighter took out.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import torch
 
@@ -21,15 +19,15 @@ from .evidence import Evidence, read_evidence
 from .initial import lit_skin
 from .look import capture_look
 from .population import estimate_skin_tone
-from .prior import WEIGHTS, load
+from .prior import load_chosen
 from .skin_tone import TEXTURE, SkinTone, parse_skin_tone
 from .white_point import given_white
 
-SIZE = 256
+TONE_SIDE_TEXELS = 256
 """Side at which the mean is taken: it needs no detail."""
-HUMAN_GREEN = 0.02, 0.45
+HUMAN_GREEN_LINEAR = 0.02, 0.45
 """Range of linear green a skin's mean albedo can have; red and blue follow from the colour."""
-UNKNOWN = [0.38, 0.23, 0.17]
+UNKNOWN_TONE_LINEAR = [0.38, 0.23, 0.17]
 """Linear sRGB of the tone that is taken where neither the texture nor the prior tells of any."""
 
 
@@ -37,11 +35,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Leaves the figures of `tell_skin_tone`. Raises Problem where no facial skin was seen."""
     report.progress(0, 1, "reading the texture, the head and the masks")
     head = read_filmed_head(capture)
-    evidence = read_evidence(capture, head, SIZE)
+    evidence = read_evidence(capture, head, TONE_SIDE_TEXELS)
     tone = estimate_from_frames(capture, head, settings, evidence, report)
     if tone is None:
-        prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS,
-                     settings.compute_device)
+        prior = load_chosen(settings)
         tone = estimate_from_texture(evidence.texture, lit_skin(evidence), prior.tones)
     tell_skin_tone(tone, report)
 
@@ -83,7 +80,7 @@ def estimate_from_texture(texture: torch.Tensor, weight: torch.Tensor, tones: li
     """
     values = texture[:, weight > 0.5 * weight.max().clamp_min(1e-6)]  # [3, N]
     if values.shape[1] == 0:
-        return SkinTone.from_linear(np.median(tones, 0) if tones else UNKNOWN, TEXTURE)
+        return SkinTone.from_linear(np.median(tones, 0) if tones else UNKNOWN_TONE_LINEAR, TEXTURE)
     bright = values[:, values[1] >= values[1].median()]
     tone = bright[:, bright[1] <= bright[1].quantile(0.9)].mean(1) if bright.shape[1] < 2**24 else bright.mean(1)
     tone = tone.clamp_min(1e-3)
@@ -95,7 +92,7 @@ def estimate_from_texture(texture: torch.Tensor, weight: torch.Tensor, tones: li
         nearest = known[distance.argsort()[:5]].mean(0)
         chroma = ((tone / tone[1]).log() + (nearest - nearest[1])) / 2
         tone = tone[1] * chroma.exp()
-    return SkinTone.from_linear(tone * (tone[1].clamp(*HUMAN_GREEN) / tone[1]), TEXTURE)
+    return SkinTone.from_linear(tone * (tone[1].clamp(*HUMAN_GREEN_LINEAR) / tone[1]), TEXTURE)
 
 
 def tell_skin_tone(tone: SkinTone, report: Reporter) -> None:

@@ -17,29 +17,29 @@ from ..contract.messages import Problem, Reporter
 from ..contract.settings import CARDS, Settings
 from ..imaging import images
 
-GREYS = np.array([0.914, 0.589, 0.363, 0.191, 0.088])
+GREY_REFLECTANCES = np.array([0.914, 0.589, 0.363, 0.191, 0.088])
 """Reflectance of a ColorChecker's neutral patches, white to neutral 3.5 (L* 96.5, 81.3, 66.8, 50.9, 35.7: the mean of
 measured charts)."""
-COST = 0.04  # above it mcc's chart is a guess
-UNEVEN = 0.25  # deviation in log units of the greys about one white above which they are no chart's
-USABLE = 0.03, 0.96  # sRGB between which a patch has kept its value
-LOOKED_AT, ENOUGH = 60, 5  # frames searched, and charts after which the search ends
-PATCH = 0.006  # half the side, over the frame's longer side, of what is averaged where a card is pointed at
-STRAY = 0.15  # deviation in log units within a card
+MAX_CHART_COST = 0.04  # above it mcc's chart is a guess
+MAX_UNEVENNESS_LOG = 0.25  # deviation in log units of the greys about one white above which they are no chart's
+USABLE_SRGB = 0.03, 0.96  # sRGB between which a patch has kept its value
+MAX_FRAMES, ENOUGH_CHARTS = 60, 5  # frames searched, and charts after which the search ends
+PATCH_SHARE = 0.006  # half the side, over the frame's longer side, of what is averaged where a card is pointed at
+MAX_STRAY_LOG = 0.15  # deviation in log units within a card
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Leaves the figures white_point (linear R, G, B) and white_point_frame. Raises Problem where no frame shows a
     ColorChecker."""
     frames = sorted(capture.frames.glob("*.jpg"))
-    frames = frames[:: max(1, len(frames) // LOOKED_AT)]
+    frames = frames[:: max(1, len(frames) // MAX_FRAMES)]
     found = {}
     for i, path in enumerate(frames):
         report.progress(i, len(frames), f"looking for a ColorChecker in frame {i + 1} of {len(frames)}")
         white = chart_white(images.read_srgb(path))
         if white is not None:
             found[path.name] = white
-        if len(found) == ENOUGH:
+        if len(found) == ENOUGH_CHARTS:
             break
     if not found:
         raise Problem("No ColorChecker was found in the frames.",
@@ -57,14 +57,14 @@ def chart_white(srgb: np.ndarray) -> np.ndarray | None:
     if not detector.process(pixels, cv2.mcc.MCC24, 1):
         return None
     chart = detector.getBestColorChecker()
-    if chart.getCost() > COST:
+    if chart.getCost() > MAX_CHART_COST:
         return None
     patches = chart.getChartsRGB()[:, 1].reshape(24, 3)[18:23] / 255  # means; the last row without its black
-    usable = ((patches > USABLE[0]) & (patches < USABLE[1])).all(1)
+    usable = ((patches > USABLE_SRGB[0]) & (patches < USABLE_SRGB[1])).all(1)
     if usable.sum() < 2:
         return None
-    each = np.log(images.srgb_to_linear(patches[usable]) / GREYS[usable, None])
-    return np.exp(each.mean(0)) if each.std(0).max() < UNEVEN else None
+    each = np.log(images.srgb_to_linear(patches[usable]) / GREY_REFLECTANCES[usable, None])
+    return np.exp(each.mean(0)) if each.std(0).max() < MAX_UNEVENNESS_LOG else None
 
 
 def card_white(srgb: np.ndarray, column: float, row: float, card: str) -> np.ndarray:
@@ -74,14 +74,14 @@ def card_white(srgb: np.ndarray, column: float, row: float, card: str) -> np.nda
     if not (0 <= column < width and 0 <= row < height):
         raise Problem(f"The place {column:g}, {row:g} is outside of the frame, which is {width} x {height}.",
                       "Give the pixel's column and row from the upper left.")
-    reach = max(2, round(PATCH * max(width, height)))
+    reach = max(2, round(PATCH_SHARE * max(width, height)))
     top, left = max(0, int(row) - reach), max(0, int(column) - reach)
     patch = srgb[top:int(row) + reach + 1, left:int(column) + reach + 1].reshape(-1, 3)
     if np.median(patch, 0).max() >= 0.98 or np.median(patch, 0).min() < 0.03:
         raise Problem("The card is burnt out or black there.",
                       "Choose another frame or place, or a grey card instead of white paper.")
     linear = images.srgb_to_linear(patch)
-    if np.log(np.maximum(linear, 1e-3)).std(0).max() > STRAY:
+    if np.log(np.maximum(linear, 1e-3)).std(0).max() > MAX_STRAY_LOG:
         raise Problem("That place is not of one colour.",
                       "Point at the middle of the card, away from its border and from writing.")
     return linear.mean(0) / CARDS[card]

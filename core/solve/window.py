@@ -26,13 +26,13 @@ from .problem import Observation, State
 from .recipes import Recipe
 from .sampler import Sampler, seeded
 
-MARGIN = 64
+MARGIN_TEXELS = 64
 """Texels of a 1024 map around the touched box that are sampled again."""
-CONTEXT = 64
+CONTEXT_TEXELS = 64
 """Texels of a 1024 map around the window that the network sees beside it: the side of the patches it was trained on."""
-STEPS = 40
+MAX_STEPS = 40
 """Most steps of such a sampling: what surrounds the window settles its large shapes."""
-LARGEST = 0.5
+MAX_SHARE = 0.5
 """Share of the map from which on a part is not worth its while."""
 
 
@@ -52,7 +52,8 @@ def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], mult
     """What an edit from the mask `before` to `now` [S, S] touches; None where they are the same.
 
     `cells` (rows, columns) of V cover the map, the network takes sides that are multiples of `multiple`, `reference` is
-    the size that MARGIN counts texels of. Raises ValueError, with a sentence, where the whole map is to be solved.
+    the size that MARGIN_TEXELS counts texels of. Raises ValueError, with a sentence, where the whole map is to be
+    solved.
     """
     size = now.shape[0]
     touched = (now - before).abs() > 1e-3
@@ -64,8 +65,8 @@ def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], mult
     for axis, count in enumerate(cells):
         hit = torch.nonzero(touched.any(1 - axis))[:, 0]
         whole = math.lcm(multiple * 4, size // count)  # 4: the coarsest map's factor
-        within = _grown(int(hit[0]), int(hit[-1]) + 1, MARGIN * size // reference, 4, size)
-        around = _grown(within.start, within.stop, CONTEXT * size // reference, whole, size)
+        within = _grown(int(hit[0]), int(hit[-1]) + 1, MARGIN_TEXELS * size // reference, 4, size)
+        around = _grown(within.start, within.stop, CONTEXT_TEXELS * size // reference, whole, size)
         wide = size // count
         part = slice(around.start // wide, -(-around.stop // wide))
         cell = torch.arange(part.start, part.stop)
@@ -75,7 +76,7 @@ def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], mult
         seen.append(around)
         cells_seen.append(part)
     share = math.prod(part.stop - part.start for part in inside) / size**2
-    if share > LARGEST:
+    if share > MAX_SHARE:
         raise ValueError(f"The edit touches {share:.0%} of the map.")
     return Window(tuple(inside), tuple(seen), tuple(cells_seen), moving[0][:, None] & moving[1][None])
 
@@ -90,7 +91,7 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
     observations : of the whole map, by coarsening factor
     earlier : what goes on around the window; stays as it is
     part : the window
-    recipe : the earlier solve's; the walk is its, with at most STEPS steps
+    recipe : the earlier solve's; the walk is its, with at most MAX_STEPS steps
     seed : of the noise
     report : hears each step
 
@@ -117,7 +118,7 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
         report.progress(state.step, steps, f"sampling the edited part, step {state.step} of {steps}")
 
     last = max(end for _, _, end in recipe.phases)
-    local = replace(recipe, steps=min(recipe.steps, STEPS), phases=(("cells", 0.0, last),), refit=0.0)
+    local = replace(recipe, steps=min(recipe.steps, MAX_STEPS), phases=(("cells", 0.0, last),), refit=0.0)
     state = sample_within_memory(Sampler(prior, local, seeded(seed, device), with_known), here, state, keep_frozen,
                                  report.log)
     found = restored(prior, state.denoised, observations[1].coords.to(device), recipe, seed, part.seen)

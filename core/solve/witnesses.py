@@ -11,14 +11,15 @@ import numpy as np
 from ..contract.capture import Capture
 from ..face.head import Head
 from ..geometry import raster
-from ..geometry.views import View, read_views
+from ..geometry.frame_pictures import delit_views
+from ..geometry.views import View
 from ..imaging import images
 from .marks import Mark
 
-FACING = 0.35  # least cosine between the surface and the way to the camera
-SHOWN = 0.4  # of the texture's contrast that a view must show
-AGREED = 0.6  # share of the views that see the place
-FEWEST = 2  # views; where fewer saw it the texture alone decides
+MIN_FACING_COSINE = 0.35  # least cosine between the surface and the way to the camera
+MIN_SHOWN_SHARE = 0.4  # of the texture's contrast that a view must show
+MIN_AGREED_SHARE = 0.6  # share of the views that see the place
+MIN_VIEWS = 2  # views; where fewer saw it the texture alone decides
 
 
 def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
@@ -26,14 +27,12 @@ def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> lis
     cameras or no delit views."""
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return marks
-    pictures = [(view, path) for view in read_views(capture)
-                if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
     covered = head.raster(size)[0] >= 0
     points, normals = (head.interpolate(values, size) for values in (head.mesh.vertices, head.normals))
     at = tuple(np.round([[mark.row, mark.column] for mark in marks]).astype(int).clip(0, size - 1).T)
     there = points[at], normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
     seen, agreed = np.zeros(len(marks), int), np.zeros(len(marks), int)
-    for view, path in pictures:
+    for view, path in delit_views(capture):
         shown = visible(view, head.caster, *there) & covered[at]
         if not shown.any():
             continue
@@ -41,14 +40,14 @@ def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> lis
         for k in np.flatnonzero(shown):
             contrast = _contrast(view, picture, points, covered, marks[k])
             seen[k] += contrast is not None
-            agreed[k] += contrast is not None and contrast > SHOWN * marks[k].contrast
-    return [mark for mark, s, a in zip(marks, seen, agreed, strict=True) if s < FEWEST or a >= AGREED * s]
+            agreed[k] += contrast is not None and contrast > MIN_SHOWN_SHARE * marks[k].contrast
+    return [mark for mark, s, a in zip(marks, seen, agreed, strict=True) if s < MIN_VIEWS or a >= MIN_AGREED_SHARE * s]
 
 
 def visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """bool [N] of surface points [N, 3] with unit normals [N, 3]."""
     towards = view.centre - points
-    facing = (towards * normals).sum(1) > FACING * np.linalg.norm(towards, axis=1)
+    facing = (towards * normals).sum(1) > MIN_FACING_COSINE * np.linalg.norm(towards, axis=1)
     pixels, _ = view.project(points)
     inside = ((pixels > 2) & (pixels < [view.width - 2, view.height - 2])).all(1)
     return facing & inside & raster.visible_from(caster, points, normals, view.centre)

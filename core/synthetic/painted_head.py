@@ -92,7 +92,7 @@ def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: boo
     hit = face >= 0  # what lies beside the head need not be worked out
     face, bary = face[hit], bary[hit]
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
-    colour = raster.sample(albedo, np.stack([uv[:, 0], 1 - uv[:, 1]], -1) * len(albedo))
+    colour = raster.sample_uv(albedo, uv)
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary) @ rotation.T
     shade = (np.full(len(face), 0.9) if even
              else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1))

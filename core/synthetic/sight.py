@@ -116,7 +116,7 @@ def look(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, 
     uv = (mesh.uvs[mesh.face_uvs[where]] * bary[..., None]).sum(1)
 
     def of_map(picture: np.ndarray) -> np.ndarray:
-        return raster.sample(picture, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(picture))
+        return raster.sample_uv(picture, uv)
 
     smooth = _unit((stage.normals[corner] * bary[..., None]).sum(1))
     position = (mesh.vertices[corner] * bary[..., None]).sum(1)

@@ -22,8 +22,8 @@ from ..contract.settings import Settings
 from ..contract.stages import advise_again
 from ..face import template
 from ..face.head import Head, Unfolded, read_filmed_head
-from ..geometry.frame_pictures import check_shape
-from ..geometry.views import View, read_views
+from ..geometry.frame_pictures import check_shape, delit_views
+from ..geometry.views import View
 from ..imaging import images
 from .align import align
 from .blend import bands_of, blend, equalise, robust_weights
@@ -95,8 +95,7 @@ def observe_all(capture: Capture, head: Head, size: int,
     """What each delit view sees of the head on a map of `size`, the frame's own sharpness counted, and which parts of
     the person they show. Raises Problem where no view was delit."""
     frames = read_frames(capture).by_name
-    views = [(view, path) for view in read_views(capture)
-             if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
+    views = delit_views(capture)
     if not views:
         raise Problem("There is no delit frame of a registered view.",
                       "Run the stage Delight, or put pictures named like the frames into the delighter's folder.")

@@ -20,7 +20,7 @@ from safetensors.torch import load_file
 
 from ..contract.files import replacing
 from ..contract.messages import Reporter
-from ..delight.unet import SIDE, network_input
+from ..delight.unet import SIDE_PX, network_input
 from ..geometry.meshes import vertex_normals
 from ..solve.prior import WEIGHTS
 from ..synthetic import sight
@@ -141,7 +141,8 @@ def mirrored(batch: PortraitBatch) -> PortraitBatch:
 
 
 def _half(picture: np.ndarray) -> np.ndarray:
-    return cv2.resize(np.ascontiguousarray(picture, np.float32), (SIDE // 2, SIDE // 2), interpolation=cv2.INTER_AREA)
+    half = SIDE_PX // 2, SIDE_PX // 2
+    return cv2.resize(np.ascontiguousarray(picture, np.float32), half, interpolation=cv2.INTER_AREA)
 
 
 def _prepare_one(job: tuple) -> None:
@@ -158,7 +159,7 @@ def _prepare_one(job: tuple) -> None:
     with replacing(place / "visible.npy") as temporary, open(temporary, "wb") as file:
         np.save(file, np.packbits(stage.visible, axis=1))
     for view in range(views):
-        sight.save(place / f"{view}.npz", sight_of(stage, skin, np.random.default_rng([seed, 51, view]), SIDE))
+        sight.save(place / f"{view}.npz", sight_of(stage, skin, np.random.default_rng([seed, 51, view]), SIDE_PX))
 
 
 def _skin(skins: Skins, index: int) -> Skin:

@@ -23,7 +23,7 @@ from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
 from ..solve.network import UNet, denoise
-from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype, packed
+from ..solve.prior import BLIND_SIGMA, WEIGHTS, build, condition, fast_dtype, packed
 from . import command_line, descent
 from .patches import PatchBatch, Windows, mean_map, reference_skins, spread_about
 from .release import TrainingCard, again, release
@@ -179,11 +179,11 @@ def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: PatchBatch,
     mean = mean.to(device) - CLEARER * blind
     blind = torch.maximum(blind, 1 - known[:, 3:].amax((1, 2, 3)))
     sigma = (torch.from_numpy(rng.standard_normal(len(mean))).float()
-             * deviation).to(device).add(mean).exp().clamp(0.005, BLIND)
+             * deviation).to(device).add(mean).exp().clamp(0.005, BLIND_SIGMA)
     noise = torch.from_numpy(rng.standard_normal(batch.clean.shape, dtype=np.float32)).to(device)
     told = condition(batch.coords.to(device), OCTAVES, **statistics, tone=batch.tone.to(device), blind=blind)
     s, spread = sigma[:, None, None, None].expand(-1, 7, -1, -1).clone(), told.spread
-    s[:, 3:][blind > 0] = BLIND
+    s[:, 3:][blind > 0] = BLIND_SIGMA
     noisy = torch.where(known > 0, clean + s * noise, told.mean + (s**2 + spread**2).sqrt() * noise)
     low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
     with torch.autocast(device, torch.bfloat16, enabled=low):

@@ -24,8 +24,8 @@ from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
 from ..delight.packed import pack, unpack
-from ..delight.texel_net import BANDS, TexelNet
-from ..delight.texels import SIDE
+from ..delight.texel_net import BAND_TEXELS, TexelNet
+from ..delight.texels import SIDE_TEXELS
 from ..solve.prior import fast_dtype
 from . import command_line, descent
 from .release import TrainingCard, again, card_before, release
@@ -89,7 +89,7 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
         raise Problem(f"There are no people in {work} yet.",
                       "Wait for `train texels --prepare`, or train without --growing.")
     prepare_props(t["props"], work, hdri, t["seed"])
-    unseen = UnfoldedPeople(data["held_out_seeds"], work, device).draw(2 * t["held_out"], SIDE // 2,
+    unseen = UnfoldedPeople(data["held_out_seeds"], work, device).draw(2 * t["held_out"], SIDE_TEXELS // 2,
                                                                        np.random.default_rng(1))
     torch.manual_seed(t["seed"])
     network = TexelNet(**CONFIGS[config]["model"])
@@ -134,10 +134,10 @@ def bands_of(error: torch.Tensor, weight: torch.Tensor) -> list[tuple[torch.Tens
     """The luminance's part of an error [N, 3, S, S] in each of BANDS, fine to coarse, [N, 1, h, h] of S divided by the
     band's texels, and their weights."""
     luminance, side, found = error.mean(1, keepdim=True), error.shape[-1], []
-    for k, texels in enumerate(BANDS):
-        here, base = _pooled(luminance, weight, max(1, texels * side // SIDE))
-        if k + 1 < len(BANDS):
-            coarse, _ = _pooled(luminance, weight, max(2, BANDS[k + 1] * side // SIDE))
+    for k, texels in enumerate(BAND_TEXELS):
+        here, base = _pooled(luminance, weight, max(1, texels * side // SIDE_TEXELS))
+        if k + 1 < len(BAND_TEXELS):
+            coarse, _ = _pooled(luminance, weight, max(2, BAND_TEXELS[k + 1] * side // SIDE_TEXELS))
             here = here - functional.interpolate(coarse, size=here.shape[-2:], mode="bilinear", align_corners=False)
         found.append((here, base))
     return found
@@ -171,7 +171,7 @@ def figures(average: dict, config: str, batch: TexelBatch, device: str) -> dict[
     _, error = split_tone(shading - batch.shading, batch.weight)
     for k, (band, weight) in enumerate(bands_of(error, batch.weight)):
         constant = ((band.abs() * weight).sum() / weight.sum()).clamp_min(1e-6).log()
-        told[f"gain_{BANDS[k]}"] = (_surprise(band, weight, constant.expand(len(band), 1, 4, 4))
+        told[f"gain_{BAND_TEXELS[k]}"] = (_surprise(band, weight, constant.expand(len(band), 1, 4, 4))
                                     - _surprise(band, weight, spread[:, k:k + 1])).item()
     return {name: round(float(value), 4) for name, value in told.items()}
 
@@ -213,8 +213,8 @@ class _TexelSteps(Dataset):
             self.people.look_again()
         rng = np.random.default_rng([self.t["seed"], step])
         fine = step % self.t["fine_every"] == self.t["fine_every"] - 1
-        batch = self.people.draw(max(1, self.t["pairs"] // 2) if fine else self.t["pairs"], SIDE if fine else SIDE // 2,
-                                 rng)
+        pairs, side = (max(1, self.t["pairs"] // 2), SIDE_TEXELS) if fine else (self.t["pairs"], SIDE_TEXELS // 2)
+        batch = self.people.draw(pairs, side, rng)
         return mirrored(batch) if step % 2 else batch
 
 

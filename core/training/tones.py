@@ -24,7 +24,7 @@ from ..face import template
 from ..geometry import meshes, raster
 from ..light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..solve.look import FRONT, Look, look, skin_weight
-from ..solve.population import FILE, SHEEN, coordinates
+from ..solve.population import MODEL_FILE, SHEEN_REFLECTANCE, coordinates
 from ..synthetic import light, pigment
 from ..synthetic.exposure import phone_exposure
 from ..synthetic.parameters import sample_parameters
@@ -55,7 +55,7 @@ class LitSkin:
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m core train tones", description=__doc__.splitlines()[0])
     parser.add_argument("--subjects", type=int, default=160)
-    parser.add_argument("--out", type=Path, default=FILE)
+    parser.add_argument("--out", type=Path, default=MODEL_FILE)
     options = parser.parse_args(arguments)
     if not 50 <= options.subjects <= HELD_OUT_SEED - FIRST_SEED:
         raise Problem(f"{options.subjects} subjects are too few or too many.",
@@ -94,7 +94,7 @@ def scenes_of(seed: int) -> list[LitSkin]:
         shading = np.maximum(ambient @ sky, 0.005) + (cosine * reach)[:, None] * colour
         shadowed = (cosine > 0.02) & (reach < 0.5) & (colour.max() > 0)
         bright = np.average(shading, axis=0, weights=facial[where])
-        sheen = np.exp(rng.normal(np.log(SHEEN), 0.5)) * (0.5 * shading + 0.5 * bright)
+        sheen = np.exp(rng.normal(np.log(SHEEN_REFLECTANCE), 0.5)) * (0.5 * shading + 0.5 * bright)
         turned = FRONT + rng.normal(0, CARD_TILT, 3)
         turned /= np.linalg.norm(turned)
         card = np.maximum((sh_basis(turned) * per_function(LAMBERT)) @ sky, 0.005) + max(turned @ sun, 0) * colour
@@ -134,7 +134,7 @@ def fitted(scenes: list[LitSkin]) -> dict:
         for phone in range(PHONES):
             taken, card = photographed(each, np.random.default_rng([len(true), phone, 32]))
             best, surroundings, front, white, tone = coordinates(np.stack([taken.best, taken.surroundings, taken.front,
-                                                                           card, each.tone + SHEEN]))
+                                                                           card, each.tone + SHEEN_REFLECTANCE]))
             true.append(tone)
             shown.append(np.concatenate([best, surroundings, front - white]))
     system = np.concatenate([true, np.ones((len(true), 1))], 1)

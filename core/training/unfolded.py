@@ -19,7 +19,7 @@ import torch
 from torch.nn import functional
 
 from ..delight.texel_net import UnfoldedMaps
-from ..delight.texels import DARKEST
+from ..delight.texels import MIN_LINEAR
 from ..synthetic.olat import DIRECTIONS, GLOSS, LIGHTS
 from ..synthetic.unfolded import LAMPS, SIDE
 from ..upscale.network import srgb_to_linear
@@ -78,7 +78,7 @@ def light_up(crowd: Crowd, who: torch.Tensor, albedo: torch.Tensor, props: Props
     tone = mean_over(albedo, skin)
     linear, gains = expose(albedo * diffuse + gloss, skin, dice)
     both = torch.cat([linear, ((tone * diffuse + gloss) * gains).clamp(0, 1)], -1)
-    both = srgb_to_linear(curve(both, dice)).clamp_min(DARKEST).log()
+    both = srgb_to_linear(curve(both, dice)).clamp_min(MIN_LINEAR).log()
     log, even, apart = misplaced(*both.chunk(2, -1), dice)
     log = log + drift(side, dice, n) + 0.01 * dice.noise(*log.shape)
     strength = lamps.tint.mean(-1)
@@ -88,7 +88,7 @@ def light_up(crowd: Crowd, who: torch.Tensor, albedo: torch.Tensor, props: Props
     found = fit_light(carried, radiance, lamps, tone * gains, normal, dice)
     maps = as_captured(log, apart, seen, found, dice)
     strong = (0.6 * strength.sum(1) / mean_over(diffuse, skin).mean(1).flatten().clamp_min(1e-6)).clamp_max(1)
-    return LitPeople(maps, even - tone.clamp_min(DARKEST).log(), lost, strong)
+    return LitPeople(maps, even - tone.clamp_min(MIN_LINEAR).log(), lost, strong)
 
 
 def _lamps(crowd: Crowd, who: torch.Tensor, sun: torch.Tensor, position: torch.Tensor, props: Props,

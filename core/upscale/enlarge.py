@@ -5,17 +5,15 @@ in strips with what they read around them. Without strips the tail's features at
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import load_file
 
-from ..contract import shipped_files
 from ..contract.messages import Problem
+from ..face.networks import has_files, read_network
 from ..imaging import images
 from .maps import HeadMaps
 from .network import CHANNELS, FACTOR, HALO, Rcan, bicubic
@@ -56,14 +54,10 @@ def channels_of(maps: HeadMaps) -> torch.Tensor:
 @cache
 def load_network(path: Path = WEIGHTS) -> Rcan:
     """The shipped network. Raises Problem where its files are missing."""
-    card = Path(path).with_suffix(".json")
-    if not (Path(path).is_file() and card.is_file()):
-        raise Problem(f"The upscaler's weights are missing ({Path(path).name}).",
+    if not has_files(path):
+        raise Problem(f"The upscaler's weights are missing ({path.name}).",
                       "Install the extension again, or choose Lanczos as the way to enlarge.")
-    shipped_files.require_whole(path)
-    network = Rcan(**json.loads(card.read_text(encoding="utf-8"))["model"])
-    network.load_state_dict({name: value.float() for name, value in load_file(path).items()})
-    return network.eval()
+    return read_network(Rcan, path)
 
 
 def _strip(network: Rcan, small: torch.Tensor, features: torch.Tensor, rows: slice) -> torch.Tensor:

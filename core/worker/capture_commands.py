@@ -9,51 +9,42 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..contract import artist_landmarks, deletion, report, settings, stages
+from ..contract import artist_landmarks, deletion, report, stages
 from ..contract.capture import Capture
 from ..contract.messages import Problem
-from .job import read_job
+from .commands import add_command
+from .job import last_settings
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def add_commands(commands) -> None:
     """Adds them to the subparsers of `python -m core`."""
-    status = commands.add_parser("status", help="say which stages of a capture are done")
-    status.add_argument("capture", metavar="CAPTURE", type=Path)
-    status.set_defaults(command=_status)
-    gone = commands.add_parser("delete",
-                               help="delete a face: all that WildCap wrote of it; without --yes, list what would go "
-                                    "and what would stay")
-    gone.add_argument("capture", metavar="CAPTURE", type=Path)
+    add_command(commands, "status", _status, "say which stages of a capture are done", "CAPTURE")
+    gone = add_command(commands, "delete", _delete,
+                       "delete a face: all that WildCap wrote of it; without --yes, list what would go and what would "
+                       "stay", "CAPTURE")
     gone.add_argument("--yes", action="store_true", help="delete it, for good")
-    gone.set_defaults(command=_delete)
-    about = commands.add_parser("report-problem",
-                                help="write a zip to send: logs, versions, settings; no pictures, names or paths")
+    about = add_command(commands, "report-problem", _report_problem,
+                        "write a zip to send: logs, versions, settings; no pictures, names or paths")
     about.add_argument("capture", metavar="CAPTURE", type=Path, nargs="?")
     about.add_argument("--to", metavar="ZIP", type=Path, required=True)
-    about.set_defaults(command=_report_problem)
     mask = commands.add_parser("mask", help="bring a painted shadow mask in")
     mask = mask.add_subparsers(required=True, metavar="import")
-    bring = mask.add_parser("import", help="make a picture the capture's shadow mask: white is shadow")
-    bring.add_argument("capture", metavar="CAPTURE", type=Path)
+    bring = add_command(mask, "import", _mask_import, "make a picture the capture's shadow mask: white is shadow",
+                        "CAPTURE")
     bring.add_argument("picture", metavar="PNG", type=Path)
-    bring.set_defaults(command=_mask_import)
     marks = commands.add_parser("landmarks", help="put landmarks by hand; they win over what was found")
     marks = marks.add_subparsers(required=True, metavar="set|free|import")
-    put = marks.add_parser("set", help="put one landmark at a place of the capture's world")
-    put.add_argument("capture", metavar="CAPTURE", type=Path)
+    put = add_command(marks, "set", _landmarks, "put one landmark at a place of the capture's world", "CAPTURE")
     put.add_argument("index", metavar="INDEX", help="0 to 467, as in landmarks.json")
     put.add_argument("position", metavar=("X", "Y", "Z"), nargs=3, type=float, help="metres")
-    put.set_defaults(command=_landmarks)
-    free = marks.add_parser("free", help="let the frames say again where a landmark is")
-    free.add_argument("capture", metavar="CAPTURE", type=Path)
+    free = add_command(marks, "free", _landmarks, "let the frames say again where a landmark is", "CAPTURE")
     free.add_argument("index", metavar="INDEX")
-    free.set_defaults(command=_landmarks, position=None)
-    many = marks.add_parser("import", help='take the points of a JSON file: {"points": {"152": [x, y, z]}}, metres')
-    many.add_argument("capture", metavar="CAPTURE", type=Path)
+    free.set_defaults(position=None)
+    many = add_command(marks, "import", _landmarks,
+                       'take the points of a JSON file: {"points": {"152": [x, y, z]}}, metres', "CAPTURE")
     many.add_argument("file", metavar="JSON", type=Path)
-    many.set_defaults(command=_landmarks)
 
 
 def _status(options: argparse.Namespace) -> int:
@@ -63,7 +54,7 @@ def _status(options: argparse.Namespace) -> int:
         raise Problem(f"There is no capture at {capture.root}.",
                       "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
     record = capture.read()
-    chosen = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()
+    chosen = last_settings(capture)
     print(f"source        {capture.source or 'none yet'}")
     for stage in stages.STAGES:
         finished, verdict = record["stages"].get(stage.name), capture.verdict(stage, chosen)

@@ -67,6 +67,12 @@ def read_job(path: Path) -> JobRequest:
                       "Start the job again from Blender or with `python -m core run`.") from error
 
 
+def last_settings(capture: Capture) -> Settings:
+    """Those of the capture's last job, by which its stages are judged; the defaults where there was none. Raises
+    Problem when its file is damaged."""
+    return read_job(capture.job).settings if capture.job.is_file() else Settings()
+
+
 def _check_names(root: Path, source: str | Path) -> None:
     """Raises Problem for a name that is no text, in the path of the capture or of its source, or of a photograph: no
     record could hold it."""

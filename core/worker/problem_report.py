@@ -34,7 +34,7 @@ from ..contract.frame_records import read_frames
 from ..contract.messages import Problem
 from ..contract.ownership import BOOKS, FIRST_FORMAT
 from . import doctor
-from .job import read_job
+from .job import last_settings
 
 LOG_BYTES = 256 << 10
 """Of each log, its end."""
@@ -176,8 +176,7 @@ def _described(capture: Capture | None) -> dict:
     if capture is None:
         return {}
     try:
-        record, chosen = (capture.read(),
-                          read_job(capture.job).settings if capture.job.is_file() else contract_settings.Settings())
+        record, chosen = capture.read(), last_settings(capture)
     except Problem as problem:
         return {"problem": str(problem)}
     done = {name: {"state": capture.state(stages.by_name(name), chosen),

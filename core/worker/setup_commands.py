@@ -13,6 +13,7 @@ from pathlib import Path
 from ..contract.messages import Done, Failed, Problem, Progress
 from . import index, installation, locks, wheels
 from .background import BackgroundTask
+from .commands import add_command
 from .environment import answer, python_of
 
 REQUIREMENTS = Path(__file__).resolve().parents[2] / "requirements"
@@ -21,22 +22,18 @@ POLL_S = 0.1
 
 def add_commands(commands) -> None:
     """Adds them to the subparsers of `python -m core`."""
-    install = commands.add_parser("install",
-                                  help="make the solver's environment from this Python, as Install Solver does")
+    install = add_command(commands, "install", _install,
+                          "make the solver's environment from this Python, as Install Solver does")
     install.add_argument("folder", metavar="FOLDER", type=Path,
                          help="new, empty, or one that an earlier installation began")
     install.add_argument("--wheels", metavar="FOLDER", type=Path,
                          help="a folder of wheels to install from, without a network")
     _add_build(install)
-    install.set_defaults(command=_install)
-    bring = commands.add_parser("wheels",
-                                help="download all wheels of a platform into a folder, to install from without a "
-                                     "network")
-    bring.add_argument("folder", metavar="FOLDER", type=Path)
+    bring = add_command(commands, "wheels", _wheels,
+                        "download all wheels of a platform into a folder, to install from without a network", "FOLDER")
     bring.add_argument("--for", dest="name", choices=locks.names(), metavar="PLATFORM-PYTHON",
                        help=f"{', '.join(locks.names())}; this machine and Python without it")
     _add_build(bring)
-    bring.set_defaults(command=_wheels)
 
 
 def _add_build(parser: argparse.ArgumentParser) -> None:

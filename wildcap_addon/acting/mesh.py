@@ -16,6 +16,7 @@ import numpy as np
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from .. import captures
+from ..data_blocks import read_field
 from ..head import OUTER
 from . import carrying, filmed, materials
 from .asset import GAZE, SIDES, FaceUnits, load
@@ -99,8 +100,7 @@ def follow(obj, head: np.ndarray, normals: np.ndarray) -> None:
 
 def _shape(obj, rest: np.ndarray, units: dict, normals: np.ndarray) -> None:
     keys = obj.data.shape_keys
-    before = np.empty(rest.size, np.float32)
-    keys.reference_key.data.foreach_get("co", before)
+    before = read_field(keys.reference_key.data, "co", 3)
     for key in keys.key_blocks:
         if key == keys.reference_key:
             continue
@@ -109,9 +109,7 @@ def _shape(obj, rest: np.ndarray, units: dict, normals: np.ndarray) -> None:
             shape = rest.copy()
             shape[rows] += moves
         else:  # one that the artist made: its displacements stay as they are
-            shape = np.empty(rest.size, np.float32)
-            key.data.foreach_get("co", shape)
-            shape = (shape - before).reshape(-1, 3) + rest
+            shape = read_field(key.data, "co", 3) - before + rest
         key.data.foreach_set("co", shape.astype(np.float32).ravel())
     keys.reference_key.data.foreach_set("co", rest.astype(np.float32).ravel())
     obj.data.vertices.foreach_set("co", rest.astype(np.float32).ravel())
@@ -147,8 +145,7 @@ def _check(obj, asset: FaceUnits) -> None:
 
 def is_built_in(obj, asset: FaceUnits) -> bool:
     """Whether its mesh is the built-in head's, not cut open yet."""
-    corners = np.empty(len(obj.data.loops), np.int32)
-    obj.data.loops.foreach_get("vertex_index", corners)
+    corners = read_field(obj.data.loops, "vertex_index", kind=np.int32)
     return len(obj.data.vertices) == len(asset.template) and np.array_equal(corners, asset.triangles.ravel())
 
 
@@ -160,17 +157,16 @@ def _built(old, asset: FaceUnits, rest: np.ndarray):
     inner = [[i for i in face if i >= 0] for face in asset.faces.tolist()]
     mesh = bpy.data.meshes.new(old.name)
     mesh.from_pydata(rest, [], triangles.tolist() + inner)
-    uv = np.empty(2 * len(old.loops), np.float32)
-    old.uv_layers[0].data.foreach_get("uv", uv)
+    uv = read_field(old.uv_layers[0].data, "uv", 2)
     first = len(rest) - len(asset.parts)
     known = np.zeros((len(rest), 2))  # of each vertex of the seams, by its side
-    np.put_along_axis(known, triangles.ravel()[:, None].repeat(2, 1), uv.reshape(-1, 2), 0)
+    np.put_along_axis(known, triangles.ravel()[:, None].repeat(2, 1), uv, 0)
     known[first:] = asset.uvs
     corners = np.concatenate([np.array(face) for face in inner])
     tile = np.repeat(asset.slots, [len(face) for face in inner])
     extra = known[corners] + np.stack([tile, 0 * tile], 1)
     layer = mesh.uv_layers.new(name=old.uv_layers[0].name)
-    layer.data.foreach_set("uv", np.concatenate([uv, extra.astype(np.float32).ravel()]))
+    layer.data.foreach_set("uv", np.concatenate([uv, extra.astype(np.float32)]).ravel())
     mesh.polygons.foreach_set("material_index",
                               np.concatenate([np.zeros(len(triangles), np.int32), asset.slots.astype(np.int32)]))
     mesh.shade_smooth()
@@ -190,23 +186,19 @@ def _attributes(old, new, asset: FaceUnits) -> None:
             and not attribute.is_required
         ):
             field, width = LAYOUT[attribute.data_type]
-            values = np.empty((len(old.vertices), width), np.float32)
-            attribute.data.foreach_get(field, values.ravel())
-            every = np.concatenate([values, values[asset.copies], np.zeros((len(asset.parts), width), np.float32)])
+            values = read_field(attribute.data, field, width)
+            inner = np.zeros((len(asset.parts), *values.shape[1:]), np.float32)
+            every = np.concatenate([values, values[asset.copies], inner])
             new.attributes.new(attribute.name, attribute.data_type, 'POINT').data.foreach_set(field, every.ravel())
 
 
 def _vertices(mesh) -> np.ndarray:
-    co = np.empty(3 * len(mesh.vertices), np.float32)
-    mesh.vertices.foreach_get("co", co)
-    return co.reshape(-1, 3).astype(np.float64)
+    return read_field(mesh.vertices, "co", 3).astype(np.float64)
 
 
 def _corner_normals(mesh) -> np.ndarray:
     """Normals [L, 3] at the corners of the head before it was cut: along the seams they are those of a closed face."""
-    normals = np.empty(3 * len(mesh.loops), np.float32)
-    mesh.corner_normals.foreach_get("vector", normals)
-    return normals.reshape(-1, 3)
+    return read_field(mesh.corner_normals, "vector", 3)
 
 
 def _set_normals(mesh, normals: np.ndarray) -> None:

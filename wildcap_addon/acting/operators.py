@@ -7,7 +7,7 @@ import bpy
 
 from ...core.contract.messages import Problem
 from .. import captures, head
-from ..base_operator import BaseOperator
+from ..base_operator import HeadOperator
 from . import gaze, materials, mesh
 from .close_up import building
 
@@ -16,13 +16,7 @@ OPEN = 0.22
 """Height over width of an eye from which the registration takes it for open (core/registration/eyes.py)."""
 
 
-class _OnHead(BaseOperator):
-    @classmethod
-    def poll(cls, context):
-        return cls.in_object_mode(context) and cls.with_capture(context)
-
-
-class WILDCAP_OT_add_face_units(_OnHead, bpy.types.Operator):
+class WILDCAP_OT_add_face_units(HeadOperator, bpy.types.Operator):
     """Open the head's lips and lids, put eyes and a mouth behind them, and give it ARKit's face units as shape keys"""
 
     bl_idname = "wildcap.add_face_units"
@@ -43,7 +37,7 @@ class WILDCAP_OT_add_face_units(_OnHead, bpy.types.Operator):
         self.warn(filmed_open(captures.folder(item)))
 
 
-class WILDCAP_OT_iris(_OnHead, bpy.types.Operator):
+class WILDCAP_OT_iris(HeadOperator, bpy.types.Operator):
     """Colour of the eyes"""
 
     bl_idname = "wildcap.iris"
@@ -58,7 +52,7 @@ class WILDCAP_OT_iris(_OnHead, bpy.types.Operator):
         materials.recolour(obj, mesh.filmed_iris(obj) if self.iris == FILMED[0] else self.iris)
 
 
-class WILDCAP_OT_rest_face(_OnHead, bpy.types.Operator):
+class WILDCAP_OT_rest_face(HeadOperator, bpy.types.Operator):
     """Bring all face units back to zero and the lids to where they were filmed"""
 
     bl_idname = "wildcap.rest_face"
@@ -69,7 +63,7 @@ class WILDCAP_OT_rest_face(_OnHead, bpy.types.Operator):
         mesh.rest(_acting(context))
 
 
-class _Toggle(_OnHead):
+class _Toggle(HeadOperator):
     """Mixin: adds to the head what the module `switched` makes, or takes it away again."""
 
     bl_options = {'REGISTER', 'UNDO'}

@@ -13,7 +13,7 @@ from ...core.batch.record import GATES, Batch, read_batch
 from ...core.batch.state import WAITING
 from ...core.contract.messages import Problem
 from .. import batches, captures, jobs, preferences
-from ..base_operator import BaseOperator
+from ..base_operator import BaseOperator, FileOperator
 from . import planning, running, walking
 
 
@@ -84,7 +84,7 @@ class WILDCAP_OT_cancel_batch(BaseOperator, bpy.types.Operator):
         running.cancel()
 
 
-class WILDCAP_OT_open_batch(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_open_batch(FileOperator, bpy.types.Operator):
     """Open the folder of a batch, also of one that was planned and run from a terminal or on a farm: its faces come
     into the list of captures"""
 
@@ -97,8 +97,7 @@ class WILDCAP_OT_open_batch(BaseOperator, bpy.types.Operator):
     def invoke(self, context, event):
         if self.directory:
             return self.execute(context)
-        context.window_manager.fileselect_add(self)
-        return {'RUNNING_MODAL'}
+        return super().invoke(context, event)
 
     def work(self, context):
         batch = read_batch(Path(bpy.path.abspath(self.directory)))

@@ -9,10 +9,10 @@ import bpy
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from .. import captures, links
-from ..base_operator import BaseOperator
+from ..base_operator import CaptureOperator, FileOperator
 
 
-class WILDCAP_OT_open_capture(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_open_capture(FileOperator, bpy.types.Operator):
     """Open a capture folder that exists"""
 
     bl_idname = "wildcap.open_capture"
@@ -20,10 +20,6 @@ class WILDCAP_OT_open_capture(BaseOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     directory: bpy.props.StringProperty(subtype='DIR_PATH')
-
-    def invoke(self, context, event):
-        context.window_manager.fileselect_add(self)
-        return {'RUNNING_MODAL'}
 
     def work(self, context):
         root = Path(bpy.path.abspath(self.directory)).absolute()
@@ -34,7 +30,7 @@ class WILDCAP_OT_open_capture(BaseOperator, bpy.types.Operator):
         captures.add(context, root)
 
 
-class WILDCAP_OT_locate_capture(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_locate_capture(FileOperator, CaptureOperator, bpy.types.Operator):
     """Find the folder of a capture that was moved: beside the .blend, among your captures, or where you say; others
     that moved along are found, too"""
 
@@ -44,16 +40,11 @@ class WILDCAP_OT_locate_capture(BaseOperator, bpy.types.Operator):
 
     directory: bpy.props.StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE'})
 
-    @classmethod
-    def poll(cls, context):
-        return cls.with_capture(context)
-
     def invoke(self, context, event):
         item = captures.require(context)
         if not captures.folder(item).root.is_dir() and links.find(item) is not None:
             return self.execute(context)
-        context.window_manager.fileselect_add(self)
-        return {'RUNNING_MODAL'}
+        return super().invoke(context, event)
 
     def work(self, context):
         item = captures.require(context)
@@ -76,16 +67,12 @@ class WILDCAP_OT_locate_capture(BaseOperator, bpy.types.Operator):
                 links.move(other, place.parent / Path(other.path).name)
 
 
-class WILDCAP_OT_close_capture(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_close_capture(CaptureOperator, bpy.types.Operator):
     """Take the capture off this list; its folder stays"""
 
     bl_idname = "wildcap.close_capture"
     bl_label = "Close Capture"
     bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context):
-        return cls.with_capture(context)
 
     def work(self, context):
         props = context.scene.wildcap
@@ -95,15 +82,11 @@ class WILDCAP_OT_close_capture(BaseOperator, bpy.types.Operator):
         props.active_index = max(0, min(index, len(props.captures) - 1))
 
 
-class WILDCAP_OT_open_report(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_open_report(CaptureOperator, bpy.types.Operator):
     """Open the report in the browser: a picture and the figures of every stage, and what is wrong with the video"""
 
     bl_idname = "wildcap.open_report"
     bl_label = "Open Report"
-
-    @classmethod
-    def poll(cls, context):
-        return cls.with_capture(context)
 
     def work(self, context):
         report = captures.folder(captures.require(context)).report

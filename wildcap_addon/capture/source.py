@@ -12,7 +12,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from .. import captures, preferences, problems
-from ..base_operator import BaseOperator
+from ..base_operator import FileOperator
 from ..base_panel import WildcapPanel
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm")
@@ -22,7 +22,7 @@ WIDTH = 240
 """Of the file browser's sidebar, pixels."""
 
 
-class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
     """Choose the video of a face, or any one of its photographs: all in that folder are used. A capture folder is made
     for it"""
 
@@ -39,8 +39,7 @@ class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
     def invoke(self, context, event):
         if self.filepath or self.files:  # dropped
             return self.execute(context)
-        context.window_manager.fileselect_add(self)
-        return {'RUNNING_MODAL'}
+        return super().invoke(context, event)
 
     def draw(self, context):
         """Beside the file browser."""

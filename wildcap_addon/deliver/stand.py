@@ -13,12 +13,12 @@ from math import floor
 from pathlib import Path
 
 import bpy
-import numpy as np
 from mathutils import Matrix
 
 from ...core.contract.delivery_plan import PACKING, DeliveryPlan
 from ...core.contract.messages import Problem
 from .. import captures, colours, head, node_trees
+from ..data_blocks import read_field
 
 SCENE = "WildCap Delivery"
 HEAD_TILE = 1001
@@ -92,9 +92,7 @@ def _mean_colour(data: bpy.types.Curves) -> list[float]:
     attribute = data.attributes.get(captures.HAIR_COLOUR)
     if attribute is None or not attribute.data:
         return [0.8] * 3
-    colours_of = np.empty(4 * len(attribute.data), np.float32)
-    attribute.data.foreach_get("color", colours_of)
-    return colours_of.reshape(-1, 4)[:, :3].mean(0).tolist()
+    return read_field(attribute.data, "color", 4)[:, :3].mean(0).tolist()
 
 
 def require_eyes(plan: DeliveryPlan, obj: bpy.types.Object | None) -> None:
@@ -112,18 +110,15 @@ def _lids(mesh) -> list:
 
 def _open_eyes(obj) -> None:
     """The head of an object with its lids open for good, and without shape keys."""
-    count = 3 * len(obj.data.vertices)
-    rest, place = np.empty(count, np.float32), np.empty(count, np.float32)
-    obj.data.shape_keys.reference_key.data.foreach_get("co", rest)
+    rest = read_field(obj.data.shape_keys.reference_key.data, "co", 3)
     opened = rest.copy()
     for key in _lids(obj.data):
-        key.data.foreach_get("co", place)
-        opened += place - rest
+        opened += read_field(key.data, "co", 3) - rest
     keys = obj.data.shape_keys
     obj.shape_key_clear()
     if keys in set(bpy.data.shape_keys):  # nobody's any more, and Blender keeps it until the file is read again
         bpy.data.batch_remove([keys])
-    obj.data.vertices.foreach_set("co", opened)
+    obj.data.vertices.foreach_set("co", opened.ravel())
     obj.data.update()
 
 

@@ -16,6 +16,7 @@ from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
 from .. import captures, head, local_view, node_trees
+from ..data_blocks import read_field, replace_data
 
 TITLES = {"brows": "Brows", "lashes": "Lashes", "beard": "Beard"}
 GROWN, MATERIAL = "wildcap_grown", "wildcap_hair_material"
@@ -52,13 +53,7 @@ def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour
         hair.parent = obj
         hair[captures.HAIR_KEY] = part
     else:
-        old, hair.data = hair.data, data
-        for material in old.materials:
-            data.materials.append(material)
-        name = old.name
-        if old.users == 0:  # the artist may have put it to another use
-            bpy.data.hair_curves.remove(old)
-            data.name = name
+        replace_data(hair, data, bpy.data.hair_curves)
     if not data.materials:
         data.materials.append(_material(f"{obj.name} Hair", colour.mean(0)))
     _root(hair, obj)
@@ -127,10 +122,9 @@ def _rooting_uvs(mesh) -> str:
     """The name of the UV map in which each place of the skin is the only one with its UVs, made where there is none."""
     if head.OUTER in mesh and head.HAIR_UVS not in mesh.uv_layers:
         active = mesh.uv_layers.active_index
-        uv = np.empty(2 * len(mesh.loops), np.float32)
-        mesh.uv_layers[0].data.foreach_get("uv", uv)
-        uv[2 * mesh.polygons[mesh[head.OUTER]].loop_start:] += INNER_TILE
-        mesh.uv_layers.new(name=head.HAIR_UVS, do_init=False).data.foreach_set("uv", uv)
+        uv = read_field(mesh.uv_layers[0].data, "uv", 2)
+        uv[mesh.polygons[mesh[head.OUTER]].loop_start:] += INNER_TILE
+        mesh.uv_layers.new(name=head.HAIR_UVS, do_init=False).data.foreach_set("uv", uv.ravel())
         mesh.uv_layers.active_index = active
     return head.HAIR_UVS if head.OUTER in mesh else mesh.uv_layers[0].name
 
@@ -165,21 +159,12 @@ def _skin(mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Triangles [F, 3] of the head's own skin at rest, the places of all vertices [V, 3], and the triangles' UVs [F, 3,
     2]."""
     mesh.calc_loop_triangles()
-    triangles = mesh.loop_triangles
-    corners, loops, polygons = (np.empty(count, np.int32)
-                                for count in (3 * len(triangles), 3 * len(triangles), len(triangles)))
-    triangles.foreach_get("vertices", corners)
-    triangles.foreach_get("loops", loops)
-    triangles.foreach_get("polygon_index", polygons)
-    places, uvs = np.empty(3 * len(mesh.vertices), np.float32), np.empty(2 * len(mesh.loops), np.float32)
-    (mesh.shape_keys.reference_key.data if mesh.shape_keys else mesh.vertices).foreach_get("co", places)
-    mesh.uv_layers[0].data.foreach_get("uv", uvs)
+    corners, loops, polygons = (read_field(mesh.loop_triangles, field, width, np.int32)
+                                for field, width in (("vertices", 3), ("loops", 3), ("polygon_index", 1)))
+    places = read_field(mesh.shape_keys.reference_key.data if mesh.shape_keys else mesh.vertices, "co", 3)
+    uvs = read_field(mesh.uv_layers[0].data, "uv", 2)
     skin = polygons < mesh.get(head.OUTER, len(mesh.polygons))
-    return (
-        corners.reshape(-1, 3)[skin],
-        places.reshape(-1, 3).astype(np.float64),
-        uvs.reshape(-1, 2)[loops.reshape(-1, 3)[skin]].astype(np.float64),
-    )
+    return corners[skin], places.astype(np.float64), uvs[loops[skin]].astype(np.float64)
 
 
 def _deform_group() -> bpy.types.NodeTree:
@@ -224,15 +209,11 @@ def _attribute(data, name: str, kind: str, domain: str):
 
 def _offsets(data) -> np.ndarray:
     """Where each curve's points begin, and the end, [M + 1]."""
-    offsets = np.empty(len(data.curve_offset_data), np.int32)
-    data.curve_offset_data.foreach_get("value", offsets)
-    return offsets
+    return read_field(data.curve_offset_data, "value", kind=np.int32)
 
 
 def _read(attribute, field: str, width: int) -> np.ndarray:
-    values = np.empty(width * len(attribute.data), np.float32)
-    attribute.data.foreach_get(field, values)
-    return values.reshape(-1, width).astype(np.float64)
+    return read_field(attribute.data, field, width).astype(np.float64)
 
 
 def _digest(data) -> str:

@@ -12,7 +12,7 @@ from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from ...core.contract.stages import STRANDS, advise_again
 from .. import captures, status
-from ..base_operator import BaseOperator
+from ..base_operator import HeadOperator
 from . import curves
 
 BEARD_MM = 6.0
@@ -22,7 +22,7 @@ MOST_BYTES = 256 << 20
 AGAIN = advise_again("upscale")
 
 
-class WILDCAP_OT_grow_hair(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
     """Grow brows, lashes and beard as hair curves from the capture's masks, over the skin below them; what you combed
     since stays as it is"""
 
@@ -40,10 +40,6 @@ class WILDCAP_OT_grow_hair(BaseOperator, bpy.types.Operator):
                                        min=0.2, max=4.0)
     share: bpy.props.FloatProperty(name="Share", description="How many of the hairs are grown", default=1.0, min=0.02,
                                    max=1.0, subtype='FACTOR')
-
-    @classmethod
-    def poll(cls, context):
-        return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
         item = captures.require(context)

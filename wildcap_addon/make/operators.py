@@ -5,18 +5,12 @@
 import bpy
 
 from ...core.contract.messages import Problem
-from .. import captures, jobs
-from ..base_operator import BaseOperator
+from .. import captures
+from ..base_operator import JobOperator
 from . import results
 
 
-class _Making(BaseOperator):
-    @classmethod
-    def poll(cls, context):
-        return jobs.can_start(cls, context)
-
-
-class WILDCAP_OT_make_my_head(_Making, bpy.types.Operator):
+class WILDCAP_OT_make_my_head(JobOperator, bpy.types.Operator):
     """Do all from the video or the photographs to a relit head: reconstruct, solve with the proposed shadow mask, put
     the maps on the head, render it"""
 
@@ -32,7 +26,7 @@ class WILDCAP_OT_make_my_head(_Making, bpy.types.Operator):
         results.begin(item)
 
 
-class WILDCAP_OT_accept_proposal(_Making, bpy.types.Operator):
+class WILDCAP_OT_accept_proposal(JobOperator, bpy.types.Operator):
     """Solve with the shadow mask that was found by itself, or as it was painted, and go on to a relit head; painting it
     and solving again stays possible"""
 

@@ -8,14 +8,14 @@ from ...core.contract import stages
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from .. import captures, jobs
-from ..base_operator import BaseOperator
+from ..base_operator import BaseOperator, CaptureOperator
 from . import edits, mask_image, session
 
 EDITS = {"GROW": edits.grow, "SHRINK": edits.shrink, "SOFTEN": edits.soften, "MIRROR": edits.mirror,
          "INVERT": edits.invert, "CLEAR": edits.clear}
 
 
-class WILDCAP_OT_paint_mask(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_paint_mask(CaptureOperator, bpy.types.Operator):
     """Paint where the shadow is (red), or what must be kept as skin (green): Ctrl takes away; on the head or on a flat
     sheet of its texture"""
 
@@ -32,10 +32,6 @@ class WILDCAP_OT_paint_mask(BaseOperator, bpy.types.Operator):
         items=[('SHADOW', "Shadow", "Where a shadow is baked into the texture"),
                ('PROTECT', "Protect",
                 "Moles, scars and make-up that the solver must not take for shadow; it wins over the shadow mask")])
-
-    @classmethod
-    def poll(cls, context):
-        return cls.with_capture(context)
 
     def work(self, context):
         session.begin(context, captures.require(context), self.on == 'SHEET', self.mask)

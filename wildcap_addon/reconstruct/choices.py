@@ -10,7 +10,7 @@ import bpy
 from ...core.contract.files import storage_problem
 from ...core.contract.messages import Problem
 from .. import bring_back, captures
-from ..base_operator import BaseOperator
+from ..base_operator import BaseOperator, CaptureOperator, FileOperator
 from . import delighters
 
 
@@ -57,7 +57,7 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
         item.registration.template = str(path)
 
 
-class WILDCAP_OT_choose_template(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_choose_template(FileOperator, CaptureOperator, bpy.types.Operator):
     """Fit a head mesh of your own, too: an OBJ, or a folder with a neutral OBJ and its shapes, as ICT-FaceKit. Maps are
     baked into its UVs"""
 
@@ -67,14 +67,6 @@ class WILDCAP_OT_choose_template(BaseOperator, bpy.types.Operator):
 
     filepath: bpy.props.StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
     filter_glob: bpy.props.StringProperty(default="*.obj;*.OBJ", options={'HIDDEN'})
-
-    @classmethod
-    def poll(cls, context):
-        return cls.with_capture(context)
-
-    def invoke(self, context, event):
-        context.window_manager.fileselect_add(self)
-        return {'RUNNING_MODAL'}
 
     def work(self, context):
         path = Path(bpy.path.abspath(self.filepath)).absolute()
@@ -104,7 +96,7 @@ class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
         captures.require(context).registration.template = ""
 
 
-class WILDCAP_OT_compare_delit(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_compare_delit(CaptureOperator, bpy.types.Operator):
     """Show a frame before and after its light was taken out; click again for the next one"""
 
     bl_idname = "wildcap.compare_delit"
@@ -112,10 +104,6 @@ class WILDCAP_OT_compare_delit(BaseOperator, bpy.types.Operator):
 
     which: bpy.props.IntProperty(name="Frame", default=-1, options={'SKIP_SAVE'},
                                  description="Which of the delit frames; -1: the next one")
-
-    @classmethod
-    def poll(cls, context):
-        return cls.with_capture(context)
 
     def work(self, context):
         item = captures.require(context)

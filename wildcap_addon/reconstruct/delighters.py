@@ -16,6 +16,7 @@ from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from ...core.contract.stages import advise_again
 from .. import colours
+from ..data_blocks import read_pixels
 
 SIDE = 256
 """Of the square icon, pixels"""
@@ -91,13 +92,12 @@ def _read(path: Path) -> np.ndarray:
     try:
         scale = SIDE / max(1, *image.size)
         image.scale(max(1, round(image.size[0] * scale)), max(1, round(image.size[1] * scale)))
-        width, height = image.size
-        pixels = np.empty(width * height * image.channels, np.float32)
-        image.pixels.foreach_get(pixels)
+        pixels = read_pixels(image)
     finally:
         bpy.data.images.remove(image)
     square = np.zeros((SIDE, SIDE, 4), np.float32)
+    height, width = pixels.shape[:2]
     left, low = (SIDE - width) // 2, (SIDE - height) // 2
-    square[low:low + height, left:left + width, :3] = pixels.reshape(height, width, -1)[..., :3]
+    square[low:low + height, left:left + width, :3] = pixels[..., :3]
     square[low:low + height, left:left + width, 3] = 1
     return square

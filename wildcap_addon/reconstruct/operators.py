@@ -7,11 +7,11 @@ import bpy
 from ...core.contract import stages
 from ...core.contract.messages import Problem
 from .. import bring_back, captures, head, jobs
-from ..base_operator import BaseOperator
+from ..base_operator import BaseOperator, HeadOperator, JobOperator
 from . import evidence, landmarks
 
 
-class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_reconstruct(JobOperator, bpy.types.Operator):
     """Turn the video into a textured head and propose its shadow mask; finished stages are not done twice"""
 
     bl_idname = "wildcap.reconstruct"
@@ -28,10 +28,6 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
         after_mask = stages.NAMES.index(properties.first) > stages.NAMES.index(stages.MASK_STAGE)
         end = "to the end" if after_mask else "up to the mask"
         return f"Run from the stage {stages.by_name(properties.first).label}, also where it is done, {end}"
-
-    @classmethod
-    def poll(cls, context):
-        return jobs.can_start(cls, context)
 
     def work(self, context):
         item = captures.require(context)
@@ -66,16 +62,12 @@ class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
         jobs.cancel(root if jobs.of(root) else "")
 
 
-class WILDCAP_OT_bring_in_head(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_bring_in_head(HeadOperator, bpy.types.Operator):
     """Bring the reconstructed head into this scene, or update it in place"""
 
     bl_idname = "wildcap.bring_in_head"
     bl_label = "Bring In Head"
     bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context):
-        return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
         item = captures.require(context)
@@ -85,7 +77,7 @@ class WILDCAP_OT_bring_in_head(BaseOperator, bpy.types.Operator):
             head.look_at(context, obj)
 
 
-class WILDCAP_OT_bring_in_cameras(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_bring_in_cameras(HeadOperator, bpy.types.Operator):
     """Bring in the cameras that took the frames, each with its frame behind the head; or update them in place"""
 
     bl_idname = "wildcap.bring_in_cameras"
@@ -95,42 +87,30 @@ class WILDCAP_OT_bring_in_cameras(BaseOperator, bpy.types.Operator):
     every: bpy.props.BoolProperty(name="Every Frame", default=False,
                                   description="All registered frames; off: those that the texture is made from")
 
-    @classmethod
-    def poll(cls, context):
-        return cls.in_object_mode(context) and cls.with_capture(context)
-
     def work(self, context):
         item = captures.require(context)
         if not bring_back.begin(self, item, "frames/"):
             evidence.bring_in_cameras(context, item, self.every)
 
 
-class WILDCAP_OT_bring_in_scan(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_bring_in_scan(HeadOperator, bpy.types.Operator):
     """Bring in the scan that the head was fitted to, or update it in place"""
 
     bl_idname = "wildcap.bring_in_scan"
     bl_label = "Bring In Scan"
     bl_options = {'REGISTER', 'UNDO'}
 
-    @classmethod
-    def poll(cls, context):
-        return cls.in_object_mode(context) and cls.with_capture(context)
-
     def work(self, context):
         evidence.bring_in_scan(context, captures.require(context))
 
 
-class WILDCAP_OT_show_landmarks(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_show_landmarks(HeadOperator, bpy.types.Operator):
     """Show the landmarks that placed the head as small spheres on it: move those that are wrong, then click Fit Head
     Again"""
 
     bl_idname = "wildcap.show_landmarks"
     bl_label = "Show Landmarks"
     bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context):
-        return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
         landmarks.show(context, captures.require(context))

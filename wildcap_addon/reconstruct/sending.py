@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core.contract import consent
 from ...core.contract.messages import Problem
 from .. import captures, frame_icons, preferences, properties
-from ..base_operator import BaseOperator, Dialog
+from ..base_operator import CaptureOperator, Dialog
 
 COLUMNS, SCALE = 6, 4.0
 """Of the pictures in the dialog: how many side by side, and how many buttons high each is."""
@@ -52,16 +52,12 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
         consent.give(captures.folder(item), now)
 
 
-class WILDCAP_OT_withdraw_consent(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_withdraw_consent(CaptureOperator, bpy.types.Operator):
     """Take your consent back: no frame of this capture is sent any more. What SwitchLight has answered stays in the
     capture"""
 
     bl_idname = "wildcap.withdraw_consent"
     bl_label = "Withdraw Consent"
-
-    @classmethod
-    def poll(cls, context):
-        return cls.with_capture(context)
 
     def work(self, context):
         consent.withdraw(captures.folder(captures.require(context)))

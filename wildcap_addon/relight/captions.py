@@ -6,6 +6,8 @@ window, no scene and no render is needed."""
 import bpy
 import numpy as np
 
+from ..data_blocks import read_field
+
 FONT = 0.52
 """Size of the letters as a share of a line's height"""
 FINE = 4
@@ -34,10 +36,7 @@ def _triangles(word: str) -> np.ndarray:
     mesh = bpy.data.meshes.new_from_object(obj)
     try:
         mesh.calc_loop_triangles()
-        points, corners = np.empty(3 * len(mesh.vertices), np.float32), np.empty(3 * len(mesh.loop_triangles), np.int32)
-        mesh.vertices.foreach_get("co", points)
-        mesh.loop_triangles.foreach_get("vertices", corners)
-        return points.reshape(-1, 3)[corners.reshape(-1, 3), :2]
+        return read_field(mesh.vertices, "co", 3)[read_field(mesh.loop_triangles, "vertices", 3, np.int32), :2]
     finally:
         bpy.data.meshes.remove(mesh)
         bpy.data.curves.remove(text)  # takes its object along

@@ -13,6 +13,7 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract.files import place_file
+from ..data_blocks import load_pixels
 from ..properties import LIGHTS
 from . import captions, lights, output, picture, reel
 
@@ -58,21 +59,10 @@ def _joined(paths: list[Path], strips: list[np.ndarray], size: int) -> np.ndarra
     strips = [GROUND + (1 - GROUND) * np.repeat(strip, 3, 2) for strip in strips]
     rows = []
     for i, strip in zip(range(0, len(paths), COLUMNS), strips, strict=False):
-        cells = [_read(path) for path in paths[i:i + COLUMNS]]
+        cells = [load_pixels(path)[..., :3] for path in paths[i:i + COLUMNS]]
         cells += [np.full((size, size, 3), GROUND, np.float32)] * (COLUMNS - len(cells))
         rows += [np.hstack(cells), strip]
     return np.vstack([*rows, strips[-1]][::-1])
-
-
-def _read(path: Path) -> np.ndarray:
-    """A picture's numbers [H, W, 3] as they are in the file, rows from the bottom."""
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.is_data = True
-    pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
-    image.pixels.foreach_get(pixels)
-    shape = image.size[1], image.size[0], 4
-    bpy.data.images.remove(image)
-    return pixels.reshape(shape)[..., :3]
 
 
 def _save(pixels: np.ndarray, path: Path) -> None:

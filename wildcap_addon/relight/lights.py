@@ -13,6 +13,7 @@ from math import radians
 import bpy
 from mathutils import Matrix, Vector
 
+from ..data_blocks import stop_animation
 from ..hdri import Hdri, light_with
 from . import sky
 
@@ -92,19 +93,11 @@ def build(scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radiu
 def clear(scene: bpy.types.Scene) -> None:
     """Takes the lamps away, and what carried them."""
     for obj in [o for o in scene.objects if o.type in ('LIGHT', 'EMPTY') and o.name.startswith("WildCap ")]:
-        stop(obj)
+        stop_animation(obj)
         if obj.data is not None:
             bpy.data.lights.remove(obj.data)  # takes its object along
         else:
             bpy.data.objects.remove(obj)
-
-
-def stop(thing: bpy.types.ID) -> None:
-    """Takes away what moved it over the frames."""
-    action = thing.animation_data.action if thing.animation_data else None
-    thing.animation_data_clear()
-    if action is not None and action.users == 0:
-        bpy.data.actions.remove(action)
 
 
 def rig(scene: bpy.types.Scene) -> bpy.types.Object | None:

@@ -5,12 +5,12 @@
 import bpy
 
 from .. import captures, colours, hdri
-from ..base_operator import BaseOperator
+from ..base_operator import BaseOperator, HeadOperator
 from . import contact_sheet, headless, material, output
 from .picture import RenderSettings
 
 
-class WILDCAP_OT_assemble_material(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_assemble_material(HeadOperator, bpy.types.Operator):
     """Put the solved maps into a skin material on the head; again in place, keeping the values you set"""
 
     bl_idname = "wildcap.assemble_material"
@@ -19,10 +19,6 @@ class WILDCAP_OT_assemble_material(BaseOperator, bpy.types.Operator):
 
     unless_edited: bpy.props.BoolProperty(description="Leave a material alone that somebody changed",
                                           options={'HIDDEN', 'SKIP_SAVE'})
-
-    @classmethod
-    def poll(cls, context):
-        return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
         item = captures.require(context)

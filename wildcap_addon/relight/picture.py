@@ -12,6 +12,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .. import captures, colours
+from ..data_blocks import stop_animation
 from ..hdri import Hdri
 from . import lights
 from .output import SCENE, view_label
@@ -93,7 +94,7 @@ def _camera(scene, frame: Matrix, radius: float) -> None:
         camera = bpy.data.objects.new(data.name, data)
         scene.collection.objects.link(camera)
         scene.camera = camera
-    lights.stop(camera)
+    stop_animation(camera)
     camera.data.lens = FOCAL_LENGTH_MM
     direction = Vector(CAMERA_DIRECTION).normalized()
     distance = radius * 1.12 / tan(camera.data.angle / 2)

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.contract import skin_regions
+from ..data_blocks import load_pixels, read_field
 
 ATTRIBUTE = "wildcap_roughness"
 MASKS = Path(__file__).resolve().parents[2] / "core" / "assets" / "masks"
@@ -22,13 +23,11 @@ SHARES = skin_regions.ROUGHNESS
 def write(mesh: bpy.types.Mesh) -> None:
     """Writes the attribute: 0 is the cheeks' roughness, -0.2 a fifth less. The mesh has the built-in head's UVs; what
     has none of its own stays 0."""
-    uvs, corners = np.empty(2 * len(mesh.loops), np.float32), np.empty(len(mesh.loops), np.int32)
-    mesh.uv_layers[0].data.foreach_get("uv", uvs)
-    mesh.loops.foreach_get("vertex_index", corners)
     shares = _shares()
-    texel = np.clip((uvs.reshape(-1, 2) * len(shares)).astype(int), 0, len(shares) - 1)
+    uvs = read_field(mesh.uv_layers[0].data, "uv", 2)
+    texel = np.clip((uvs * len(shares)).astype(int), 0, len(shares) - 1)
     values = np.zeros(len(mesh.vertices), np.float32)
-    values[corners] = shares[texel[:, 1], texel[:, 0]]
+    values[read_field(mesh.loops, "vertex_index", kind=np.int32)] = shares[texel[:, 1], texel[:, 0]]
     attribute = mesh.attributes.get(ATTRIBUTE)
     if attribute is not None and (attribute.domain, attribute.data_type) != ('POINT', 'FLOAT'):
         mesh.attributes.remove(attribute)
@@ -41,7 +40,8 @@ def write(mesh: bpy.types.Mesh) -> None:
 @cache
 def _shares() -> np.ndarray:
     """[S, S], rows from the bottom as v goes."""
-    masks = {name: _mask(name) for name in ("face", "brows", "neck", "ears", "scalp", "nose", "eyes", "lips")}
+    masks = {name: load_pixels(MASKS / f"{name}.png")[::STEP, ::STEP, 0]
+             for name in ("face", "brows", "neck", "ears", "scalp", "nose", "eyes", "lips")}
     rows = np.arange(len(masks["face"]))
     above = np.clip((rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max())
                     / (skin_regions.FOREHEAD_FADE * len(rows)), 0, 1)
@@ -50,13 +50,3 @@ def _shares() -> np.ndarray:
     for name, share in SHARES.items():
         result += masks[name] * (share - result)
     return result
-
-
-def _mask(name: str) -> np.ndarray:
-    image = bpy.data.images.load(str(MASKS / f"{name}.png"))
-    image.colorspace_settings.is_data = True
-    pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
-    image.pixels.foreach_get(pixels)
-    width, height = image.size
-    bpy.data.images.remove(image)
-    return pixels.reshape(height, width, 4)[::STEP, ::STEP, 0].copy()

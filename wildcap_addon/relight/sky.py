@@ -12,6 +12,7 @@ import bpy
 from mathutils import Matrix
 
 from .. import node_trees
+from ..data_blocks import stop_animation
 
 WORLD = "WildCap Relight"
 HORIZON_BLEND = 0.04
@@ -38,10 +39,7 @@ def world() -> bpy.types.World:
     """The relight scene's world, with a background at strength 1 and nothing before it."""
     found = bpy.data.worlds.get(WORLD) or bpy.data.worlds.new(WORLD)
     tree = node_trees.of(found)
-    action = tree.animation_data.action if tree.animation_data else None
-    tree.animation_data_clear()
-    if action is not None and action.users == 0:
-        bpy.data.actions.remove(action)
+    stop_animation(tree)
     for node in [n for n in tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:
         tree.nodes.remove(node)
     background = next(n for n in tree.nodes if n.type == 'BACKGROUND')

@@ -11,11 +11,11 @@ from ...core.contract.messages import Problem
 from ...core.worker import environment
 from ...core.worker.background import BackgroundTask
 from .. import jobs, preferences
-from ..base_operator import BaseOperator
+from ..base_operator import FileOperator
 from . import checking
 
 
-class WILDCAP_OT_use_python(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_use_python(FileOperator, bpy.types.Operator):
     """Choose a Python, or the folder of a virtual environment, that has the solver's packages"""
 
     bl_idname = "wildcap.use_python"
@@ -26,10 +26,6 @@ class WILDCAP_OT_use_python(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         return cls.allowed(jobs.of("") is None, "The solver is being set up: wait for it, or click Cancel")
-
-    def invoke(self, context, event):
-        context.window_manager.fileselect_add(self)
-        return {'RUNNING_MODAL'}
 
     def work(self, context):
         python = interpreter(Path(bpy.path.abspath(self.filepath)))

@@ -12,10 +12,10 @@ from ...core.contract.messages import Problem
 from ...core.worker import problem_report
 from ...core.worker.background import BackgroundTask
 from .. import captures, jobs, preferences, problems
-from ..base_operator import BaseOperator
+from ..base_operator import FileOperator
 
 
-class WILDCAP_OT_save_report(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_save_report(FileOperator, bpy.types.Operator):
     """Save a zip with logs, versions and settings, to send with a question: no pictures, no names, no paths of yours.
     Nothing is sent"""
 
@@ -31,8 +31,7 @@ class WILDCAP_OT_save_report(BaseOperator, bpy.types.Operator):
 
     def invoke(self, context, event):
         self.filepath = str(Path.home() / f"wildcap_report_{time.strftime('%Y-%m-%d_%H%M')}.zip")
-        context.window_manager.fileselect_add(self)
-        return {'RUNNING_MODAL'}
+        return super().invoke(context, event)
 
     def work(self, context):
         if not self.filepath:

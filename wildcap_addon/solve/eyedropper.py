@@ -12,6 +12,7 @@ from mathutils.geometry import barycentric_transform
 from ...core.contract.messages import Problem
 from .. import captures
 from ..base_operator import BaseOperator
+from ..data_blocks import read_pixels
 
 PATCH = 1 / 128
 """Half the side of the square that is averaged, in UV: pores and freckles do not decide."""
@@ -108,12 +109,10 @@ def shown_image(head) -> bpy.types.Image:
 def colour_at(image: bpy.types.Image, uv) -> tuple[float, float, float]:
     """Mean of the image around a UV as sRGB in [0, 1], averaged as light is: linearly."""
     width, height = image.size
-    pixels = np.empty(width * height * image.channels, np.float32)
-    image.pixels.foreach_get(pixels)
     column, row = int(uv[0] * width), int(uv[1] * height)  # Blender's rows go up
     reach = max(1, round(PATCH * width))
     top, left = max(0, row - reach), max(0, column - reach)
-    patch = pixels.reshape(height, width, -1)[top:row + reach + 1, left:column + reach + 1, :3]
+    patch = read_pixels(image)[top:row + reach + 1, left:column + reach + 1, :3]
     if not image.is_float:  # bytes are as in the file, sRGB; float images are linear already
         patch = np.where(patch <= 0.04045, patch / 12.92, ((patch + 0.055) / 1.055) ** 2.4)
     mean = patch.mean((0, 1))

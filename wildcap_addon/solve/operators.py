@@ -6,19 +6,15 @@ import bpy
 
 from ...core.contract.messages import Problem
 from .. import captures, jobs, status
-from ..base_operator import BaseOperator
+from ..base_operator import BaseOperator, JobOperator
 from . import live, preview
 
 
-class WILDCAP_OT_solve(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_solve(JobOperator, bpy.types.Operator):
     """Take light and shadow out of the texture; continues from the last checkpoint after a cancel"""
 
     bl_idname = "wildcap.solve"
     bl_label = "Solve"
-
-    @classmethod
-    def poll(cls, context):
-        return jobs.can_start(cls, context)
 
     def work(self, context):
         item = captures.require(context)
@@ -46,16 +42,12 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
         begin(context, captures.require(context), edited_part=True)
 
 
-class WILDCAP_OT_estimate_skin_tone(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_estimate_skin_tone(JobOperator, bpy.types.Operator):
     """Look at the skin outside of the shadow mask in all frames, and set the skin tone from it, with how sure it is; a
     measured white point helps most"""
 
     bl_idname = "wildcap.estimate_skin_tone"
     bl_label = "Estimate"
-
-    @classmethod
-    def poll(cls, context):
-        return jobs.can_start(cls, context)
 
     def work(self, context):
         root = captures.root(captures.require(context))
@@ -72,14 +64,13 @@ def begin(context, item, **shared) -> None:
 
 def set_tone(root: str, figures: dict) -> None:
     """The estimated tone into the settings of the capture, in whichever scene lists it."""
-    for scene in bpy.data.scenes:
-        for item in scene.wildcap.captures:
-            if captures.root(item) == root:
-                item.skin_tone, item.use_skin_tone = figures["skin_tone_srgb"], True
-                item.estimated_tone = figures["skin_tone_srgb"]
-                item.tone_group = figures.get("skin_tone_group", "")
-                item.tone_source = figures.get("skin_tone_source", "")
-                item.tone_deviation = figures.get("skin_tone_deviation_l", 0.0)
+    for item in captures.listed():
+        if captures.root(item) == root:
+            item.skin_tone, item.use_skin_tone = figures["skin_tone_srgb"], True
+            item.estimated_tone = figures["skin_tone_srgb"]
+            item.tone_group = figures.get("skin_tone_group", "")
+            item.tone_source = figures.get("skin_tone_source", "")
+            item.tone_deviation = figures.get("skin_tone_deviation_l", 0.0)
 
 
 CLASSES = (WILDCAP_OT_solve, WILDCAP_OT_solve_edited, WILDCAP_OT_estimate_skin_tone)

@@ -10,23 +10,19 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core.contract.messages import Problem
 from ...core.contract.settings import CARDS
 from .. import bring_back, captures, jobs
-from ..base_operator import BaseOperator
+from ..base_operator import CaptureOperator, JobOperator
 from .eyedropper import colour_at
 
 BURNT, BLACK = 0.97, 0.04
 """sRGB beyond which a channel has lost its value"""
 
 
-class WILDCAP_OT_find_color_checker(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_find_color_checker(JobOperator, bpy.types.Operator):
     """Look for a ColorChecker in the frames and take the white point from its greys; the colour of the light then no
     longer has to be guessed"""
 
     bl_idname = "wildcap.find_color_checker"
     bl_label = "Find ColorChecker"
-
-    @classmethod
-    def poll(cls, context):
-        return jobs.can_start(cls, context)
 
     def work(self, context):
         root = captures.root(captures.require(context))
@@ -34,7 +30,7 @@ class WILDCAP_OT_find_color_checker(BaseOperator, bpy.types.Operator):
                               then=lambda: set_white(root, job.figures["white_point"]))
 
 
-class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
     """Shows a frame: click on a grey card or white paper that is in the face's light. Mouse wheel or arrow keys go to
     other frames, Esc leaves it"""
 
@@ -47,10 +43,6 @@ class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):
                                         ('white', "White Paper", "Plain paper, not glossy")])
     frame: bpy.props.StringProperty(name="Frame", description="Name of the frame's file")
     uv: bpy.props.FloatVectorProperty(name="UV", size=2, description="Where on the frame to look; a click says it")
-
-    @classmethod
-    def poll(cls, context):
-        return cls.with_capture(context)
 
     def invoke(self, context, event):
         self._frames = frame_names(captures.folder(captures.require(context)))
@@ -120,16 +112,12 @@ class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):
         bpy.data.images.remove(self._shown)
 
 
-class WILDCAP_OT_clear_white_point(BaseOperator, bpy.types.Operator):
+class WILDCAP_OT_clear_white_point(CaptureOperator, bpy.types.Operator):
     """Forget the measured white point: the scene tells it again"""
 
     bl_idname = "wildcap.clear_white_point"
     bl_label = "Clear White Point"
     bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context):
-        return cls.with_capture(context)
 
     def work(self, context):
         captures.require(context).solve.white_point = "auto"
@@ -142,10 +130,9 @@ def frame_names(capture) -> list[str]:
 
 def set_white(root: str, linear: list[float]) -> None:
     """The measured white point into the settings of the capture, in whichever scene lists it."""
-    for scene in bpy.data.scenes:
-        for item in scene.wildcap.captures:
-            if captures.root(item) == root:
-                item.solve.white_point = ",".join(f"{v:.4f}" for v in linear)
+    for item in captures.listed():
+        if captures.root(item) == root:
+            item.solve.white_point = ",".join(f"{v:.4f}" for v in linear)
 
 
 CLASSES = (WILDCAP_OT_find_color_checker, WILDCAP_OT_pick_white_point, WILDCAP_OT_clear_white_point)

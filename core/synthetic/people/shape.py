@@ -15,7 +15,7 @@ import numpy as np
 
 from ...face import template
 from ...geometry import raster
-from ...geometry.meshes import Mesh
+from ...geometry.meshes import Mesh, vertex_uvs
 from ...geometry.noise import octaves
 from ..identities import identity_coefficients
 from .facekit import fields
@@ -77,9 +77,7 @@ def face_weight() -> np.ndarray:
 
 
 def _at_vertices(mesh: Mesh, picture: np.ndarray) -> np.ndarray:
-    uv = np.zeros((len(mesh.vertices), 2))
-    uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
-    return raster.sample(picture, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(picture)).astype(np.float64)
+    return raster.sample_uv(picture, vertex_uvs(mesh)).astype(np.float64)
 
 
 @cache

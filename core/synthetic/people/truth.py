@@ -68,7 +68,7 @@ class Scene:
         for part, picture in ((SKIN, skin), (EYES, self.figure.eye)):
             here = self.part[face] == part
             uv = (self.uv[face[here]] * bary[here, :, None]).sum(1)
-            out[here] = raster.sample(picture, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(picture))
+            out[here] = raster.sample_uv(picture, uv)
         return out
 
 
@@ -114,7 +114,7 @@ def _bare(scene: Scene, view: View, over: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _of_uv(scene: Scene, name: str, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
     uv = (scene.uv[face] * bary[..., None]).sum(1)
-    return raster.sample(template.mask(name, 1024), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 1024)
+    return raster.sample_uv(template.mask(name, 1024), uv)
 
 
 def _shrunk(image: np.ndarray, factor: int) -> np.ndarray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...data_blocks import read_field
 from ..asset import LEFT_EYE, SIDES, FaceUnits, load
 
 WAYS = ("Up", "Down", "In", "Out")
@@ -66,9 +67,7 @@ def rims(asset: FaceUnits, number: int) -> LidRims:
 
 def places(key) -> np.ndarray:
     """Vertices [N, 3] of a shape key."""
-    values = np.empty(3 * len(key.data), np.float32)
-    key.data.foreach_get("co", values)
-    return values.reshape(-1, 3).astype(np.float64)
+    return read_field(key.data, "co", 3).astype(np.float64)
 
 
 def _angles(way: np.ndarray) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import bpy
 
-from ... import captures, local_view
+from ... import captures, data_blocks, local_view
 from .. import materials as of_the_head
 from .. import mesh
 from ..asset import load
@@ -33,13 +33,7 @@ def add(context, obj) -> None:
             thing.parent, thing[KEY] = obj, kind
             made.append(thing)
         else:
-            old, thing.data = thing.data, data
-            for material in old.materials:
-                data.materials.append(material)
-            name = old.name
-            if old.users == 0:
-                bpy.data.meshes.remove(old)
-                data.name = name
+            data_blocks.replace_data(thing, data, bpy.data.meshes)
         return thing
 
     eyes.build(obj, keep, _irises(obj))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...data_blocks import read_field
 from .. import materials as of_the_head
 from ..asset import LEFT_EYE, SIDES, FaceUnits, load
 from . import ball, materials, nodes, shapes
@@ -89,14 +90,10 @@ def _along_lids(name: str, rims: ball.LidRims, constant: dict[str, float]):
 def _margin(name: str, rims: ball.LidRims, head):
     """The same with the UVs of the rims, all the way down."""
     mesh = _along_lids(name, rims, {})
-    corners, uv = np.empty(len(head.loops), np.int32), np.empty(2 * len(head.loops), np.float32)
-    head.loops.foreach_get("vertex_index", corners)
-    head.uv_layers[0].data.foreach_get("uv", uv)
     known = np.zeros((len(head.vertices), 2), np.float32)
-    known[corners] = uv.reshape(-1, 2)
+    known[read_field(head.loops, "vertex_index", kind=np.int32)] = read_field(head.uv_layers[0].data, "uv", 2)
     of_rim = known[np.concatenate([rims.upper, rims.lower])].repeat(ACROSS, 0)
-    own = np.empty(len(mesh.loops), np.int32)
-    mesh.loops.foreach_get("vertex_index", own)
+    own = read_field(mesh.loops, "vertex_index", kind=np.int32)
     mesh.uv_layers.new(name=head.uv_layers[0].name).data.foreach_set("uv", of_rim[own].ravel())
     return mesh
 

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's data-blocks: their numbers as arrays, an object's data replaced by other data, animation taken away."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+
+def read_field(collection, field: str, width: int = 1, kind=np.float32) -> np.ndarray:
+    """A field of all N members of a collection: [N], or [N, width]."""
+    values = np.empty((len(collection), width) if width > 1 else len(collection), kind)
+    collection.foreach_get(field, values.ravel())
+    return values
+
+
+def read_pixels(image: bpy.types.Image) -> np.ndarray:
+    """float32 [H, W, C], the lowest row first."""
+    width, height = image.size
+    pixels = np.empty((height, width, image.channels), np.float32)
+    image.pixels.foreach_get(pixels.ravel())
+    return pixels
+
+
+def load_pixels(path: Path) -> np.ndarray:
+    """Those of a file as they are stored there."""
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.is_data = True
+    pixels = read_pixels(image)
+    bpy.data.images.remove(image)
+    return pixels
+
+
+def replace_data(obj: bpy.types.Object, data, kind) -> None:
+    """Gives an object other data of its `kind` (bpy.data.meshes and the like), with the materials and, where nothing
+    else uses the old one, the name of what it had."""
+    old, obj.data = obj.data, data
+    for material in old.materials:
+        data.materials.append(material)
+    name = old.name
+    if old.users == 0:
+        kind.remove(old)
+        data.name = name
+
+
+def stop_animation(thing: bpy.types.ID) -> None:
+    """Takes a data-block's animation away, and its action, where nothing else has it."""
+    action = thing.animation_data.action if thing.animation_data else None
+    thing.animation_data_clear()
+    if action is not None and action.users == 0:
+        bpy.data.actions.remove(action)
