@@ -167,7 +167,7 @@ def score(judged: dict[str, Judged]) -> tuple[dict, dict]:
 
 def choose(judged: dict[str, Judged], before: dict[str, np.ndarray], answer: str, shipped: Weighing) -> dict:
     """Which Weighing of GRID is best for an answer beside what there is `before`, over people, and with each person
-    left out of the choice."""
+    left out of the choice. People count alike, by ratios: their mean is the geometric one."""
     errors = {weighing: {name: each.error(weighed(before[name], getattr(each, answer), weighing))
                          for name, each in judged.items()} for weighing in {*GRID, shipped}}
     persons = sorted({each.person for each in judged.values()})
@@ -175,15 +175,18 @@ def choose(judged: dict[str, Judged], before: dict[str, np.ndarray], answer: str
     def of_person(weighing: Weighing, person: str) -> float:
         return float(np.mean([errors[weighing][name] for name, each in judged.items() if each.person == person]))
 
+    def mean(errors_of_people: list[float]) -> float:
+        return float(np.exp(np.mean(np.log(errors_of_people))))
+
     def best(over: list[str]) -> Weighing:
-        return min(GRID, key=lambda weighing: np.mean([of_person(weighing, person) for person in over]))
+        return min(GRID, key=lambda weighing: mean([of_person(weighing, person) for person in over]))
 
     over_all, none = best(persons), Weighing(0.0, DOUBTS[0])
     left_out = [of_person(best([other for other in persons if other != person]), person) for person in persons]
     return {"share": over_all.share, "doubt": over_all.doubt,
-            **{key: float(np.mean([of_person(weighing, person) for person in persons]))
+            **{key: mean([of_person(weighing, person) for person in persons])
                for key, weighing in (("best", over_all), ("shipped", shipped), ("without", none))},
-            "left_out": float(np.mean(left_out)),
+            "left_out": mean(left_out),
             "people_better": sum(out < of_person(none, person) for out, person in zip(left_out, persons, strict=True)),
             "people": len(persons)}
 

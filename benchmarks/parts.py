@@ -28,6 +28,7 @@ import av
 import numpy as np
 
 from core.face import faces, parser
+from core.face.parser_network import ParseNet
 from core.face.parts import PARTS, SIDE, cut, inside, to_crop
 from core.imaging import images
 from core.synthetic.people import snapshot, unlit
@@ -102,7 +103,7 @@ def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def _crops(pictures: Iterator[tuple[np.ndarray, np.ndarray]],
-           network: parser.ParseNet) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+           network: ParseNet) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Of each picture in which a face is found: the true parts, the network's, and where the crop shows the picture;
     [SIDE, SIDE] each."""
     for srgb, shares in pictures:
@@ -137,7 +138,7 @@ def _share(some: int, whole: int) -> float | None:
     return float(some / whole) if whole else None
 
 
-def write_sheet(out: Path, pictures: list[Path], network: parser.ParseNet, brighter: float) -> None:
+def write_sheet(out: Path, pictures: list[Path], network: ParseNet, brighter: float) -> None:
     """The crops of photographs, and beside each its parts: in colours, and laid over it."""
     rows = []
     for path in [path for each in pictures for path in (sorted(each.iterdir()) if each.is_dir() else [each])

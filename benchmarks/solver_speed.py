@@ -218,12 +218,13 @@ def prior_of(row: SolverVariant, options: argparse.Namespace):
     import torch
 
     from core.solve import network as networks
+    from core.solve import network_blocks
     from core.solve.memory import spare_memory
     from core.solve.prior import ReleasedPrior, build, fast_dtype, load
 
     dtype = torch.float32 if row.float32 else fast_dtype(options.device)
     if row.channels_first:
-        networks.LAYOUT = torch.contiguous_format
+        networks.MEMORY_FORMAT = network_blocks.MEMORY_FORMAT = torch.contiguous_format
     if options.network == "ours":
         prior = load(device=options.device, dtype=dtype)
     else:

@@ -26,9 +26,10 @@ def sections(answers: Figures) -> Sections:
         """, delight_answers.table(answers.rows))),
         ("How far to believe them", prose("""
         An answer counts by *share* where it agrees with what there is, and by half of it where the two are *doubt*
-        apart (`core/delight/second_opinion.py`). Both are the best of a grid over people; *chosen by the others* is
-        the mean error when each person's are chosen without that person, which is what can be expected of the next
-        one; *people who gain*, how many are better off so than without the answer.
+        apart (`core/delight/second_opinion.py`). *Best* is the best of a grid over people, whose mean is the geometric
+        one here, so that all count alike; *chosen by the others*, the mean error when each person's are chosen without
+        that person, which is what can be expected of the next one; *people who gain*, how many are better off so than
+        without the answer. What is shipped was chosen before *closed* and *fringed* were there.
         """, delight_answers.choices(answers.chosen), f"""
         The fitted light is worth {100 * (1 - fitted.shipped / fitted.without):.0f} % of the error as shipped, and
         {100 * (1 - fitted.left_out / fitted.without):.1f} % on people that were not asked. **The whole head's network
