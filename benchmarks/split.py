@@ -253,9 +253,8 @@ def scale_table(scales: dict[str, dict[str, float]]) -> str:
 def reach_table(found: dict) -> str:
     sides = ("same side", "mirror image")
     return (f"Correlation of the grey log ratio of {found['skins']} painted skins to their mean, whose deviation is "
-            f"{found['deviation']:.2f}, by distance; the "
-            f"model takes exp(-distance / {1e3 * split.TRAIT_REACH_M:.0f} mm), and {split.MIRROR_CORRELATION} of it with the mirror "
-            "image.\n\n"
+            f"{found['deviation']:.2f}, by distance; the model takes exp(-distance / {1e3 * split.TRAIT_REACH_M:.0f} "
+            f"mm), and {split.MIRROR_CORRELATION} of it with the mirror image.\n\n"
             + figures.markdown(["", *found[sides[0]]], [[side, *found[side].values()] for side in sides]))
 
 
