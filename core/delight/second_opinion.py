@@ -34,7 +34,8 @@ class HeadInLook:
     shadow: np.ndarray
 
 
-def of_both(looks: list[ShadingEstimate], fitted: list[np.ndarray], skins: list[np.ndarray]) -> list[ShadingEstimate]:
+def combine_answers(looks: list[ShadingEstimate], fitted: list[np.ndarray],
+                    skins: list[np.ndarray]) -> list[ShadingEstimate]:
     """The looks moved towards the fitted log-shading [h, h, 3] of each, brought to their level over bare skin (skins
     [h, h], above 0.5 there)."""
     apart = [(log - look.shading)[skin > 0.5] for look, log, skin in zip(looks, fitted, skins, strict=True)]
@@ -44,8 +45,8 @@ def of_both(looks: list[ShadingEstimate], fitted: list[np.ndarray], skins: list[
     return [_towards(look, log - level) for look, log in zip(looks, fitted, strict=True)]
 
 
-def with_whole_head(looks: list[ShadingEstimate], heads: list[HeadInLook],
-                    skins: list[np.ndarray]) -> list[ShadingEstimate]:
+def move_to_whole_head(looks: list[ShadingEstimate], heads: list[HeadInLook],
+                       skins: list[np.ndarray]) -> list[ShadingEstimate]:
     """The looks moved by WHOLE_HEAD_WEIGHT towards the whole head's log-shading in each, brought to their level over
     bare skin (skins [h, h], above 0.5 there). A shadow that a look shows and the whole head does not know is one that
     it took for pigment: there the look keeps its own."""
@@ -63,8 +64,8 @@ def _halfway(look: ShadingEstimate, head: HeadInLook, level: np.ndarray) -> Shad
     return replace(look, shading=(look.shading + weight * (head.log - level - look.shading)).astype(np.float32))
 
 
-def beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice], light: np.ndarray,
-           share: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def continue_beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice],
+                    light: np.ndarray, share: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A frame's log-shading [H, W, 3] and shadow [H, W], where known [H, W] in [0, 1] falls to 0 taken over by the
     fitted light [h, w, 3] and its share [h, w] in the part `box` of the frame, at the level of the rest; here bool [h,
     w]: the head. Scalp and neck lie beyond what the network sees."""
@@ -79,7 +80,7 @@ def beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tupl
     return shading, shadow
 
 
-def coarse(light: np.ndarray, side: int) -> np.ndarray:
+def average_cells(light: np.ndarray, side: int) -> np.ndarray:
     """The log [side, side, 3] of the light in a square picture, linear [S, S, 3], averaged as the eye would."""
     return np.log(np.maximum(cv2.resize(np.asarray(light, np.float32), (side, side), interpolation=cv2.INTER_AREA),
                              1e-4))
