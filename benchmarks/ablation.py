@@ -39,11 +39,11 @@ from core.face.head import read_head
 from core.imaging import images
 from core.solve import initial, maps
 from core.solve.evidence import read_evidence
-from core.solve.light_fit import update_lights, variation
+from core.solve.light_fit import total_variation, update_lights
 from core.solve.prior import WEIGHTS, load
-from core.solve.problem import State, albedo, photometric
+from core.solve.problem import State, albedo, photometric_loss
 from core.solve.recipes import OURS, RECIPES, Recipe
-from core.solve.sampler import Sampler, seeded
+from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import SkinTone
 
 from . import figures
@@ -189,12 +189,13 @@ def solved(given: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0
         replace(given, mask={"painted": given.mask, "empty": 0 * given.mask, "full": 0 * given.mask + 1}[mask]
                 ).write(capture)
         evidence = read_evidence(capture, read_head(capture), size)
-    start = initial.start(prior, evidence, tone, FACE_CROP / cells, recipe)
+    start = initial.start_solve(prior, evidence, tone, FACE_CROP / cells, recipe)
     if with_prior:
-        state = Sampler(prior.of_tone(start.tone), start.recipe, seeded(seed)).sample(start.observations, start.state)
+        sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(seed))
+        state = sampler.sample(start.observations, start.state)
     else:
         state = texels_alone(start, start.recipe)
-    return maps.finished(state, evidence, start).diffuse
+    return maps.finish_maps(state, evidence, start).diffuse
 
 
 def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights,
@@ -211,8 +212,8 @@ def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: 
         with torch.no_grad():
             shading = o.shader.total(state.lights)
         adam.zero_grad()
-        loss = photometric(x, shading, o, o.weight, recipe.blur)
-        (loss + smooth * variation(albedo(x), o.weight) if smooth else loss).backward()
+        loss = photometric_loss(x, shading, o, o.weight, recipe.blur)
+        (loss + smooth * total_variation(albedo(x), o.weight) if smooth else loss).backward()
         adam.step()
         scheduler.step()
         fit(state, x.detach(), o, recipe, step, updates)

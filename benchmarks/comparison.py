@@ -45,9 +45,9 @@ from core.imaging import images
 from core.solve import initial, maps, recipe_of
 from core.solve.evidence import Evidence, read_evidence
 from core.solve.prior import load
-from core.solve.sampler import Sampler, seeded
+from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import parse_skin_tone
-from core.solve.witnesses import confirmed
+from core.solve.witnesses import confirm_marks
 
 from . import figures, light_models
 from .ablation import texels_alone
@@ -134,8 +134,8 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
     prior = _prior()
     cell = evidence.cell_side(settings.solve.grid_cells)
     tone = parse_skin_tone(settings.solve.skin_tone)
-    start = initial.start(prior, evidence, tone, cell, recipe_of(settings, prior),
-                          lambda marks: confirmed(capture, head, marks, evidence.size))
+    start = initial.start_solve(prior, evidence, tone, cell, recipe_of(settings, prior),
+                                lambda marks: confirm_marks(capture, head, marks, evidence.size))
     fit, recipe = {}, start.recipe
     if method in LIGHTS:
         start, recipe, move = LIGHTS[method](start, recipe)
@@ -143,8 +143,9 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
     if method == FREE:
         state = texels_alone(start, replace(recipe, decay=0.995), FREE_UPDATES, smooth=FREE_SMOOTH, **fit)
     else:
-        state = Sampler(prior.of_tone(start.tone), recipe, seeded(seed), **fit).sample(start.observations, start.state)
-    result = maps.finished(state, evidence, start)
+        sampler = Sampler(prior.of_tone(start.tone), recipe, seed_noise(seed), **fit)
+        state = sampler.sample(start.observations, start.state)
+    result = maps.finish_maps(state, evidence, start)
     return result.diffuse, result.shading, time.monotonic() - began
 
 

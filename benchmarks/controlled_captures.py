@@ -27,7 +27,7 @@ from core.imaging import images
 from core.solve import initial, maps, recipe_of
 from core.solve.evidence import read_evidence
 from core.solve.prior import load
-from core.solve.sampler import Sampler, seeded
+from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import parse_skin_tone
 
 from .flash_light import write_delit
@@ -53,11 +53,11 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     began, prior = time.monotonic(), _prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
-    start = initial.start(prior, evidence, parse_skin_tone(settings.solve.skin_tone),
-                          evidence.cell_side(settings.solve.grid_cells), recipe)
-    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seeded(settings.seed))
+    start = initial.start_solve(prior, evidence, parse_skin_tone(settings.solve.skin_tone),
+                                evidence.cell_side(settings.solve.grid_cells), recipe)
+    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(settings.seed))
     state = sampler.sample(start.observations, start.state)
-    diffuse = maps.finished(state, evidence, start).diffuse
+    diffuse = maps.finish_maps(state, evidence, start).diffuse
     return images.linear_to_srgb(diffuse), {"seconds": round(time.monotonic() - began, 1)}
 
 

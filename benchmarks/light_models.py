@@ -23,7 +23,7 @@ from torch.nn import functional
 from core.solve.initial import Start
 from core.solve.light_fit import update_lights
 from core.solve.lighting import Lights, shading_basis
-from core.solve.problem import Observation, albedo, photometric
+from core.solve.problem import Observation, albedo, photometric_loss
 from core.solve.recipes import Recipe
 
 CELLS = 64  # of a region's outline, over the map's side
@@ -73,7 +73,7 @@ def regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
 def _region_loss(lights: RegionLights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
     """L_pho with the pull of our own recipe: the regions' own light towards none, as no mask has a border to ask."""
     own = o.shader.own(lights)
-    loss = photometric(denoised, o.shader.main(lights) + own, o, o.weight * o.trust)
+    loss = photometric_loss(denoised, o.shader.main(lights) + own, o, o.weight * o.trust)
     brightness = (o.weight * albedo(denoised) ** 2).mean()
     return loss + brightness * recipe.faint * (o.weight * own**2).sum()
 
@@ -138,7 +138,7 @@ def _environment_loss(lights: EnvironmentLights, denoised: torch.Tensor, o: Obse
     one, other = o.shader.neighbours.T
     rough = ((lights.glob[one] - lights.glob[other]) ** 2).mean()
     brightness = (o.weight * albedo(denoised) ** 2).mean()
-    fit = photometric(denoised, o.shader.main(lights), o, o.weight * o.trust)
+    fit = photometric_loss(denoised, o.shader.main(lights), o, o.weight * o.trust)
     return fit + ROUGH * brightness * o.weight.sum() * rough
 
 

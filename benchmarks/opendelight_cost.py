@@ -20,7 +20,7 @@ import torch
 from torch.utils.flop_counter import FlopCounterMode
 
 from core.delight.opendelight_checkpoint import BASE, ENHANCER, load
-from core.delight.opendelight_network import delit
+from core.delight.opendelight_network import delight_crop
 
 SIZE = 512
 
@@ -39,8 +39,8 @@ def main() -> None:
     picture = torch.rand(1, 3, SIZE, SIZE, generator=torch.Generator().manual_seed(0)).to(options.device)
     yardsticks, frames, steps = [_yardstick(options.device)], [], []
     for _ in range(options.frames):
-        frames.append(_seconds(lambda: delit(checkpoint.base, checkpoint.enhancer, picture,
-                                             lambda: steps.append(time.monotonic())), options.device))
+        frames.append(_seconds(lambda: delight_crop(checkpoint.base, checkpoint.enhancer, picture,
+                                                    lambda: steps.append(time.monotonic())), options.device))
         yardsticks.append(_yardstick(options.device))
     print(f"{np.mean(frames):.1f} s per frame on {options.device}, {torch.get_num_threads()} threads; 10^12 "
           f"multiplications: {np.mean(yardsticks):.1f} s; "
@@ -51,8 +51,8 @@ def main() -> None:
 def multiplications() -> float:
     """Of one frame, in 10^12, counted without computing anything."""
     with torch.device("meta"), FlopCounterMode(display=False) as counter:
-        delit(*({name: torch.zeros(shape) for name, shape in shapes.items()} for shapes in (base(), enhancer())),
-              torch.zeros(1, 3, SIZE, SIZE))
+        delight_crop(*({name: torch.zeros(shape) for name, shape in shapes.items()} for shapes in (base(), enhancer())),
+                     torch.zeros(1, 3, SIZE, SIZE))
     return counter.get_total_flops() / 2e12
 
 

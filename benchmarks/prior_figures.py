@@ -26,13 +26,13 @@ import torch
 from core.contract.messages import Reporter
 from core.face import template
 from core.imaging import images
-from core.solve.draft import restored
+from core.solve.draft import restore_maps
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.network import denoise
-from core.solve.prior import WEIGHTS, ConditionedPrior, Prior, condition, coordinates, load, mean_at
+from core.solve.prior import WEIGHTS, ConditionedPrior, Prior, coordinates, load, make_condition, mean_at
 from core.solve.problem import Observation, State
 from core.solve.recipes import OURS
-from core.solve.sampler import Sampler, ancestral, karras, seeded
+from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas, seed_noise
 from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic.skin import make_skin
 from core.training.patches import mean_map
@@ -118,13 +118,13 @@ def card_of(weights: Path) -> dict:
 @torch.no_grad()
 def unconditional(prior: Prior, coords: torch.Tensor, tone: torch.Tensor, steps: int) -> torch.Tensor:
     """Maps [N, 7, P, P] drawn from the prior alone at coords [N, 2, P, P] for skins of tone [N, 3]."""
-    told = condition(coords, prior.octaves, prior.mean_face, prior.spread, tone, torch.zeros(len(tone)))
-    sigmas = [s for s in karras(steps, 0.01, 80.0) if s <= FIRST_SIGMA]
+    told = make_condition(coords, prior.octaves, prior.mean_face, prior.spread, tone, torch.zeros(len(tone)))
+    sigmas = [s for s in karras_sigmas(steps, 0.01, 80.0) if s <= FIRST_SIGMA]
     generator = torch.Generator().manual_seed(0)
     x = told.mean + sigmas[0] * torch.randn(told.mean.shape, generator=generator)
     for s, s_next in zip(sigmas[:-1], sigmas[1:], strict=True):
         clean = denoise(prior.network, x, torch.full((len(x),), s), told)
-        s_down, s_up = ancestral(s, s_next)
+        s_down, s_up = ancestral_sigmas(s, s_next)
         x = x + (x - clean) / s * (s_down - s) + s_up * torch.randn(x.shape, generator=generator)
     return clean
 
@@ -144,7 +144,7 @@ def measure_response(options: argparse.Namespace) -> None:
         noise = torch.randn(1, *truth.shape, generator=torch.Generator().manual_seed(0))
         expected = conditioned.respond(truth[None], coords, noise)[0]
         draft = given_diffuse(conditioned, truth, options.steps, "proximal")
-        again = restored(conditioned, draft[None], coords, replace(OURS, guidance="proximal"), 0)[0]
+        again = restore_maps(conditioned, draft[None], coords, replace(OURS, guidance="proximal"), 0)[0]
         rows.append([errors(maps, truth, face) for maps in (solved, expected, again, draft, mean, other)])
         print(f"{seed}: "
               + "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}"
@@ -192,7 +192,7 @@ def given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: int, guid
     coords = coordinates(size, slice(0, size), slice(0, size))
     lights = Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 1, 1), torch.ones(3))
     start = mean_at(prior.prior.mean_face, coords, prior.tone)
-    return Sampler(prior, recipe, seeded(0)).sample(found, State(0, None, start, lights)).denoised[0] * everywhere
+    return Sampler(prior, recipe, seed_noise(0)).sample(found, State(0, None, start, lights)).denoised[0] * everywhere
 
 
 def errors(maps: torch.Tensor, truth: torch.Tensor, face: torch.Tensor) -> tuple[float, float]:

@@ -62,19 +62,20 @@ def measure(filmed: Filmed) -> dict:
     capture = filmed.capture
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
     tone = parse_skin_tone(people.skin_tone(filmed.truth))
-    begun = initial.start(load(), evidence, tone, evidence.cell_side(Settings().solve.grid_cells), OURS)
+    begun = initial.start_solve(load(), evidence, tone, evidence.cell_side(Settings().solve.grid_cells), OURS)
     luminance = {name: np.log(np.maximum(images.resize(np.ascontiguousarray(image, np.float32), REFERENCE_TEXELS,
                                                        REFERENCE_TEXELS).mean(-1), 1e-3))
                  for name, image in (("filmed", images.read_linear(capture.texture_filmed)),
                                      ("delit", images.read_linear(capture.texture)), ("true", filmed.answer(TRUE)))}
-    seen = np.log(initial.remaining_light(evidence, begun).numpy().clip(0.05, 4)).mean(0)
+    seen = np.log(initial.find_remaining_light(evidence, begun).numpy().clip(0.05, 4)).mean(0)
     weight = (evidence.weight * evidence.trust * evidence.skin).numpy()
     kinds = {"removed": luminance["filmed"] - luminance["delit"], "seen": seen,
              "left": luminance["delit"] - luminance["true"]}
     row, steps = {"person": filmed.person}, {}
     for kind, value in kinds.items():
-        steps[kind], sure = border.border_steps(value.astype(np.float32), begun.alpha.numpy(), weight, evidence.texel)
-        row |= dict(zip((kind, f"{kind}_spread"), border.spread(steps[kind], sure), strict=True))
+        steps[kind], sure = border.measure_border_steps(value.astype(np.float32), begun.alpha.numpy(), weight,
+                                                        evidence.texel)
+        row |= dict(zip((kind, f"{kind}_spread"), border.mean_and_deviation(steps[kind], sure), strict=True))
     about = {kind: steps[kind] - row[kind] for kind in ("seen", "left")}
     return row | {"best": float((sure * about["seen"] * about["left"]).sum()
                                 / max((sure * about["seen"] ** 2).sum(), 1e-6))}

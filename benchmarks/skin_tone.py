@@ -29,7 +29,7 @@ from core.face.head import read_head
 from core.imaging import images
 from core.solve.evidence import read_evidence
 from core.solve.look import Look
-from core.solve.population import TYPOLOGY_GROUPS, estimate_skin_tone, group, lab
+from core.solve.population import TYPOLOGY_GROUPS, estimate_skin_tone, name_group, to_lab
 from core.solve.prior import WEIGHTS
 from core.solve.skin_tone import SkinTone
 from core.solve.tone import TONE_SIDE_TEXELS, estimate_from_frames, estimate_from_texture
@@ -61,7 +61,7 @@ def main() -> None:
         if subjects[expected(seed)] >= asked.each:
             continue
         scenes = scenes_of(seed)
-        name = group(scenes[0].tone)
+        name = name_group(scenes[0].tone)
         subjects[name] += 1
         for light, scene in enumerate(scenes):
             for phone in range(PHONES):
@@ -82,7 +82,8 @@ def main() -> None:
 def expected(seed: int) -> str:
     """The group that a subject's pigments promise, which is looked up sooner than its skin is made."""
     p = sample_parameters(seed)
-    return group(reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope, p.chroma)[0])
+    tones = reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope, p.chroma)
+    return name_group(tones[0])
 
 
 def before(look: Look, known: list) -> SkinTone:
@@ -93,7 +94,7 @@ def before(look: Look, known: list) -> SkinTone:
 
 def errors(tone: SkinTone, truth: np.ndarray) -> tuple[float, float, float]:
     """Signed error of L*, delta E 2000, and the stated deviation of L*, nan where none is stated."""
-    found, true = lab(np.array(tone.linear)), lab(truth)
+    found, true = to_lab(np.array(tone.linear)), to_lab(truth)
     return (float(found[0] - true[0]), float(deltaE_ciede2000(true, found)),
             np.nan if tone.deviation is None else tone.deviation)
 
@@ -139,11 +140,11 @@ def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> dict:
     lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
     by_row = {"before": estimate_from_texture(evidence.texture, lit, known),
               "scene": estimate_from_frames(capture, head, settings, evidence, Reporter("skin_tone"))}
-    found: dict = {"lightness": lab(truth)[0]}
+    found: dict = {"lightness": to_lab(truth)[0]}
     for row, tone in by_row.items():
         signed, colour, stated = errors(tone, truth)
-        print(f"{row:9} {capture.root.name:20} {group(truth):13} L* {lab(truth)[0]:.1f} error {signed:+.2f} delta E "
-              f"{colour:.2f} stated {stated:.2f}")
+        print(f"{row:9} {capture.root.name:20} {name_group(truth):13} L* {to_lab(truth)[0]:.1f} error {signed:+.2f} "
+              f"delta E {colour:.2f} stated {stated:.2f}")
         found[row] = {"lightness": signed, "delta_e": colour, "stated": stated if np.isfinite(stated) else None}
     return found
 

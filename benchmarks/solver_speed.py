@@ -167,24 +167,24 @@ def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> di
     from core.solve.evidence import read_evidence
     from core.solve.memory import sample_within_memory
     from core.solve.recipes import OURS
-    from core.solve.sampler import Sampler, seeded
+    from core.solve.sampler import Sampler, seed_noise
     from core.solve.skin_tone import parse_skin_tone
 
     prior = prior_of(row, options)
     coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
     evidence = read_evidence(capture, read_head(capture), options.size)
-    begun = initial.start(prior, evidence, parse_skin_tone(TONE), evidence.cell_side(96), recipe)
+    begun = initial.start_solve(prior, evidence, parse_skin_tone(TONE), evidence.cell_side(96), recipe)
     short = replace(begun.recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
     if options.compile:
         prior.network = torch.compile(prior.network)
     conditioned = prior.of_tone(begun.tone)
     if options.compile or options.device != "cpu":
-        sample_within_memory(Sampler(conditioned, short, seeded(0)), begun.observations, begun.state)  # warms up
+        sample_within_memory(Sampler(conditioned, short, seed_noise(0)), begun.observations, begun.state)  # warms up
         begun.state.step, begun.state.x, begun.state.denoised = 0, None, begun.reference
     report = Reporter("solve", emit=lambda message: print(message.text, file=sys.stderr))
     began, worked = time.perf_counter(), time.process_time()
-    sample_within_memory(Sampler(conditioned, short, seeded(0)), begun.observations, begun.state, log=report.log)
+    sample_within_memory(Sampler(conditioned, short, seed_noise(0)), begun.observations, begun.state, log=report.log)
     seconds, worked = time.perf_counter() - began, time.process_time() - worked
     dtype = str(prior.network.proj_in.weight.dtype).removeprefix("torch.")
     return {"seconds": round(seconds, 3), "processor_seconds": round(worked, 2),
@@ -220,7 +220,7 @@ def prior_of(row: SolverVariant, options: argparse.Namespace):
     from core.solve import network as networks
     from core.solve import network_blocks
     from core.solve.memory import spare_memory
-    from core.solve.prior import ReleasedPrior, build, fast_dtype, load
+    from core.solve.prior import ReleasedPrior, build_network, fast_dtype, load
 
     dtype = torch.float32 if row.float32 else fast_dtype(options.device)
     if row.channels_first:
@@ -229,7 +229,7 @@ def prior_of(row: SolverVariant, options: argparse.Namespace):
         prior = load(device=options.device, dtype=dtype)
     else:
         torch.manual_seed(0)
-        network = build(AUTHORS)
+        network = build_network(AUTHORS)
         for parameter in network.parameters():  # those that begin at zero as well: their products are to be worked out
             torch.nn.init.normal_(parameter, std=0.02)
         prior = ReleasedPrior(network, "coord", 0, (0.01, 80.0), None)

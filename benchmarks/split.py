@@ -137,14 +137,16 @@ def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, di
             others = [shapes[other.name] for other in own if other is not filmed]
             answers = {method: filmed.answer(method) for method in (NOTHING, TRUE, DELIT, SOLVED)}
             answers |= {name: solved_map(path / f"{filmed.name}.wildcap") for name, path in beside.items()}
-            alone = split.split([shapes[filmed.name]])
+            alone = split.split_captures([shapes[filmed.name]])
             scales[filmed.name] = {name: round(value, 4) for name, value in asdict(alone.scales).items()}
             answers |= {ALONE: divided(shapes[filmed.name], alone, False)}
             if others:
-                answers |= {TOGETHER: divided(shapes[filmed.name], split.split([shapes[filmed.name], *others]), True)}
+                together = split.split_captures([shapes[filmed.name], *others])
+                answers |= {TOGETHER: divided(shapes[filmed.name], together, True)}
             for name, factor in ((LESS, 0.5), (MORE, 2.0)):
                 typical = split.Scales(*(factor * value for value in split.TYPICAL_SCALES))
-                answers |= {name: divided(shapes[filmed.name], split.split([shapes[filmed.name]], typical), False)}
+                alone = split.split_captures([shapes[filmed.name]], typical)
+                answers |= {name: divided(shapes[filmed.name], alone, False)}
             maps.append(small({method: answer for method, answer in answers.items() if answer is not None}))
             print(f"{filmed.name}: split", file=sys.stderr, flush=True)
         each = [in_uv(filmed, answers) for filmed, answers in zip(own, maps, strict=True)]
@@ -167,12 +169,14 @@ def shapes_of(filmed: Filmed) -> split.Shapes:
     tone = parse_skin_tone(people.skin_tone(filmed.truth))
     if tone is None:
         raise Problem(f"{filmed.truth} has no skin tone.", "Give it a skin_tone.txt with sRGB R,G,B.")
-    return initial.shapes_of(evidence, albedo(initial.reference(prior(), tone, evidence, "mean")))
+    return initial.make_shapes(evidence, albedo(initial.make_reference(prior(), tone, evidence, "mean")))
 
 
 def divided(shapes: split.Shapes, found: split.Split, local: bool) -> np.ndarray:
     """The delit texture [SIZE, SIZE, 3], linear, over the light that was found, at any exposure."""
-    light = found.light(shapes.normal) * (split.enlarged(torch.from_numpy(found.local), SIZE).exp() if local else 1)
+    light = found.light(shapes.normal)
+    if local:
+        light = light * split.enlarge_field(torch.from_numpy(found.local), SIZE).exp()
     return (shapes.texture / light).permute(1, 2, 0).numpy()
 
 
@@ -180,11 +184,11 @@ def parts_side_by_side(filmed: Filmed) -> np.ndarray:
     """As filmed, delit, mean face; mean face with traits, global and local light about a middle grey; the texture over
     the global light, solved, true: sRGB, at the truth's tone."""
     shapes = shapes_of(filmed)
-    found = split.split([shapes])
+    found = split.split_captures([shapes])
     maps = small({method: answer for method in (NOTHING, DELIT, SOLVED, TRUE)
                   if (answer := filmed.answer(method)) is not None})
     mean = shapes.reference.permute(1, 2, 0).numpy()
-    traits, local = (split.enlarged(torch.from_numpy(part), SIZE).exp().permute(1, 2, 0).numpy()
+    traits, local = (split.enlarge_field(torch.from_numpy(part), SIZE).exp().permute(1, 2, 0).numpy()
                      for part in (found.traits, found.local))
     light = found.light(shapes.normal).permute(1, 2, 0).numpy()
     where, tone = filmed.where, maps[TRUE][filmed.where].mean(0)

@@ -34,7 +34,7 @@ from core.contract.messages import Reporter
 from core.face import template
 from core.face.head import read_head
 from core.imaging import images
-from core.solve.initial import face_of_tone
+from core.solve.initial import tint_face
 from core.solve.prior import load
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
@@ -77,7 +77,7 @@ def whole(seed: int, surface: HeadSurface) -> dict:
     truth, face = _painted(surface, seed), template.mask("face", size)
     skin = torch.from_numpy(np.ascontiguousarray(template.mask("skin", size)))
     tone = torch.from_numpy((truth.diffuse * skin.numpy()[..., None]).sum((0, 1)) / float(skin.sum())).float()
-    mean = face_of_tone(load().mean_face, tone, skin)[0].numpy().transpose(1, 2, 0)
+    mean = tint_face(load().mean_face, tone, skin)[0].numpy().transpose(1, 2, 0)
     shown = np.clip(2 * face, 0, 1)[..., None]
     diffuse = truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)
     specular = truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2 * (1 - shown[..., 0])

@@ -193,7 +193,7 @@ def _white(options: argparse.Namespace) -> int:
         capture.require("frames/")
         if not path.is_file():
             raise Problem(f"There is no frame {path}.", "Name one of the pictures in the capture's frames folder.")
-        white = white_point.card_white(read_srgb(path), *options.at, options.card).tolist()
+        white = white_point.measure_card_white(read_srgb(path), *options.at, options.card).tolist()
     else:
         capture.require("frames/")
         report = Reporter("white_point")

@@ -45,7 +45,7 @@ def make(root: Path) -> Capture:
     made = Capture(root)
     made.claim()
     skin = torch.from_numpy(template.mask("skin", SIZE).copy())
-    face = initial.face_of_tone(load().mean_face, torch.from_numpy(TONE), skin)
+    face = initial.tint_face(load().mean_face, torch.from_numpy(TONE), skin)
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     shadow = 1 / (1 + np.exp((np.hypot(x - 0.66, y - 0.55) - 0.09) / 0.006))
     light = (0.7 + 0.3 * x) * (1 - 0.5 * shadow)

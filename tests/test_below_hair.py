@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from core.delight.below_hair import completed, without_features
+from core.delight.below_hair import complete_shading, fill_features
 from core.delight.evening import ShadingEstimate
 from core.imaging import images
 
@@ -24,16 +24,16 @@ def slope(side: int = 40) -> np.ndarray:
 def test_a_hole_in_a_harmonic_shading_comes_back_exactly():
     hole = np.zeros((40, 40), bool)
     hole[10:20, 5:30], hole[30:34, 12:16] = True, True
-    assert completed(np.where(hole[..., None], 9.0, slope()), hole) == pytest.approx(slope(), abs=1e-9)
+    assert complete_shading(np.where(hole[..., None], 9.0, slope()), hole) == pytest.approx(slope(), abs=1e-9)
 
 
 def test_a_hole_at_the_border_and_no_hole_at_all():
     hole = np.zeros((40, 40), bool)
     hole[:6, :6] = True
-    found = completed(np.where(hole[..., None], 9.0, np.float64(0.4) + 0 * slope()), hole)
+    found = complete_shading(np.where(hole[..., None], 9.0, np.float64(0.4) + 0 * slope()), hole)
     assert found == pytest.approx(0.4, abs=1e-9)
-    assert completed(slope(), np.zeros((40, 40), bool)) is not None
-    assert np.array_equal(completed(slope(), np.ones((40, 40), bool)), slope())
+    assert complete_shading(slope(), np.zeros((40, 40), bool)) is not None
+    assert np.array_equal(complete_shading(slope(), np.ones((40, 40), bool)), slope())
 
 
 def test_the_cells_of_a_brow_and_those_beside_it_take_the_skins_shading():
@@ -41,8 +41,8 @@ def test_the_cells_of_a_brow_and_those_beside_it_take_the_skins_shading():
     share[18:21, 10:30] = 0.9
     leaky = slope() - 2.0 * (share > 0)[..., None]
     leaky[17, 10:30] -= 1.0  # the answer is coarse: the row beside has a part of it
-    assert without_features(leaky, share) == pytest.approx(slope(), abs=0.02)
-    assert np.array_equal(without_features(leaky, np.full_like(share, 0.2)), leaky.astype(np.float32))
+    assert fill_features(leaky, share) == pytest.approx(slope(), abs=0.02)
+    assert np.array_equal(fill_features(leaky, np.full_like(share, 0.2)), leaky.astype(np.float32))
 
 
 def test_a_photograph_keeps_a_brow_where_the_parser_sees_one(monkeypatch):
@@ -57,7 +57,7 @@ def test_a_photograph_keeps_a_brow_where_the_parser_sees_one(monkeypatch):
     parts = SimpleNamespace(of=lambda *names: dark)
     monkeypatch.setattr(network.faces, "detect", lambda srgb: SimpleNamespace(landmarks=landmarks))
     monkeypatch.setattr(network, "parser", SimpleNamespace(parse=lambda srgb, found: parts))
-    monkeypatch.setattr(network, "load", lambda device: None)
+    monkeypatch.setattr(network, "load_network", lambda device: None)
 
     def look(net, box, crop):
         log = np.log(images.srgb_to_linear(network.cv2.resize(crop, (128, 128), interpolation=network.cv2.INTER_AREA)))

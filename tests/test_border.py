@@ -33,7 +33,7 @@ def light_and_mask(taken: float) -> tuple[torch.Tensor, torch.Tensor]:
 @pytest.mark.parametrize("taken", [0.05, 0.2, 0.5])
 def test_a_known_step_is_told_at_the_border_with_caution_and_less_inwards(taken):
     light, mask = light_and_mask(taken)
-    found = border.missing(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()[40:-40]
+    found = border.measure_missing_light(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()[40:-40]
     within = 90 - np.abs(X - 500)[40:-40]
     at_border = (within > 0) & (within < 25)
     assert found[at_border].min() > 0.65 * taken - 0.01 and found.max() < taken + 0.01
@@ -43,8 +43,9 @@ def test_a_known_step_is_told_at_the_border_with_caution_and_less_inwards(taken)
 
 def test_where_the_light_is_even_nothing_is_missing():
     light, mask = light_and_mask(0.0)
-    assert border.missing(light, mask, torch.ones(SIZE, SIZE), TEXEL).max() < 0.02
-    assert border.missing(1 / light, 0 * mask, torch.ones(SIZE, SIZE), TEXEL).max() == 0, "and no mask has no border"
+    assert border.measure_missing_light(light, mask, torch.ones(SIZE, SIZE), TEXEL).max() < 0.02
+    nowhere = border.measure_missing_light(1 / light, 0 * mask, torch.ones(SIZE, SIZE), TEXEL)
+    assert nowhere.max() == 0, "and no mask has no border"
 
 
 def test_steps_that_differ_more_than_a_delighter_leaves_are_mostly_the_skins_own():
@@ -52,15 +53,15 @@ def test_steps_that_differ_more_than_a_delighter_leaves_are_mostly_the_skins_own
     grows."""
     light, mask = light_and_mask(0.1)
     bearded = torch.from_numpy((np.abs(Y - 512) < 200).astype(np.float32))
-    clean = border.missing(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()
+    clean = border.measure_missing_light(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()
     steps = []
     for dark in (0.9, 0.6, 0.3):
         beard_inside = light * (1 - (1 - dark) * bearded * mask)
         value = beard_inside.log().mean(0).numpy()
-        seen, sure = border.border_steps(value, mask.numpy(), np.ones((SIZE, SIZE), np.float32), TEXEL)
-        share, found = border.share_of_light(seen, sure), border.missing(beard_inside, mask, torch.ones(SIZE, SIZE),
-                                                                         TEXEL).numpy()
-        assert share == pytest.approx(min(1, border.LEFT_LOG**2 / border.spread(seen, sure)[1] ** 2))
+        seen, sure = border.measure_border_steps(value, mask.numpy(), np.ones((SIZE, SIZE), np.float32), TEXEL)
+        share = border.estimate_light_share(seen, sure)
+        found = border.measure_missing_light(beard_inside, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()
+        assert share == pytest.approx(min(1, border.LEFT_LOG**2 / border.mean_and_deviation(seen, sure)[1] ** 2))
         steps.append((share, found[128, int(430 / TEXEL)]))
     (least, alike), _, (most, unlike) = steps
     assert least == 1 and most < 0.2, steps
@@ -70,10 +71,11 @@ def test_steps_that_differ_more_than_a_delighter_leaves_are_mostly_the_skins_own
 def test_the_outline_of_what_was_seen_is_no_border_and_far_from_one_nothing_is_known():
     light, _ = light_and_mask(0.0)
     seen = torch.from_numpy((X < 600).astype(np.float32))
-    assert border.missing(light * (0.5 + 0.5 * seen), seen, seen, TEXEL).max() == 0
+    assert border.measure_missing_light(light * (0.5 + 0.5 * seen), seen, seen, TEXEL).max() == 0
     light, _ = light_and_mask(0.3)
     half = torch.from_numpy((X < 500).astype(np.float32))  # its other edge is the shadow's own
-    wide = border.missing(light, (half + (light[0] < 0.8)).clamp(0, 1), torch.ones(SIZE, SIZE), TEXEL).numpy()
+    mask = (half + (light[0] < 0.8)).clamp(0, 1)
+    wide = border.measure_missing_light(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()
     assert wide[128, int(570 / TEXEL)] > 0.18 and wide[128, int(400 / TEXEL)] < 0.01
 
 

@@ -12,13 +12,13 @@ import pytest
 import torch
 
 from core.contract.messages import Problem, Reporter
-from core.delight.below_hair import FITTED_SHARE, without_hair
-from core.delight.casts import without_casts
+from core.delight.below_hair import FITTED_SHARE, fill_hair
+from core.delight.casts import remove_casts
 from core.delight.evening import ShadingEstimate, even_out
-from core.delight.lift import lift, lift_share
+from core.delight.lift import lift_shading, lift_share
 from core.delight.lit_head import LitHead
-from core.delight.network import WEIGHTS, crop, face_box, load
-from core.delight.second_opinion import Weighing, beyond, weigh_in
+from core.delight.network import WEIGHTS, crop, load_network, square_around
+from core.delight.second_opinion import Weighing, continue_beyond, weigh_in
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.face import template
 from core.face.head import Head
@@ -42,7 +42,7 @@ def test_a_lifted_shadow_edge_lies_where_the_picture_has_it():
     shading[:, 101:] = -1.2
     coarse = cv2.resize(shading, (64, 64), interpolation=cv2.INTER_AREA)
     log = np.repeat((shading + pores - 1)[..., None], 3, -1)
-    lifted = lift(np.repeat(coarse[..., None], 3, -1), log)[..., 0]
+    lifted = lift_shading(np.repeat(coarse[..., None], 3, -1), log)[..., 0]
     plain = cv2.resize(coarse, (256, 256), interpolation=cv2.INTER_LINEAR)
     edge = slice(97, 105)
     assert np.abs(lifted - shading)[:, edge].mean() < 0.35 * np.abs(plain - shading)[:, edge].mean()
@@ -74,7 +74,7 @@ def test_a_crop_finds_a_place_again():
         at = (np.arange(size) + 0.5) * 120 / size
         assert np.abs(cut[size // 2, 2:-2, 0] - (50 + at[2:-2])).max() < 0.1
         assert np.abs(cut[2:-2, size // 2, 1] - (20 + at[2:-2])).max() < 0.1
-    left, top, side = face_box(np.array([[100, 50], [140, 90.0]]))
+    left, top, side = square_around(np.array([[100, 50], [140, 90.0]]))
     assert (left + side / 2, top + side / 2) == pytest.approx((120, 70)) and side > 40
 
 
@@ -146,7 +146,7 @@ def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():
     albedo[40:44, 10:50] += np.float32([0.1, -0.4, -0.3])
     said = light - shadow[..., None] * np.float32([-0.07, 0, 0.07])
     given = ShadingEstimate((0, 0, 64), said, shadow, light + albedo)
-    (mended,) = without_casts([given], [np.ones((64, 64), np.float32)])
+    (mended,) = remove_casts([given], [np.ones((64, 64), np.float32)])
 
     def hue(look):
         left = look.log - look.shading
@@ -170,10 +170,10 @@ def test_beyond_the_square_the_fitted_light_takes_over_at_the_same_level():
     share, here = np.ones((40, 30), np.float32), np.ones((40, 30), bool)
     share[:10] = 0
     box = (slice(0, 40), slice(0, 30))
-    whole, dark = beyond(shading, shadow, known, box, light, share, here)
+    whole, dark = continue_beyond(shading, shadow, known, box, light, share, here)
     assert whole[10:] == pytest.approx(-0.5, abs=1e-5) and whole[:10] == pytest.approx(-0.5 + np.log(0.3), abs=1e-5)
     assert dark[:10] == pytest.approx(1) and not dark[10:].any()
-    same, _ = beyond(shading, shadow, np.zeros_like(known), box, light, share, here)
+    same, _ = continue_beyond(shading, shadow, np.zeros_like(known), box, light, share, here)
     assert np.array_equal(same, shading)  # nothing to take the level from
 
 
@@ -181,12 +181,12 @@ def test_missing_weights_are_named(monkeypatch, tmp_path):
     module = importlib.import_module("core.delight.network")  # the package has a function of that name
     monkeypatch.setattr(module, "WEIGHTS", tmp_path / "delighter.safetensors")
     with pytest.raises(Problem, match="weights of the delighting network are missing"):
-        load("cpu")
+        load_network("cpu")
 
 
 def test_the_shipped_network_is_the_one_its_card_tells_of():
     card = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))
-    net = load("cpu")
+    net = load_network("cpu")
     assert sum(v.numel() for v in net.parameters()) == card["parameters"] and WEIGHTS.stat().st_size < 15e6
     assert not set(card["seeds"]) & (set(card["held_out_seeds"]) | set(reserved_seeds()))
     assert not set(card["skins"]) & set(card["held_out_skins"])
@@ -218,12 +218,12 @@ def test_below_hair_the_mean_of_both_answers_counts_at_the_level_of_the_skin_aro
     hair = (np.hypot(x - 24, y - 30) < 12).astype(np.float32)
     face = np.where(np.hypot(x - 24, y - 24) < 23, 0, -1)
     look = ShadingEstimate((0, 0, 48), true - 1.1 * hair[..., None], hair, true, face)
-    told = without_hair(look, true + 0.4, hair)
+    told = fill_hair(look, true + 0.4, hair)
     expected = true - (1 - FITTED_SHARE) * 1.1 * hair[..., None]
     assert np.abs(told.shading - expected)[face >= 0].max() < 0.01 and told.shadow[face >= 0].max() < 1e-6
     assert np.array_equal(told.shading[face < 0], look.shading[face < 0])
-    assert without_hair(look, true, 0 * hair) is look
-    assert without_hair(look, true, 1 + 0 * hair) is look, "nothing is bare that would tell the level"
+    assert fill_hair(look, true, 0 * hair) is look
+    assert fill_hair(look, true, 1 + 0 * hair) is look, "nothing is bare that would tell the level"
 
 
 def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):

@@ -34,7 +34,7 @@ def machine(monkeypatch, **devices) -> list[str]:
             raise devices[name]
         return devices[name]
 
-    monkeypatch.setattr(device, "candidates", lambda: [name for name in devices if name != "cpu"])
+    monkeypatch.setattr(device, "list_devices", lambda: [name for name in devices if name != "cpu"])
     monkeypatch.setattr(device, "run_pass", run_pass)
     return tried
 

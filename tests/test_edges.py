@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core.light.shadow_edges import BAND, INWARD, penumbra, place
-from core.solve.evidence import softened
+from core.solve.evidence import soften_mask
 
 SIZE = 512
 TAKEN = np.array([0.62, 0.55, 0.48])  # the share of the light that the shadow takes
@@ -34,9 +34,9 @@ def pores(size, strength=0.05):
 def test_alpha_lies_on_the_penumbra(width):
     distance, shadow, painted = shadowed(width)
     light = pores(SIZE) * (1 - shadow[..., None] * TAKEN)
-    edge = place(light, softened(painted), np.ones((SIZE, SIZE), np.float32), 2.0)
+    edge = place(light, soften_mask(painted), np.ones((SIZE, SIZE), np.float32), 2.0)
     near = np.abs(distance) < 25
-    before, after = (np.abs(alpha - shadow)[near].mean() for alpha in (softened(painted), edge.alpha))
+    before, after = (np.abs(alpha - shadow)[near].mean() for alpha in (soften_mask(painted), edge.alpha))
     assert after < 0.01 and after < 0.1 * before
     assert np.abs(edge.alpha - shadow)[np.abs(distance) > width / 2 + 4].max() < 0.05  # no halo to either side
     assert np.abs(edge.colour - TAKEN / TAKEN.mean()).max() < 0.05
@@ -44,7 +44,7 @@ def test_alpha_lies_on_the_penumbra(width):
 
 
 def test_a_mask_without_a_shadow_stays_as_it_was_painted():
-    painted = softened(shadowed(0)[2])
+    painted = soften_mask(shadowed(0)[2])
     edge = place(pores(SIZE) * np.ones(3), painted, np.ones((SIZE, SIZE), np.float32), 2.0)
     assert np.array_equal(edge.alpha, painted) and edge.found.max() == 0
 
@@ -65,7 +65,7 @@ def test_a_step_of_another_colour_is_not_the_shadows():
     _, shadow, painted = shadowed(2, centre=(0.7, 0.5))
     _, patch, around = shadowed(2, centre=(0.25, 0.5), radius=60.0)
     light = (1 - shadow[..., None] * TAKEN) * np.exp(-patch[..., None] * MELANIN)
-    mask = softened(np.maximum(painted, around))
+    mask = soften_mask(np.maximum(painted, around))
     edge = place(light * pores(SIZE), mask, np.ones((SIZE, SIZE), np.float32), 2.0)
     left = np.arange(SIZE) < SIZE // 2
     assert np.abs(edge.alpha - shadow)[:, ~left].mean() < 0.1 * np.abs(mask - shadow)[:, ~left].mean()
@@ -77,6 +77,6 @@ def test_deep_strokes_are_never_taken_back():
     size = SIZE
     y, x = (np.mgrid[:size, :size] + 0.5) * 2
     shadow = ((np.hypot(x - 500, y - 500) < 200) & (np.hypot(x - 500, y - 500) > 60)).astype(np.float32)
-    painted = softened((np.hypot(x - 500, y - 500) < 206).astype(np.float32))
+    painted = soften_mask((np.hypot(x - 500, y - 500) < 206).astype(np.float32))
     edge = place(1 - shadow[..., None] * TAKEN, painted, np.ones((size, size), np.float32), 2.0)
     assert edge.alpha[np.hypot(x - 500, y - 500) < 206 - INWARD - BAND].min() == 1

@@ -75,7 +75,7 @@ class Painted:
         return Eyeball(tuple(ball.centre), ball.radius, tuple(ball.gaze), 0.9, eyes.IRIS_MM / 1000, 5)
 
     def found(self, side: int):
-        return iris.iris_colour(self.views, self.head, side, self.eyeball(side), self.albedo, Reporter("solve"))
+        return iris.measure_iris_colour(self.views, self.head, side, self.eyeball(side), self.albedo, Reporter("solve"))
 
     def true(self) -> np.ndarray:
         """The median of the picture between pupil and rim."""
@@ -105,7 +105,7 @@ def test_a_blink_and_another_skin_change_little(tmp_path):
 def test_an_iris_that_no_frame_faces_has_no_colour(tmp_path):
     person = Painted(tmp_path, (0.05, 0.06, 0.07))
     behind = replace(person.eyeball(0), gaze=(0.0, 1.0, 0.0))
-    assert iris.iris_colour(person.views, person.head, 0, behind, person.albedo, Reporter("solve")) is None
+    assert iris.measure_iris_colour(person.views, person.head, 0, behind, person.albedo, Reporter("solve")) is None
 
 
 def test_the_iris_is_what_lids_and_pupil_leave_of_it():
@@ -119,10 +119,10 @@ def test_the_iris_is_what_lids_and_pupil_leave_of_it():
     move = np.array([[1.0, 0, SIDE / 2 - middle[0]], [0, 1.0, SIDE / 2 - middle[1]]])
     share = np.zeros((SIDE, SIDE), np.float32)
     share[SIDE // 2:] = 1
-    rows, columns = iris.iris_pixels(view, eye, EyeShares(share, share, move), shape)
+    rows, columns = iris.find_iris_pixels(view, eye, EyeShares(share, share, move), shape)
     x, y = columns + 0.5 - middle[0], rows + 0.5 - middle[1]
     assert len(rows) == pytest.approx(np.pi * radius**2 * (0.85**2 - 0.55**2) / 2, rel=0.1)
     assert (np.hypot(x, y) / radius > 0.54).all() and (np.hypot(x, y) / radius < 0.86).all() and y.min() > -1.5
     shut = EyeShares(share, np.zeros_like(share), move)
-    assert not len(iris.iris_pixels(view, eye, shut, shape)[0])
-    assert not len(iris.iris_pixels(view, replace(eye, iris_radius=0.0), EyeShares(share, share, move), shape)[0])
+    assert not len(iris.find_iris_pixels(view, eye, shut, shape)[0])
+    assert not len(iris.find_iris_pixels(view, replace(eye, iris_radius=0.0), EyeShares(share, share, move), shape)[0])

@@ -149,18 +149,18 @@ def test_a_checkpoint_that_did_not_fit_on_the_disk_is_told_by_name(tmp_path, mon
     state = State(1, None, torch.ones(1, 7, 32, 32), Lights(*torch.ones(3, 4)), [])
     path = tmp_path / "solve.safetensors"
     assert (
-        "solve.safetensors could not be written" in with_limit(4096, lambda: checkpoint.write(path, state, "key"))
+        "solve.safetensors could not be written" in with_limit(4096, lambda: checkpoint.write_state(path, state, "key"))
         and os.listdir(tmp_path) == []
     )
-    assert with_limit(1 << 20, lambda: checkpoint.write(path, state, "key")) == ""
-    assert checkpoint.read(path, "key").step == 1
+    assert with_limit(1 << 20, lambda: checkpoint.write_state(path, state, "key")) == ""
+    assert checkpoint.read_state(path, "key").step == 1
 
     def full(*_, **__):
         raise SafetensorError("Error while serializing: I/O error: No space left on device (os error 28)")
 
     monkeypatch.setattr(checkpoint, "save_file", full)
     with pytest.raises(Problem, match="disk is full"):
-        checkpoint.write(path, state, "key")
+        checkpoint.write_state(path, state, "key")
 
 
 def with_limit(most_bytes: int, attempt) -> str:

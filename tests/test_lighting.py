@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.solve.lighting import Lights, Shader, constant_light, fit_global, interpolation, shading_basis
+from core.solve.lighting import Lights, Shader, constant_light, fit_global, interpolation_matrix, shading_basis
 
 
 def sphere(rows: int = 200, columns: int = 400):
@@ -67,7 +67,7 @@ def test_local_light_lives_inside_the_mask_only(coloured):
     assert difference[:, alpha == 0].abs().max() == 0
     assert difference[:, alpha > 0].abs().mean() > 0.1
     # the definition, texel by texel: gamma = gamma^g + interp(V) M
-    rows, columns = interpolation(5, 40), interpolation(5, 40)
+    rows, columns = interpolation_matrix(5, 40), interpolation_matrix(5, 40)
     grid = rows @ lights.grid @ columns.T * (lights.chroma[:, None, None, None] if coloured else 1)
     gamma = lights.glob[:, :, None, None] + grid * alpha
     assert torch.allclose((gamma * shader.basis).sum(1), shader.total(lights), atol=1e-4)
@@ -75,11 +75,11 @@ def test_local_light_lives_inside_the_mask_only(coloured):
 
 def test_interpolation_keeps_constants_and_lines():
     for cells, texels in ((12, 96), (7, 100), (1, 24), (96, 24), (5, 5)):
-        matrix = interpolation(cells, texels)
+        matrix = interpolation_matrix(cells, texels)
         assert torch.allclose(matrix.sum(1), torch.ones(texels), atol=1e-6)
-    line = interpolation(20, 160) @ torch.arange(20.0)
+    line = interpolation_matrix(20, 160) @ torch.arange(20.0)
     assert torch.allclose(line[24:-24], (torch.arange(160.0)[24:-24] + 0.5) / 8 - 0.5, atol=1e-4)
-    assert torch.equal(interpolation(6, 6), torch.eye(6))
+    assert torch.equal(interpolation_matrix(6, 6), torch.eye(6))
 
 
 def test_global_light_is_found_in_closed_form():

@@ -14,16 +14,16 @@ import torch
 from core.contract.capture import Capture
 from core.face import template
 from core.face.head import read_head
-from core.geometry import meshes, raster
+from core.geometry import frame_pictures, meshes, raster
 from core.geometry.views import View
 from core.imaging import images
 from core.light.shadow_edges import penumbra
 from core.solve import initial, maps, witnesses
 from core.solve.evidence import read_evidence
-from core.solve.marks import Mark, find, unlike_shadow
+from core.solve.marks import Mark, find_marks, is_unlike_shadow
 from core.solve.prior import load
 from core.solve.recipes import OURS
-from core.solve.sampler import Sampler, seeded
+from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import GIVEN, SkinTone
 
 SIZE = 512
@@ -51,12 +51,12 @@ def skin(strength=0.05):
 
 @pytest.mark.parametrize("diameter", [6, 8, 12, 16])
 def test_a_mole_is_found_where_and_as_large_as_it_is(diameter):
-    marks = find(skin() * np.exp(-spot(200, 300, diameter) * MELANIN), SKIN, TEXEL)
+    marks = find_marks(skin() * np.exp(-spot(200, 300, diameter) * MELANIN), SKIN, TEXEL)
     assert len(marks) == 1
     assert np.hypot(marks[0].row - 200, marks[0].column - 300) < 1.5
     assert 0.6 < marks[0].radius * TEXEL / (diameter / 2) < 1.6
     assert 0.6 * MELANIN.mean() < marks[0].contrast < 1.2 * MELANIN.mean()
-    assert unlike_shadow(marks[0], TAKEN / TAKEN.mean())
+    assert is_unlike_shadow(marks[0], TAKEN / TAKEN.mean())
 
 
 def test_freckles_pores_and_shadow_edges_are_no_moles():
@@ -65,16 +65,16 @@ def test_freckles_pores_and_shadow_edges_are_no_moles():
     freckles[tuple(random.integers(0, SIZE, (2, 1500)))] = random.uniform(0.1, 0.35, 1500)
     freckles = cv2.GaussianBlur(freckles, (0, 0), 1.5 / TEXEL) * (2 * np.pi) * (1.5 / TEXEL) ** 2
     # where several fall on one place
-    assert len(find(skin() * np.exp(-freckles[..., None] * MELANIN), SKIN, TEXEL)) <= 5
-    assert find(skin(0.12), SKIN, TEXEL) == []
+    assert len(find_marks(skin() * np.exp(-freckles[..., None] * MELANIN), SKIN, TEXEL)) <= 5
+    assert find_marks(skin(0.12), SKIN, TEXEL) == []
     wavy = 260 + 20 * np.sin(np.arange(SIZE) / 12)
     shadow = (np.arange(SIZE)[:, None] > wavy).astype(float)[..., None]
-    assert find(skin() * (1 - shadow * TAKEN), SKIN, TEXEL) == []
+    assert find_marks(skin() * (1 - shadow * TAKEN), SKIN, TEXEL) == []
 
 
 def test_a_speck_of_shadow_is_told_by_its_colour():
-    marks = find(skin() * (1 - spot(200, 300, 10) * TAKEN), SKIN, TEXEL)
-    assert len(marks) == 1 and not unlike_shadow(marks[0], TAKEN / TAKEN.mean())
+    marks = find_marks(skin() * (1 - spot(200, 300, 10) * TAKEN), SKIN, TEXEL)
+    assert len(marks) == 1 and not is_unlike_shadow(marks[0], TAKEN / TAKEN.mean())
 
 
 def test_views_confirm_what_they_all_show(tmp_path, monkeypatch):
@@ -101,11 +101,11 @@ def test_views_confirm_what_they_all_show(tmp_path, monkeypatch):
             cv2.circle(picture, tuple(int(v) for v in pixel), 5, (0.2, 0.2, 0.2), -1)
         images.write_srgb((capture.delit / view.name).with_suffix(".png"), picture)
         views.append(view)
-    monkeypatch.setattr(witnesses, "read_views", lambda capture: views)
-    assert witnesses.confirmed(capture, read_head(capture), marks, 256) == marks[:1]
-    monkeypatch.setattr(witnesses, "read_views", lambda capture: views[:1])
+    monkeypatch.setattr(frame_pictures, "read_views", lambda capture: views)
+    assert witnesses.confirm_marks(capture, read_head(capture), marks, 256) == marks[:1]
+    monkeypatch.setattr(frame_pictures, "read_views", lambda capture: views[:1])
     # one view is too few to deny what the texture shows
-    assert witnesses.confirmed(capture, read_head(capture), marks, 256) == marks
+    assert witnesses.confirm_marks(capture, read_head(capture), marks, 256) == marks
 
 
 def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
@@ -113,7 +113,7 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     texels too large and beside it."""
     prior, capture = load(), Capture(tmp_path)
     covered = torch.from_numpy(template.mask("skin", SIZE).copy())
-    albedo = (initial.face_of_tone(prior.mean_face, torch.from_numpy(TONE), covered)[0, :3].permute(1, 2, 0).numpy()
+    albedo = (initial.tint_face(prior.mean_face, torch.from_numpy(TONE), covered)[0, :3].permute(1, 2, 0).numpy()
               + 1) / 2
     row, column = round(0.56 * SIZE), round(0.655 * SIZE)
     albedo = albedo * skin(0.04) / TONE * np.exp(-spot(row, column, 8) * MELANIN)
@@ -124,10 +124,10 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     images.write_data(capture.shadow_mask, (distance_to(row - 1.5, column + 1.5) < 98).astype(np.float32))
     meshes.write_obj(capture.head, template.load())
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
-    start = initial.start(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
+    start = initial.start_solve(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
-    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seeded(0))
-    result = maps.finished(sampler.sample(start.observations, start.state), evidence, start)
+    sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(0))
+    result = maps.finish_maps(sampler.sample(start.observations, start.state), evidence, start)
     solved = result.diffuse
 
     def contrast(image):

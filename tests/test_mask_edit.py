@@ -16,7 +16,7 @@ from core.contract.capture import Capture
 from core.contract.messages import CancelledError, Reporter
 from core.contract.stages import MAPS
 from core.imaging import images
-from core.solve.window import window
+from core.solve.window import find_window
 
 from .painted_skin import brief_confidence, make, settings  # noqa: F401
 
@@ -142,13 +142,13 @@ def test_the_add_on_can_tell_without_torch(capture):
 def test_windows_lie_on_whole_cells_and_stay_in_the_map():
     before, now = torch.zeros(256, 256), torch.zeros(256, 256)
     now[:9, 100:110] = 1
-    part = window(before, now, (64, 64), 8, 256)
+    part = find_window(before, now, (64, 64), 8, 256)
     assert part.inside == (slice(0, 76), slice(36, 176))
     assert all(s.start % 32 == 0 and s.stop % 32 == 0 and 0 <= s.start < s.stop <= 256 for s in part.seen)
     moving = torch.nonzero(part.moving)
     assert moving[:, 0].min() == 0, "at the map's border nothing else is read"
     column = (moving[:, 1].min() + part.cells[1].start).item()
     assert (column - 1.5) * 4 >= 36 > (column - 2.5) * 4
-    assert window(now, now, (64, 64), 8, 256) is None
+    assert find_window(now, now, (64, 64), 8, 256) is None
     with pytest.raises(ValueError, match="does not divide"):
-        window(before, now, (60, 60), 8, 256)
+        find_window(before, now, (60, 60), 8, 256)

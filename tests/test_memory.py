@@ -15,7 +15,7 @@ from core.contract.stages import MAPS, by_name
 from core.solve.memory import sample_within_memory
 from core.solve.network import UNet, UNetLayout
 from core.solve.recipes import Recipe
-from core.solve.sampler import Sampler, seeded
+from core.solve.sampler import Sampler, seed_noise
 
 from .painted_skin import brief_confidence, make, settings  # noqa: F401
 from .recorded import changed, record
@@ -59,7 +59,7 @@ def problem():
 def unbroken():
     priors, seen, recipe = problem()
     sizes = []
-    sampler = Sampler(lambda x, s, c: priors[x.shape[-1]](x, s, c), recipe, seeded(1))
+    sampler = Sampler(lambda x, s, c: priors[x.shape[-1]](x, s, c), recipe, seed_noise(1))
     out = sampler.sample(seen, start(-0.2), lambda state, steps: sizes.append(state.x.shape[-1]))
     assert sizes[0] == 16 and sizes[-1] == 32
     return out
@@ -70,7 +70,7 @@ def unbroken():
 def test_a_step_that_did_not_fit_is_done_again_to_the_same_bytes(unbroken, at, backward):
     priors, seen, recipe = problem()
     prior, said, steps = Refusing(priors, at, REFUSALS[at % len(REFUSALS)], backward), [], []
-    out = sample_within_memory(Sampler(prior, recipe, seeded(1)), seen, start(-0.2),
+    out = sample_within_memory(Sampler(prior, recipe, seed_noise(1)), seen, start(-0.2),
                                lambda state, of: steps.append(state.step), said.append)
     assert torch.equal(out.denoised, unbroken.denoised) and torch.equal(out.x, unbroken.x)
     assert all(torch.equal(a, b) for a, b in zip(out.lights.parameters(), unbroken.lights.parameters(), strict=True))
@@ -91,7 +91,7 @@ def test_lights_that_did_not_fit_start_over_too(unbroken, monkeypatch):
 
     monkeypatch.setattr(light_fit, "light_loss", refusing)
     priors, seen, recipe = problem()
-    out = sample_within_memory(Sampler(Refusing(priors, 0, None), recipe, seeded(1)), seen, start(-0.2))
+    out = sample_within_memory(Sampler(Refusing(priors, 0, None), recipe, seed_noise(1)), seen, start(-0.2))
     assert torch.equal(out.denoised, unbroken.denoised) and torch.equal(out.lights.grid, unbroken.lights.grid)
 
 
@@ -99,7 +99,7 @@ def test_lights_that_did_not_fit_start_over_too(unbroken, monkeypatch):
 def test_what_does_not_fit_in_either_mode_is_a_problem_with_a_remedy(error):
     priors, seen, recipe = problem()
     with pytest.raises(Problem, match="step 3 of 6") as raised:
-        sample_within_memory(Sampler(Refusing(priors, 3, error, always=True), recipe, seeded(1)), seen, start(-0.2))
+        sample_within_memory(Sampler(Refusing(priors, 3, error, always=True), recipe, seed_noise(1)), seen, start(-0.2))
     assert "smaller map size" in raised.value.remedy
 
 
@@ -107,7 +107,7 @@ def test_other_errors_are_not_taken_for_a_lack_of_memory():
     priors, seen, recipe = problem()
     prior = Refusing(priors, 2, RuntimeError("mat1 and mat2 shapes cannot be multiplied"))
     with pytest.raises(RuntimeError, match="shapes"):
-        sample_within_memory(Sampler(prior, recipe, seeded(1)), seen, start(-0.2))
+        sample_within_memory(Sampler(prior, recipe, seed_noise(1)), seen, start(-0.2))
     assert prior.calls == 2 and not prior.network.low_memory
 
 

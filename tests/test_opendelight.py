@@ -18,9 +18,9 @@ from core import __main__ as terminal
 from core.contract.capture import Capture
 from core.contract.messages import CancelledError, Problem, Reporter
 from core.contract.settings import DelightSettings, from_json
-from core.delight.face_crop import alignment, cut, face_mask, put_back
+from core.delight.face_crop import cut_face, face_mask, ffhq_alignment, put_face_back
 from core.delight.opendelight_checkpoint import BASE, ENHANCER, load
-from core.delight.opendelight_network import base_shapes, delit, enhancer_shapes
+from core.delight.opendelight_network import base_shapes, delight_crop, enhancer_shapes
 from core.face.faces import Face
 from core.imaging import images
 from core.synthetic.painted_head import camera, photograph
@@ -73,7 +73,7 @@ def test_the_first_network_is_the_plain_one(checkpoint):
     with torch.no_grad():
         wanted = plain(picture)
     assert wanted.std() > 0.05
-    torch.testing.assert_close(delit(load(str(checkpoint)).base, None, picture), wanted, atol=1e-4, rtol=0)
+    torch.testing.assert_close(delight_crop(load(str(checkpoint)).base, None, picture), wanted, atol=1e-4, rtol=0)
 
 
 def test_the_second_network_is_the_plain_one(checkpoint):
@@ -81,14 +81,14 @@ def test_the_second_network_is_the_plain_one(checkpoint):
     plain.load_state_dict(torch.load(checkpoint / ENHANCER, weights_only=True), strict=True)
     picture = torch.rand(1, 3, 96, 96, generator=torch.Generator().manual_seed(1))
     with torch.no_grad():
-        wanted = plain(torch.cat([delit(files.base, None, picture), picture], 1))
+        wanted = plain(torch.cat([delight_crop(files.base, None, picture), picture], 1))
     assert wanted.std() > 0.02
-    torch.testing.assert_close(delit(files.base, files.enhancer, picture), wanted, atol=1e-4, rtol=0)
+    torch.testing.assert_close(delight_crop(files.base, files.enhancer, picture), wanted, atol=1e-4, rtol=0)
 
 
 def test_a_face_stands_upright_in_its_crop():
     _, face = painted_face(angle=0.4)
-    to_crop = alignment(face, 512, 0.85)
+    to_crop = ffhq_alignment(face, 512, 0.85)
     points = face.landmarks[:, :2] @ to_crop[:, :2].T + to_crop[:, 2]
     right, left, mouth = points[33], points[263], points[[61, 291]].mean(0)
     assert right[1] == pytest.approx(left[1], abs=0.01) and left[0] > right[0]
@@ -102,17 +102,17 @@ def test_a_face_stands_upright_in_its_crop():
 @pytest.mark.parametrize("size", [160, 512])
 def test_a_crop_that_was_not_changed_gives_the_frame_back(size):
     srgb, face = painted_face()
-    to_crop = alignment(face, size, 0.85)
-    crop, mask = cut(srgb, to_crop, size), face_mask(face, to_crop, size)
-    assert np.abs(put_back(srgb, crop, crop, mask, to_crop) - srgb).max() < 0.02
+    to_crop = ffhq_alignment(face, size, 0.85)
+    crop, mask = cut_face(srgb, to_crop, size), face_mask(face, to_crop, size)
+    assert np.abs(put_face_back(srgb, crop, crop, mask, to_crop) - srgb).max() < 0.02
 
 
 def test_what_was_made_of_the_face_lands_on_the_face():
     srgb, face = painted_face()
-    to_crop = alignment(face, 512, 0.85)
-    crop, mask = cut(srgb, to_crop, 512), face_mask(face, to_crop, 512)
+    to_crop = ffhq_alignment(face, 512, 0.85)
+    crop, mask = cut_face(srgb, to_crop, 512), face_mask(face, to_crop, 512)
     half = images.linear_to_srgb(0.5 * images.srgb_to_linear(crop))
-    back = images.srgb_to_linear(put_back(srgb, crop, half, mask, to_crop)) / images.srgb_to_linear(srgb)
+    back = images.srgb_to_linear(put_face_back(srgb, crop, half, mask, to_crop)) / images.srgb_to_linear(srgb)
     x, y = np.round(face.landmarks[[33, 263, 61, 291], :2].mean(0)).astype(int)
     assert back[y - 10:y + 10, x - 10:x + 10].mean() == pytest.approx(0.5, abs=0.03)
     assert (back[:40] == 1).all() and (back[:, -40:] == 1).all()

@@ -14,13 +14,13 @@ from .painted_skin import brief_confidence, make, settings  # noqa: F401
 
 def test_a_solve_shows_pictures_that_change_and_how_its_loss_falls(tmp_path, monkeypatch):
     capture, seen, drawn = make(tmp_path / "a.wildcap"), [], []
-    curve = drawing.loss_curve
+    curve = drawing.draw_loss_curve
 
     def loss_curve(losses, steps):
         drawn.append((list(losses), steps))
         return curve(losses, steps)
 
-    monkeypatch.setattr(drawing, "loss_curve", loss_curve)
+    monkeypatch.setattr(drawing, "draw_loss_curve", loss_curve)
 
     def hear(message) -> None:
         if isinstance(message, Preview):
@@ -36,10 +36,10 @@ def test_a_solve_shows_pictures_that_change_and_how_its_loss_falls(tmp_path, mon
 
 
 def test_the_loss_curve_falls_from_the_upper_left_to_the_lower_right():
-    picture = drawing.loss_curve([(step, 0.1 ** (step / 5)) for step in range(1, 11)], 10)
+    picture = drawing.draw_loss_curve([(step, 0.1 ** (step / 5)) for step in range(1, 11)], 10)
     orange = np.argwhere(picture[..., 0] > 0.8)
     first, last = orange[orange[:, 1] < 10], orange[orange[:, 1] > picture.shape[1] - 10]
     assert first[:, 0].mean() < 20 and last[:, 0].mean() > picture.shape[0] - 20
-    half = drawing.loss_curve([(step, 0.1 ** (step / 5)) for step in range(1, 6)], 10)
+    half = drawing.draw_loss_curve([(step, 0.1 ** (step / 5)) for step in range(1, 6)], 10)
     assert not (half[:, 140:, 0] > 0.8).any(), "what is still to come is empty"
-    assert np.isfinite(drawing.loss_curve([(1, 0.0)], 10)).all()
+    assert np.isfinite(drawing.draw_loss_curve([(1, 0.0)], 10)).all()

@@ -72,8 +72,8 @@ def capture(tmp_path):
     """The mean face of TONE in a little light from the left, a soft shadow on one cheek, and another head fitted beside
     the built-in one."""
     made = Capture(tmp_path / "face.wildcap")
-    reference = initial.face_of_tone(load().mean_face, torch.from_numpy(TONE),
-                                     torch.from_numpy(template.mask("skin", SIZE).copy()))
+    reference = initial.tint_face(load().mean_face, torch.from_numpy(TONE),
+                                  torch.from_numpy(template.mask("skin", SIZE).copy()))
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     shadow = 1 / (1 + np.exp((np.hypot(x - 0.6, y - 0.5) - 0.06) / 0.006))
     light = (0.7 + 0.3 * x) * (1 - 0.5 * shadow)
@@ -103,14 +103,14 @@ def settings(prior, **options):
 
 def seen_layouts(monkeypatch) -> list[layout.Layout]:
     """Gets the layouts that runs from here on work in."""
-    fitted, kept = layout.fitted, []
+    fitted, kept = layout.fit_layout, []
 
     def keep(*given):
         found = fitted(*given)
         kept.append(found[0])
         return found
 
-    monkeypatch.setattr(layout, "fitted", keep)
+    monkeypatch.setattr(layout, "fit_layout", keep)
     return kept
 
 
@@ -119,7 +119,7 @@ def carried():
     """The layout of the other head at 256, and the built-in head's texels: position [S, S, 3], and which of them are
     far within the window."""
     own, size = other_head(), 256
-    there = layout.between(front(), own, np.ones(len(own.faces), bool), size, load().mean_face, lambda done: None)
+    there = layout.make_layout(front(), own, np.ones(len(own.faces), bool), size, load().mean_face, lambda done: None)
     face, bary = raster.rasterize_uv(template.load(), size)
     position = raster.interpolate(template.load().vertices, template.load().faces, face, bary).astype(np.float32)
     return there, raster.bleed(position, face >= 0), template.mask("face", size) > 0.9
@@ -168,8 +168,8 @@ def test_the_prior_is_asked_in_its_own_window_and_coordinates(carried):
     head = template.load()
     wanted = (head.vertices[head.faces[face[[6, 197]]]] * bary[[6, 197], :, None]).sum(1).mean(0)
     assert np.linalg.norm(at.numpy() - wanted) < 0.006
-    assert layout.whole_size(1024, 8) == 1024 and layout.whole_size(500, 8) == 480
-    assert layout.whole_size(1024, 64) * 3 / 4 % 64 == 0
+    assert layout.round_size(1024, 8) == 1024 and layout.round_size(500, 8) == 480
+    assert layout.round_size(1024, 64) * 3 / 4 % 64 == 0
 
 
 @pytest.mark.parametrize("recipe", ["wildcap", "released"])

@@ -13,7 +13,7 @@ from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.prior import coordinates
 from core.solve.problem import Observation, State
 from core.solve.recipes import RECIPES, Recipe
-from core.solve.sampler import Sampler, ancestral, karras, schedule, seeded
+from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas, noise_schedule, seed_noise
 
 SIZE = 32
 MEAN, SPREAD = 0.1, 0.3
@@ -61,18 +61,19 @@ def start(value=0.0, size=SIZE, light=1.0, cells=(4, 4)):
 
 
 def test_schedule_walks_the_last_part_of_karras_sequence():
-    sigmas = schedule(Recipe(steps=599, start=0.599))
+    sigmas = noise_schedule(Recipe(steps=599, start=0.599))
     assert len(sigmas) == 600 and sigmas[-1] == 0 and abs(sigmas[0] - 7.26) < 0.02
     assert all(a > b for a, b in zip(sigmas, sigmas[1:], strict=False))
     for s, s_next in zip(sigmas, sigmas[1:], strict=False):
-        down, up = ancestral(s, s_next)
+        down, up = ancestral_sigmas(s, s_next)
         assert abs(down**2 + up**2 - s_next**2) < 1e-9 * s**2
-    assert karras(10, 0.01, 80.0)[0] == pytest.approx(80) and karras(10, 0.01, 80.0)[9] == pytest.approx(0.01)
+    sigmas = karras_sigmas(10, 0.01, 80.0)
+    assert sigmas[0] == pytest.approx(80) and sigmas[9] == pytest.approx(0.01)
 
 
 def test_without_observation_the_sampler_draws_from_the_prior():
     o = observation(torch.zeros(3, SIZE, SIZE), weight=torch.zeros(SIZE, SIZE))
-    drawn = torch.cat([Sampler(gaussian_prior, EVEN, seeded(seed)).sample({1: o}, start()).denoised
+    drawn = torch.cat([Sampler(gaussian_prior, EVEN, seed_noise(seed)).sample({1: o}, start()).denoised
                        for seed in range(3)])
     assert abs(drawn.mean().item() - MEAN) < 0.02
     assert abs(drawn.std().item() - SPREAD) < 0.03
@@ -90,7 +91,7 @@ def test_posterior_mean_under_a_gaussian_prior(guidance):
     weight[:, SIZE // 2:] = 0.0  # the right half is unseen: its posterior is the prior
     recipe = Recipe(steps=75, coarse=(), guidance=guidance, rate=0.0)
     o = {1: observation(texture, weight=weight)}
-    drawn = torch.stack([Sampler(gaussian_prior, recipe, seeded(seed)).sample(o, start(light=light)).denoised[0]
+    drawn = torch.stack([Sampler(gaussian_prior, recipe, seed_noise(seed)).sample(o, start(light=light)).denoised[0]
                          for seed in range(12)])
     seen, unseen = drawn[:, :3, :, :SIZE // 2], drawn[:, :3, :, SIZE // 2:]
     assert (seen.mean(0) - truth[0, :3, :, :SIZE // 2]).abs().mean() < 0.02
@@ -115,8 +116,8 @@ def test_a_known_soft_shadow_is_removed_and_only_with_the_grid():
     recipe = Recipe(steps=60, coarse=())
     errors = {}
     for name, alpha in (("grid", mask), ("no grid", torch.zeros_like(mask))):
-        out = Sampler(prior, recipe, seeded(0)).sample({1: observation(texture, alpha, (8, 8))},
-                                                       start(-0.2, 64, cells=(8, 8)))
+        out = Sampler(prior, recipe, seed_noise(0)).sample({1: observation(texture, alpha, (8, 8))},
+                                                           start(-0.2, 64, cells=(8, 8)))
         error = ((out.denoised - truth)[0, :3] / 2) ** 2
         errors[name] = error[:, shadow].mean().sqrt().item(), error[:, mask == 0].mean().sqrt().item()
     assert errors["grid"][0] < 0.6 * errors["no grid"][0]
@@ -132,7 +133,7 @@ def test_the_paper_and_its_code_remove_a_known_shadow_too(name):
     o = observation(texture, support, (8, 8))
     first = start(-0.2, 64, cells=(8, 8))
     first.lights.grid = torch.zeros(3, 9, 8, 8)
-    out = Sampler(prior, recipe, seeded(0)).sample({1: o}, first)
+    out = Sampler(prior, recipe, seed_noise(0)).sample({1: o}, first)
     error, before = ((out.denoised - truth)[0, :3] / 2).abs(), (texture - (truth[0, :3] + 1) / 2).abs()
     assert error[:, shadow].mean() < 0.7 * before[:, shadow].mean()
     # lights fitted one after the other leave more outside than lights fitted together
@@ -142,7 +143,7 @@ def test_the_paper_and_its_code_remove_a_known_shadow_too(name):
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
     prior, _, texture, mask, _ = shadow_problem(32)
     o = {1: observation(texture, mask)}
-    a, b, c = (Sampler(prior, Recipe(steps=12, coarse=()), seeded(seed)).sample(o, start(-0.2)).denoised
+    a, b, c = (Sampler(prior, Recipe(steps=12, coarse=()), seed_noise(seed)).sample(o, start(-0.2)).denoised
                for seed in (5, 5, 6))
     assert torch.equal(a, b) and not torch.equal(a, c)
 
@@ -162,14 +163,14 @@ def test_resuming_from_a_checkpoint_gives_the_same_bytes(tmp_path, coarse):
 
     def store(state, steps):
         if state.step == 5:
-            checkpoint.write(path, state, "key")
+            checkpoint.write_state(path, state, "key")
 
-    whole = Sampler(denoiser, recipe, seeded(1)).sample(o, start(-0.2), store)
-    assert checkpoint.read(path, "another key") is None
-    resumed = Sampler(denoiser, recipe, seeded(1)).sample(o, checkpoint.read(path, "key"))
+    whole = Sampler(denoiser, recipe, seed_noise(1)).sample(o, start(-0.2), store)
+    assert checkpoint.read_state(path, "another key") is None
+    resumed = Sampler(denoiser, recipe, seed_noise(1)).sample(o, checkpoint.read_state(path, "key"))
     assert torch.equal(whole.denoised, resumed.denoised) and torch.equal(whole.lights.grid, resumed.lights.grid)
     path.write_bytes(path.read_bytes()[:1000])
-    assert checkpoint.read(path, "key") is None
+    assert checkpoint.read_state(path, "key") is None
 
 
 @pytest.mark.parametrize("kind", ["empty", "full", "one texel"])
@@ -179,7 +180,7 @@ def test_any_mask_gives_finite_maps(kind, guidance):
     alpha = {"empty": torch.zeros(32, 32), "full": torch.ones(32, 32), "one texel": torch.zeros(32, 32)}[kind]
     if kind == "one texel":
         alpha[7, 9] = 1
-    sampler = Sampler(prior, Recipe(steps=20, coarse=(), guidance=guidance), seeded(0))
+    sampler = Sampler(prior, Recipe(steps=20, coarse=(), guidance=guidance), seed_noise(0))
     out = sampler.sample({1: observation(texture, alpha)}, start(-0.2))
     assert torch.isfinite(out.denoised).all()
     assert ((out.denoised - truth)[0, :3, 20:] / 2).abs().mean() < (0.1 if kind != "full" else 0.5)
@@ -188,4 +189,4 @@ def test_any_mask_gives_finite_maps(kind, guidance):
 def test_divergence_is_a_problem_with_a_remedy():
     o = {1: observation(torch.full((3, SIZE, SIZE), float("nan")))}
     with pytest.raises(Problem, match="diverged at step 1"):
-        Sampler(gaussian_prior, EVEN, seeded(0)).sample(o, start())
+        Sampler(gaussian_prior, EVEN, seed_noise(0)).sample(o, start())

@@ -58,7 +58,7 @@ def test_line_ends_of_a_checkout_are_no_damage(core):
 
 
 @pytest.mark.parametrize(("module", "name", "load"), [
-    (network, "delighter", lambda path: network.load("cpu")), (enlarge, "upscaler", enlarge.load_network),
+    (network, "delighter", lambda path: network.load_network("cpu")), (enlarge, "upscaler", enlarge.load_network),
     (prior, "prior", prior._load_ours), (whole_head, "prior", lambda path: whole_head.usual_skin(8))])
 def test_damaged_weights_are_named_by_what_needs_them(core, monkeypatch, module, name, load):
     path = core / "weights" / f"{name}.safetensors"

@@ -32,7 +32,7 @@ def test_the_front_of_smoothly_lit_skin_is_found_past_shadows_and_highlights():
     lit = (0.6 - 0.3 * normals[:, 1] + 0.2 * normals[:, 0])[:, None] * np.array([0.5, 0.3, 0.2])
     lit[::9] *= 0.4  # in shadow
     lit[4::31] += 0.5  # a highlight
-    found = look.look(lit, normals, np.ones(len(lit)))
+    found = look.summarise_look(lit, normals, np.ones(len(lit)))
     assert np.allclose(found.front, 0.9 * np.array([0.5, 0.3, 0.2]), rtol=0.03)
     assert np.allclose(found.best / found.best[1], [5 / 3, 1, 2 / 3], rtol=0.08) and found.best[1] > found.front[1]
 
@@ -47,14 +47,14 @@ def test_highlights_that_move_do_not_count():
 @pytest.mark.parametrize("reflects", [0.6, 0.3, 0.12, 0.05])
 def test_with_a_measured_white_a_tone_is_what_it_is(reflects):
     """Of light and dark skin alike: neither exposure nor the light's colour reaches the tone."""
-    known = population.population()
+    known = population.read_population()
     true = known.tones[np.abs(known.tones[:, 0] - reflects).argmin()]
     shown = (true + population.SHEEN_REFLECTANCE) * BRIGHT
     found = [population.estimate_skin_tone(look.Look(gain * shown, gain * shown), white=gain * BRIGHT)
              for gain in (0.2, 0.7)]
     assert np.allclose(found[0].linear, found[1].linear, rtol=1e-3)
-    lightness = population.lab(np.array(found[0].linear))[0]
-    assert abs(lightness - population.lab(true)[0]) < 4 and 0 < found[0].deviation < 10
+    lightness = population.to_lab(np.array(found[0].linear))[0]
+    assert abs(lightness - population.to_lab(true)[0]) < 4 and 0 < found[0].deviation < 10
 
 
 def test_the_stated_deviation_holds_and_no_group_is_drawn_to_the_middle():
@@ -63,10 +63,10 @@ def test_the_stated_deviation_holds_and_no_group_is_drawn_to_the_middle():
     for seed in range(9000, 9014):
         for k, scene in enumerate(tones.scenes_of(seed)[:2]):
             shown, card = tones.photographed(scene, np.random.default_rng([seed, k]))
-            true = population.lab(scene.tone)[0]
+            true = population.to_lab(scene.tone)[0]
             found = population.estimate_skin_tone(shown)
-            signed.append(population.lab(np.array(found.linear))[0] - true)
-            measured.append(population.lab(np.array(population.estimate_skin_tone(shown, card).linear))[0] - true)
+            signed.append(population.to_lab(np.array(found.linear))[0] - true)
+            measured.append(population.to_lab(np.array(population.estimate_skin_tone(shown, card).linear))[0] - true)
             stated.append(found.deviation)
             light.append(true)
     signed, stated, light = np.array(signed), np.array(stated), np.array(light)
@@ -78,12 +78,12 @@ def test_the_stated_deviation_holds_and_no_group_is_drawn_to_the_middle():
 
 
 def test_groups_by_their_angle():
-    from core.solve.population import from_lab, group
+    from core.solve.population import from_lab, name_group
 
     for angle, name in ((60, "very light"), (48, "light"), (35, "intermediate"), (20, "tan"), (-10, "brown"),
                         (-50, "dark")):
         lightness = 50 + 16 * np.tan(np.radians(angle))
-        assert group(from_lab(np.array([lightness, 12.0, 16.0]))) == name
+        assert name_group(from_lab(np.array([lightness, 12.0, 16.0]))) == name
 
 
 def test_a_setting_is_a_tone_and_a_tone_a_setting():

@@ -17,7 +17,7 @@ from core.face import template
 from core.face.head import read_head
 from core.imaging import images
 from core.solve import initial, tone
-from core.solve.evidence import read_evidence, softened
+from core.solve.evidence import read_evidence, soften_mask
 from core.solve.prior import WEIGHTS, load
 from core.solve.problem import albedo
 from core.solve.skin_tone import GIVEN, SkinTone
@@ -151,7 +151,7 @@ def test_auto_tone_ignores_what_is_masked_and_stays_human():
 def test_a_hard_mask_gets_a_soft_border():
     mask = np.zeros((256, 256), np.float32)
     mask[64:128, 64:128] = 1
-    soft = softened(mask)
+    soft = soften_mask(mask)
     assert soft[96, 96] == 1 and soft[0, 0] == 0
     assert 0.5 < soft[96, 64] < 1 and 0 < soft[96, 63] < 0.5
 
@@ -171,8 +171,8 @@ def test_the_nearest_skin_is_the_one_that_was_filmed(capture):
     light = images.read_linear(capture.texture) / np.maximum(filmed(prior.mean_face, evidence), 1e-3)
     for skin in prior.references[[3, 7]]:
         evidence = replace(evidence, texture=torch.from_numpy((filmed(skin, evidence) * light).transpose(2, 0, 1)))
-        found = initial.reference(prior, told, evidence, "nearest")
-        assert torch.equal(found, initial.face_of_tone(skin, told.tensor, evidence.skin))
+        found = initial.make_reference(prior, told, evidence, "nearest")
+        assert torch.equal(found, initial.tint_face(skin, told.tensor, evidence.skin))
 
 
 def test_a_confidence_of_another_size_is_named(capture):
@@ -182,4 +182,4 @@ def test_a_confidence_of_another_size_is_named(capture):
 
 
 def filmed(face, evidence) -> np.ndarray:
-    return albedo(initial.face_of_tone(face, torch.from_numpy(TONE), evidence.skin)).permute(1, 2, 0).numpy()
+    return albedo(initial.tint_face(face, torch.from_numpy(TONE), evidence.skin)).permute(1, 2, 0).numpy()

@@ -190,7 +190,7 @@ def test_a_training_goes_on_where_it_stopped_and_its_weights_are_read_again(work
     first = training.train_texels("cpu", out, SILENT, run(0.02))
     second = training.train_texels("cpu", out, SILENT, run(0.04))
     assert second["steps"] > first["steps"] > 0 and second["started"] == "random weights"
-    network = whole_head.load("cpu", out)
+    network = whole_head.load_texel_net("cpu", out)
     assert sum(value.numel() for value in network.parameters()) == second["parameters"]
     (work / "state.pt").unlink()
     third = training.train_texels("cpu", work / "next.safetensors", SILENT, run(0.01, start=out))

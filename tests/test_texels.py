@@ -13,7 +13,7 @@ from core.delight import texels, whole_head
 from core.delight.evening import ShadingEstimate
 from core.delight.lit_head import LitHead
 from core.delight.packed import pack, unpack
-from core.delight.texel_net import CHANNELS, TexelNet, maps_of, network_input
+from core.delight.texel_net import CHANNELS, TexelNet, network_input, to_tensors
 from core.delight.texels import Texels
 from core.face import template
 from core.face.head import Head
@@ -41,7 +41,7 @@ def drawn(rng, count=400, views=5):
 def test_exposures_are_found_and_highlights_drop_out():
     true, level, seen = drawn(np.random.default_rng(0))
     weights = np.ones(seen.shape[:2], np.float32)
-    found = texels.exposures(seen, weights)
+    found = texels.estimate_exposures(seen, weights)
     assert np.abs(found - level).max() < 0.02
     mean = texels.robust_mean(seen - found[:, None], weights)
     assert np.quantile(np.abs(mean - true), 0.9) < 0.05 < 0.2 < np.abs((seen - found[:, None]).mean(0) - true).max()
@@ -51,18 +51,19 @@ def test_a_point_that_one_view_sees_keeps_the_others_exposure():
     true, level, seen = drawn(np.random.default_rng(1))
     weights = np.ones(seen.shape[:2], np.float32)
     weights[1:, :50] = 0
-    mean = texels.robust_mean(seen - texels.exposures(seen, weights)[:, None], weights)
+    mean = texels.robust_mean(seen - texels.estimate_exposures(seen, weights)[:, None], weights)
     assert np.median(np.abs(mean - true)[:50]) < 0.03
 
 
 def test_the_border_of_the_sun_is_a_signed_distance():
     lit_here = np.zeros((64, 64), bool)
     lit_here[:, 20:] = True
-    distance = texels.border_distance(lit_here)
+    distance = texels.measure_border_distance(lit_here)
     expected = np.tanh((np.arange(64) - 19.5 + 0.5 * np.sign(np.arange(64) - 19.5)) * texels.SIDE_TEXELS / 64
                        / texels.BORDER_TEXELS)
     assert np.abs(distance - expected).max() < 0.02
-    assert not texels.border_distance(lit_here | True).any() and not texels.border_distance(lit_here & False).any()
+    assert not texels.measure_border_distance(lit_here | True).any()
+    assert not texels.measure_border_distance(lit_here & False).any()
 
 
 def head_in_light(side=64) -> Texels:
@@ -78,7 +79,7 @@ def test_the_mirror_image_of_a_head_is_the_mirror_image_of_what_the_network_read
     turned = Texels(**{name: getattr(known, name)[:, ::-1].copy() for name in known.__dataclass_fields__})
     turned.normal[..., 0] *= -1
     (layers, light, middle), (opposite, other_light, other) = (
-        network_input(maps_of(each, "cpu")) for each in (known, turned))
+        network_input(to_tensors(each, "cpu")) for each in (known, turned))
     layers = layers.flip(-1)
     layers[:, 5] *= -1
     assert layers.shape == (1, CHANNELS, 64, 64) and (middle - other).abs().max() < 0.02
@@ -96,7 +97,7 @@ def test_the_network_begins_with_the_fitted_light_half_of_its_sun_blocked():
 
 def test_missing_weights_of_the_whole_head_are_named(tmp_path):
     with pytest.raises(Problem, match="weights of the delighting network are missing"):
-        whole_head.load("cpu", tmp_path / "texels.safetensors")
+        whole_head.load_texel_net("cpu", tmp_path / "texels.safetensors")
 
 
 def test_packed_weights_are_what_they_were_within_a_hundredth_of_their_filter():
@@ -134,7 +135,7 @@ def evenly_lit(tmp_path_factory):
 
 def test_what_the_views_of_a_head_agree_on_is_its_colour_whatever_their_exposures(evenly_lit):
     head, views, albedo = evenly_lit
-    found = texels.gather(head, views)
+    found = texels.gather_texels(head, views)
     side = texels.SIDE_TEXELS
     truth = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), side, side), 1e-3))
     where = (found.seen > 0.5) & (template.mask("skin", texels.SIDE_TEXELS) > 0.9)
@@ -150,12 +151,12 @@ def test_a_look_is_told_what_the_whole_head_says_of_what_it_shows(evenly_lit, mo
     head, views, _ = evenly_lit
     u = (np.mgrid[0:texels.SIDE_TEXELS, 0:texels.SIDE_TEXELS][1] + 0.5) / texels.SIDE_TEXELS
     ramp = np.repeat((1.5 * (u - 0.5))[..., None], 3, 2).astype(np.float32)
-    monkeypatch.setattr(whole_head, "tell_shading",
+    monkeypatch.setattr(whole_head, "predict_shading",
                         lambda net, known: whole_head.Shading(ramp, ramp[..., 0], ramp[..., 0]))
     face, bary, _ = render_view(head.caster, views[2], 0.25)
     empty = np.zeros((*face.shape, 3), np.float32)
     look = ShadingEstimate((0, 0, 1), empty, empty[..., 0], empty, face, bary)
-    (seen,) = whole_head.answers_in_looks(None, head, views, [look], lambda done, of: None)
+    (seen,) = whole_head.read_answers(None, head, views, [look], lambda done, of: None)
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, face, bary)
     expected = 1.5 * (uv[face >= 0][:, 0] - 0.5)
     assert np.abs(seen[face >= 0] - expected[:, None]).max() < 0.02 and not seen[face < 0].any()

@@ -12,7 +12,7 @@ import torch
 from core.contract.messages import Problem, Reporter
 from core.face import template
 from core.imaging import images
-from core.solve.prior import build, load
+from core.solve.prior import build_network, load
 from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic import pigment
 from core.training import prior, skins
@@ -130,7 +130,7 @@ def test_carried_skins_teach_only_the_diffuse_they_know(carried, cache, seen):
     windows = Windows(seen + theirs)
     mean = mean_map(seen + theirs)
     statistics = {"mean_face": mean, "spread": spread_about(windows, mean, 32)}
-    network = build(prior.CONFIGS["cpu"])
+    network = build_network(prior.CONFIGS["cpu"])
     torch.nn.init.normal_(network.proj_out.weight, std=0.05)
     other = torch.where(batch.known > 0, batch.clean, torch.rand_like(batch.clean))
     losses = [prior._loss(network, statistics, b, np.random.default_rng(0), "cpu")

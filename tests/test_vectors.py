@@ -15,11 +15,11 @@ import torch
 from core.solve import maps, prior
 from core.solve.initial import mean_tone
 from core.solve.light_fit import light_loss
-from core.solve.lighting import Lights, Shader, interpolation, shading_basis
+from core.solve.lighting import Lights, Shader, interpolation_matrix, shading_basis
 from core.solve.network import Condition, denoise
-from core.solve.problem import Observation, State, albedo, blurred
+from core.solve.problem import Observation, State, albedo, blur_maps
 from core.solve.recipes import RECIPES, Recipe
-from core.solve.sampler import Sampler, ancestral, karras
+from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas
 
 VECTORS = Path(os.environ.get("WILDCAP_VECTORS", Path(__file__).parents[2] / "shared" / "vectors"))
 pytestmark = pytest.mark.skipif(not VECTORS.is_dir(), reason=f"the parity vectors are not at {VECTORS}")
@@ -55,7 +55,7 @@ def test_vectors_resizer():
     assert tags
     for tag in tags:
         given, wanted = v[f"{tag}_in"], v[f"{tag}_out"]
-        rows, columns = (interpolation(given.shape[axis], wanted.shape[axis]) for axis in (-2, -1))
+        rows, columns = (interpolation_matrix(given.shape[axis], wanted.shape[axis]) for axis in (-2, -1))
         close(rows @ given @ columns.T, wanted)
 
 
@@ -66,9 +66,9 @@ def test_vectors_schedule():
             continue
         tag = key.removesuffix("_sigmas")
         low, high = (float(part[4:]) for part in tag.split("_"))
-        sigmas = karras(1000, low, high)
+        sigmas = karras_sigmas(1000, low, high)
         assert np.allclose(sigmas, v[key], rtol=2e-5, atol=1e-7)
-        pairs = np.array([ancestral(s, s_next) for s, s_next in zip(sigmas, sigmas[1:], strict=False)])
+        pairs = np.array([ancestral_sigmas(s, s_next) for s, s_next in zip(sigmas, sigmas[1:], strict=False)])
         assert np.allclose(pairs[:, 0], v[f"{tag}_down_eta1"], rtol=1e-3, atol=2e-5)
         assert np.allclose(pairs[:, 1], v[f"{tag}_up_eta1"], rtol=1e-3, atol=2e-5)
 
@@ -84,7 +84,7 @@ def test_vectors_coordinates():
 
 def test_vectors_losses():
     v = arrays("losses.npz")
-    close(blurred(v["blur_in"][0]), v["blur_out"][0])
+    close(blur_maps(v["blur_in"][0]), v["blur_out"][0])
     close(mean_tone(v["diff"][0], v["shadow_mask"]), v["skin_tone"][0])
     # our light loss, made of the same terms: with the ring as given and weight zero only the regularisers remain
     shade, main, ring = v["shade"][0], v["shade_main"][0], v["tv_ring_mask"][0, 0] > 0.5
@@ -157,7 +157,7 @@ def test_vectors_miniloop(run):
     last = Sampler(denoiser, recipe, noise).sample({1: o}, State(0, None, reference, first), compare)
     with torch.no_grad():
         close(albedo(last.denoised), v["out_diff"][0], 2e-4)
-        close(blurred(albedo(last.denoised) * shader.total(last.lights)), v["out_shading"][0], 4e-4)
+        close(blur_maps(albedo(last.denoised) * shader.total(last.lights)), v["out_shading"][0], 4e-4)
         diffuse, skin = torch.zeros(3, 40, 40), v["in_skin_mask"][0, 0]
         diffuse[:, rows, columns] = albedo(last.denoised).clamp_min(0)
         tone = mean_tone(v["in_init_diff"][0] ** (1 / 2.2), skin) ** 2.2

@@ -16,7 +16,7 @@ from core.solve.network import UNet, UNetLayout
 from core.solve.prior import ConditionedPrior, Prior, ReleasedPrior, coordinates
 from core.solve.problem import Observation, State
 from core.solve.recipes import RECIPES
-from core.solve.sampler import Sampler, seeded
+from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import GIVEN, SkinTone
 
 SIZE = 32
@@ -86,7 +86,7 @@ def walk(prior: ConditionedPrior, name: str, noise, device: str) -> State:
 @pytest.mark.parametrize("name", UNLIKE_OURS)
 @pytest.mark.parametrize("make", [our_prior, released_prior])
 def test_a_step_reads_nothing_back(name, make):
-    state = walk(make(), name, seeded(0), "cpu")
+    state = walk(make(), name, seed_noise(0), "cpu")
     assert state.step == 2 and torch.isfinite(state.x).all() and state.x.std() > 0
 
 
@@ -119,9 +119,9 @@ def test_the_watch_sees_a_number_read_on_the_processor():
 
 
 def test_the_noise_is_of_its_step_and_seed():
-    drawn = seeded(3, "cpu")(1)(2, 5)
+    drawn = seed_noise(3, "cpu")(1)(2, 5)
     assert (
-        torch.equal(drawn, seeded(3)(1)(2, 5))
-        and not torch.equal(drawn, seeded(3)(2)(2, 5))
-        and not torch.equal(drawn, seeded(4)(1)(2, 5))
+        torch.equal(drawn, seed_noise(3)(1)(2, 5))
+        and not torch.equal(drawn, seed_noise(3)(2)(2, 5))
+        and not torch.equal(drawn, seed_noise(4)(1)(2, 5))
     )

@@ -53,12 +53,12 @@ def filmed(root, *pictures) -> Capture:
 @pytest.mark.parametrize("quad", [QUAD, [QUAD[2], QUAD[3], QUAD[0], QUAD[1]]], ids=["upright", "upside down"])
 @pytest.mark.parametrize("light", [LIGHT, [0.5, 0.7, 0.85], [1.3, 1.2, 1.0]], ids=["warm", "cold", "burnt white"])
 def test_a_chart_gives_its_light_within_two_percent(light, quad):
-    found = white_point.chart_white(frame(light, quad))
+    found = white_point.measure_chart_white(frame(light, quad))
     assert np.abs(found / light - 1).max() < 0.02
 
 
 def test_without_a_chart_nothing_is_found():
-    assert white_point.chart_white(frame()) is None
+    assert white_point.measure_chart_white(frame()) is None
 
 
 def test_the_tool_finds_the_chart_in_whichever_frame(tmp_path, capsys):
@@ -80,7 +80,7 @@ def test_no_chart_in_any_frame_is_said_plainly(tmp_path):
 def test_a_card_that_is_pointed_at_gives_its_light(tmp_path, capsys, card, reflectance):
     picture = frame()
     picture[100:160, 200:280] = images.linear_to_srgb(reflectance * LIGHT)
-    assert np.abs(white_point.card_white(picture, 240, 130, card) / LIGHT - 1).max() < 0.01
+    assert np.abs(white_point.measure_card_white(picture, 240, 130, card) / LIGHT - 1).max() < 0.01
     capture = filmed(tmp_path, picture)
     assert main(["white", str(capture.root), "--frame", "00000.jpg", "--at", "240", "130", "--card", card]) == 0
     found = np.array([float(v) for v in capsys.readouterr().out.split()[-1].split(",")])
@@ -94,7 +94,7 @@ def test_a_place_that_tells_nothing_is_refused(where, colour, said):
     picture = np.full((60, 80, 3), 0.5 if colour is None else colour, np.float32)
     picture[:, 20:] = 0.2 if colour is None else colour
     with pytest.raises(Problem, match=said):
-        white_point.card_white(picture, *where, "grey")
+        white_point.measure_card_white(picture, *where, "grey")
 
 
 @pytest.mark.parametrize(("words", "said"),
@@ -105,11 +105,11 @@ def test_the_command_says_what_is_missing(tmp_path, capsys, words, said):
 
 
 def test_a_white_point_that_is_none_is_refused():
-    assert white_point.given_white("auto") is None
-    assert np.allclose(white_point.given_white("0.9,0.8,1.6"), [0.9, 0.8, 1.6])
+    assert white_point.parse_white("auto") is None
+    assert np.allclose(white_point.parse_white("0.9,0.8,1.6"), [0.9, 0.8, 1.6])
     for wrong in ("white", "1,1", "0,1,1", "1,nan,1"):
         with pytest.raises(Problem, match="is not a colour"):
-            white_point.given_white(wrong)
+            white_point.parse_white(wrong)
 
 
 def test_a_new_white_point_touches_the_solve_alone(tmp_path):

@@ -29,13 +29,13 @@ FITTED_SHARE = 0.5
 against the skin) it leaves -0.41 too much and the network +0.48; a second beard errs alike."""
 
 
-def without_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
+def fill_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Log-shading [h, h, C] with that of cells whose `share` [h, h] of FEATURES is MIN_HAIR_SHARE, and of those around
     them, carried over from the skin."""
-    return completed(shading, _covered(share)).astype(np.float32)
+    return complete_shading(shading, _covered(share)).astype(np.float32)
 
 
-def without_hair(look: ShadingEstimate, fitted: np.ndarray, share: np.ndarray) -> ShadingEstimate:
+def fill_hair(look: ShadingEstimate, fitted: np.ndarray, share: np.ndarray) -> ShadingEstimate:
     """The look moved by FITTED_SHARE towards the fitted log-shading [h, h, 3] below hair, whose `share` of the head is
     [h, h], at the level at which it meets the skin around; and the shadow that is seen there."""
     here = look.face >= 0
@@ -43,7 +43,7 @@ def without_hair(look: ShadingEstimate, fitted: np.ndarray, share: np.ndarray) -
     if not hairy.any() or not bare.any():
         return look
     known = np.concatenate([look.shading - fitted, look.shadow[..., None]], -1)
-    around = completed(np.where(bare[..., None], known, 0), ~bare)
+    around = complete_shading(np.where(bare[..., None], known, 0), ~bare)
     moved = look.shading + FITTED_SHARE * (fitted + around[..., :3] - look.shading)
     return replace(look, shading=np.where(hairy[..., None], moved, look.shading).astype(np.float32),
                    shadow=np.where(hairy, around[..., 3], look.shadow).astype(np.float32))
@@ -54,7 +54,7 @@ def _covered(share: np.ndarray) -> np.ndarray:
     return cv2.dilate((share > MIN_HAIR_SHARE).astype(np.uint8), np.ones((2 * REACH_CELLS + 1,) * 2, np.uint8)) > 0
 
 
-def completed(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+def complete_shading(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
     """Values [H, W, C] with those where `unknown` bool [H, W] replaced by the smoothest surface that meets the others
     (a harmonic one)."""
     if not unknown.any() or unknown.all():

@@ -21,7 +21,7 @@ USUAL_HUE_LOG = 0.08  # natural log units of hue from which skin is something el
 MIN_SKIN_CELLS = 200  # cells of skin below which nothing is said
 
 
-def without_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[ShadingEstimate]:
+def remove_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[ShadingEstimate]:
     """The looks with one hue of skin in light and shade. skins: [h, h] each, above 0.5 where a look shows bare skin."""
     where = [skin > 0.5 for skin in skins]
     if sum(int(w.sum()) for w in where) < MIN_SKIN_CELLS:

@@ -17,7 +17,7 @@ from ..face.head import Unfolded
 from ..geometry.raster import interpolate, sample, sample_uv, visible_from
 from ..geometry.views import View
 from .lit_head import LitHead
-from .texels import exposures, robust_mean
+from .texels import estimate_exposures, robust_mean
 
 UV_TEXELS = 256
 COARSE_CELLS = 3.0  # cells of the network's map below which nothing is moved
@@ -46,7 +46,7 @@ def even_out(head: LitHead, views: list[View], looks: list[ShadingEstimate]) -> 
     texel = np.flatnonzero(surface.covered)
     found = [_opinion(surface, view, look) for view, look in zip(views, looks, strict=True)]
     opinions, weights = (np.stack(part) for part in zip(*found, strict=True))
-    level = exposures(opinions, weights)
+    level = estimate_exposures(opinions, weights)
     mean = robust_mean(opinions - level[:, None], weights)
     known = np.zeros(UV_TEXELS**2, np.float32)
     known[texel] = np.minimum(weights.sum(0) / MIN_WEIGHT, 1) * (weights.sum(0) > MIN_WEIGHT)

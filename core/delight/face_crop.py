@@ -26,7 +26,7 @@ MAX_DETAIL_RATIO = 4.0
 """By what factor a pixel may differ from the crop's blur of it."""
 
 
-def alignment(face: Face, size: int, margin: float) -> np.ndarray:
+def ffhq_alignment(face: Face, size: int, margin: float) -> np.ndarray:
     """The similarity that FFHQ cuts a face by, its square smaller or larger by `margin`."""
     points = face.landmarks[:, :2].astype(np.float64)
     right, left = (points[list(eye)].mean(0) for eye in EYES)
@@ -38,7 +38,7 @@ def alignment(face: Face, size: int, margin: float) -> np.ndarray:
     return np.array([[c, s, size / 2 - c * x - s * y], [-s, c, size / 2 + s * x - c * y]])
 
 
-def cut(srgb: np.ndarray, to_crop: np.ndarray, size: int) -> np.ndarray:
+def cut_face(srgb: np.ndarray, to_crop: np.ndarray, size: int) -> np.ndarray:
     """The crop [size, size, 3]; black where the frame ends."""
     shrinks = 1 / np.hypot(*to_crop[:, 0])
     source = cv2.GaussianBlur(srgb, (0, 0), 0.5 * np.sqrt(shrinks**2 - 1)) if shrinks > 1.2 else srgb
@@ -57,8 +57,8 @@ def face_mask(face: Face, to_crop: np.ndarray, size: int, growth: float = 1.0) -
     return mask.astype(np.float32)
 
 
-def put_back(frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask: np.ndarray,
-             to_crop: np.ndarray) -> np.ndarray:
+def put_face_back(frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask: np.ndarray,
+                  to_crop: np.ndarray) -> np.ndarray:
     """The frame sRGB [H, W, 3] with what was made of its crop, `before` -> `after` sRGB, inside of the mask and
     feathered; elsewhere it stays.
 

@@ -18,10 +18,10 @@ EDGE_LOG = 0.02  # natural log units: what varies less in a window is skin and n
 PORE_SHARE, PORE_LOG = 0.006, 0.25
 
 
-def lift(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
+def lift_shading(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
     """Coarse log-shading [h, w, C] and the log of the linear picture [H, W, C] that it covers -> log-shading [H, W,
     C]."""
-    guide = without_pores(log)
+    guide = remove_pores(log)
     height, width = shading.shape[:2]
     small = cv2.resize(guide, (width, height), interpolation=cv2.INTER_AREA).reshape(shading.shape)
     slope, offset = _affine(small, shading)
@@ -33,10 +33,10 @@ def lift(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
 
 def lift_share(share: np.ndarray, log: np.ndarray) -> np.ndarray:
     """The same for a coarse share [h, w] in [0, 1], guided by luminance: [H, W] in [0, 1]."""
-    return np.clip(lift(share[..., None].astype(np.float32), log.mean(-1, keepdims=True))[..., 0], 0, 1)
+    return np.clip(lift_shading(share[..., None].astype(np.float32), log.mean(-1, keepdims=True))[..., 0], 0, 1)
 
 
-def without_pores(log: np.ndarray) -> np.ndarray:
+def remove_pores(log: np.ndarray) -> np.ndarray:
     """A log picture [H, W, C] smoothed where it varies finely and faintly; edges stay."""
     reach = max(1.0, PORE_SHARE * max(log.shape[:2]))
     channels = (np.ascontiguousarray(log[..., k], np.float32) for k in range(log.shape[-1]))

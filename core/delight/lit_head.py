@@ -60,7 +60,7 @@ class LitHead:
         return ambient, self.light.direct(normal), free, normal
 
 
-def lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
+def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     """Fits the light of these views to the head; half of the stage's progress. Raises Problem where the views hardly
     see it."""
     normals = smooth_normals(head)

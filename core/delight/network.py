@@ -30,17 +30,17 @@ from ..face.networks import has_files, read_network
 from ..geometry.raster import interpolate, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
-from .below_hair import FEATURES, without_features, without_hair
-from .casts import without_casts
+from .below_hair import FEATURES, fill_features, fill_hair
+from .casts import remove_casts
 from .contract import Delit
 from .evening import ShadingEstimate, even_out
-from .lift import lift, lift_share
-from .lit_head import MAX_ALBEDO, LitHead, lit_head
-from .second_opinion import FITTED, WHOLE, beyond, coarse, weigh_in
+from .lift import lift_shading, lift_share
+from .lit_head import MAX_ALBEDO, LitHead, fit_lit_head
+from .second_opinion import FITTED, WHOLE, average_cells, continue_beyond, weigh_in
 from .shading import light_in_frame, light_seen
 from .unet import MIN_LINEAR, SIDE_PX, DelightNet, network_input
-from .whole_head import READING, answers_in_looks
-from .whole_head import load as load_whole_head
+from .whole_head import READING, read_answers
+from .whole_head import load_texel_net as load_whole_head
 
 DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
@@ -77,9 +77,9 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
 
 def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
     """All answers on a capture, before they are put together. Raises Problem as `network` does."""
-    net, views = load(settings.compute_device), read_views(capture, selected_only=True)
+    net, views = load_network(settings.compute_device), read_views(capture, selected_only=True)
     whole = load_whole_head(settings.compute_device)
-    head = lit_head(read_head(capture), views, report)
+    head = fit_lit_head(read_head(capture), views, report)
     looks, fitted = [], []
     for i, view in enumerate(views):
         report.progress(4 * len(views) + 2 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")
@@ -92,7 +92,7 @@ def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
         report.progress(6 * of + done, 8 * of, READING)
 
     looks = even_out(head, views, looks)
-    heads = answers_in_looks(whole, head, views, looks, step) if head.head.built_in else None
+    heads = read_answers(whole, head, views, looks, step) if head.head.built_in else None
     return Answers(head, views, looks, fitted, heads, skins, hair)
 
 
@@ -101,8 +101,8 @@ def put_together(answers: Answers) -> list[ShadingEstimate]:
     looks = weigh_in(answers.looks, answers.fitted, answers.skins, FITTED)
     if answers.whole is not None:
         looks = weigh_in(looks, answers.whole, answers.skins, WHOLE)
-    looks = [without_hair(*told) for told in zip(looks, answers.fitted, answers.hair, strict=True)]
-    return without_casts(looks, answers.skins)
+    looks = [fill_hair(*told) for told in zip(looks, answers.fitted, answers.hair, strict=True)]
+    return remove_casts(looks, answers.skins)
 
 
 def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, np.ndarray]:
@@ -112,14 +112,14 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
     if face is None:
         raise Problem("No face was found in the photograph.",
                       "Choose a photograph that shows the face from the front or half from the side.")
-    box = face_box(face.landmarks[:, :2])
-    look = _look(load("cpu"), box, crop(srgb, box, SIDE_PX))
+    box = square_around(face.landmarks[:, :2])
+    look = _look(load_network("cpu"), box, crop(srgb, box, SIDE_PX))
     share = crop(parser.parse(srgb, face.landmarks).of(*FEATURES), box, len(look.shading))
-    look = replace(look, shading=without_features(look.shading, share))
-    return _divided(srgb, without_casts([look], [_hull(face.landmarks[:, :2], look)])[0])
+    look = replace(look, shading=fill_features(look.shading, share))
+    return _divided(srgb, remove_casts([look], [_hull(face.landmarks[:, :2], look)])[0])
 
 
-def load(device: str) -> DelightNet:
+def load_network(device: str) -> DelightNet:
     """The shipped network. Raises Problem where its file or its card is missing."""
     if not has_files(WEIGHTS):
         raise Problem("The weights of the delighting network are missing.",
@@ -127,7 +127,7 @@ def load(device: str) -> DelightNet:
     return read_network(DelightNet, WEIGHTS).to(torch.device(device), memory_format=torch.channels_last)
 
 
-def face_box(points: np.ndarray) -> tuple[float, float, float]:
+def square_around(points: np.ndarray) -> tuple[float, float, float]:
     """Left, top and side of the square around a face's landmarks [N, 2] in pixels."""
     low, high = points.min(0), points.max(0)
     side = FACE_MARGIN * float((high - low).max())
@@ -151,7 +151,7 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
 def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEstimate, np.ndarray]:
     """What the network says of a frame, and the log-shading of the fitted light at the same size."""
     pixels, _ = view.project(_landmarks(head))
-    box = face_box(pixels[np.isfinite(pixels).all(1)])
+    box = square_around(pixels[np.isfinite(pixels).all(1)])
     y, x = np.mgrid[0:SIDE_PX, 0:SIDE_PX]
     rays = view.rays((np.stack([x.ravel(), y.ravel()], -1) + 0.5) * box[2] / SIDE_PX + box[:2])
     face, bary, _ = head.caster.first_hits(np.repeat(view.centre[None], len(rays), 0), rays)
@@ -162,7 +162,7 @@ def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEs
     look = _look(net, box, picture, geometry)
     light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary,
                           round(max(view.width, view.height) * SIDE_PX / box[2]))
-    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), coarse(light, SIDE_PX // 2)
+    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), average_cells(light, SIDE_PX // 2)
 
 
 @torch.inference_mode()
@@ -202,7 +202,7 @@ def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = Non
     linear = images.srgb_to_linear(srgb)
     size = round(look.box[2])
     log = np.log(np.maximum(crop(linear, look.box, size), MIN_LINEAR))
-    shading, shadow = lift(look.shading, log), lift_share(look.shadow, log)
+    shading, shadow = lift_shading(look.shading, log), lift_share(look.shadow, log)
     y, x = np.mgrid[0:srgb.shape[0], 0:srgb.shape[1]]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]
     within = np.minimum(at, size - at).min(1).reshape(srgb.shape[:2])  # pixels to the square's border
@@ -211,7 +211,7 @@ def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = Non
     shadow = shadow * inside
     if fitted is not None:
         share = np.clip(within / (FADE_SHARE * size), 0, 1).astype(np.float32)
-        shading, shadow = beyond(shading, shadow, share, *fitted)
+        shading, shadow = continue_beyond(shading, shadow, share, *fitted)
     albedo = linear / np.exp(shading)
     bright = float(np.quantile(albedo[inside].max(-1), 0.75)) if inside.any() else 0.0
     return images.linear_to_srgb(albedo

@@ -21,8 +21,8 @@ ZONE_SHARE = 0.008  # and of the zone about it that must be no darker or lighter
 FINE_SHARE = 0.0025  # skin's detail below this scale is kept even there
 
 
-def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, skin: np.ndarray,
-              head: np.ndarray, side: int) -> np.ndarray:
+def estimate_sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, skin: np.ndarray,
+                       head: np.ndarray, side: int) -> np.ndarray:
     """[H, W] in [0, 1]: how much of the sun each pixel gets. `side`: the longer side in pixels of the frame this is a
     part of.
 
@@ -50,7 +50,7 @@ def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free:
                    max(1.5, BAND_SHARE * side))
 
 
-def seamless(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
+def remove_seams(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
     """[H, W, 3]: what to take from a log albedo [H, W, 3] along the edges of `share` so that no outline of the shadow
     stays.
 

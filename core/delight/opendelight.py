@@ -22,9 +22,9 @@ from ..face.faces import Face, detect, segment_person
 from ..geometry.views import read_views
 from ..imaging import images
 from .contract import Delit
-from .face_crop import alignment, cut, face_mask, put_back
+from .face_crop import cut_face, face_mask, ffhq_alignment, put_face_back
 from .opendelight_checkpoint import Checkpoint, load
-from .opendelight_network import delit
+from .opendelight_network import delight_crop
 
 CROP_PX = 512
 FFHQ_MARGIN = 0.85  # of FFHQ's square, which the checkpoint was trained on
@@ -68,13 +68,13 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
 def delight_face(srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu",
                  step: Callable[[], None] = lambda: None) -> np.ndarray:
     """A frame sRGB [H, W, 3] with the albedo of one face in it."""
-    to_crop = alignment(face, CROP_PX, FFHQ_MARGIN)
-    crop = cut(srgb, to_crop, CROP_PX)
+    to_crop = ffhq_alignment(face, CROP_PX, FFHQ_MARGIN)
+    crop = cut_face(srgb, to_crop, CROP_PX)
     mask = np.maximum(face_mask(face, to_crop, CROP_PX),
                       face_mask(face, to_crop, CROP_PX, FACE_RIM) * (segment_person(crop) > 0.5))
     picture = torch.from_numpy((crop * mask[..., None]).transpose(2, 0, 1)[None].astype(np.float32)).to(device)
-    albedo = delit(checkpoint.base, checkpoint.enhancer, picture, step)[0].permute(1, 2, 0).cpu().numpy()
-    return put_back(srgb, crop, albedo, mask, to_crop)
+    albedo = delight_crop(checkpoint.base, checkpoint.enhancer, picture, step)[0].permute(1, 2, 0).cpu().numpy()
+    return put_face_back(srgb, crop, albedo, mask, to_crop)
 
 
 @lru_cache(maxsize=1)

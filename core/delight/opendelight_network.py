@@ -24,7 +24,7 @@ Step = Callable[[], None]
 
 
 @torch.inference_mode()
-def delit(base: State, enhancer: State | None, picture: Tensor, step: Step = lambda: None) -> Tensor:
+def delight_crop(base: State, enhancer: State | None, picture: Tensor, step: Step = lambda: None) -> Tensor:
     """Albedo sRGB [1, 3, S, S] of an aligned face sRGB [1, 3, S, S] in [0, 1], black off the face; `step` is called
     between layers. S: a multiple of 16."""
     albedo = _decoded(base, _encoded(base, picture, step), step)

@@ -44,8 +44,8 @@ def weigh_in(looks: list[ShadingEstimate], answers: list[np.ndarray], skins: lis
     return [_towards(look, answer - level, weighing) for look, answer in zip(looks, answers, strict=True)]
 
 
-def beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice], light: np.ndarray,
-           share: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def continue_beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice],
+                    light: np.ndarray, share: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A frame's log-shading [H, W, 3] and shadow [H, W], where known [H, W] in [0, 1] falls to 0 taken over by the
     fitted light [h, w, 3] and its share [h, w] in the part `box` of the frame, at the level of the rest; here bool [h,
     w]: the head. Scalp and neck lie beyond what the network sees."""
@@ -60,7 +60,7 @@ def beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tupl
     return shading, shadow
 
 
-def coarse(light: np.ndarray, side: int) -> np.ndarray:
+def average_cells(light: np.ndarray, side: int) -> np.ndarray:
     """The log [side, side, 3] of the light in a square picture, linear [S, S, 3], averaged as the eye would."""
     return np.log(np.maximum(cv2.resize(np.asarray(light, np.float32), (side, side), interpolation=cv2.INTER_AREA),
                              1e-4))

@@ -21,14 +21,14 @@ from ..geometry.raster import bleed, interpolate, render_view
 from ..geometry.views import View, read_views
 from ..imaging import images
 from .contract import Delit
-from .lit_head import LitHead, lit_head
-from .occlusion import seamless, sun_share
+from .lit_head import LitHead, fit_lit_head
+from .occlusion import estimate_sun_share, remove_seams
 
 
 def shading(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The selected frames divided by their shading, which is 1 where the skin is best lit."""
     views = read_views(capture, selected_only=True)
-    head = lit_head(read_head(capture), views, report)
+    head = fit_lit_head(read_head(capture), views, report)
     for i, view in enumerate(views):
         report.progress(2 * len(views) + 2 * i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
         yield _delight(view, head)
@@ -66,10 +66,10 @@ def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.nda
     share = np.ones(here.shape, np.float32)
     if head.light.has_sun:
         own = interpolate(np.maximum(head.hair, head.brows)[:, None], head.mesh.faces, face, bary)[..., 0]
-        share = sun_share(linear, ambient, direct, free, 1 - own, here, side)
+        share = estimate_sun_share(linear, ambient, direct, free, 1 - own, here, side)
     lit = np.maximum(bleed((ambient + share[..., None] * direct).astype(np.float32), here), 1e-4)
     if head.light.has_sun:
-        lit = lit * np.exp(seamless(np.log(np.maximum(linear, 1e-3) / lit), share, here, side))
+        lit = lit * np.exp(remove_seams(np.log(np.maximum(linear, 1e-3) / lit), share, here, side))
     return lit, share
 
 

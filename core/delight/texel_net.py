@@ -21,7 +21,7 @@ from torch import nn
 from torch.nn import functional
 
 from ..face import template
-from .texels import MIN_LINEAR, Texels, border_distance
+from .texels import MIN_LINEAR, Texels, measure_border_distance
 from .unet import Trunk
 
 CHANNELS = 23
@@ -50,7 +50,7 @@ class UnfoldedMaps:
     free: torch.Tensor
 
 
-def maps_of(texels: Texels, device: str | torch.device) -> UnfoldedMaps:
+def to_tensors(texels: Texels, device: str | torch.device) -> UnfoldedMaps:
     """One head's texels."""
     def tensor(values: np.ndarray) -> torch.Tensor:
         planes = np.atleast_3d(values).transpose(2, 0, 1)[None]
@@ -74,7 +74,7 @@ def network_input(maps: UnfoldedMaps) -> tuple[torch.Tensor, torch.Tensor, torch
     middle = on_face(maps.log)
     sun = maps.direct.amax(1, keepdim=True) * maps.free
     lit = sun / (maps.ambient.amax(1, keepdim=True) + sun).clamp_min(1e-6)
-    border = np.stack([border_distance(each) for each in (lit[:, 0] > 1e-3).cpu().numpy()])
+    border = np.stack([measure_border_distance(each) for each in (lit[:, 0] > 1e-3).cpu().numpy()])
     fitted = (maps.ambient, maps.ambient + maps.direct * maps.free)
     against = [(maps.log - light.clamp_min(MIN_LINEAR / 4).log()).clamp(-MAX_LOG, MAX_LOG) * there for light in fitted]
     layers = [(maps.log - middle) * there, maps.spread, seen, maps.normal, maps.open, *against, lit,

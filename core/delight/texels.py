@@ -54,7 +54,7 @@ class Texels:
     free: np.ndarray
 
 
-def gather(head: LitHead, views: list[View], step: Callable[[int, int], None] = lambda done, of: None) -> Texels:
+def gather_texels(head: LitHead, views: list[View], step: Callable[[int, int], None] = lambda done, of: None) -> Texels:
     """What these views say of the head. The head has the built-in UVs; step(done, of) is told of each view."""
     surface = head.head.unfold(SIDE_TEXELS)
     colours, weights = (np.zeros((len(views), len(surface.points), n), np.float32) for n in (3, 1))
@@ -62,7 +62,7 @@ def gather(head: LitHead, views: list[View], step: Callable[[int, int], None] = 
         step(i, len(views))
         colours[i], weights[i, :, 0] = _colours_seen(surface.points, surface.normals, surface.caster, view)
     some = np.s_[:, ::EXPOSURE_STRIDE]
-    colours -= exposures(colours[some], weights[..., 0][some])[:, None]
+    colours -= estimate_exposures(colours[some], weights[..., 0][some])[:, None]
     mean = robust_mean(colours, weights[..., 0])
     total = np.maximum(weights.sum(0)[:, 0], 1e-6)
     spread = np.sqrt((weights[..., 0] * (colours - mean).mean(-1) ** 2).sum(0) / total)
@@ -92,7 +92,7 @@ def _colours_seen(points: np.ndarray, normals: np.ndarray, caster: raster.RayCas
     return log, weight
 
 
-def exposures(colours: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def estimate_exposures(colours: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """How much higher than the others' each view's log colours [V, N, 3] are as a whole, [V, 3] of mean 0: without it,
     what one view alone sees would keep that view's exposure. weights [V, N]."""
     level = np.zeros((len(colours), 3), np.float32)
@@ -114,7 +114,7 @@ def robust_mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return mean
 
 
-def border_distance(lit: np.ndarray) -> np.ndarray:
+def measure_border_distance(lit: np.ndarray) -> np.ndarray:
     """Signed distance [S, S] to the border of where the fitted sun falls (bool [S, S]), in [-1, 1]: positive within, 1
     from BORDER_TEXELS on, 0 where there is no sun."""
     if not lit.any() or lit.all():

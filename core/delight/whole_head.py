@@ -24,10 +24,10 @@ from ..geometry.views import View, read_views
 from ..imaging import images
 from .contract import Delit
 from .evening import ShadingEstimate
-from .lit_head import MAX_ALBEDO, LitHead, lit_head
+from .lit_head import MAX_ALBEDO, LitHead, fit_lit_head
 from .packed import unpack
-from .texel_net import TexelNet, maps_of, network_input
-from .texels import Texels, gather
+from .texel_net import TexelNet, network_input, to_tensors
+from .texels import Texels, gather_texels
 
 DATA_FILES = ("weights/texels.safetensors", "weights/texels.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
@@ -50,25 +50,25 @@ class Shading:
 def whole_head(capture: Capture, settings: Settings, report: Reporter, weights: Path = WEIGHTS) -> Iterator[Delit]:
     """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see
     the head."""
-    net, views = load(settings.compute_device, weights), read_views(capture, selected_only=True)
+    net, views = load_texel_net(settings.compute_device, weights), read_views(capture, selected_only=True)
     filmed = read_head(capture)
     if not filmed.built_in:
         raise Problem("Whole Head knows the built-in head's UVs alone, and this capture's head has others.",
                       "Choose Network or Shading to delight with.")
-    head = lit_head(filmed, views, report)
-    texels = gather(head, views, lambda done, of: report.progress(2 * of + done, 4 * of, READING))
-    found = tell_shading(net, texels)
+    head = fit_lit_head(filmed, views, report)
+    texels = gather_texels(head, views, lambda done, of: report.progress(2 * of + done, 4 * of, READING))
+    found = predict_shading(net, texels)
     found = Shading(found.log + np.log(_exposure(texels, found)), found.shadow, found.spread)
     for i, view in enumerate(views):
         report.progress(3 * len(views) + i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
         yield _delit(view, head, found)
 
 
-def answers_in_looks(net: TexelNet, head: LitHead, views: list[View], looks: list[ShadingEstimate],
-                     step: Callable[[int, int], None]) -> list[np.ndarray]:
+def read_answers(net: TexelNet, head: LitHead, views: list[View], looks: list[ShadingEstimate],
+                 step: Callable[[int, int], None]) -> list[np.ndarray]:
     """The whole head's log-shading [h, h, 3] in each look, as coarse as a look is; 0 where a look does not show the
     head, which has the built-in UVs."""
-    log = tell_shading(net, gather(head, views, step)).log
+    log = predict_shading(net, gather_texels(head, views, step)).log
     coarse = np.log(images.resize(np.exp(log), LOOK_TEXELS, LOOK_TEXELS)).astype(np.float32)
     answers = []
     for look in looks:
@@ -77,7 +77,7 @@ def answers_in_looks(net: TexelNet, head: LitHead, views: list[View], looks: lis
     return answers
 
 
-def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
+def load_texel_net(device: str, weights: Path = WEIGHTS) -> TexelNet:
     """The shipped network. Raises Problem where its file or its card is missing."""
     if not has_files(weights):
         raise Problem("The weights of the delighting network are missing.",
@@ -86,9 +86,9 @@ def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
 
 
 @torch.inference_mode()
-def tell_shading(net: TexelNet, texels: Texels) -> Shading:
+def predict_shading(net: TexelNet, texels: Texels) -> Shading:
     """The mean of what the network says of a head and of its mirror image."""
-    layers, light, middle = network_input(maps_of(texels, next(net.parameters()).device))
+    layers, light, middle = network_input(to_tensors(texels, next(net.parameters()).device))
     turned = layers.flip(-1)
     turned[:, 5] *= -1
     parts = net(*(torch.cat(pair).contiguous(memory_format=torch.channels_last)

@@ -26,20 +26,20 @@ from ..face.head import read_filmed_head
 from ..imaging import images
 from . import checkpoint, comparison, drawing, initial, iris, layout, maps
 from .checkpoint import Solution
-from .confidence import spread
-from .draft import restored
+from .confidence import sample_spread
+from .draft import restore_maps
 from .edited import solve_edited
 from .evidence import REFERENCE_TEXELS, Evidence, read_evidence
 from .memory import sample_within_memory, spare_memory
 from .prior import ConditionedPrior, Prior, load_chosen
-from .problem import State, unexplained
-from .recipes import RECIPES, Recipe, free
-from .sampler import Sampler, seeded
+from .problem import State, rms_residual
+from .recipes import RECIPES, Recipe, free_recipe
+from .sampler import Sampler, seed_noise
 from .skin_tone import SkinTone
 from .together import read_others
 from .tone import resolve_skin_tone
-from .window import coarse
-from .witnesses import confirmed
+from .window import average_down
+from .witnesses import confirm_marks
 
 FAINT_WEIGHT = 2.0
 """After any delighter little of a shadow is left, and what M takes along of dark skin and beards is not to be explained
@@ -61,41 +61,41 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     recipe = recipe_of(settings, prior)
     report.progress(0, recipe.steps, "reading the texture, the head and the masks")
     # the network halves the map several times
-    size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32
+    size = layout.round_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32
     head = read_filmed_head(capture)
     known = evidence = read_evidence(capture, head, size)
     elsewhere = None
     if options.prior:  # the authors' prior speaks of maps in other UVs
-        elsewhere, prior = layout.fitted(capture, head, known, prior, report)
+        elsewhere, prior = layout.fit_layout(capture, head, known, prior, report)
         # the split knows its places on the built-in head
-        evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), free(recipe)
+        evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), free_recipe(recipe)
     _check_often(prior, report)
     part = (solve_edited(capture, head, settings, recipe, prior, evidence, report) if settings.edited_part
             and elsewhere is None else None)
     if part is not None:
-        iris.measure(capture, head, part[0].diffuse, report)
+        iris.measure_irises(capture, head, part[0].diffuse, report)
         _leave_figures(capture, evidence, *part, report)
         return
     conditions = mask_edit.conditions(capture, settings)
-    witness = (lambda marks: confirmed(capture, head, marks, evidence.size)) if elsewhere is None else list
+    witness = (lambda marks: confirm_marks(capture, head, marks, evidence.size)) if elsewhere is None else list
     tone = resolve_skin_tone(capture, head, settings, known, evidence, prior.tones, report)
     others = read_others(capture, settings, report)
-    start = initial.start(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, witness, others)
+    start = initial.start_solve(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, witness, others)
     if others and not start.recipe.linear:
         report.log("The other captures were not used: they help where a delighter has left a faint light, on the "
                    "built-in head, by the default recipe.")
     denoiser = prior.of_tone(start.tone)
     report.figure("marks_kept_from_light", len(start.marks))
     images.write_srgb(capture.picture("solve", "edges_and_marks"),
-                      drawing.edges_and_marks(evidence, start.alpha, start.marks))
+                      drawing.draw_edges_and_marks(evidence, start.alpha, start.marks))
     stored = capture.checkpoints / "solve.safetensors"
     state = _sampled(capture, settings, start, denoiser, stored, _key(evidence, settings, start), report)
     result, found = _finished(denoiser, state, evidence, start, settings.seed, report)
     delivered = (result if elsewhere is None
                  else elsewhere.returned(result, known, state.lights, start.exposure, start.tone))
-    maps.write(capture, delivered, found, conditions)
-    iris.measure(capture, head, delivered.diffuse, report)
-    comparison.write(capture, known, delivered.diffuse)
+    maps.write_maps(capture, delivered, found, conditions)
+    iris.measure_irises(capture, head, delivered.diffuse, report)
+    comparison.write_comparison(capture, known, delivered.diffuse)
     maps.write_preview(capture, state, start.observations, report)
     _leave_figures(capture, evidence, result, start.tone, report)
     stored.unlink(missing_ok=True)
@@ -106,7 +106,7 @@ def _sampled(capture: Capture, settings: Settings, start: initial.Start, denoise
     """The last state of the walk, on the processor; goes on from the checkpoint `stored` where that is of this run,
     which `key` stands for."""
     state, seen = start.state, {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
-    stopped = checkpoint.read(stored, key)
+    stopped = checkpoint.read_state(stored, key)
     if stopped is not None:
         report.log(f"Going on after step {stopped.step} of {start.recipe.steps}.")
         state = stopped
@@ -114,16 +114,16 @@ def _sampled(capture: Capture, settings: Settings, start: initial.Start, denoise
 
     def on_step(state: State, steps: int) -> None:
         report.progress(state.step, steps, f"sampling, step {state.step} of {steps}")
-        losses.append((state.step, unexplained(state, seen)))
+        losses.append((state.step, rms_residual(state, seen)))
         if state.step % settings.solve.checkpoint_every == 0:
-            checkpoint.write(stored, state, key)
+            checkpoint.write_state(stored, state, key)
             maps.write_preview(capture, state, seen, report)
-            images.write_srgb(capture.preview / "loss.png", drawing.loss_curve(losses, steps))
+            images.write_srgb(capture.preview / "loss.png", drawing.draw_loss_curve(losses, steps))
             report.preview("preview/loss.png")
 
-    sampler = Sampler(denoiser, start.recipe, seeded(settings.seed, denoiser.device))
+    sampler = Sampler(denoiser, start.recipe, seed_noise(settings.seed, denoiser.device))
     state = sample_within_memory(sampler, seen, state.to(denoiser.device), on_step, report.log)
-    state.denoised = restored(denoiser, state.denoised, seen[1].coords, start.recipe, settings.seed)
+    state.denoised = restore_maps(denoiser, state.denoised, seen[1].coords, start.recipe, settings.seed)
     return state.to("cpu")
 
 
@@ -131,9 +131,9 @@ def _finished(prior: ConditionedPrior, state: State, evidence: Evidence, start: 
               report: Reporter) -> tuple[maps.Maps, Solution]:
     """The maps with their confidence, and what a later solve of a part needs."""
     factor = max(start.observations)
-    varied = spread(prior, start.observations[factor], coarse(start.reference, factor), state.lights, start.recipe,
-                    seed, report.check)
-    result = maps.finished(state, evidence, start, varied)
+    varied = sample_spread(prior, start.observations[factor], average_down(start.reference, factor), state.lights,
+                           start.recipe, seed, report.check)
+    result = maps.finish_maps(state, evidence, start, varied)
     return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain,
                             start.exposure, start.local, start.recipe.linear > 0)
 

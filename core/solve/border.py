@@ -32,7 +32,7 @@ MAX_MISSING_SHARE = 0.9  # more of the light than this never goes
 LEFT_LOG = 0.14
 
 
-def missing(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texel: float) -> torch.Tensor:
+def measure_missing_light(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texel: float) -> torch.Tensor:
     """The share [S, S] in [0, MAX_MISSING_SHARE] of the light that is missing under M = 1, by the steps along M's
     border; 0 where no border is near.
 
@@ -41,16 +41,16 @@ def missing(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texe
     `texel` is the side of one in texels of a 1024 map.
     """
     value = np.log(np.clip(light.numpy(), 0.05, 4)).mean(0).astype(np.float32)
-    steps, sure = border_steps(value, alpha.numpy(), weight.numpy(), texel)
+    steps, sure = measure_border_steps(value, alpha.numpy(), weight.numpy(), texel)
     step = _blurred(-sure * steps, INWARDS_TEXELS / texel) / (_blurred(sure, INWARDS_TEXELS / texel) + MIN_BORDER_SHARE)
-    share = 1 - np.exp(-np.maximum(share_of_light(steps, sure) * step, 0))
+    share = 1 - np.exp(-np.maximum(estimate_light_share(steps, sure) * step, 0))
     return torch.from_numpy(share.clip(0, MAX_MISSING_SHARE).astype(np.float32))
 
 
-def border_steps(value: np.ndarray, alpha: np.ndarray, weight: np.ndarray,
-                 texel: float) -> tuple[np.ndarray, np.ndarray]:
+def measure_border_steps(value: np.ndarray, alpha: np.ndarray, weight: np.ndarray,
+                         texel: float) -> tuple[np.ndarray, np.ndarray]:
     """By how much values [S, S] are larger inside of M than outside, at the places of its border [S, S], and how surely
-    that is known [S, S] in [0, 1], 0 away from the border; alpha, weight and texel as in `missing`."""
+    that is known [S, S] in [0, 1], 0 away from the border; alpha, weight and texel as in `measure_missing_light`."""
     inside = alpha > 0.5
     if not inside.any() or inside.all():
         return np.zeros_like(value), np.zeros_like(value)
@@ -65,12 +65,12 @@ def border_steps(value: np.ndarray, alpha: np.ndarray, weight: np.ndarray,
     return sides[0] - sides[1], np.where(sure > 0.02, sure / max(float(sure.max()), 1e-6), 0)
 
 
-def share_of_light(steps: np.ndarray, sure: np.ndarray) -> float:
-    """The share in (0, 1] of the steps of `border_steps` that is light, and no skin."""
-    return LEFT_LOG**2 / max(spread(steps, sure)[1] ** 2, LEFT_LOG**2)
+def estimate_light_share(steps: np.ndarray, sure: np.ndarray) -> float:
+    """The share in (0, 1] of the steps of `measure_border_steps` that is light, and no skin."""
+    return LEFT_LOG**2 / max(mean_and_deviation(steps, sure)[1] ** 2, LEFT_LOG**2)
 
 
-def spread(values: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
+def mean_and_deviation(values: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
     """Mean and deviation of values [S, S] under a weight [S, S]; zeros without any."""
     total = max(float(weight.sum()), 1e-6)
     mean = float((weight * values).sum()) / total

@@ -73,7 +73,7 @@ def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
         return None
 
 
-def write(path: Path, state: State, key: str) -> None:
+def write_state(path: Path, state: State, key: str) -> None:
     """Stores a state; `key` stands for everything its future depends on."""
     tensors = {"denoised": state.denoised, "glob": state.lights.glob, "grid": state.lights.grid,
                "chroma": state.lights.chroma}
@@ -85,7 +85,7 @@ def write(path: Path, state: State, key: str) -> None:
     _save(path, tensors, {"key": key})
 
 
-def read(path: Path, key: str) -> State | None:
+def read_state(path: Path, key: str) -> State | None:
     """The stored state, or None where there is none, it is damaged, or it belongs to another run."""
     try:
         with safe_open(path, "pt") as file:

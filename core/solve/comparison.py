@@ -16,7 +16,7 @@ LUMINANCE_WEIGHTS = np.float32([0.2126, 0.7152, 0.0722])
 """Of linear sRGB (Rec. 709)."""
 
 
-def write(capture: Capture, evidence: Evidence, albedo: np.ndarray) -> None:
+def write_comparison(capture: Capture, evidence: Evidence, albedo: np.ndarray) -> None:
     """The folder comparison/ with delit.png, and filmed.png where the texture stage left one: 8-bit sRGB of the
     texture's size.
 

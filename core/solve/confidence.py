@@ -18,7 +18,7 @@ from .lighting import Lights
 from .prior import ConditionedPrior
 from .problem import Observation, State, albedo
 from .recipes import Recipe
-from .sampler import Sampler, seeded
+from .sampler import Sampler, seed_noise
 
 ERROR_PER_SHARE, ERROR_PER_DIFFERENCE, ERROR_PER_SPREAD = 0.015, 0.55, 0.5
 """Error of the albedo in sRGB that is expected per share explained as light, per difference from the mean face, per
@@ -30,40 +30,40 @@ SHORT_RUNS, SHORT_RUN_STEPS = 3, 8
 """Short runs, and the steps of each: closed form, on a map of a quarter of the size."""
 
 
-def confidence(seen: torch.Tensor, explained: torch.Tensor, found: torch.Tensor, reference: torch.Tensor,
-               spread: torch.Tensor | None) -> torch.Tensor:
+def estimate_confidence(seen: torch.Tensor, explained: torch.Tensor, found: torch.Tensor, reference: torch.Tensor,
+                        spread: torch.Tensor | None) -> torch.Tensor:
     """[S, S] in [0, 1]: 1 for a texel that was well seen and where no error is expected, a half where
     HALF_CONFIDENCE_ERROR is.
 
     seen [S, S]: how far a texel's observation counts; explained [S, S]: the share of light that the grid took away;
-    found, reference [3, S, S]: the albedo as delivered and the mean face of the tone, linear; spread: `spread`'s, of
-    any size, or None.
+    found, reference [3, S, S]: the albedo as delivered and the mean face of the tone, linear; spread:
+    `sample_spread`'s, of any size, or None.
     """
-    unlike = (shown(found) - shown(reference)).abs().mean(0)
-    varied = 0.0 if spread is None else enlarged(spread, seen.shape)
+    unlike = (to_display(found) - to_display(reference)).abs().mean(0)
+    varied = 0.0 if spread is None else enlarge_map(spread, seen.shape)
     expected = ERROR_PER_SHARE * explained + ERROR_PER_DIFFERENCE * unlike + ERROR_PER_SPREAD * varied
     return (seen / (1 + expected / HALF_CONFIDENCE_ERROR)).clamp(0, 1)
 
 
-def spread(prior: ConditionedPrior, o: Observation, reference: torch.Tensor, lights: Lights, recipe: Recipe, seed: int,
-           check: Callable[[], None] = lambda: None) -> torch.Tensor:
+def sample_spread(prior: ConditionedPrior, o: Observation, reference: torch.Tensor, lights: Lights, recipe: Recipe,
+                  seed: int, check: Callable[[], None] = lambda: None) -> torch.Tensor:
     """Deviation [H, W] of the albedo's lightness over short runs on a coarse map `o`, which begin at the reference face
     [1, 7, H, W], each with a seed of its own, under the light that was solved. `check` may raise to cancel."""
     short = replace(recipe, steps=SHORT_RUN_STEPS, guidance="proximal", coarse=(), candidates=1, phases=())
     device, runs = prior.device, []
     for run in range(SHORT_RUNS):
         begun = State(0, None, reference.clone(), lights).to(device)
-        sampler = Sampler(prior, short, seeded(seed + 7919 * (run + 1), device))
+        sampler = Sampler(prior, short, seed_noise(seed + 7919 * (run + 1), device))
         state = sampler.sample({1: o.to(device)}, begun, lambda state, steps: check())
-        runs.append(shown(albedo(state.denoised)).mean(0).cpu())
+        runs.append(to_display(albedo(state.denoised)).mean(0).cpu())
     return torch.stack(runs).std(0)
 
 
-def shown(linear: torch.Tensor) -> torch.Tensor:
+def to_display(linear: torch.Tensor) -> torch.Tensor:
     """Linear colours [3, H, W] about as sRGB encodes them, in [0, 1]."""
     return linear.clamp(0, 1).pow(1 / 2.2)
 
 
-def enlarged(image: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
+def enlarge_map(image: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
     """[H, W] at another size, bilinear."""
     return functional.interpolate(image[None, None], size, mode="bilinear", align_corners=False)[0, 0]

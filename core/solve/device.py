@@ -37,7 +37,7 @@ class Proof:
 @cache
 def prove() -> Proof:
     """The first device that computes what the CPU computes, and faster; the CPU where none does."""
-    found = candidates()
+    found = list_devices()
     if not found:
         return Proof("cpu", "PyTorch finds no graphics card that it can use.")
     expected, cpu_s = run_pass("cpu")
@@ -59,7 +59,7 @@ def prove() -> Proof:
     return Proof("cpu", " ".join(reasons))
 
 
-def candidates() -> list[str]:
+def list_devices() -> list[str]:
     """The devices that PyTorch names, beside the CPU."""
     return [name for name, there in (("cuda", torch.cuda.is_available()), ("mps", torch.backends.mps.is_available()))
             if there]

@@ -14,8 +14,8 @@ from .recipes import Recipe
 WHOLE_MAP = slice(None), slice(None)
 
 
-def restored(prior: ConditionedPrior, denoised: torch.Tensor, coords: torch.Tensor, recipe: Recipe, seed: int,
-             part: tuple[slice, slice] = WHOLE_MAP) -> torch.Tensor:
+def restore_maps(prior: ConditionedPrior, denoised: torch.Tensor, coords: torch.Tensor, recipe: Recipe, seed: int,
+                 part: tuple[slice, slice] = WHOLE_MAP) -> torch.Tensor:
     """The map [1, 7, S, S], or those rows and columns of it, with the normals and specular that are expected of its
     albedo where the recipe's guidance was the closed form; as it is where not. coords [1, 2, S, S] are the whole map's;
     a part gets the noise that it would get in the whole map."""

@@ -17,7 +17,7 @@ CURVE_PX = 192, 256  # rows and columns of the loss curve
 PAINTED_RGB, LAID_RGB, MARK_RGB = (1.0, 1.0, 1.0), (1.0, 0.45, 0.0), (0.1, 0.9, 0.2)
 
 
-def edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, ...]) -> np.ndarray:
+def draw_edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, ...]) -> np.ndarray:
     """sRGB [H, 2 H, 3]: the texture with the painted contour in white, M's border as it is used in orange, the marks
     ringed in green; M itself beside it."""
     side = min(evidence.size, REFERENCE_TEXELS // 2)
@@ -35,7 +35,7 @@ def edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, 
     return np.hstack([shown, np.repeat(np.clip(small, 0, 1)[..., None], 3, 2)])
 
 
-def loss_curve(losses: list[tuple[int, float]], steps: int) -> np.ndarray:
+def draw_loss_curve(losses: list[tuple[int, float]], steps: int) -> np.ndarray:
     """sRGB [h, w, 3] of (step, loss) over all steps of the run, on a logarithmic scale from the largest to the smallest
     so far; a line at every tenfold."""
     height, width = CURVE_PX

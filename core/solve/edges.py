@@ -13,7 +13,7 @@ from ..light.shadow_edges import place
 from .evidence import Evidence
 
 
-def with_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor) -> Evidence:
+def snap_to_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor) -> Evidence:
     """The evidence with `place`'s alpha for its own; light [3, S, S] and weight [S, S] as there. What is protected
     stays out of M."""
     edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), (weight * evidence.covered).numpy(),

@@ -16,15 +16,15 @@ from ..contract.settings import Settings
 from ..face.head import Head
 from . import checkpoint, initial, maps
 from .checkpoint import Solution
-from .confidence import spread
+from .confidence import sample_spread
 from .evidence import REFERENCE_TEXELS, Evidence, grid_cells
 from .lighting import Lights
 from .prior import ConditionedPrior, Prior
 from .problem import State
 from .recipes import Recipe
 from .skin_tone import SkinTone
-from .window import Window, coarse, cropped, solve_inside, window
-from .witnesses import confirmed
+from .window import Window, average_down, crop_observation, find_window, solve_inside
+from .witnesses import confirm_marks
 
 
 def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence,
@@ -40,7 +40,7 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     try:
         if earlier is None:
             raise ValueError(obstacle or "What the last solve left behind is damaged.")
-        part = window(earlier.painted, evidence.alpha, grid_cells(cell), prior.multiple, REFERENCE_TEXELS)
+        part = find_window(earlier.painted, evidence.alpha, grid_cells(cell), prior.multiple, REFERENCE_TEXELS)
     except ValueError as reason:
         report.log(f"The whole map is solved. {reason}")
         return None
@@ -48,16 +48,16 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     near = torch.zeros_like(evidence.alpha)
     if part is not None:
         near[part.inside] = 1
-    start = initial.again(prior, evidence, earlier, cell, recipe, near,
-                          lambda marks: confirmed(capture, head, marks, evidence.size))
+    start = initial.start_again(prior, evidence, earlier, cell, recipe, near,
+                                lambda marks: confirm_marks(capture, head, marks, evidence.size))
     found = (earlier if part is None
              else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, part, report))
     state = State(0, None, found.denoised, found.lights)
-    result = maps.finished(state, evidence, start, found.spread, found.gain)
+    result = maps.finish_maps(state, evidence, start, found.spread, found.gain)
     if part is None:
         report.log("The mask is the last solve's: nothing was solved again.")
     else:
-        maps.write(capture, result, found, conditions, part.inside)
+        maps.write_maps(capture, result, found, conditions, part.inside)
         maps.write_preview(capture, state, start.observations, report)
         height, width = (s.stop - s.start for s in part.inside)
         report.log(f"{width} x {height} texels were solved again in {time.monotonic() - began:.1f} s.")
@@ -69,9 +69,9 @@ def _sampled(settings: Settings, prior: ConditionedPrior, evidence: Evidence, ea
     denoised, lights = solve_inside(prior, start.observations, earlier, part, start.recipe, settings.seed, report)
     factor = max(start.observations)
     here = Lights(lights.glob, lights.grid[(..., *part.cells)], lights.chroma)
-    reference = coarse(start.reference[(..., *part.seen)], factor)
-    patch = spread(prior, cropped(start.observations[factor], part, factor), reference, here, start.recipe,
-                   settings.seed, report.check)
+    reference = average_down(start.reference[(..., *part.seen)], factor)
+    patch = sample_spread(prior, crop_observation(start.observations[factor], part, factor), reference, here,
+                          start.recipe, settings.seed, report.check)
     rows, columns = (slice(a.start // factor, a.stop // factor) for a in part.inside)
     whole = earlier.spread.clone()
     rest = tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor)

@@ -21,7 +21,7 @@ from ..geometry import raster
 from ..imaging import images
 from .lighting import Shader
 from .prior import coordinates
-from .problem import Observation, blurred
+from .problem import Observation, blur_maps
 from .recipes import Recipe
 
 REFERENCE_TEXELS = 1024  # lengths in texels are given for maps of this size
@@ -113,7 +113,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     mask, asked = _shadow_mask(capture, size)
     protected = (_sized(images.read_mask(capture.protect_mask), size) if capture.protect_mask.is_file()
                  else np.zeros_like(mask))
-    alpha = softened(mask) * (1 - protected)
+    alpha = soften_mask(mask) * (1 - protected)
     skin = template.mask("skin", size) * template.mask("face", size)
     skin = skin * (1 - template.mask("eyes", size)) * (1 - hidden)
     weight = np.where(covered, np.clip(seen / FULL_CONFIDENCE, 0, 1), 0)
@@ -136,15 +136,15 @@ def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:
     return mask, np.clip(mask - proposal, 0, 1)
 
 
-def softened(mask: np.ndarray) -> np.ndarray:
+def soften_mask(mask: np.ndarray) -> np.ndarray:
     """A mask [S, S] in [0, 1] whose hard borders fade over a few texels, as the light's do; faint remains become
     zero."""
     faded = cv2.GaussianBlur(mask, (0, 0), max(MASK_FADE_TEXELS * len(mask) / REFERENCE_TEXELS, 0.3))
     return np.clip((faded - 0.02) / 0.96, 0, 1)
 
 
-def observations(evidence: Evidence, exposure: float, cell: float, multiple: int,
-                 recipe: Recipe) -> dict[int, Observation]:
+def make_observations(evidence: Evidence, exposure: float, cell: float, multiple: int,
+                      recipe: Recipe) -> dict[int, Observation]:
     """The evidence as the sampler takes it, per coarsening factor. The texture is multiplied by `exposure`; `cell` is a
     grid cell where the map has REFERENCE_TEXELS texels.
 
@@ -159,7 +159,7 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         maps = (evidence.weight, evidence.alpha, evidence.trust, evidence.edge, evidence.protected)
         weight, alpha, trust, edge, protected = (torch.from_numpy(_sized(a.numpy(), size)) for a in maps)
         texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
-        texture = blurred(texture) if recipe.blur else texture
+        texture = blur_maps(texture) if recipe.blur else texture
         normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)
         inside = (alpha > (0.5 if recipe.hard_mask else 0)).numpy().astype(np.uint8)
         support = cv2.dilate(inside, np.ones((5, 5)))  # M and two texels around it

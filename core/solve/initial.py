@@ -11,18 +11,18 @@ from dataclasses import dataclass, field, replace
 import torch
 
 from ..contract.messages import Problem
-from .border import missing
+from .border import measure_missing_light
 from .checkpoint import Solution
-from .edges import with_edges
-from .evidence import Evidence, grid_cells, observations
+from .edges import snap_to_edges
+from .evidence import Evidence, grid_cells, make_observations
 from .lighting import Lights, constant_light, fit_around_constant, fit_global, shading_basis
-from .marks import Mark, with_marks
+from .marks import Mark, protect_marks
 from .prior import Prior, coordinates, mean_at
 from .problem import Observation, State
 from .problem import albedo as albedo_of
-from .recipes import OURS, Recipe, free, settled
+from .recipes import OURS, Recipe, free_recipe, settle_recipe
 from .skin_tone import SkinTone
-from .split import Shapes, enlarged, split
+from .split import Shapes, enlarge_field, split_captures
 
 
 @dataclass(frozen=True)
@@ -44,43 +44,43 @@ class Start:
     local: torch.Tensor = field(default_factory=lambda: torch.zeros(3, 1, 1))
 
 
-def start(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe: Recipe,
-          witness: Callable[[list[Mark]], list[Mark]] = list, others: Sequence[Evidence] = ()) -> Start:
+def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe: Recipe,
+                witness: Callable[[list[Mark]], list[Mark]] = list, others: Sequence[Evidence] = ()) -> Start:
     """All that a run begins with. `cell` is a cell of V in texels of a 1024 map; `witness` leaves those marks that the
     views confirm; `others` are what is known of other captures of the same person.
 
     Raises Problem where no facial skin was seen.
     """
-    lit = lit_skin(evidence)
-    x_ref = reference(prior, tone, evidence, recipe.reference)
-    exposure = exposure_to(albedo_of(x_ref), evidence.texture, lit)
+    lit = weigh_lit_skin(evidence)
+    x_ref = make_reference(prior, tone, evidence, recipe.reference)
+    exposure = match_exposure(albedo_of(x_ref), evidence.texture, lit)
     trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
     weight = trusted * (1 - evidence.alpha) if recipe.fitted else lit  # one even light is best told by skin
-    lights = first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal,
-                          weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
+    lights = fit_first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal,
+                              weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
     local = torch.zeros(3, 1, 1)
     if recipe.linear:
-        told = split([shapes_of(each, albedo_of(reference(prior, tone, each, recipe.reference)))
-                      for each in (evidence, *others)])
+        told = split_captures([make_shapes(each, albedo_of(make_reference(prior, tone, each, recipe.reference)))
+                               for each in (evidence, *others)])
         light = told.light(evidence.normal)
-        if deviation(light.log(), lit) < recipe.linear:
-            recipe = settled(recipe)
+        if weighted_deviation(light.log(), lit) < recipe.linear:
+            recipe = settle_recipe(recipe)
             lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal),
                                               evidence.skin * evidence.weight, 1e-3)
             if others:  # one capture alone cannot tell a light of this form from a trait
                 local = torch.from_numpy(told.local)
         else:
-            recipe = free(recipe)
+            recipe = free_recipe(recipe)
     begun = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
     return _laid_out(prior, evidence, begun, cell, witness=witness)
 
 
-def again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, recipe: Recipe, near: torch.Tensor,
-          witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
+def start_again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, recipe: Recipe, near: torch.Tensor,
+                witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and where `near` [S, S] is 0
     its mask too."""
-    x_ref = reference(prior, earlier.tone, evidence, recipe.reference)
-    recipe = settled(recipe) if earlier.settled else free(recipe)
+    x_ref = make_reference(prior, earlier.tone, evidence, recipe.reference)
+    recipe = settle_recipe(recipe) if earlier.settled else free_recipe(recipe)
     begun = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {},
                   State(0, None, earlier.denoised, earlier.lights), local=earlier.local)
     return _laid_out(prior, evidence, begun, cell, lambda alpha: torch.lerp(earlier.alpha, alpha, near), witness)
@@ -91,30 +91,29 @@ def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float,
               witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
     recipe = begun.recipe
-    evidence = replace(evidence, texture=evidence.texture / enlarged(begun.local, evidence.size).exp())
-    light = remaining_light(evidence, begun)
+    evidence = replace(evidence, texture=evidence.texture / enlarge_field(begun.local, evidence.size).exp())
+    light = find_remaining_light(evidence, begun)
     if recipe.sharp_edges:
-        evidence = with_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))
+        evidence = snap_to_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))
     evidence = replace(evidence, alpha=mask(evidence.alpha))
     if recipe.faint:
-        evidence = replace(evidence,
-                           missing=missing(light, evidence.alpha, evidence.weight * evidence.trust * evidence.skin,
-                                           evidence.texel))
+        bare = evidence.weight * evidence.trust * evidence.skin
+        evidence = replace(evidence, missing=measure_missing_light(light, evidence.alpha, bare, evidence.texel))
     marks: list[Mark] = []
     if recipe.protect_marks:
-        evidence, marks = with_marks(evidence, witness)
+        evidence, marks = protect_marks(evidence, witness)
     return replace(begun, alpha=evidence.alpha, marks=tuple(marks),
-                   observations=observations(evidence, begun.exposure, cell, prior.multiple, recipe))
+                   observations=make_observations(evidence, begun.exposure, cell, prior.multiple, recipe))
 
 
-def remaining_light(evidence: Evidence, begun: Start) -> torch.Tensor:
+def find_remaining_light(evidence: Evidence, begun: Start) -> torch.Tensor:
     """The texture over the reference face in its global light [3, S, S], linear: about 1, less where light is missing
     or the skin is darker."""
     shading = torch.einsum("ck,khw->chw", begun.state.lights.glob, shading_basis(evidence.normal))
     return evidence.texture * begun.exposure / (shading * albedo_of(begun.reference).clamp_min(1e-3)).clamp_min(1e-3)
 
 
-def lit_skin(evidence: Evidence) -> torch.Tensor:
+def weigh_lit_skin(evidence: Evidence) -> torch.Tensor:
     """[S, S]: how far a texel tells of the skin in the light, 0 in shadows. Raises Problem where no facial skin was
     seen."""
     lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
@@ -126,22 +125,22 @@ def lit_skin(evidence: Evidence) -> torch.Tensor:
     return lit
 
 
-def deviation(log: torch.Tensor, weight: torch.Tensor) -> float:
+def weighted_deviation(log: torch.Tensor, weight: torch.Tensor) -> float:
     """Standard deviation of fields [3, H, W] about their own means, under a weight [H, W]."""
     away = log - mean_tone(log, weight)[:, None, None]
     return float(mean_tone(away**2, weight).mean().sqrt())
 
 
-def exposure_to(albedo: torch.Tensor, texture: torch.Tensor, weight: torch.Tensor) -> float:
+def match_exposure(albedo: torch.Tensor, texture: torch.Tensor, weight: torch.Tensor) -> float:
     """What a texture [3, H, W] is multiplied by to be as bright as an albedo under a weight [H, W]."""
     return float(mean_tone(albedo, weight).mean() / mean_tone(texture, weight).mean().clamp_min(1e-6))
 
 
-def shapes_of(evidence: Evidence, albedo: torch.Tensor) -> Shapes:
+def make_shapes(evidence: Evidence, albedo: torch.Tensor) -> Shapes:
     """What `split` takes of a capture: facial skin outside of M, and brows, lips and beards as little as light may
     explain them."""
-    told = lit_skin(evidence) * evidence.trust
-    return Shapes(evidence.texture * exposure_to(albedo, evidence.texture, told), albedo, evidence.normal, told)
+    told = weigh_lit_skin(evidence) * evidence.trust
+    return Shapes(evidence.texture * match_exposure(albedo, evidence.texture, told), albedo, evidence.normal, told)
 
 
 def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
@@ -149,24 +148,24 @@ def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     return (albedo * weight).sum((1, 2)) / weight.sum().clamp_min(1e-6)
 
 
-def reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) -> torch.Tensor:
+def make_reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) -> torch.Tensor:
     """x_0^ref [1, 7, S, S] of the tone: the prior's mean face; the one of its reference skins that explains the texture
     best ("nearest"); or the tone everywhere ("uniform", and where the prior has neither)."""
     if prior.mean_face is None or kind == "uniform":
-        return uniform_skin(tone.tensor, evidence.size)
+        return make_uniform_skin(tone.tensor, evidence.size)
     if kind == "mean" or prior.references is None:
-        return face_of_tone(prior.mean_face, tone.tensor, evidence.skin)
+        return tint_face(prior.mean_face, tone.tensor, evidence.skin)
     basis, weight = shading_basis(evidence.normal), evidence.weight * (1 - evidence.alpha)
 
     def unexplained(face: torch.Tensor) -> float:
-        light = first_lights(evidence.texture, albedo_of(face), evidence.normal, weight, (1, 1), OURS).glob
+        light = fit_first_lights(evidence.texture, albedo_of(face), evidence.normal, weight, (1, 1), OURS).glob
         return float((((evidence.texture - albedo_of(face) * torch.einsum("ck,khw->chw", light, basis))
                        * weight) ** 2).sum())
 
-    return min((face_of_tone(skin, tone.tensor, evidence.skin) for skin in prior.references), key=unexplained)
+    return min((tint_face(skin, tone.tensor, evidence.skin) for skin in prior.references), key=unexplained)
 
 
-def face_of_tone(face: torch.Tensor, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
+def tint_face(face: torch.Tensor, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
     """A face [7, R, R] in the form of the prior's mean face as x [1, 7, S, S], the mean of its skin [S, S] brought to
     the tone, linear [3]."""
     size = skin.shape[0]
@@ -176,15 +175,15 @@ def face_of_tone(face: torch.Tensor, tone: torch.Tensor, skin: torch.Tensor) -> 
     return out
 
 
-def uniform_skin(tone: torch.Tensor, size: int) -> torch.Tensor:
+def make_uniform_skin(tone: torch.Tensor, size: int) -> torch.Tensor:
     """[1, 7, S, S]: the tone, linear [3], a flat normal and an ordinary specular albedo everywhere."""
     out = torch.zeros(1, 7, size, size)
     out[:, :3], out[:, 5], out[:, 6] = 2 * tone[:, None, None] - 1, 1.0, -0.3
     return out
 
 
-def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor,
-                 cells: tuple[int, int], recipe: Recipe) -> Lights:
+def fit_first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor,
+                     cells: tuple[int, int], recipe: Recipe) -> Lights:
     """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light)
     or the constant light, V zero.
 

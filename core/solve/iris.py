@@ -23,8 +23,8 @@ from ..geometry import raster
 from ..geometry.meshes import vertex_uvs
 from ..geometry.views import View, read_views
 from ..imaging import images
-from .look import BURNT_SRGB, skin_weight
-from .witnesses import visible
+from .look import BURNT_SRGB, weigh_skin
+from .witnesses import find_visible
 
 RING_SHARES = 0.55, 0.85
 """Shares of the iris' radius between which it is iris: a pupil is seldom wider than half, and the rim is darker."""
@@ -41,7 +41,7 @@ MIN_POINTS = 12  # points of skin, or pixels of the iris, that a frame must show
 MAX_VIEWS = 10
 
 
-def measure(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) -> None:
+def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) -> None:
     """maps/irises.json from the frames and a linear albedo [S, S, 3] of the head's UVs; none where the eyes were closed
     or no frame shows them well.
 
@@ -52,7 +52,7 @@ def measure(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) 
         return
     eyes = read_eyes(capture)
     views = [view for view in read_views(capture) if view.path.is_file()]
-    colours = [iris_colour(views, head, side, eye, albedo, report) for side, eye in enumerate(eyes)]
+    colours = [measure_iris_colour(views, head, side, eye, albedo, report) for side, eye in enumerate(eyes)]
     known = [colour for colour in colours if colour is not None]
     if not known:
         return
@@ -62,8 +62,8 @@ def measure(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) 
         report.figure(f"{side}_iris_srgb", [round(float(v), 3) for v in images.linear_to_srgb(np.array(colour))])
 
 
-def iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray,
-                report: Reporter) -> Colour | None:
+def measure_iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray,
+                        report: Reporter) -> Colour | None:
     """Linear albedo of the left (0) or the right iris, by the median over it and the frames that face it most; None
     where none shows it."""
     skin, known = _skin_around(head, eye, albedo)
@@ -81,7 +81,8 @@ def iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: 
     return tuple(round(float(v), 4) for v in np.clip(np.median(found, 0), 0.001, 1)) if found else None
 
 
-def iris_pixels(view: View, eye: Eyeball, seen: EyeShares, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+def find_iris_pixels(view: View, eye: Eyeball, seen: EyeShares,
+                     shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns [N] of the pixels of a view's picture of that shape that show the iris between pupil and rim:
     where an eyeball has it, and the reader saw it, in the picture's pixels."""
     shrink = np.array([shape[1] / view.width, shape[0] / view.height])
@@ -102,7 +103,7 @@ def iris_pixels(view: View, eye: Eyeball, seen: EyeShares, shape: tuple[int, ...
 def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The vertices [N] of plain skin about an eye that are turned as it is, and their linear albedo [N, 3]."""
     mesh, uvs = head.mesh, vertex_uvs(head.mesh)
-    plain = raster.sample_uv(skin_weight(512, np.zeros((8, 8))), uvs) > 0.5
+    plain = raster.sample_uv(weigh_skin(512, np.zeros((8, 8))), uvs) > 0.5
     near = np.linalg.norm(mesh.vertices - eye.centre, axis=1) < REACH_RADII * eye.radius
     rows = np.flatnonzero(plain & near & (head.normals @ np.array(eye.gaze) > MIN_SKIN_COSINE))
     return rows, np.maximum(raster.sample_uv(albedo, uvs[rows]), 1e-3)
@@ -115,8 +116,8 @@ def _in_frame(view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray,
     linear, whole = images.srgb_to_linear(frame), frame.max(-1)
     corners = view.project(head.mesh.vertices[list(lids.corners()[side])])[0]
     seen = read_eye(frame, corners * [frame.shape[1] / view.width, frame.shape[0] / view.height], side == 0)
-    rows, columns = iris_pixels(view, eye, seen, frame.shape)
-    at = np.flatnonzero(visible(view, head.caster, head.mesh.vertices[skin], head.normals[skin]))
+    rows, columns = find_iris_pixels(view, eye, seen, frame.shape)
+    at = np.flatnonzero(find_visible(view, head.caster, head.mesh.vertices[skin], head.normals[skin]))
     if len(at) < MIN_POINTS or len(rows) < MIN_POINTS:
         return None
     pixels = view.project(head.mesh.vertices[skin[at]])[0] * [frame.shape[1] / view.width, frame.shape[0] / view.height]

@@ -24,7 +24,7 @@ from ..face.head import Head
 from ..geometry import atlas, baking, meshes
 from .evidence import REFERENCE_TEXELS, Evidence, Extent
 from .lighting import Lights, shading_basis
-from .maps import MIN_ALBEDO, Maps, picture_of
+from .maps import MIN_ALBEDO, Maps, to_picture
 from .prior import Prior, load, mean_at
 from .skin_tone import SkinTone
 
@@ -52,7 +52,7 @@ class Layout:
 
     def mean_face(self) -> torch.Tensor:
         """Our prior's mean face in the window [7, C, C]."""
-        face = picture_of(self.face)
+        face = to_picture(self.face)
         normal = 2 * baking.bake_normals(face[..., 3:6] / 2 + 0.5, self.there) - 1
         return _planes(np.dstack([baking.bake(face[..., :3], self.there), normal,
                                   baking.bake(face[..., 6], self.there)]))
@@ -87,13 +87,13 @@ class Layout:
             share = inside.reshape(inside.shape + (1,) * (baked.ndim - 2))
             return (share * baked + (1 - share) * beyond).astype(np.float32)
 
-        normal = joined(baking.bake_normals(solved.normal, self.back), picture_of(mean[3:6]) / 2 + 0.5) * 2 - 1
+        normal = joined(baking.bake_normals(solved.normal, self.back), to_picture(mean[3:6]) / 2 + 0.5) * 2 - 1
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
         confidence = np.where(self.back.known, inside * baking.bake(solved.confidence, self.back), 0)
-        return replace(solved, diffuse=joined(baking.bake(solved.diffuse, self.back), picture_of(seen)),
+        return replace(solved, diffuse=joined(baking.bake(solved.diffuse, self.back), to_picture(seen)),
                        normal=(normal / 2 + 0.5).astype(np.float32),
                        specular=joined(baking.bake(solved.specular, self.back), ((mean[6] + 1) / 2).numpy()),
-                       shading=joined(baking.bake(solved.shading, self.back), picture_of(light)),
+                       shading=joined(baking.bake(solved.shading, self.back), to_picture(light)),
                        confidence=confidence.astype(np.float32))
 
     def _inside(self) -> np.ndarray:
@@ -123,14 +123,14 @@ class Layout:
         return torch.from_numpy(baked) if values.ndim == 2 else _planes(baked)
 
 
-def whole_size(asked: int, multiple: int) -> int:
+def round_size(asked: int, multiple: int) -> int:
     """The largest size up to `asked` (but one step at least) of which the window is a whole number of the network's
     `multiple` of texels."""
     step = 16 * multiple // math.gcd(12, multiple)
     return max(asked // step, 1) * step
 
 
-def fitted(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Reporter) -> tuple[Layout, Prior]:
+def fit_layout(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Reporter) -> tuple[Layout, Prior]:
     """The layout of the own head that lies in the capture, at the evidence's size, and a released prior with what it
     lacks to start from: the mean face of ours, and the tones of skins. Raises Problem where there is no own head, or
     its UVs are not the prior's."""
@@ -146,15 +146,15 @@ def fitted(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Repo
     if not skin.any():
         raise strange
     ours = load()
-    layout = between(head.mesh, own, skin, e.size, ours.mean_face,
-                     lambda done: report.progress(done, 100, "laying the prior's UVs over the head"))
+    layout = make_layout(head.mesh, own, skin, e.size, ours.mean_face,
+                         lambda done: report.progress(done, 100, "laying the prior's UVs over the head"))
     if not layout.fits(e.skin.numpy()):
         raise strange
     return layout, prior.with_face(layout.mean_face(), ours.tones)
 
 
-def between(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor,
-            tick: Callable[[float], None]) -> Layout:
+def make_layout(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor,
+                tick: Callable[[float], None]) -> Layout:
     """The layout of `own`, which lies on `head`, for maps of size x size. skin bool [F]: its triangles that count;
     face: Layout's."""
     there = baking.places(own, (0, 0), baking.Source(head), size, MAX_DISTANCE_M, tick, skin)

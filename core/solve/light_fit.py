@@ -9,7 +9,7 @@ from collections.abc import Callable
 import torch
 
 from .lighting import Lights, fit_around_constant
-from .problem import Observation, State, albedo, photometric
+from .problem import Observation, State, albedo, photometric_loss
 from .recipes import Recipe
 
 ADAM_BETAS = 0.9, 0.999
@@ -46,7 +46,7 @@ def _refit(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe)
 def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
     """L_pho + L_neg + 0.1 L_TV of theta, and what our recipe adds. L_TV makes M's border seamless."""
     shading = o.shader.total(lights)
-    loss = photometric(denoised, shading, o, o.weight if recipe.trusting else o.weight * o.trust, recipe.blur)
+    loss = photometric_loss(denoised, shading, o, o.weight if recipe.trusting else o.weight * o.trust, recipe.blur)
     brightness = (o.weight * albedo(denoised) ** 2).mean()  # L_pho is larger on light skin
     if o.shader.empty:
         return loss
@@ -56,7 +56,7 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
         gamma = o.shader.coefficients(lights)
         loss = loss + recipe.tv * ((gamma.diff(dim=-1) ** 2).sum() + (gamma.diff(dim=-2) ** 2).sum())
     elif recipe.tv:
-        loss = loss + recipe.tv * variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
+        loss = loss + recipe.tv * total_variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
     if recipe.faint:
         held, missing = (value[o.shader.box] if isinstance(value, torch.Tensor) else value
                          for value in (o.held, o.missing))
@@ -64,11 +64,11 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     if recipe.smooth:
         # a shadow's own edge is in M and costs nothing
         free = o.shader.unmodulated(lights) if recipe.sharp_edges else local
-        loss = loss + recipe.smooth * brightness / o.texel * variation(free, o.shader.box_alpha)
+        loss = loss + recipe.smooth * brightness / o.texel * total_variation(free, o.shader.box_alpha)
     return loss
 
 
-def variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
+def total_variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     """The weighted L1 norm of forward differences of [3, H, W]; the weight [H, W] is taken at the later texel."""
     return (image.diff(dim=1).abs() * weight[1:]).sum() + (image.diff(dim=2).abs() * weight[:, 1:]).sum()
 

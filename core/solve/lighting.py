@@ -66,8 +66,8 @@ class Shader:
         # the ring's differences
         self.box = (slice(0, 1), slice(0, 1)) if self.empty else tuple(
             slice(max(int(i[0]) - 3, 0), min(int(i[-1]) + 4, size)) for i, size in ((rows, height), (columns, width)))
-        self.up_rows = interpolation(cells[0], height, bilinear).to(normal)[self.box[0]]  # [h', h]
-        self.up_columns = interpolation(cells[1], width, bilinear).to(normal)[self.box[1]]  # [w', w]
+        self.up_rows = interpolation_matrix(cells[0], height, bilinear).to(normal)[self.box[0]]  # [h', h]
+        self.up_columns = interpolation_matrix(cells[1], width, bilinear).to(normal)[self.box[1]]  # [w', w]
         self.box_basis = self.basis[(slice(None), *self.box)]
         self.box_alpha = alpha[self.box]
 
@@ -108,7 +108,7 @@ class Shader:
         return shading
 
 
-def interpolation(cells: int, texels: int, bilinear: bool = False) -> torch.Tensor:
+def interpolation_matrix(cells: int, texels: int, bilinear: bool = False) -> torch.Tensor:
     """The matrix [texels, cells] that resamples a line by the cubic kernel (a = -0.5) or the linear one, half-pixel
     centres, borders repeated.
 

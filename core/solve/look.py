@@ -23,7 +23,7 @@ from ..geometry.meshes import vertex_uvs
 from ..geometry.views import View, read_views
 from ..imaging import images
 from ..light.spherical_harmonics import sh_basis
-from .witnesses import visible
+from .witnesses import find_visible
 
 FRONT = np.array([0.0, -1.0, 0.0])
 VIEW_QUANTILE = 0.3  # over the views: below the median, as every highlight brightens and nothing but shadow darkens
@@ -52,7 +52,8 @@ class Look:
     surroundings: np.ndarray | None = None
 
 
-def look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray, surroundings: np.ndarray | None = None) -> Look:
+def summarise_look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray,
+                   surroundings: np.ndarray | None = None) -> Look:
     """From linear colours [N, 3] of facial skin with unit normals [N, 3] and weights [N] in [0, 1], 0 for what is
     shadowed or no skin."""
     brightness = colours @ LUMINANCE_WEIGHTS
@@ -63,7 +64,7 @@ def look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray, surroundi
                 surroundings)
 
 
-def capture_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter) -> Look | None:
+def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter) -> Look | None:
     """From the selected frames as they were filmed. `shadow` [S, S]: the soft mask in UV. None where the frames or
     cameras are gone, or hardly any skin is seen."""
     if not capture.frames_json.is_file() or not capture.cameras.is_dir():
@@ -72,7 +73,7 @@ def capture_look(capture: Capture, head: Head, shadow: np.ndarray, report: Repor
     if not views or not head.built_in:
         return None
     mesh, normals = head.mesh, head.normals
-    weight = raster.sample_uv(skin_weight(512, shadow), vertex_uvs(mesh))
+    weight = raster.sample_uv(weigh_skin(512, shadow), vertex_uvs(mesh))
     points = np.flatnonzero(weight > 0.05)
     seen = np.full((len(views), len(points), 3), np.nan)
     around = []
@@ -86,10 +87,11 @@ def capture_look(capture: Capture, head: Head, shadow: np.ndarray, report: Repor
         return None
     colours = _low_quantile(seen[:, known])
     around = [each for each in around if each is not None]
-    return look(colours, normals[points[known]], weight[points[known]], np.median(around, 0) if around else None)
+    surroundings = np.median(around, 0) if around else None
+    return summarise_look(colours, normals[points[known]], weight[points[known]], surroundings)
 
 
-def skin_weight(size: int, shadow: np.ndarray) -> np.ndarray:
+def weigh_skin(size: int, shadow: np.ndarray) -> np.ndarray:
     """[size, size] in [0, 1]: facial skin that is out of the `shadow` [S, S], without lips, brows, eyes, nostrils and
     where a beard may grow."""
     skin = template.mask("skin", size) * template.mask("face", size)
@@ -121,7 +123,7 @@ def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.nd
           normals: np.ndarray) -> np.ndarray:
     """Linear colours [N, 3] of surface points in an sRGB frame, nan where it does not see them or is burnt out."""
     found = np.full((len(points), 3), np.nan)
-    facing = np.flatnonzero(visible(view, caster, points, normals))
+    facing = np.flatnonzero(find_visible(view, caster, points, normals))
     if len(facing):
         pixels, _ = view.project(points[facing])
         smooth = cv2.GaussianBlur(images.srgb_to_linear(frame), (0, 0), SMOOTHING_SHARE * max(frame.shape[:2]))

@@ -15,12 +15,12 @@ from ..contract.files import replacing_folder
 from ..contract.messages import Reporter
 from ..imaging import images
 from .checkpoint import Solution, write_solution
-from .confidence import confidence
+from .confidence import estimate_confidence
 from .evidence import Evidence
 from .initial import Start, mean_tone
-from .marks import cover
+from .marks import draw_cover
 from .problem import Observation, State, albedo
-from .split import enlarged
+from .split import enlarge_field
 
 MIN_ALBEDO = 0.004  # linear albedo below which no skin or hair lies
 
@@ -39,8 +39,8 @@ class Maps:
     gain: torch.Tensor
 
 
-def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tensor | None = None,
-             gain: torch.Tensor | None = None) -> Maps:
+def finish_maps(state: State, evidence: Evidence, start: Start, spread: torch.Tensor | None = None,
+                gain: torch.Tensor | None = None) -> Maps:
     """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the
     skin tone (or by a `gain` [3] that was found before); the shading takes the inverse, so that their product stays.
     What nobody saw is the mean face of that tone: a drawn sample would be as likely, but would look like something that
@@ -50,12 +50,12 @@ def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tenso
     shader = start.observations[1].shader
     x = torch.lerp(start.reference, state.denoised, evidence.weight.sqrt())[0]
     with torch.no_grad():
-        beside = enlarged(start.local, evidence.size).exp() / start.exposure
+        beside = enlarge_field(start.local, evidence.size).exp() / start.exposure
         shading = shader.total(state.lights).clamp_min(1e-3) * beside
         main = shader.main(state.lights).clamp_min(1e-3) * beside
     diffuse = albedo(x[None])
     if start.marks:  # what is known to be no light is the skin's, be it ever so unlikely to the prior
-        kept = torch.from_numpy(cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
+        kept = torch.from_numpy(draw_cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
         diffuse = torch.lerp(diffuse, evidence.texture / shading, kept)
     diffuse = diffuse.clamp_min(MIN_ALBEDO)
     if gain is None:
@@ -64,9 +64,9 @@ def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tenso
     specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
     each = gain[:, None, None]
-    trusted = confidence(evidence.weight, explained, diffuse * each, albedo(start.reference), spread)
-    return Maps(picture_of((diffuse * each).clamp(MIN_ALBEDO, 1)), specular, picture_of(normal),
-                picture_of(shading / each), trusted.numpy(), gain)
+    trusted = estimate_confidence(evidence.weight, explained, diffuse * each, albedo(start.reference), spread)
+    return Maps(to_picture((diffuse * each).clamp(MIN_ALBEDO, 1)), specular, to_picture(normal),
+                to_picture(shading / each), trusted.numpy(), gain)
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
@@ -78,8 +78,8 @@ def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, resca
     return (tone ** (1 / gamma) / mean_tone(diffuse ** (1 / gamma), weight)).pow(gamma).clamp(0.2, 5.0)
 
 
-def write(capture: Capture, maps: Maps, found: Solution, conditions: dict[str, str],
-          only: tuple[slice, slice] | None = None) -> None:
+def write_maps(capture: Capture, maps: Maps, found: Solution, conditions: dict[str, str],
+               only: tuple[slice, slice] | None = None) -> None:
     """The folder maps/, whole or not at all, with what a later solve of a part goes on from. `only` those rows and
     columns are new where given: the others keep the values that their files have."""
     def put(write: Callable, name: str, values: np.ndarray, **options) -> None:
@@ -106,10 +106,10 @@ def write_preview(capture: Capture, state: State, seen: dict[int, Observation], 
         shading = o.shader.total(state.lights).clamp_min(0).cpu()
     scale = 0.6 / max(float(np.percentile(shading.numpy(), 95)), 1e-6)
     for name, image in (("albedo", albedo(state.denoised).cpu()), ("shading", scale * shading)):
-        images.write_srgb(capture.preview / f"{name}.png", images.linear_to_srgb(picture_of(image)))
+        images.write_srgb(capture.preview / f"{name}.png", images.linear_to_srgb(to_picture(image)))
         report.preview(f"preview/{name}.png")
 
 
-def picture_of(planes: torch.Tensor) -> np.ndarray:
+def to_picture(planes: torch.Tensor) -> np.ndarray:
     """[C, H, W] -> [H, W, C]."""
     return np.ascontiguousarray(planes.permute(1, 2, 0).numpy(), np.float32)

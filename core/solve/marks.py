@@ -60,7 +60,8 @@ class _Blob:
     stands_out: bool
 
 
-def with_marks(evidence: Evidence, witness: Callable[[list[Mark]], list[Mark]] = list) -> tuple[Evidence, list[Mark]]:
+def protect_marks(evidence: Evidence,
+                  witness: Callable[[list[Mark]], list[Mark]] = list) -> tuple[Evidence, list[Mark]]:
     """The evidence with no trust in what the marks inside M say of light, and those marks; `witness` leaves the ones
     that the views confirm."""
     if not (evidence.alpha > 0).any():
@@ -68,14 +69,14 @@ def with_marks(evidence: Evidence, witness: Callable[[list[Mark]], list[Mark]] =
     feature = cv2.blur(1 - evidence.trust.numpy(), (2 * round(FEATURE_MARGIN_TEXELS / evidence.texel) + 1,) * 2)
     where = (evidence.skin.numpy() > 0.5) & (evidence.weight.numpy() > 0.5) & (feature < 0.02)
     alpha, taken = evidence.alpha.numpy(), np.array(evidence.taken)
-    marks = [mark for mark in find(evidence.texture.permute(1, 2, 0).numpy(), where, evidence.texel)
-             if alpha[round(mark.row), round(mark.column)] > 0.05 and unlike_shadow(mark, taken)]
+    marks = [mark for mark in find_marks(evidence.texture.permute(1, 2, 0).numpy(), where, evidence.texel)
+             if alpha[round(mark.row), round(mark.column)] > 0.05 and is_unlike_shadow(mark, taken)]
     marks = witness(marks)
-    return replace(evidence,
-                   trust=evidence.trust * (1 - torch.from_numpy(cover(marks, evidence.size, evidence.texel)))), marks
+    cover = torch.from_numpy(draw_cover(marks, evidence.size, evidence.texel))
+    return replace(evidence, trust=evidence.trust * (1 - cover)), marks
 
 
-def find(texture: np.ndarray, where: np.ndarray, texel: float) -> list[Mark]:
+def find_marks(texture: np.ndarray, where: np.ndarray, texel: float) -> list[Mark]:
     """The marks of a linear texture [S, S, 3] on the texels `where` bool [S, S]: seen skin without lips, brows and
     lids. Darkest first."""
     if not where.any():
@@ -93,7 +94,7 @@ def find(texture: np.ndarray, where: np.ndarray, texel: float) -> list[Mark]:
     return [mark for mark in kept if _alone(mark, candidates, NEIGHBOUR_REACH_TEXELS / texel)]
 
 
-def unlike_shadow(mark: Mark, taken: np.ndarray) -> bool:
+def is_unlike_shadow(mark: Mark, taken: np.ndarray) -> bool:
     """Whether a mark has another colour than a shadow that dark; taken [3]: the light's share that shadows take, over
     its mean (zeros: not known, grey)."""
     taken = taken if np.any(taken) else np.ones(3)
@@ -104,7 +105,7 @@ def unlike_shadow(mark: Mark, taken: np.ndarray) -> bool:
     return distance > MIN_COLOUR_DISTANCE * mark.contrast
 
 
-def cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
+def draw_cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
     """[size, size] in [0, 1]: 1 on the marks and a little around them, fading over a texel or two."""
     out = np.zeros((size, size), np.float32)
     row, column = np.mgrid[:size, :size]

@@ -41,7 +41,7 @@ TYPOLOGY_GROUPS = ((55, "very light"), (41, "light"), (28, "intermediate"), (10,
 
 @dataclass(frozen=True)
 class Population:
-    """tones [N, 3] linear, of all groups alike; what a phone shows of one is slope [9, 3] times the `coordinates` of
+    """tones [N, 3] linear, of all groups alike; what a phone shows of one is slope [9, 3] times the `to_coordinates` of
     the tone with its sheen plus offset [9], with this covariance [9, 9]: the coordinates of the best lit skin, of the
     surroundings, and of skin facing the front over a white surface there."""
 
@@ -59,21 +59,21 @@ def estimate_skin_tone(look: Look, white: np.ndarray | None = None) -> SkinTone:
     surface that faces as the face does, or None. Its sRGB is rounded to DECIMALS, as a tone that is typed has no
     more."""
     if white is not None:
-        return _posterior(OVER_WHITE_ROWS, coordinates(look.front) - coordinates(white),
+        return _posterior(OVER_WHITE_ROWS, to_coordinates(look.front) - to_coordinates(white),
                           np.square([MEASURED_SIGMA_LOG[0], MEASURED_SIGMA_LOG[1], MEASURED_SIGMA_LOG[1]]), WHITE_POINT)
     if look.surroundings is None:
-        return _posterior(BEST_ROWS, coordinates(look.best), np.zeros(3), SCENE)
-    shown = np.concatenate([coordinates(look.best), coordinates(look.surroundings)])
+        return _posterior(BEST_ROWS, to_coordinates(look.best), np.zeros(3), SCENE)
+    shown = np.concatenate([to_coordinates(look.best), to_coordinates(look.surroundings)])
     return _posterior(BEST_ROWS + SURROUNDINGS_ROWS, shown, np.zeros(6), SCENE)
 
 
 def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray, source: str) -> SkinTone:
     """The estimate from these rows of the model, as they are `shown`; `variance` is added to the model's own."""
-    known = population()
-    of_tones = coordinates(known.tones + SHEEN_REFLECTANCE)
+    known = read_population()
+    of_tones = to_coordinates(known.tones + SHEEN_REFLECTANCE)
     away = shown - of_tones @ known.slope[rows].T - known.offset[rows]
     # [N, R]: on dark skin sheen is much of what is seen
-    shiny = (coordinates(known.tones + SHEEN_REFLECTANCE * np.exp(SHEEN_SIGMA_LOG)) - of_tones) @ known.slope[rows].T
+    shiny = (to_coordinates(known.tones + SHEEN_REFLECTANCE * np.exp(SHEEN_SIGMA_LOG)) - of_tones) @ known.slope[rows].T
     covariance = (
         known.covariance[np.ix_(rows, rows)]
         + np.diag(variance)
@@ -86,32 +86,32 @@ def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray, source:
     return _stretched(known.tones, weight / weight.sum(), source)
 
 
-def coordinates(linear: np.ndarray) -> np.ndarray:
+def to_coordinates(linear: np.ndarray) -> np.ndarray:
     """Linear colours [..., 3] -> ln luminance, ln R/G, ln B/G [..., 3]."""
     log = np.log(np.maximum(linear, 1e-4))
     return np.stack([np.log(np.maximum(linear @ LUMINANCE_WEIGHTS, 1e-4)), log[..., 0] - log[..., 1],
                      log[..., 2] - log[..., 1]], -1)
 
 
-def lab(linear: np.ndarray) -> np.ndarray:
+def to_lab(linear: np.ndarray) -> np.ndarray:
     """Linear sRGB [..., 3] -> CIE L*a*b* under D65."""
     return color.rgb2lab(images.linear_to_srgb(linear))
 
 
 def from_lab(values: np.ndarray) -> np.ndarray:
-    """The inverse of `lab`; values outside of sRGB are brought to its border."""
+    """The inverse of `to_lab`; values outside of sRGB are brought to its border."""
     return np.clip(images.srgb_to_linear(color.lab2rgb(values)), 1e-3, 1)
 
 
-def group(linear: np.ndarray) -> str:
+def name_group(linear: np.ndarray) -> str:
     """The name of a tone's group, by its typology angle."""
-    lightness, _, yellow = lab(linear)
+    lightness, _, yellow = to_lab(linear)
     angle = np.degrees(np.arctan2(lightness - 50, yellow))
     return next(name for least, name in TYPOLOGY_GROUPS if angle > least)
 
 
 @cache
-def population() -> Population:
+def read_population() -> Population:
     stored = json.loads(MODEL_FILE.read_text(encoding="utf-8"))
     return Population(*(np.array(stored[name]) for name in Population.__dataclass_fields__))
 
@@ -120,7 +120,7 @@ def _stretched(tones: np.ndarray, weight: np.ndarray, source: str) -> SkinTone:
     """The posterior over the tones [N, 3] as an estimate without the prior's pull: for Gaussians of prior variance P
     and posterior variance V the likelihood's own centre is P / (P - V) times as far from the prior's mean, with
     variance P V / (P - V). Along L*; a* and b* follow as they go with it under the posterior."""
-    values = lab(tones)
+    values = to_lab(tones)
     prior, mean = values.mean(0), weight @ values
     covariance = (values - mean).T @ ((values - mean) * weight[:, None])
     variance, before = max(covariance[0, 0], 1e-6), values[:, 0].var()
@@ -128,7 +128,7 @@ def _stretched(tones: np.ndarray, weight: np.ndarray, source: str) -> SkinTone:
     lightness = np.clip(prior[0] + factor * (mean[0] - prior[0]), values[:, 0].min(), values[:, 0].max())
     moved = mean + covariance[:, 0] / variance * (lightness - mean[0])
     linear = from_lab(moved)
-    error = weight @ color.deltaE_ciede2000(values, np.broadcast_to(lab(linear), values.shape))
+    error = weight @ color.deltaE_ciede2000(values, np.broadcast_to(to_lab(linear), values.shape))
     deviation = float(np.hypot(np.sqrt(factor * variance), MIN_SIGMA_L))
     rounded = [round(float(value), DECIMALS) for value in images.linear_to_srgb(linear)]
-    return SkinTone.from_srgb(rounded, source, deviation=deviation, error=float(error), group=group(linear))
+    return SkinTone.from_srgb(rounded, source, deviation=deviation, error=float(error), group=name_group(linear))

@@ -80,13 +80,13 @@ class Prior:
     def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> Condition:
         """What `denoise` is told of maps at coords [N, 2, H, W] of skins of tone [1, 3]."""
         blind = torch.zeros(1, device=self.device) if self.network.mapping_cond.in_features == 5 else None
-        return condition(coords, self.octaves, self.mean_face, self.spread, tone, blind)
+        return make_condition(coords, self.octaves, self.mean_face, self.spread, tone, blind)
 
     def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor,
                 tone: torch.Tensor | None) -> torch.Tensor:
         """`ConditionedPrior.respond` for a skin of tone [1, 3]."""
-        known = condition(coords, self.octaves, self.mean_face, self.spread, tone,
-                          blind=torch.ones(1, device=self.device))
+        known = make_condition(coords, self.octaves, self.mean_face, self.spread, tone,
+                               blind=torch.ones(1, device=self.device))
         levels = torch.tensor([CLEAR_SIGMA] * 3 + [BLIND_SIGMA] * 4, device=self.device)[None, :, None, None]
         x = torch.where(levels < BLIND_SIGMA, maps, known.mean) + levels * noise
         out = denoise(self.network, x, torch.full((1,), CLEAR_SIGMA, device=self.device), known, levels)
@@ -166,7 +166,7 @@ class ReleasedPrior(Prior):
         return Condition(self.noise[0][:, rows, columns].transpose(0, 1))
 
 
-def packed(maps: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+def pack_maps(maps: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """Maps [N, C, R, R] in 256 levels of each channel's range: uint8 [N, C, R, R] and that range, lowest and highest,
     [C, 2]. A quarter of float32's size."""
     limits = torch.stack([maps.amin((0, 2, 3)), maps.amax((0, 2, 3))], 1)
@@ -174,13 +174,13 @@ def packed(maps: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     return ((maps - low) / (high - low).clamp_min(1e-6) * 255).round().to(torch.uint8), limits
 
 
-def unpacked(levels: torch.Tensor, limits: torch.Tensor) -> torch.Tensor:
-    """What `packed` packed, to a 510th of each channel's range."""
+def unpack_maps(levels: torch.Tensor, limits: torch.Tensor) -> torch.Tensor:
+    """What `pack_maps` packed, to a 510th of each channel's range."""
     return limits[:, 0, None, None] + levels.float() / 255 * (limits[:, 1] - limits[:, 0])[:, None, None]
 
 
-def condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor, tone: torch.Tensor,
-              blind: torch.Tensor | None) -> Condition:
+def make_condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor,
+                   tone: torch.Tensor, blind: torch.Tensor | None) -> Condition:
     """What our network is told of maps at coords [N, 2, H, W] of skins of tone [N, 3]. blind [N] is 1 where the normals
     and specular it gets are pure noise (`denoise`'s `levels` are BLIND_SIGMA there): they follow from the diffuse."""
     texel = 512 * (coords[:, 0, 0, 1] - coords[:, 0, 0, 0]).abs()  # side of a texel in texels of a 1024 map
@@ -232,7 +232,7 @@ def fast_dtype(device: str) -> torch.dtype:
     return torch.bfloat16 if str(device) == "cpu" and torch.cpu._is_avx512_bf16_supported() else torch.float32
 
 
-def build(config: dict) -> UNet:
+def build_network(config: dict) -> UNet:
     """The network of a card's or config.json's `model` and `cond` entries."""
     model, cond = config["model"], config.get("cond", {})
     channels = {"coord": 2, "posenc": 2 + 4 * int(cond.get("pos_enc_freq", 0)), "noise": 3}[cond.get("type", "coord")]
@@ -270,16 +270,16 @@ def _load_ours(path: Path) -> Prior:
     mean_face, spread, references = (
         tensors.pop("mean_face"),
         tensors.pop("spread"),
-        unpacked(tensors.pop("references"), tensors.pop("references_range")),
+        unpack_maps(tensors.pop("references"), tensors.pop("references_range")),
     )
-    network = build(card)
+    network = build_network(card)
     network.load_state_dict(tensors)
     return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, card["tones"], references)
 
 
 def _load_released(folder: Path) -> ReleasedPrior:
     config = released.read_config(folder)
-    network, state = build(config), from_state(released.read_weights(folder))
+    network, state = build_network(config), from_state(released.read_weights(folder))
     try:
         network.load_state_dict(state)
     except RuntimeError as error:

@@ -65,15 +65,15 @@ def albedo(denoised: torch.Tensor) -> torch.Tensor:
     return (denoised[0, :3] + 1) / 2
 
 
-def photometric(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, weight: torch.Tensor,
-                blur: bool = False) -> torch.Tensor:
+def photometric_loss(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, weight: torch.Tensor,
+                     blur: bool = False) -> torch.Tensor:
     """L_pho: the weighted sum of squares over the map (paper, equation 1); `blur` puts the rendering through a small
     Gaussian."""
     rendered = albedo(denoised) * shading
-    return ((weight * ((blurred(rendered) if blur else rendered) - o.texture)) ** 2).sum()
+    return ((weight * ((blur_maps(rendered) if blur else rendered) - o.texture)) ** 2).sum()
 
 
-def unexplained(state: State, observations: dict[int, Observation]) -> float:
+def rms_residual(state: State, observations: dict[int, Observation]) -> float:
     """Root mean square of texture minus albedo times shading, linear, where the texture counts: what a person watches
     fall while the solver runs."""
     o = next(o for o in observations.values() if o.weight.shape == state.denoised.shape[-2:])
@@ -82,7 +82,7 @@ def unexplained(state: State, observations: dict[int, Observation]) -> float:
     return float((error.sum() / (3 * o.weight.sum()).clamp_min(1e-6)).sqrt())
 
 
-def blurred(image: torch.Tensor, sigma: float = 0.8) -> torch.Tensor:
+def blur_maps(image: torch.Tensor, sigma: float = 0.8) -> torch.Tensor:
     """[3, H, W] under a 3 x 3 Gaussian, reflected at the border: the released code compares textures through it."""
     line = torch.exp(-torch.arange(-1.0, 2.0, device=image.device) ** 2 / (2 * sigma**2))
     line = line / line.sum()

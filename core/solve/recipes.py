@@ -106,11 +106,11 @@ RECIPES = {
 }
 
 
-def settled(recipe: Recipe) -> Recipe:
+def settle_recipe(recipe: Recipe) -> Recipe:
     """Where the split has told gamma^g: it stays, V alone moves."""
     return replace(recipe, phases=tuple(("grid", begin, end) for _, begin, end in recipe.phases), refit=0.0)
 
 
-def free(recipe: Recipe) -> Recipe:
+def free_recipe(recipe: Recipe) -> Recipe:
     """Where it has not: all light moves as the phases say."""
     return replace(recipe, linear=0.0)

@@ -19,12 +19,12 @@ import torch
 
 from ..contract.messages import Problem
 from .light_fit import update_lights
-from .lighting import Lights, interpolation
-from .problem import Observation, State, albedo, blurred, photometric
+from .lighting import Lights, interpolation_matrix
+from .problem import Observation, State, albedo, blur_maps, photometric_loss
 from .recipes import Recipe
 
 
-def seeded(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Callable]:
+def seed_noise(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Callable]:
     """The noise of a run: step -> draw(*shape), standard normal, drawn on the device. It depends on (seed, step,
     device) alone, so a run continued from a stored state gives the same bytes."""
     def of_step(step: int) -> Callable:
@@ -37,7 +37,7 @@ def seeded(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Cal
 class Sampler:
     """How a map is sampled, whatever is observed of it.
 
-    denoiser(x, sigma, coords) is the prior; noise is `seeded`'s, of the observations' device; known(x, sigma, draw)
+    denoiser(x, sigma, coords) is the prior; noise is `seed_noise`'s, of the observations' device; known(x, sigma, draw)
     puts what is known of the map for sure into x_t (window.py); fit moves theta after each step
     (light_fit.update_lights, or another light model's).
     """
@@ -55,7 +55,7 @@ class Sampler:
         `observations` maps a coarsening factor to what is known at that size. Raises Problem when the numbers leave all
         bounds.
         """
-        sigmas = schedule(self.recipe)
+        sigmas = noise_schedule(self.recipe)
         steps = len(sigmas) - 1
         for i in range(state.step, steps):
             s = sigmas[i]
@@ -91,15 +91,15 @@ class Sampler:
             shading = o.shader.total(state.lights)
         guided, gradient = denoised.detach(), 0.0
         if recipe.guidance == "dps":
-            loss = photometric(denoised, shading, o, o.weight, recipe.blur)  # equation 1
+            loss = photometric_loss(denoised, shading, o, o.weight, recipe.blur)  # equation 1
             scale = recipe.zeta * (1 + s * s if recipe.preserving else 1.0)
-            gradient = clipped(torch.autograd.grad(loss, x)[0] * o.weight * scale, recipe)
+            gradient = clip_gradient(torch.autograd.grad(loss, x)[0] * o.weight * scale, recipe)
         else:
-            guided = proximal(guided, shading, o, s, recipe.residual)
+            guided = proximal_step(guided, shading, o, s, recipe.residual)
         self.fit(state, denoised.detach(), o, recipe, state.step, steps)  # equation 9
 
         with torch.no_grad():
-            s_down, s_up = ancestral(s, s_next)
+            s_down, s_up = ancestral_sigmas(s, s_next)
             x = x.detach()
             x_prime = x + (x - guided) / s * (s_down - s)  # equation 7, its mean
             x_prime = x_prime - gradient  # equation 8
@@ -115,7 +115,7 @@ class Sampler:
         if self.recipe.candidates == 1:
             return mean + s_up * draw(*mean.shape)
         shading = o.shader.total(lights)
-        target = kept * blurred(albedo(x) * shading) + (1 - kept) * o.texture
+        target = kept * blur_maps(albedo(x) * shading) + (1 - kept) * o.texture
         best, least = mean, torch.full((), torch.inf, device=mean.device)
         for _ in range(self.recipe.candidates):
             candidate = mean + s_up * draw(*mean.shape)
@@ -124,28 +124,28 @@ class Sampler:
         return best
 
 
-def schedule(recipe: Recipe) -> list[float]:
+def noise_schedule(recipe: Recipe) -> list[float]:
     """Noise levels: the last `steps` of Karras' sequence (rho 7) whose length makes them the share `start` of it, then
     0."""
     count = max(recipe.steps, round(recipe.steps / recipe.start))
-    return karras(count, recipe.sigma_min, recipe.sigma_max)[-recipe.steps - 1:]
+    return karras_sigmas(count, recipe.sigma_min, recipe.sigma_max)[-recipe.steps - 1:]
 
 
-def karras(count: int, sigma_min: float, sigma_max: float) -> list[float]:
+def karras_sigmas(count: int, sigma_min: float, sigma_max: float) -> list[float]:
     """`count` noise levels from sigma_max to sigma_min and a final 0 (Karras et al. 2022, equation 5, rho 7)."""
     low, high = sigma_min ** (1 / 7), sigma_max ** (1 / 7)
     ramp = torch.linspace(0, 1, count, dtype=torch.float64)
     return [*((high + ramp * (low - high)) ** 7).tolist(), 0.0]
 
 
-def ancestral(s: float, s_next: float) -> tuple[float, float]:
+def ancestral_sigmas(s: float, s_next: float) -> tuple[float, float]:
     """(s_down, s_up) of a step that keeps the process's variance: down to s_down without noise, then s_up of fresh
     noise."""
     s_up = min(s_next, (s_next**2 * (s**2 - s_next**2) / s**2) ** 0.5)
     return (s_next**2 - s_up**2) ** 0.5, s_up
 
 
-def clipped(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
+def clip_gradient(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
     """The guidance [1, 7, H, W] within the recipe's limit: texel by texel, so that one bad texel does not hold up the
     others, or all of it at once."""
     if recipe.clip == "texel":
@@ -156,7 +156,8 @@ def clipped(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
     return gradient
 
 
-def proximal(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, s: float, residual: float) -> torch.Tensor:
+def proximal_step(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, s: float,
+                  residual: float) -> torch.Tensor:
     """The map nearest to `denoised` (spread s) that explains the texture (spread `residual`): per texel, in closed form
     (Zhu et al. 2023)."""
     half = shading / 2 * o.weight
@@ -174,6 +175,6 @@ def _factor(s: float, recipe: Recipe, observations: dict[int, Observation]) -> i
 def _resized(maps: torch.Tensor, height: int, width: int) -> torch.Tensor:
     if maps.shape[-2:] == (height, width):
         return maps
-    rows, columns = (interpolation(old, new).to(maps)
+    rows, columns = (interpolation_matrix(old, new).to(maps)
                      for old, new in zip(maps.shape[-2:], (height, width), strict=True))
     return rows @ maps @ columns.T

@@ -143,24 +143,24 @@ class Covariances:
         return parts + LEVEL_DEVIATION**2 * self.level + 1e-6 * np.eye(*self.level.shape)
 
 
-def split(captures: list[Shapes], typical: Scales = TYPICAL_SCALES) -> Split:
+def split_captures(captures: list[Shapes], typical: Scales = TYPICAL_SCALES) -> Split:
     """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the
     scales' prior."""
     fewer = len(captures) ** -0.5
     most = captures[0].weight.shape[0] // MIN_CELL_TEXELS
-    seen, values = seen_together([cells_of(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures])
-    scales = find_scales(model(seen, seen), values, typical)
-    return infer([cells_of(shapes, round(min(CELLS, most) * fewer)) for shapes in captures], scales)
+    seen, values = join_seen([average_cells(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures])
+    scales = find_scales(model_covariances(seen, seen), values, typical)
+    return infer_split([average_cells(shapes, round(min(CELLS, most) * fewer)) for shapes in captures], scales)
 
 
-def cells_of(shapes: Shapes, count: int) -> Cells:
+def average_cells(shapes: Shapes, count: int) -> Cells:
     """A capture as count x count cells."""
     weight = shapes.weight.numpy().astype(np.float32)
     texture, reference = (np.log(np.maximum(part.numpy(), MIN_LINEAR)) for part in (shapes.texture, shapes.reference))
     ratio = texture - reference
     share = _shrunk(weight, count)
     mean = _shrunk(ratio.transpose(1, 2, 0) * weight[..., None], count) / np.maximum(share, 1e-4)[..., None]
-    places, covered = places_of(count)
+    places, covered = place_cells(count)
     normal = _shrunk(shapes.normal.numpy().transpose(1, 2, 0), count)[covered].astype(np.float64)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
     seen = np.flatnonzero(share[covered] > MIN_SEEN_SHARE)
@@ -168,14 +168,14 @@ def cells_of(shapes: Shapes, count: int) -> Cells:
 
 
 @cache
-def places_of(count: int) -> tuple[np.ndarray, np.ndarray]:
+def place_cells(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Of count x count cells: where on the built-in head they lie [N, 3], and which of them do [count, count]."""
     mesh = template.load()
     face, bary = raster.rasterize_uv(mesh, count)
     return raster.interpolate(mesh.vertices, mesh.faces, face, bary)[face >= 0], face >= 0
 
 
-def seen_together(captures: list[Cells]) -> tuple[Places, np.ndarray]:
+def join_seen(captures: list[Cells]) -> tuple[Places, np.ndarray]:
     """All cells that were seen, and their values [K, 3]."""
     own = np.repeat(np.arange(len(captures)), [len(cells.seen) for cells in captures])
     return Places(*(np.concatenate([getattr(cells, name)[cells.seen] for cells in captures])
@@ -183,7 +183,7 @@ def seen_together(captures: list[Cells]) -> tuple[Places, np.ndarray]:
         np.concatenate([cells.values for cells in captures])
 
 
-def model(these: Places, others: Places) -> Covariances:
+def model_covariances(these: Places, others: Places) -> Covariances:
     """The covariances of places with others; each capture has a light of its own."""
     same = (these.own[:, None] == others.own[None]).astype(np.float64)
     apart = np.linalg.norm(these.at[:, None] - others.at[None], axis=-1)
@@ -226,11 +226,11 @@ def log_probability(together: Covariances, values: np.ndarray, scales: Scales,
     return total
 
 
-def infer(captures: list[Cells], scales: Scales) -> Split:
+def infer_split(captures: list[Cells], scales: Scales) -> Split:
     """The posterior mean of each part of the first capture, under the scales."""
-    first, (seen, values) = captures[0], seen_together(captures)
-    among = model(seen, seen)
-    beyond = model(Places(first.places, first.normal, np.zeros(len(first.places), int)), seen)
+    first, (seen, values) = captures[0], join_seen(captures)
+    among = model_covariances(seen, seen)
+    beyond = model_covariances(Places(first.places, first.normal, np.zeros(len(first.places), int)), seen)
     basis = SH_SCALE * sh_basis(first.normal[first.seen])
     traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
     for axis, size in enumerate(AXIS_DEVIATIONS):
@@ -243,7 +243,7 @@ def infer(captures: list[Cells], scales: Scales) -> Split:
     return Split(COLOUR_AXES.T @ coefficients, *maps, scales)
 
 
-def enlarged(field: torch.Tensor, size: int) -> torch.Tensor:
+def enlarge_field(field: torch.Tensor, size: int) -> torch.Tensor:
     """A field [3, C, C] at size x size."""
     return torch.nn.functional.interpolate(field[None], (size, size), mode="bicubic", align_corners=False)[0]
 

@@ -16,12 +16,12 @@ from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..face.head import Head, read_filmed_head
 from .evidence import Evidence, read_evidence
-from .initial import lit_skin
-from .look import capture_look
+from .initial import weigh_lit_skin
+from .look import read_look
 from .population import estimate_skin_tone
 from .prior import load_chosen
 from .skin_tone import TEXTURE, SkinTone, parse_skin_tone
-from .white_point import given_white
+from .white_point import parse_white
 
 TONE_SIDE_TEXELS = 256
 """Side at which the mean is taken: it needs no detail."""
@@ -39,7 +39,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     tone = estimate_from_frames(capture, head, settings, evidence, report)
     if tone is None:
         prior = load_chosen(settings)
-        tone = estimate_from_texture(evidence.texture, lit_skin(evidence), prior.tones)
+        tone = estimate_from_texture(evidence.texture, weigh_lit_skin(evidence), prior.tones)
     tell_skin_tone(tone, report)
 
 
@@ -56,7 +56,7 @@ def resolve_skin_tone(capture: Capture, head: Head, settings: Settings, built_in
         return given
     tone = estimate_from_frames(capture, head, settings, built_in, report)
     if tone is None:
-        return estimate_from_texture(evidence.texture, lit_skin(evidence), tones)
+        return estimate_from_texture(evidence.texture, weigh_lit_skin(evidence), tones)
     tell_skin_tone(tone, report)
     return tone
 
@@ -65,8 +65,8 @@ def estimate_from_frames(capture: Capture, head: Head, settings: Settings, evide
                          report: Reporter) -> SkinTone | None:
     """The tone that the frames tell under the measured white point, or the scene's; None where frames or cameras are
     gone. `evidence` in the built-in UVs."""
-    white = given_white(settings.solve.white_point)
-    seen = capture_look(capture, head, evidence.alpha.numpy(), report)
+    white = parse_white(settings.solve.white_point)
+    seen = read_look(capture, head, evidence.alpha.numpy(), report)
     return None if seen is None else estimate_skin_tone(seen, white)
 
 

@@ -36,7 +36,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     found = {}
     for i, path in enumerate(frames):
         report.progress(i, len(frames), f"looking for a ColorChecker in frame {i + 1} of {len(frames)}")
-        white = chart_white(images.read_srgb(path))
+        white = measure_chart_white(images.read_srgb(path))
         if white is not None:
             found[path.name] = white
         if len(found) == ENOUGH_CHARTS:
@@ -49,7 +49,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("white_point_frame", next(iter(found)))
 
 
-def chart_white(srgb: np.ndarray) -> np.ndarray | None:
+def measure_chart_white(srgb: np.ndarray) -> np.ndarray | None:
     """The linear white [3] that a ColorChecker Classic's greys in an sRGB frame [H, W, 3] agree on; None where none is
     seen."""
     detector = cv2.mcc.CCheckerDetector_create()
@@ -67,7 +67,7 @@ def chart_white(srgb: np.ndarray) -> np.ndarray | None:
     return np.exp(each.mean(0)) if each.std(0).max() < MAX_UNEVENNESS_LOG else None
 
 
-def card_white(srgb: np.ndarray, column: float, row: float, card: str) -> np.ndarray:
+def measure_card_white(srgb: np.ndarray, column: float, row: float, card: str) -> np.ndarray:
     """The linear white [3] that a card says at a pixel of an sRGB frame [H, W, 3]; `card` is one of settings.CARDS.
     Raises Problem where the place is outside, burnt out or uneven."""
     height, width = srgb.shape[:2]
@@ -87,7 +87,7 @@ def card_white(srgb: np.ndarray, column: float, row: float, card: str) -> np.nda
     return linear.mean(0) / CARDS[card]
 
 
-def given_white(setting: str) -> np.ndarray | None:
+def parse_white(setting: str) -> np.ndarray | None:
     """The white [3] of settings.solve.white_point, None for auto. Raises Problem for what is neither."""
     if setting == "auto":
         return None

@@ -18,13 +18,13 @@ from torch.nn import functional
 
 from ..contract.messages import Reporter
 from .checkpoint import Solution
-from .draft import restored
+from .draft import restore_maps
 from .lighting import Lights
 from .memory import sample_within_memory
 from .prior import ConditionedPrior
 from .problem import Observation, State
 from .recipes import Recipe
-from .sampler import Sampler, seeded
+from .sampler import Sampler, seed_noise
 
 MARGIN_TEXELS = 64
 """Texels of a 1024 map around the touched box that are sampled again."""
@@ -47,8 +47,8 @@ class Window:
     moving: torch.Tensor
 
 
-def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], multiple: int,
-           reference: int) -> Window | None:
+def find_window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], multiple: int,
+                reference: int) -> Window | None:
     """What an edit from the mask `before` to `now` [S, S] touches; None where they are the same.
 
     `cells` (rows, columns) of V cover the map, the network takes sides that are multiples of `multiple`, `reference` is
@@ -100,7 +100,7 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
     The map [1, 7, S, S] and theta, on the processor.
     """
     device, denoised, lights = prior.device, earlier.denoised, earlier.lights
-    here = {factor: cropped(o, part, factor).to(device) for factor, o in observations.items()}
+    here = {factor: crop_observation(o, part, factor).to(device) for factor, o in observations.items()}
     known = denoised[(..., *part.seen)].to(device)
     grid = lights.grid[(..., *part.cells)].to(device)
     state = State(0, None, known.clone(),
@@ -110,7 +110,7 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
 
     def with_known(x: torch.Tensor, s: float, draw: Callable) -> torch.Tensor:
         factor = known.shape[-1] // x.shape[-1]
-        clean, within = coarse(known, factor), coarse(inside[None, None], factor)
+        clean, within = average_down(known, factor), average_down(inside[None, None], factor)
         return torch.where(within > 0.5, x, clean + s * draw(*x.shape))
 
     def keep_frozen(state: State, steps: int) -> None:
@@ -119,16 +119,16 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
 
     last = max(end for _, _, end in recipe.phases)
     local = replace(recipe, steps=min(recipe.steps, MAX_STEPS), phases=(("cells", 0.0, last),), refit=0.0)
-    state = sample_within_memory(Sampler(prior, local, seeded(seed, device), with_known), here, state, keep_frozen,
+    state = sample_within_memory(Sampler(prior, local, seed_noise(seed, device), with_known), here, state, keep_frozen,
                                  report.log)
-    found = restored(prior, state.denoised, observations[1].coords.to(device), recipe, seed, part.seen)
+    found = restore_maps(prior, state.denoised, observations[1].coords.to(device), recipe, seed, part.seen)
     solved, moved = denoised.clone(), lights.grid.clone()
     moved[(..., *part.cells)] = state.lights.grid.cpu()
     solved[(..., *part.seen)] = torch.where(inside > 0, found, known).cpu()
     return solved, Lights(lights.glob, moved, lights.chroma)
 
 
-def cropped(o: Observation, part: Window, factor: int) -> Observation:
+def crop_observation(o: Observation, part: Window, factor: int) -> Observation:
     """What is known of the window and its surroundings, of a map coarser by `factor`; coordinates keep their place."""
     rows, columns = (slice(s.start // factor, s.stop // factor) for s in part.seen)
     tensors = {f.name: getattr(o, f.name)[..., rows, columns] for f in fields(o)
@@ -136,7 +136,7 @@ def cropped(o: Observation, part: Window, factor: int) -> Observation:
     return replace(o, **tensors, shader=o.shader.part(rows, columns, part.cells))
 
 
-def coarse(maps: torch.Tensor, factor: int) -> torch.Tensor:
+def average_down(maps: torch.Tensor, factor: int) -> torch.Tensor:
     """[1, C, H, W] at 1 / factor of its size, areas averaged."""
     return functional.avg_pool2d(maps, factor)
 

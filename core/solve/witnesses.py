@@ -22,7 +22,7 @@ MIN_AGREED_SHARE = 0.6  # share of the views that see the place
 MIN_VIEWS = 2  # views; where fewer saw it the texture alone decides
 
 
-def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
+def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
     """The marks, in texels of a size x size map, that the delit views agree on; all of them where this capture has no
     cameras or no delit views."""
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
@@ -33,7 +33,7 @@ def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> lis
     there = points[at], normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
     seen, agreed = np.zeros(len(marks), int), np.zeros(len(marks), int)
     for view, path in delit_views(capture):
-        shown = visible(view, head.caster, *there) & covered[at]
+        shown = find_visible(view, head.caster, *there) & covered[at]
         if not shown.any():
             continue
         picture = np.log(np.maximum(images.read_linear(path), 1e-3)).mean(-1)
@@ -44,7 +44,7 @@ def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> lis
     return [mark for mark, s, a in zip(marks, seen, agreed, strict=True) if s < MIN_VIEWS or a >= MIN_AGREED_SHARE * s]
 
 
-def visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def find_visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """bool [N] of surface points [N, 3] with unit normals [N, 3]."""
     towards = view.centre - points
     facing = (towards * normals).sum(1) > MIN_FACING_COSINE * np.linalg.norm(towards, axis=1)

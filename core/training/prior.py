@@ -23,7 +23,7 @@ from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
 from ..solve.network import UNet, denoise
-from ..solve.prior import BLIND_SIGMA, WEIGHTS, build, condition, fast_dtype, packed
+from ..solve.prior import BLIND_SIGMA, WEIGHTS, build_network, fast_dtype, make_condition, pack_maps
 from . import command_line, descent
 from .patches import PatchBatch, Windows, mean_map, reference_skins, spread_about
 from .release import TrainingCard, again, release
@@ -79,7 +79,7 @@ def train_prior(config: str, out: Path, report: Reporter, run: descent.TrainingR
     held_out_windows = {kind: Windows(s, real=0.5).draw(96, t["patch"], np.random.default_rng(1))
                         for kind, s in unseen.items() if s.names}
     state = descent.resumed(work, _begin(config, data, seen, windows))
-    network = build(CONFIGS[config])
+    network = build_network(CONFIGS[config])
     statistics = {name: value.to(device) for name, value in state["statistics"].items()}
 
     def loss(batch: PatchBatch, step: int, share: float) -> torch.Tensor:
@@ -105,7 +105,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     card that says where they come from."""
     state = descent.read_state(work)
     data = state["data"]
-    levels, limits = packed(state["references"])
+    levels, limits = pack_maps(state["references"])
     statistics = {name: value.half().contiguous() for name, value in state["statistics"].items()}
     told = "Procedural skins of core/synthetic on the built-in head, which derives from the MakeHuman base mesh (CC0)"
     if data["skins"]:
@@ -151,7 +151,7 @@ def _begin(config: str, data: dict, skins: Skins, windows: Windows) -> dict:
     t = CONFIGS[config]["training"]
     torch.manual_seed(t["seed"])
     mean = mean_map(skins)
-    return descent.beginning(config, data, build(CONFIGS[config]), tones=skins.tones.tolist(),
+    return descent.beginning(config, data, build_network(CONFIGS[config]), tones=skins.tones.tolist(),
                              references=reference_skins(skins),
                              statistics={"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])})
 
@@ -181,7 +181,7 @@ def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: PatchBatch,
     sigma = (torch.from_numpy(rng.standard_normal(len(mean))).float()
              * deviation).to(device).add(mean).exp().clamp(0.005, BLIND_SIGMA)
     noise = torch.from_numpy(rng.standard_normal(batch.clean.shape, dtype=np.float32)).to(device)
-    told = condition(batch.coords.to(device), OCTAVES, **statistics, tone=batch.tone.to(device), blind=blind)
+    told = make_condition(batch.coords.to(device), OCTAVES, **statistics, tone=batch.tone.to(device), blind=blind)
     s, spread = sigma[:, None, None, None].expand(-1, 7, -1, -1).clone(), told.spread
     s[:, 3:][blind > 0] = BLIND_SIGMA
     noisy = torch.where(known > 0, clean + s * noise, told.mean + (s**2 + spread**2).sqrt() * noise)
@@ -195,7 +195,7 @@ def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: PatchBatch,
 @torch.no_grad()
 def _held_out_loss(average: dict, statistics: dict, config: str, batch: PatchBatch, device: str) -> list[float]:
     """The averaged network's loss per scale, always on the same patches and noise."""
-    network = build(CONFIGS[config])
+    network = build_network(CONFIGS[config])
     network.load_state_dict(average)
     losses = _loss(network.to(device, memory_format=torch.channels_last), statistics, batch, np.random.default_rng(2),
                    device).cpu()

@@ -23,8 +23,8 @@ from ..contract.messages import Problem, Reporter
 from ..face import template
 from ..geometry import meshes, raster
 from ..light.spherical_harmonics import LAMBERT, per_function, sh_basis
-from ..solve.look import FRONT, Look, look, skin_weight
-from ..solve.population import MODEL_FILE, SHEEN_REFLECTANCE, coordinates
+from ..solve.look import FRONT, Look, summarise_look, weigh_skin
+from ..solve.population import MODEL_FILE, SHEEN_REFLECTANCE, to_coordinates
 from ..synthetic import light, pigment
 from ..synthetic.exposure import phone_exposure
 from ..synthetic.parameters import sample_parameters
@@ -80,7 +80,7 @@ def scenes_of(seed: int) -> list[LitSkin]:
     facial = template.mask("skin", SIZE) * template.mask("face", SIZE) * (1 - template.mask("eyes", SIZE))
     tone = np.average(skin_map.reshape(-1, 3), axis=0, weights=facial.ravel())
     where, points, normals, ambient, caster = _head()
-    weight = skin_weight(SIZE, np.zeros((SIZE, SIZE), np.float32))[where]
+    weight = weigh_skin(SIZE, np.zeros((SIZE, SIZE), np.float32))[where]
     found = []
     for k in range(LIGHTS):
         rng = np.random.default_rng([seed, k, 31])
@@ -124,7 +124,7 @@ def photographed(shown: LitSkin, rng: np.random.Generator) -> tuple[Look, np.nda
     colours = np.clip(shown.colours * exposure.gain, 0, None)
     whole = (colours < 0.97).all(1)
     weight = shown.weight * (whole if whole.sum() > 30 else 1)
-    return look(colours, shown.normals, weight, exposure.surroundings), shown.card * exposure.gain
+    return summarise_look(colours, shown.normals, weight, exposure.surroundings), shown.card * exposure.gain
 
 
 def fitted(scenes: list[LitSkin]) -> dict:
@@ -133,8 +133,8 @@ def fitted(scenes: list[LitSkin]) -> dict:
     for each in scenes:
         for phone in range(PHONES):
             taken, card = photographed(each, np.random.default_rng([len(true), phone, 32]))
-            best, surroundings, front, white, tone = coordinates(np.stack([taken.best, taken.surroundings, taken.front,
-                                                                           card, each.tone + SHEEN_REFLECTANCE]))
+            best, surroundings, front, white, tone = to_coordinates(
+                np.stack([taken.best, taken.surroundings, taken.front, card, each.tone + SHEEN_REFLECTANCE]))
             true.append(tone)
             shown.append(np.concatenate([best, surroundings, front - white]))
     system = np.concatenate([true, np.ones((len(true), 1))], 1)
