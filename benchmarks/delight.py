@@ -29,7 +29,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 
@@ -37,8 +36,6 @@ from core import delight
 from core.contract.capture import Capture
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import Settings
-from core.delight.contract import Delit
-from core.delight.second_opinion import Weighing
 from core.delight.whole_head import WEIGHTS, whole_head
 from core.imaging import images
 
@@ -73,7 +70,7 @@ def main() -> None:
     parser.add_argument("--weights", type=Path,
                         help="weights of our network, with their card beside them, instead of those that are shipped")
     parser.add_argument("--parts", action="store_true",
-                        help="on captures also the network without the whole head's answer, and that answer alone")
+                        help="on captures also what the whole head's network says alone")
     parser.add_argument("--texels", type=Path, metavar="FILE", default=WEIGHTS,
                         help="of --parts: weights of the whole head's network")
     parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
@@ -87,8 +84,7 @@ def main() -> None:
     if options.weights:
         importlib.import_module("core.delight.network").WEIGHTS = options.weights
     if options.parts:
-        delight.DELIGHTERS |= {"frames and fit": without_whole_head,
-                               "whole head": partial(whole_head, weights=options.texels)}
+        delight.DELIGHTERS |= {"whole head": partial(whole_head, weights=options.texels)}
     captures = dict(pair.split("=", 1) for pair in options.capture)
     results = (figures.read(options.json.stem, options.json.parent)["figures"] if options.json
                and options.json.is_file() else {})
@@ -152,12 +148,6 @@ def measure(chosen: Photographs, settings: Settings, features: bool = True, only
                           sheet([[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p), *delit]
                                  for p, *delit in zip(spread, *shown, strict=True)]))
     return results
-
-
-def without_whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """The delighter network as its frames and the fitted light alone would have it."""
-    with mock.patch.object(importlib.import_module("core.delight.network"), "WHOLE", Weighing(0.0, 1.0)):
-        yield from delight.DELIGHTERS["network"](capture, settings, report)
 
 
 def rows(chosen: Photographs, settings: Settings) -> list[str]:

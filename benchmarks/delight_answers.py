@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each of the delighter's answers is worth in captures, and how far two of them are best believed beside the
-frames' own (core/delight/second_opinion.py), chosen by leaving one person out.
+"""What each of the delighter's answers is worth in captures, that of the whole head's network too, and how far they are
+best believed beside the frames' own (core/delight/second_opinion.py), chosen by leaving one person out.
 
     python -m benchmarks.delight_answers FOLDER [--truths FOLDER] [--only PREFIX ...] [--sample CAPTURE]
     [--eyes FOLDER [--facekit FOLDER]] [--json PATH]
@@ -27,10 +27,10 @@ from core.contract.capture import Capture
 from core.contract.files import replacing
 from core.contract.messages import Reporter
 from core.contract.settings import Settings
-from core.delight import second_opinion
 from core.delight.evening import ShadingEstimate
 from core.delight.network import ask
-from core.delight.second_opinion import Weighing, weigh_in
+from core.delight.second_opinion import FITTED, Weighing, weigh_in
+from core.delight.whole_head import load_texel_net, read_answers
 from core.face import template
 from core.geometry.raster import interpolate, sample
 from core.imaging import images
@@ -52,8 +52,7 @@ HAIRED = 0.3  # density of hair from which a map of skin is no truth of what is 
 
 
 ROWS = {"filmed": "doing nothing", "frames": "the frames' own", "fitted": "the fitted light",
-        "whole": "the whole head's",
-        "with_fitted": "frames and fitted light", "all": "all three"}
+        "whole": "the whole head's", "with_fitted": "frames and fitted light"}
 """What is told apart, and its heading."""
 ANSWERS = ("true", "frames", "fitted", "whole")
 
@@ -125,12 +124,13 @@ def _bare_truth(seed: int, facekit: Path | None) -> tuple[np.ndarray, np.ndarray
 def keep(path: Path, capture: Capture, albedo: np.ndarray, known: np.ndarray) -> None:
     """Asks the delighter and keeps its answers where the albedo is known."""
     answers = ask(capture, Settings(device="cpu"), Reporter("delight", emit=lambda message: None))
-    if answers.whole is None:
+    if not answers.head.head.built_in:
         raise SystemExit(f"{capture.root} has an own head: the whole head's answer knows the built-in one alone.")
+    whole_head = read_answers(load_texel_net("cpu"), answers.head, answers.views, answers.looks, lambda done, of: None)
     albedo = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), SIZE, SIZE), DARKEST))
     maps = np.concatenate([albedo, known[..., None]], -1).astype(np.float32)
     mesh, cells = answers.head.mesh, {key: [] for key in ANSWERS}
-    for look, fitted, whole, skin in zip(answers.looks, answers.fitted, answers.whole, answers.skins, strict=True):
+    for look, fitted, whole, skin in zip(answers.looks, answers.fitted, whole_head, answers.skins, strict=True):
         uv = interpolate(mesh.uvs, mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
         seen = sample(maps, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * SIZE).reshape(*look.face.shape, 4)
         where = (look.face >= 0) & (skin > BARE) & (seen[..., 3] > 0.99)
@@ -151,18 +151,15 @@ def weighed(light: np.ndarray, answer: np.ndarray, weighing: Weighing) -> np.nda
 
 
 def score(judged: dict[str, Judged]) -> tuple[dict, dict]:
-    """The errors of each capture by ROWS, and for each of the two answers that are weighed in: what is shipped, the
-    best of GRID over people, and for each person the error with the best of the others', beside no such answer."""
-    rows, with_fitted = {}, {}
-    for name, each in judged.items():
-        with_fitted[name] = weighed(each.frames, each.fitted, second_opinion.FITTED)
-        together = weighed(with_fitted[name], each.whole, second_opinion.WHOLE)
-        rows[name] = {"person": each.person, "filmed": each.error(0 * each.true), "frames": each.error(each.frames),
-                      "fitted": each.error(each.fitted), "whole": each.error(each.whole),
-                      "with_fitted": each.error(with_fitted[name]), "all": each.error(together)}
+    """The errors of each capture by ROWS, and what `choose` says of both answers that may be weighed in: the whole
+    head's beside the frames' with the fitted light."""
     before = {name: each.frames for name, each in judged.items()}
-    return rows, {"fitted": choose(judged, before, "fitted", second_opinion.FITTED),
-                  "whole": choose(judged, with_fitted, "whole", second_opinion.WHOLE)}
+    with_fitted = {name: weighed(each.frames, each.fitted, FITTED) for name, each in judged.items()}
+    rows = {name: {"person": each.person, "filmed": each.error(0 * each.true), "frames": each.error(each.frames),
+                   "fitted": each.error(each.fitted), "whole": each.error(each.whole),
+                   "with_fitted": each.error(with_fitted[name])} for name, each in judged.items()}
+    return rows, {"fitted": choose(judged, before, "fitted", FITTED),
+                  "whole": choose(judged, with_fitted, "whole", Weighing(0.0, DOUBTS[0]))}
 
 
 def choose(judged: dict[str, Judged], before: dict[str, np.ndarray], answer: str, shipped: Weighing) -> dict:

@@ -6,9 +6,8 @@ known of the head.
 It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's
 pixels along its edges (lift.py), and the picture is divided by it, so pores are kept and none can be invented. In a
 capture the frames' answers are evened out over the head (evening.py) and brought together with the light that was
-fitted to all frames, which is all that is believed below hair, and with one answer for the whole head
-(second_opinion.py, whole_head.py); in a single photograph the skin around brows and eyes answers for them
-(below_hair.py). `core train delighter` makes the weights.
+fitted to all frames (second_opinion.py, below_hair.py); in a single photograph the skin around brows and eyes answers
+for them. `core train delighter` makes the weights.
 """
 
 from __future__ import annotations
@@ -36,11 +35,9 @@ from .contract import Delit
 from .evening import ShadingEstimate, even_out
 from .lift import lift_shading, lift_share
 from .lit_head import MAX_ALBEDO, LitHead, fit_lit_head
-from .second_opinion import FITTED, WHOLE, average_cells, continue_beyond, weigh_in
+from .second_opinion import average_cells, continue_beyond, weigh_in
 from .shading import light_in_frame, light_seen
 from .unet import MIN_LINEAR, SIDE_PX, DelightNet, network_input
-from .whole_head import READING, read_answers
-from .whole_head import load_texel_net as load_whole_head
 
 DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
@@ -51,14 +48,13 @@ FADE_SHARE = 0.06  # of the square's side: along its border it gives way to the 
 @dataclass(frozen=True)
 class Answers:
     """What is told of a capture's selected frames: the head and its light; the views; looks: the network's answers,
-    evened out over the head; and for each look, [h, h, 3], the log-shading of the fitted light and of the whole head
-    (none, where the head is not the built-in one), and, [h, h], the bare skin and the hair in it."""
+    evened out over the head; and for each look the log-shading of the fitted light, [h, h, 3], and the bare skin and
+    the hair in it, [h, h]."""
 
     head: LitHead
     views: list[View]
     looks: list[ShadingEstimate]
     fitted: list[np.ndarray]
-    whole: list[np.ndarray] | None
     skins: list[np.ndarray]
     hair: list[np.ndarray]
 
@@ -68,7 +64,7 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     the head."""
     answers = ask(capture, settings, report)
     for i, (view, look) in enumerate(zip(answers.views, put_together(answers), strict=True)):
-        report.progress(7 * len(answers.views) + i, 8 * len(answers.views),
+        report.progress(3 * len(answers.views) + i, 4 * len(answers.views),
                         f"Delighting frame {i + 1} of {len(answers.views)}")
         srgb = images.read_srgb(view.path)
         albedo, shadow = _divided(srgb, look, light_in_frame(view, answers.head, srgb))
@@ -76,31 +72,22 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
 
 
 def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
-    """All answers on a capture, before they are put together. Raises Problem as `network` does."""
+    """Both answers on a capture, before they are put together. Raises Problem as `network` does."""
     net, views = load_network(settings.compute_device), read_views(capture, selected_only=True)
-    whole = load_whole_head(settings.compute_device)
     head = fit_lit_head(read_head(capture), views, report)
     looks, fitted = [], []
     for i, view in enumerate(views):
-        report.progress(4 * len(views) + 2 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")
+        report.progress(2 * len(views) + i, 4 * len(views), f"Looking at frame {i + 1} of {len(views)}")
         look, log = _look_at_view(net, view, head)
         looks.append(look)
         fitted.append(log)
     skins, hair = ([_seen(head, values, look) for look in looks] for values in (head.skin, head.hair))
-
-    def step(done: int, of: int) -> None:
-        report.progress(6 * of + done, 8 * of, READING)
-
-    looks = even_out(head, views, looks)
-    heads = read_answers(whole, head, views, looks, step) if head.head.built_in else None
-    return Answers(head, views, looks, fitted, heads, skins, hair)
+    return Answers(head, views, even_out(head, views, looks), fitted, skins, hair)
 
 
 def put_together(answers: Answers) -> list[ShadingEstimate]:
-    """One shading for each frame out of all answers."""
-    looks = weigh_in(answers.looks, answers.fitted, answers.skins, FITTED)
-    if answers.whole is not None:
-        looks = weigh_in(looks, answers.whole, answers.skins, WHOLE)
+    """One shading for each frame out of both answers."""
+    looks = weigh_in(answers.looks, answers.fitted, answers.skins)
     looks = [fill_hair(*told) for told in zip(looks, answers.fitted, answers.hair, strict=True)]
     return remove_casts(looks, answers.skins)
 

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In a capture there are three answers: the network's for each frame, that of the light fitted to all frames, and the
-whole head's. Their errors differ, so a mean is better than any.
+"""In a capture there are two answers: the network's for each frame, and that of the light fitted to all frames. Their
+errors differ, so a mean is better than either.
 
-The fit holds over the whole head and knows the colours of sun and sky; the network knows what no fit explains. Where an
-answer lies far from the frames' own, it is wrong more often than they are: a lamp it did not find, a lifted hand, hair;
-a small shadow that the whole head takes for pigment. `benchmarks.delight_answers` measures both weights.
+The fit holds over the whole head and knows the colours of sun and sky; the network knows what no fit explains: a lamp
+that was not found, a lifted hand. How far the fit is to be believed shows in how far the two lie apart over the bare
+skin of the whole capture. Never place by place: where they differ most the network has taken lips or moles for shade.
 """
 
 from __future__ import annotations
@@ -21,27 +21,30 @@ from .evening import ShadingEstimate
 @dataclass(frozen=True)
 class Weighing:
     """How far an answer counts beside the frames' own: `share` where the two agree, half of it where the luminance of
-    their shadings is `doubt` apart (natural log units)."""
+    their shadings is `doubt` apart over a capture (natural log units, root mean square)."""
 
     share: float
     doubt: float
 
 
-FITTED = Weighing(share=0.5, doubt=0.2)
-"""Of the fitted light: the best over ten people in twelve captures (benchmarks/delight_answers.py)."""
-WHOLE = Weighing(share=0.3, doubt=0.05)
-"""Of the whole head's answer, by the same people; without it they are as well off."""
+FITTED = Weighing(share=0.6, doubt=0.15)
+"""Of the fitted light: the best over twelve people in sixteen captures (benchmarks/delight_answers.py)."""
 
 
 def weigh_in(looks: list[ShadingEstimate], answers: list[np.ndarray], skins: list[np.ndarray],
-             weighing: Weighing) -> list[ShadingEstimate]:
+             weighing: Weighing = FITTED) -> list[ShadingEstimate]:
     """The looks moved towards another answer, log-shading [h, h, 3] for each, brought to their level over bare skin
     (skins [h, h], above 0.5 there); as they are where no skin tells the level."""
-    apart = [(answer - look.shading)[skin > 0.5] for look, answer, skin in zip(looks, answers, skins, strict=True)]
-    if not sum(map(len, apart)):
+    apart = np.concatenate([(answer - look.shading)[skin > 0.5]
+                            for look, answer, skin in zip(looks, answers, skins, strict=True)])
+    if not len(apart):
         return looks
-    level = np.median(np.concatenate(apart), 0)
-    return [_towards(look, answer - level, weighing) for look, answer in zip(looks, answers, strict=True)]
+    level = np.median(apart, 0)
+    weight = weighing.share / (1 + np.mean((apart - level).mean(-1) ** 2) / weighing.doubt**2)
+    return [replace(look, shading=np.where((look.face >= 0)[..., None],
+                                           look.shading + weight * (answer - level - look.shading),
+                                           look.shading).astype(np.float32))
+            for look, answer in zip(looks, answers, strict=True)]
 
 
 def continue_beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice],
@@ -64,10 +67,3 @@ def average_cells(light: np.ndarray, side: int) -> np.ndarray:
     """The log [side, side, 3] of the light in a square picture, linear [S, S, 3], averaged as the eye would."""
     return np.log(np.maximum(cv2.resize(np.asarray(light, np.float32), (side, side), interpolation=cv2.INTER_AREA),
                              1e-4))
-
-
-def _towards(look: ShadingEstimate, answer: np.ndarray, weighing: Weighing) -> ShadingEstimate:
-    apart = answer - look.shading
-    weight = weighing.share / (1 + (apart.mean(-1, keepdims=True) / weighing.doubt) ** 2)
-    weight = weight * (look.face >= 0)[..., None]
-    return replace(look, shading=(look.shading + weight * apart).astype(np.float32))

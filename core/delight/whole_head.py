@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One shading of the whole head: a network tells it in the head's own UV space from what all views saw (texels.py). The
-delighter *network* asks it beside its own answers; alone, every frame is divided by it where it shows the head.
-`core train texels` makes the weights."""
+"""One shading of the whole head: a network tells it in the head's own UV space from what all views saw (texels.py), and
+every frame is divided by it where it shows the head. `core train texels` makes the weights. It is no choice yet, nor
+asked by the delighter *network*: beside that one's answers it is worth nothing (benchmarks/delight_answers.py)."""
 
 from __future__ import annotations
 
