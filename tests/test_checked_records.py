@@ -208,7 +208,7 @@ def test_what_is_out_of_date_is_not_delivered_and_what_is_older_is_named(tmp_pat
     assert (
         isinstance(ended, Failed)
         and "Solve is out of date: solve.steps changed" in ended.problem
-        and "stage solve" in ended.remedy
+        and "stage Solve" in ended.remedy
     )
     ended, _ = deliver(tmp_path / "c.wildcap", lambda capture: images.write_data(capture.shadow_mask, np.ones((8, 8))))
     assert isinstance(ended, Failed) and "shadow_mask.png changed" in ended.problem
