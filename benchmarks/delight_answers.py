@@ -7,8 +7,8 @@ best believed beside the frames' own (core/delight/second_opinion.py), chosen by
     [--eyes FOLDER [--facekit FOLDER]] [--json PATH]
 
 FOLDER holds captures with a truth, as benchmarks/state.py reads them; --sample is what `make demo` leaves; --eyes those
-of benchmarks/eye_captures.py. FOLDER/answers keeps what the delighter was told on each capture (a minute or two), with
-the code that told it: delete it to ask anew. An error is the deviation, in natural log, of the picture less an answer
+of benchmarks/eye_captures.py. FOLDER/answers keeps the answers on each capture (a minute or two), whatever code gave
+them: delete it to ask anew. An error is the deviation, in natural log, of the picture less an answer
 from the true albedo, over bare facial skin in all frames, after one gain per channel and capture.
 """
 
@@ -49,8 +49,6 @@ GRID = tuple(Weighing(share, doubt) for share, doubt in product(SHARES, DOUBTS))
 BARE = 0.5  # share of bare skin in a cell from which it counts, as in second_opinion.weigh_in
 DARKEST = 2e-3
 HAIRED = 0.3  # density of hair from which a map of skin is no truth of what is seen there
-
-
 ROWS = {"filmed": "doing nothing", "frames": "the frames' own", "fitted": "the fitted light",
         "whole": "the whole head's", "with_fitted": "frames and fitted light"}
 """What is told apart, and its heading."""
