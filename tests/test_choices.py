@@ -124,11 +124,12 @@ def test_the_chain_can_begin_at_any_stage(addon, capture, item, monkeypatch):
     monkeypatch.setattr(addon("jobs"), "start", start)
     bpy.ops.wildcap.reconstruct(first="upscale")
     bpy.ops.wildcap.reconstruct(first="transfer")
+    bpy.ops.wildcap.reconstruct(to_end=True)
     with pytest.raises(RuntimeError, match="no video"):
         bpy.ops.wildcap.reconstruct(first="delight")
     with pytest.raises(RuntimeError, match="no stage named"):
         bpy.ops.wildcap.reconstruct(first="dreams")
     Capture(capture).set_source(capture.parent / "face.mp4")
     bpy.ops.wildcap.reconstruct(first="delight")
-    assert started == [("solve", "upscale", None), ("solve", "transfer", None),
+    assert started == [("solve", "upscale", None), ("solve", "transfer", None), ("solve", None, None),
                        ("reconstruct", "delight", "shadow_mask")]

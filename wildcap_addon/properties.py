@@ -35,7 +35,7 @@ def _property(field, tooltip: str):
     common = {"name": name, "description": tooltip, "default": field.default}
     limits = {k: field.metadata[k] for k in ("min", "max") if k in field.metadata}
     if "choices" in field.metadata:
-        return bpy.props.EnumProperty(items=[_choice(field.name, c) for c in field.metadata["choices"]], **common)
+        return bpy.props.EnumProperty(items=[_choice(field, c) for c in field.metadata["choices"]], **common)
     if isinstance(field.default, bool):
         return bpy.props.BoolProperty(**common)
     if isinstance(field.default, int):
@@ -45,17 +45,19 @@ def _property(field, tooltip: str):
     return bpy.props.StringProperty(**common, subtype=SUBTYPES.get(field.metadata.get("path"), 'NONE'))
 
 
-def _choice(setting: str, value: str) -> tuple[str, str, str]:
+def _choice(field, value: str) -> tuple[str, str, str]:
     """An item of an EnumProperty: identifier, name, description."""
-    card = delighter_cards.CARDS.get(value) if setting == "delighter" else None
-    if setting == "preset":
+    card = delighter_cards.CARDS.get(value) if field.name == "delighter" else None
+    if card:
+        return value, card.title, card.what
+    if field.name == "preset":
         return value, delivery_presets.PRESETS[value].title, delivery_presets.PRESETS[value].hint
-    if setting == "format" and value != "preset":
+    if field.name == "format" and value != "preset":
         return value, delivery_presets.FORMATS[value].title, " ".join(delivery_presets.FORMATS[value].drops)
-    if setting == "what":
+    if field.name == "what":
         return value, *delivery_presets.WHAT[value]
-    named = {"preset": "As the Preset", "srgb": "sRGB", **delivery_presets.PICTURES}
-    return (value, card.title, card.what) if card else (value, named.get(value) or value.replace("_", " ").title(), "")
+    titles = {"preset": "As the Preset", **delivery_presets.PICTURES, **field.metadata.get("titles", {})}
+    return value, titles.get(value) or value.replace("_", " ").title(), ""
 
 
 GROUPS = {stage: settings_group(stage, kind) for stage, kind in STAGE_KINDS.items()}
@@ -80,7 +82,9 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
     head: bpy.props.PointerProperty(name="Head", type=bpy.types.Object, description="The head object of this capture")
     quality: bpy.props.EnumProperty(
         name="Quality", items=[(q, q.title(), "") for q in core_settings.QUALITIES], default="standard",
-        update=_apply_quality, description="A set of settings: draft to look, standard to work, film to deliver",
+        update=_apply_quality,
+        description="Draft to look, standard to work, film to deliver. Choosing one sets the fields of all stages that "
+                    "it covers: change single ones afterwards",
     )
     device: bpy.props.EnumProperty(
         name="Device", default="auto", description=SHARED_TOOLTIPS["device"],

@@ -25,9 +25,9 @@ def setting(default, **metadata):
 
     A number has `min` and `max`, and may have a `unit`. A text has `choices`, or is a `path` ("file", "folder" or
     "file_or_folder"), or has a `form` (how it is written, in a few words). `label` is its name in Blender where the one
-    made of the field's does not do, `flag` its short option of `core run` (of `core deliver` for what delivers).
-    `per_face` is True for what a quality leaves as it is, as it leaves every path; `affects_result` is False for what
-    no result depends on.
+    made of the field's does not do, `titles` are those of choices whose own does not do, `flag` is its short option of
+    `core run` (of `core deliver` for what delivers). `per_face` is True for what a quality leaves as it is, as it
+    leaves every path; `affects_result` is False for what no result depends on.
     """
     return dataclasses.field(default=default, metadata=metadata)
 

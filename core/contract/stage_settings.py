@@ -108,12 +108,12 @@ class ShadowMaskSettings:
 class SolveSettings:
     size: int = setting(1024, min=128, max=1024, unit="px")
     """Side of the map that is solved"""
-    recipe: str = setting("wildcap", choices=("wildcap", "paper", "released"))
+    recipe: str = setting("wildcap", choices=("wildcap", "paper", "released"), titles={"wildcap": "WildCap"})
     """wildcap is the default; paper and released follow the paper and its authors' code to the letter, with their own
     600 and 599 steps, and are many times slower"""
     steps: int = setting(20, min=4, max=600)
     """Sampling steps"""
-    guidance: str = setting("dps", choices=("dps", "proximal"))
+    guidance: str = setting("dps", choices=("dps", "proximal"), titles={"dps": "DPS"})
     """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast, with smoother
     normals and specular"""
     grid_cells: int = setting(96, min=1, max=512)
@@ -179,7 +179,7 @@ class DeliverSettings:
     """Side of the maps; maps that are smaller are not enlarged"""
     pictures: str = setting("preset", choices=("preset", *delivery_presets.PICTURES), flag="--pictures")
     """File of the maps"""
-    colour: str = setting("preset", choices=("preset", "srgb", "linear"), flag="--colour")
+    colour: str = setting("preset", choices=("preset", "srgb", "linear"), titles={"srgb": "sRGB"}, flag="--colour")
     """Colour space of the albedo; preset: sRGB in PNG, linear in EXR"""
     udim: str = setting("preset", choices=("preset", "numbered", "plain"), label="UDIM", flag="--udim")
     """Whether the maps' names carry the number of their UV tile (1001); maps of several tiles always do"""

@@ -27,7 +27,7 @@ def _deliver(asked) -> list[Path]:
             bpy.ops.wildcap.add_face_units()
     chosen = item.deliver
     chosen.what, chosen.preset, chosen.format = asked.what, asked.preset, asked.format
-    chosen.folder = str(asked.folder or "")
+    chosen.folder = str(asked.to or "")
     root = captures.root(item)
     with contextlib.suppress(RuntimeError):  # what the button refuses, it has told
         bpy.ops.wildcap.deliver('EXEC_DEFAULT')
@@ -46,7 +46,7 @@ def _of_deliver(kind) -> None:
     kind.add_argument("--preset", choices=tuple(delivery_presets.PRESETS), default="blender")
     kind.add_argument("--format", choices=("preset", *delivery_presets.FORMATS), default="preset")
     kind.add_argument("--what", choices=tuple(delivery_presets.WHAT), default="head")
-    kind.add_argument("--folder", type=Path, help="where to; default: exports in the capture")
+    kind.add_argument("--to", type=Path, metavar="FOLDER", help="where to; default: exports in the capture")
 
 
 COMMANDS = (Command("deliver", "the head with its maps as another program wants them", _of_deliver, _deliver),)

@@ -47,7 +47,7 @@ class WILDCAP_PT_deliver(CapturePanel, bpy.types.Panel):
             body.prop(settings, name)
         draw_settings(layout, item, stages.by_name("transfer"))
         if settings.what != "head":
-            layout.operator("wildcap.reconstruct", text="Make My Mesh and Scan", icon='FILE_REFRESH').first = "transfer"
+            layout.operator("wildcap.reconstruct", text="Make My Mesh and Scan", icon='FILE_REFRESH').to_end = True
 
 
 CLASSES = (WILDCAP_PT_deliver,)

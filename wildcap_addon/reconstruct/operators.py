@@ -21,8 +21,13 @@ class WILDCAP_OT_reconstruct(JobOperator, bpy.types.Operator):
         name="From", options={'SKIP_SAVE'},
         description="The stage to begin with, done again even if it is fresh; empty: what is not done yet")
 
+    to_end: bpy.props.BoolProperty(
+        name="To the End", options={'SKIP_SAVE'}, description="Go on past the mask, to what is delivered")
+
     @classmethod
     def description(cls, context, properties):
+        if properties.to_end:
+            return "Fit your own mesh and texture the scan; of what comes before, only stages that are out of date run"
         if properties.first not in stages.NAMES:
             return cls.bl_description
         after_mask = stages.NAMES.index(properties.first) > stages.NAMES.index(stages.MASK_STAGE)
@@ -31,9 +36,8 @@ class WILDCAP_OT_reconstruct(JobOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        after_mask = self.first and stages.NAMES.index(stages.by_name(self.first).name) > stages.NAMES.index(
-            stages.MASK_STAGE
-        )
+        after_mask = self.to_end or self.first and stages.NAMES.index(
+            stages.by_name(self.first).name) > stages.NAMES.index(stages.MASK_STAGE)
         if not after_mask and not captures.folder(item).source:
             raise Problem("This capture has no video: there is nothing to reconstruct it from.",
                           "Choose the video of your own face.")
