@@ -148,11 +148,12 @@ def write_maps(folder: Path, skin: Skin) -> None:
 
 
 def solve(capture: Capture, truth: Path, until: str, quality: str) -> None:
-    """Runs the chain from delight on, as the worker would, as far as it is not fresh. Raises SystemExit with what was
-    wrong where a stage fails."""
+    """Runs the chain from delight on, from the scan on where there is no head, as the worker would, as far as it is not
+    fresh. Raises SystemExit with what was wrong where a stage fails."""
     values = {"solve": {"skin_tone": skin_tone(truth)}}
     names, settings = [stage.name for stage in STAGES], from_json(values, preset(quality))
-    asked = STAGES[names.index("delight"):names.index(until) + 1]
+    begin = "delight" if capture.head.is_file() else "scan"
+    asked = STAGES[names.index(begin):names.index(until) + 1]
     stale = [stage.name for stage in asked if capture.state(stage, settings) != "done"]
     if not stale:
         return

@@ -9,10 +9,10 @@ beside four reference answers.
 FOLDER holds NAME.wildcap of benchmarks/people.py or of the same layout, or what benchmarks/freeze.py kept of them;
 NAME/ with the truth lies beside it or in --truths. All captures whose truths have the same head.obj show one person.
 Measured are the texture of the delit frames and the solved maps; captures that lack a texture are left out, or with
---run taken through the chain first, from the stage delight on. FOLDER/state keeps each capture's figures in pictures,
-which take the time, and NAME.jpg with its maps: a second run goes on where the first stopped. Likenesses stay there;
-nothing of them is published. People whose figures --json's record holds already, by the same code, stay in it and on
-the page: the table may be made person by person.
+--run taken through the chain first, from the stage delight on, or scan where there is no head. FOLDER/state keeps each
+capture's figures in pictures, which take the time, and NAME.jpg with its maps: a second run goes on where the first
+stopped. Likenesses stay there; nothing of them is published. People whose figures --json's record holds already, by
+the same code, stay in it and on the page: the table may be made person by person.
 """
 
 from __future__ import annotations
@@ -40,6 +40,8 @@ from .state_captures import DELIT, METHODS, SIZE, SOLVED, Filmed, find
 from .state_scores import Figures, in_pictures, in_uv, mean_of, of_person, small
 
 COMMAND = "python -m benchmarks.state FOLDER --page docs/results/state.md --json docs/figures/state.json"
+SHOWN = "skin", "brows", "lips", "beard"
+"""Parts: eyes are objects of their own, and under them lie lids that were completed from around."""
 TABLES = {
     "In the picture": {"psnr": Column("PSNR, dB"), "ssim": Column("SSIM", 3), "flip": Column("FLIP", 3, -1),
                        "detail": Column("detail"), "shadow_step": Column("shadow step", 2, 0)},
@@ -55,13 +57,12 @@ TABLES = {
                                          "light_alone": Column("that light of its own, in log", 3, 0),
                                          "agreement": Column("agreement, dB"),
                                          "light_slope": Column("slope by light", 2, -1)},
-    "Features kept": {"kept_brows": Column("brows", 2, 0), "kept_eyes": Column("eyes", 2, 0),
-                      "kept_lips": Column("lips", 2, 0),
+    "Features kept": {"kept_brows": Column("brows", 2, 0), "kept_lips": Column("lips", 2, 0),
                       "kept_chin": Column("chin", 2, 0), "lost": Column("mean abs(1 - kept)", 2, -1),
                       "between_lights": Column("between lights", 2, -1)},
-    "Parts apart": {**{f"psnr_{part}": Column(f"{part}, dB") for part in ("skin", "brows", "lips", "eyes", "beard")},
+    "Parts apart": {**{f"psnr_{part}": Column(f"{part}, dB") for part in SHOWN},
                     **{f"bias_{part}": Column(f"{part}, log", 3, 0)
-                       for part in ("skin", "brows", "lips", "eyes", "beard")}},
+                       for part in SHOWN}},
     "Confidence as an uncertainty": {"likelihood_gained": Column("nats gained", 3),
                                      "coverage": Column("within one sigma", 3, 0)},
 }
@@ -81,8 +82,8 @@ WORDS = {
     "at one tone; a flat colour agrees "
     "perfectly, the true light tells what the registrations allow. *Slope by light*: how far the answer follows from "
     "one capture to the other what was filmed.",
-    "Features kept": "Share of the truth's contrast that brows, eyes, lips and chin keep (1 is all); mean abs(1 - "
-                     "kept) of brows and eyes, each capture "
+    "Features kept": "Share of the truth's contrast that brows, lips and chin keep (1 is all); mean abs(1 - kept) of "
+                     "brows, and of closed eyes, each capture "
     "apart; the deviation of kept between a person's captures over that of the filmed textures.",
     "Parts apart": "PSNR, and the median of the grey log(answer / truth), in each part of the map after the whole "
                    "face's gain. True part masks where "
@@ -106,7 +107,7 @@ def main() -> int:
     parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
     parser.add_argument("--run", action="store_true",
-                        help="run the chain, delight to solve, on captures where it is not fresh")
+                        help="run the chain, to the solve, on captures where it is not fresh")
     parser.add_argument("--quality", choices=QUALITIES, default="standard", help="of --run")
     parser.add_argument("--page", type=Path, help="where the page goes, docs/results/state.md")
     parser.add_argument("--json", type=Path, help="where the record goes, docs/figures/state.json")
@@ -141,8 +142,8 @@ def main() -> int:
 
 
 def run_chain(capture: Capture, truth: Path, quality: str) -> None:
-    """Delight to solve where they are not fresh; a capture that cannot be taken so far is named, and the others go
-    on."""
+    """The chain to the solve as far as it is not fresh; a capture that cannot be taken so far is named, and the others
+    go on."""
     try:
         people.solve(capture, truth, "solve", quality)
     except SystemExit as ended:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from core.contract.capture import Capture
@@ -27,6 +28,7 @@ from core.geometry.raster import interpolate
 from core.imaging import images
 
 from .controlled_captures import true_frames
+from .measures.features_kept import BARE
 from .measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, flat_colour
 
 SIZE = 512
@@ -85,10 +87,17 @@ class Filmed:
 
     @cached_property
     def where(self) -> np.ndarray:
-        """bool [SIZE, SIZE]: texels of the face that the capture and its true frames saw well."""
+        """bool [SIZE, SIZE]: texels of the face that the capture and its true frames saw well. Of a person's own eyes
+        and their lashes there are none: the true frames have them painted on the lids, where an answer has lids that
+        were completed from around."""
         seen = [images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE) > SEEN
                 for capture in (self.capture, self.true_capture)]
-        return (template.mask("face", SIZE) > 0.5) & seen[0] & seen[1]
+        face = (template.mask("face", SIZE) > 0.5) & seen[0] & seen[1]
+        eyes = self.own_parts().get("eyes")
+        if eyes is None:
+            return face
+        reach = 2 * round(BARE * np.ptp(landmarks_in_uv()[:, 0])) + 1
+        return face & ~(cv2.dilate(eyes.astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0)
 
     def answer(self, method: str) -> np.ndarray | None:
         """What a method takes for the albedo, linear [S, S, 3]; None where the capture was not taken so far."""
@@ -114,13 +123,21 @@ class Filmed:
     def parts(self) -> dict[str, np.ndarray]:
         """Part -> bool [SIZE, SIZE]: the truth's own masks where it has any, else those of the built-in head, where
         they are at least half as dense as where they are densest. Skin is what no other part has."""
-        own = {path.stem.removeprefix("part_"): images.read_mask(path)
-               for path in sorted((self.truth / "maps").glob("part_*.png"))}
-        soft = {name: images.resize(mask, SIZE, SIZE)
-                for name, mask in ({name: template.mask(name, SIZE) for name in PARTS} | own).items()}
-        found = {name: mask > 0.5 * max(float(mask.max()), 1e-3) for name, mask in soft.items()}
+        found = {name: _dense(template.mask(name, SIZE)) for name in PARTS} | self.own_parts()
         others = np.logical_or.reduce([mask for name, mask in found.items() if name != "skin"])
         return {**found, "skin": found["skin"] & ~others}
+
+    def own_parts(self) -> dict[str, np.ndarray]:
+        """Part -> bool [SIZE, SIZE]: the truth's own masks; none where the head's eyes are closed and it has no
+        hair."""
+        return {path.stem.removeprefix("part_"): _dense(images.read_mask(path))
+                for path in sorted((self.truth / "maps").glob("part_*.png"))}
+
+
+def _dense(mask: np.ndarray) -> np.ndarray:
+    """bool [SIZE, SIZE]: where a mask is at least half as dense as where it is densest."""
+    soft = images.resize(mask, SIZE, SIZE)
+    return soft > 0.5 * max(float(soft.max()), 1e-3)
 
 
 def find(folder: Path, truths: Path, work: Path) -> list[Filmed]:
