@@ -126,14 +126,14 @@ def _add_white(commands) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    values = command_settings.read_options(options, "run")
-    command_settings.refuse_lone_flags(options, values)
+    run_settings = command_settings.read_options(options, "run")
+    command_settings.refuse_lone_flags(options, run_settings)
     # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever
     # sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     capture = Capture(options.capture)
     job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first,
-                    last=options.last, settings=values, quality=options.quality)
+                    last=options.last, settings=run_settings, quality=options.quality)
     return terminal.follow(ROOT, capture, job, consent.by_flag(capture) if options.send_frames else {})
 
 
@@ -207,9 +207,9 @@ def _white(options: argparse.Namespace) -> int:
 def _doctor(options: argparse.Namespace) -> int:
     from .worker.doctor import examine
 
-    found = examine(ROOT, Path(sys.executable))
-    print(found.text)
-    return 2 if found.problems else 0
+    findings = examine(ROOT, Path(sys.executable))
+    print(findings.text)
+    return 2 if findings.problems else 0
 
 
 def _self_test(options: argparse.Namespace) -> int:

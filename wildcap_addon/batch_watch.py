@@ -107,9 +107,9 @@ class Watch(threading.Thread):
         stamp = _stamp(face)
         # who holds a lock may have ended
         if stamp[0] or self._stamps.get(face.name) != stamp or face.name not in self.view.states:
-            found = _ask(batch, face)
-            self.view = replace(self.view, states={**self.view.states, face.name: found})
-            self._stamps[face.name] = () if found.state == STOPPED and found.group is None else stamp
+            face_state = _ask(batch, face)
+            self.view = replace(self.view, states={**self.view.states, face.name: face_state})
+            self._stamps[face.name] = () if face_state.state == STOPPED and face_state.group is None else stamp
             self._tell(batch)
 
     def _tell(self, batch: Batch) -> None:

@@ -58,31 +58,31 @@ def close() -> None:
 def state_of(root: str) -> FaceState | None:
     """Of a capture that belongs to the batch."""
     face = view().face(root)
-    found = view().states.get(face.name) if face else None
-    if found is not None and found.state == WAITING and root in _accepted:
+    face_state = view().states.get(face.name) if face else None
+    if face_state is not None and face_state.state == WAITING and root in _accepted:
         return FaceState(TO_DO, group_named(GATE))
-    return found
+    return face_state
 
 
 def works_on(root: str) -> bool:
     """Whether the batch has a capture in hand, or somebody else has one of its."""
-    face, found = view().face(root), state_of(root)
-    return face is not None and (face.name in view().progress.get("working", {}) or found is not None
-                                 and found.state == WORKING)
+    face, face_state = view().face(root), state_of(root)
+    return face is not None and (face.name in view().progress.get("working", {}) or face_state is not None
+                                 and face_state.state == WORKING)
 
 
 def waiting() -> list[BatchFace]:
     """The faces whose masks wait to be looked at, in the batch's order."""
     known = view()
-    return ([face for face in known.batch.faces if (found := state_of(str(face.root))) and found.state == WAITING]
+    return ([face for face in known.batch.faces if (status := state_of(str(face.root))) and status.state == WAITING]
             if known.batch else [])
 
 
 def ready() -> int:
     """How many faces are to be solved with a mask that was looked at."""
-    found = [state_of(str(face.root)) for face in view().batch.faces] if view().batch else []
+    face_states = [state_of(str(face.root)) for face in view().batch.faces] if view().batch else []
     return sum(each is not None and each.state == TO_DO and each.group is not None and each.group.name == GATE
-               for each in found)
+               for each in face_states)
 
 
 def accept(face: BatchFace) -> None:

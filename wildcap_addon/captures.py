@@ -131,8 +131,8 @@ def head(context, item) -> bpy.types.Object | None:
 
 
 def require_head(context, item) -> bpy.types.Object:
-    found = head(context, item)
-    if found is None:
+    head_object = head(context, item)
+    if head_object is None:
         raise Problem("The head is not in this scene.",
                       "Click Bring In Head; if it was never reconstructed, click Reconstruct.")
-    return found
+    return head_object

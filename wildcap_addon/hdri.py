@@ -24,8 +24,8 @@ class Hdri:
 
 def items(self, context):
     """The worlds that Blender knows, its own eight (CC0) and the artist's, for an EnumProperty."""
-    found = [(light.name, Path(light.name).stem.replace("_", " ").title(), "") for light in _worlds()]
-    _items[:] = found or [('NONE', "None", "This Blender came without any")]
+    choices = [(light.name, Path(light.name).stem.replace("_", " ").title(), "") for light in _worlds()]
+    _items[:] = choices or [('NONE', "None", "This Blender came without any")]
     return _items
 
 

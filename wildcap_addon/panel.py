@@ -42,8 +42,8 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
             layout.operator("wildcap.use_python", icon='FILE_FOLDER')
         if item is None:
             layout.operator("wildcap.open_sample_head", icon='USER')
-        found = status.of(item) if item is not None else None
-        problems.draw(layout, problems.of(root) or problems.of("") or (found.problem if found else None), width)
+        known = status.of(item) if item is not None else None
+        problems.draw(layout, problems.of(root) or problems.of("") or (known.problem if known else None), width)
         for folder, other in jobs.elsewhere(root):
             box = layout.box()
             box.label(text=Path(folder).stem, icon='USER')
@@ -63,25 +63,25 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
 
     def draw(self, context):
         item = captures.active(context)
-        found = status.of(item)
+        known = status.of(item)
         job = jobs.of(captures.root(item))
         column = self.layout.column(align=True)
-        ready = found is not None and bool(found.source or found.has_head)  # for the first stage that is to do
+        ready = known is not None and bool(known.source or known.has_head)  # for the first stage that is to do
         for stage in stages.STAGES:
-            state = ("running" if job and job.stage == stage.name else found.stages.get(stage.name, "to do") if found
+            state = ("running" if job and job.stage == stage.name else known.stages.get(stage.name, "to do") if known
                      else "to do")
             if (
                 state == "to do"
-                and found
-                and not found.source
-                and found.has_head
+                and known
+                and not known.source
+                and known.has_head
                 and stage.name in next_step.BEFORE_MASK
             ):
                 state = "not needed"  # the sample head came without what it was made from
             split = column.split(factor=0.47)
             split.label(text=stage.label, icon=STATE_ICONS[state])
             row = split.row()
-            row.label(text=_words(state, found, stage.name))
+            row.label(text=_words(state, known, stage.name))
             if state == "running" and job.progress and job.progress.of > 0:
                 row.label(text=f"{min(1.0, job.progress.done / job.progress.of):.0%}")
             if job is None and (state in ("done", "stale", "older") or state == "to do" and ready):
@@ -104,8 +104,8 @@ class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context):
         item = captures.active(context)
-        found = status.of(item) if item is not None else None
-        return found is not None and bool(found.findings)
+        known = status.of(item) if item is not None else None
+        return known is not None and bool(known.findings)
 
     def draw_header(self, context):
         self.layout.label(text="", icon='ERROR')

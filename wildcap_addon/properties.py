@@ -188,10 +188,10 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
 
 def job_settings(item: WILDCAP_PG_capture) -> dict:
     """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device. Paths are absolute."""
-    found = {stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)}
-             for stage, kind in STAGE_KINDS.items()}
-    found["solve"]["skin_tone"] = _tone(item) if item.use_skin_tone else "auto"
-    return {**found, "seed": item.seed, "device": device(item)}
+    stage_settings = {stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)}
+                      for stage, kind in STAGE_KINDS.items()}
+    stage_settings["solve"]["skin_tone"] = _tone(item) if item.use_skin_tone else "auto"
+    return {**stage_settings, "seed": item.seed, "device": device(item)}
 
 
 def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings) -> None:

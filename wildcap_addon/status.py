@@ -165,11 +165,11 @@ def _look(root: str, item) -> None:
 def _stamp(item) -> tuple[Capture, tuple]:
     """The capture, and what its status depends on: a few file times and the settings."""
     capture = captures.folder(item)
-    values = properties.job_settings(item)
+    settings = properties.job_settings(item)
     watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved,
                capture.checkpoints, capture.frames_json, capture.consent, capture.switchlight,
                *delivered(capture), capture.renders)
-    stamp = (repr(values), *map(_changed, watched))
+    stamp = (repr(settings), *map(_changed, watched))
     return capture, stamp
 
 

@@ -44,9 +44,9 @@ def forget(gone: tuple[Command, ...]) -> None:
 
 def execute(words: list[str]) -> int:
     """Does what the words ask for and prints the files. Returns an exit code: 0, or 1 after telling what is wrong."""
-    asked = parser().parse_args(words)
+    options = parser().parse_args(words)
     try:
-        made = asked.carry_out(asked)
+        made = options.carry_out(options)
     except Problem as problem:
         print(f"{problem.problem} {problem.remedy}", file=sys.stderr)
         return 1

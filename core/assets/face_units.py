@@ -97,8 +97,8 @@ def apart(head: ActingHead, moved: np.ndarray) -> np.ndarray:
             here = head.seam == k
             if not amount[here].any():
                 continue
-            held = np.append(rim[here], head.ends[k])  # in the corners nothing crosses
-            gap = np.linalg.norm(head.rest[near, None] - head.rest[held][None], axis=2)
+            anchors = np.append(rim[here], head.ends[k])  # in the corners nothing crosses
+            gap = np.linalg.norm(head.rest[near, None] - head.rest[anchors][None], axis=2)
             weight = np.exp((gap.min(1, keepdims=True) - gap) / SOFT_WITHIN)
             value = (weight * np.append(amount[here], [0, 0])).sum(1) / weight.sum(1)
             moved[near, 2] += value * np.clip(1 - gap.min(1) / REACH, 0, 1)
@@ -113,8 +113,8 @@ def _sides(head: ActingHead) -> np.ndarray:
     double above."""
     count, inner = len(head.rest) - len(head.kind), head.kind
     first = count - len(head.copies)
-    nearest = np.concatenate([np.argmin(np.linalg.norm(part[:, None] - head.rest[head.copies][None], axis=2), 1)
-                              for part in np.array_split(head.rest, 40)])
+    nearest = np.concatenate([np.argmin(np.linalg.norm(chunk[:, None] - head.rest[head.copies][None], axis=2), 1)
+                              for chunk in np.array_split(head.rest, 40)])
     side = np.where(head.rest[:, 2] >= head.rest[head.copies[nearest], 2], 1, -1)
     side[head.copies], side[first:count] = 1, -1
     side[count:][inner != 0] = 0
@@ -163,8 +163,8 @@ def on_template(head: ActingHead, vertices: np.ndarray) -> tuple[ActingHead, np.
     count = len(vertices)
     front = (vertices[:, 1] < 0.045) & (vertices[:, 2] > -0.12)
     a, b = head.rest[:count][front], vertices[front]
-    u, values, vt = np.linalg.svd((a - a.mean(0)).T @ (b - b.mean(0)))
-    turn = (u @ vt).T * (values.sum() / ((a - a.mean(0)) ** 2).sum())
+    u, singular_values, vt = np.linalg.svd((a - a.mean(0)).T @ (b - b.mean(0)))
+    turn = (u @ vt).T * (singular_values.sum() / ((a - a.mean(0)) ** 2).sum())
     rest = (head.rest - a.mean(0)) @ turn.T + b.mean(0)
     rest[:count] = vertices
     rest[count:count + len(head.copies)] = vertices[head.copies]

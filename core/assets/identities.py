@@ -33,8 +33,8 @@ def identity_space(base: Base, builder: HeadBuilder, seed: int = 0) -> tuple[np.
     mean = (heads.mean(0) + mirrored.mean(0)) / 2
     mean -= [0, *(mean[front].mean(0)[1:] - heads[0, front].mean(0)[1:])]
     difference = (heads - heads.mean(0)).reshape(SAMPLES, -1)
-    values, vectors = np.linalg.eigh(difference @ difference.T / SAMPLES)
-    order = np.argsort(values)[::-1][:COMPONENTS]
+    eigenvalues, vectors = np.linalg.eigh(difference @ difference.T / SAMPLES)
+    order = np.argsort(eigenvalues)[::-1][:COMPONENTS]
     components = (vectors[:, order].T @ difference / np.sqrt(SAMPLES)).reshape(COMPONENTS, -1, 3)
     return mean, components
 
@@ -53,20 +53,20 @@ def _controls(base: Base) -> list[tuple[float, list[np.ndarray]]]:
     into one control."""
     controls = []
     for folder, sigma in _FOLDERS.items():
-        found = {}
+        targets = {}
         for name in base.target_names(folder):
             stem = re.sub(r"/[lr]-", "/", name)
             if not _LEFT_OUT.search(name):
-                found[stem] = found.get(stem, 0) + base.target(name)
-        for stem in list(found):
+                targets[stem] = targets.get(stem, 0) + base.target(name)
+        for stem in list(targets):
             for low, high in _OPPOSITES:
-                if stem.endswith("-" + low) and stem[:-len(low)] + high in found:
-                    controls.append((sigma, [found[stem], found[stem[:-len(low)] + high]]))
+                if stem.endswith("-" + low) and stem[:-len(low)] + high in targets:
+                    controls.append((sigma, [targets[stem], targets[stem[:-len(low)] + high]]))
                     break
-                if stem.endswith("-" + high) and stem[:-len(high)] + low in found:
+                if stem.endswith("-" + high) and stem[:-len(high)] + low in targets:
                     break
             else:
-                controls.append((sigma, [found[stem]]))
+                controls.append((sigma, [targets[stem]]))
     return controls
 
 

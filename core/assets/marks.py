@@ -32,12 +32,12 @@ def find_landmarks(mean: np.ndarray, components: np.ndarray, triangles: np.ndarr
     colours = np.tile([0.55, 0.36, 0.28], (len(mean), 1))
     for chosen in (shapes[:2], shapes):
         # [views, 468, 3] on the mean head
-        found = np.concatenate([_observe(shape, triangles, colours, mean) for shape in chosen])
-        points = np.nanmedian(found, 0)
+        observed = np.concatenate([_observe(shape, triangles, colours, mean) for shape in chosen])
+        points = np.nanmedian(observed, 0)
         partner = _partners(points)
         points = (points + points[partner] * [-1, 1, 1]) / 2
-        spread = np.nanmedian(np.linalg.norm(found - points, axis=-1), 0)
-        seen = np.isfinite(found[..., 0]).mean(0)
+        spread = np.nanmedian(np.linalg.norm(observed - points, axis=-1), 0)
+        seen = np.isfinite(observed[..., 0]).mean(0)
         colours = _painted(mean, points)
     triangle, bary = _onto_surface(points, mean, triangles)
     spread = (spread + spread[partner]) / 2

@@ -86,8 +86,8 @@ def _boundary(points, seam_left, seam_right, ring):
 
 
 def _mean_value_embedding(points, faces, start):
-    held = ~np.isnan(start[:, 0])
-    rows, columns, values = [], [], []
+    pinned = ~np.isnan(start[:, 0])
+    rows, columns, edge_weights = [], [], []
     for k in range(3):
         i, j, o = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
         a, b = points[j] - points[i], points[o] - points[i]
@@ -95,13 +95,13 @@ def _mean_value_embedding(points, faces, start):
         half = np.tan(np.arccos(np.clip((a * b).sum(1) / (la * lb), -1, 1)) / 2)
         rows += [i, i]
         columns += [j, o]
-        values += [half / la, half / lb]
-    weights = sparse.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+        edge_weights += [half / la, half / lb]
+    weights = sparse.csr_matrix((np.concatenate(edge_weights), (np.concatenate(rows), np.concatenate(columns))),
                                 shape=(len(points),) * 2)
     laplacian = sparse.diags(np.asarray(weights.sum(1)).ravel()) - weights
-    uv = np.where(held[:, None], start, 0)
-    solver = splu(laplacian[~held][:, ~held].tocsc())
-    uv[~held] = solver.solve(np.asarray(-laplacian[~held][:, held] @ start[held]))
+    uv = np.where(pinned[:, None], start, 0)
+    solver = splu(laplacian[~pinned][:, ~pinned].tocsc())
+    uv[~pinned] = solver.solve(np.asarray(-laplacian[~pinned][:, pinned] @ start[pinned]))
     return uv
 
 

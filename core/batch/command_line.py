@@ -111,11 +111,11 @@ def _plan(options: argparse.Namespace) -> int:
     root = options.batch.absolute()
     before = read_batch(root) if (root / NAME).is_file() else Batch(root, ())
     _refuse_strangers(root)
-    asked = _with_options(before, options)
+    batch = _with_options(before, options)
     faces, faults = read_faces(options.shots, root, options.quality, command_settings.read_options(options, "run"))
     kept = [face for face in before.faces if face.name not in {new.name for new in faces}]
     if faces or kept:
-        write_batch(replace(asked, faces=(*kept, *faces)))
+        write_batch(replace(batch, faces=(*kept, *faces)))
     for fault in faults:
         print(f"{fault.problem} {fault.remedy}", file=sys.stderr)
     said = f"{len(faces)} face{'' if len(faces) == 1 else 's'} planned in {root}"
@@ -216,8 +216,8 @@ def _review(options: argparse.Namespace) -> int:
 def _commands(options: argparse.Namespace) -> int:
     batch = read_batch(options.batch)
     with known_hashes(batch.root):
-        found = list_flamenco_jobs(batch) if options.flamenco else list_tasks(batch, options.python, options.wildcap)
-    for each in found:
+        jobs = list_flamenco_jobs(batch) if options.flamenco else list_tasks(batch, options.python, options.wildcap)
+    for each in jobs:
         print(json.dumps(each) if options.flamenco else each.line())
     return 0
 

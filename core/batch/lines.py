@@ -48,13 +48,13 @@ def list_tasks(batch: Batch, python: str = sys.executable, root: Path = ROOT) ->
 def _of_face(batch: Batch, name: str, state: FaceState, program: tuple[str, str]) -> list[BatchTask]:
     if state.state in (DONE, WAITING) or state.group is None:
         return []
-    found: list[BatchTask] = []
+    tasks: list[BatchTask] = []
     for group in GROUPS[GROUPS.index(state.group):]:
         if waits(batch, batch.face(name), group):
             break
-        found.append(BatchTask(name, group.name, found[-1].name if found else "",
+        tasks.append(BatchTask(name, group.name, tasks[-1].name if tasks else "",
                                (*program, "batch", "task", str(batch.root), name, group.name)))
-    return found
+    return tasks
 
 
 def list_flamenco_jobs(batch: Batch) -> list[dict]:

@@ -131,10 +131,10 @@ def ask_to_stop(root: Path) -> None:
 def is_asked_to_stop(root: Path) -> bool:
     """Whether the file `stop` is there; one that holds something was meant for something else."""
     try:
-        found = (root / STOP).lstat()
+        status = (root / STOP).lstat()
     except OSError:
         return False
-    return stat.S_ISREG(found.st_mode) and found.st_size == 0
+    return stat.S_ISREG(status.st_mode) and status.st_size == 0
 
 
 def forget_stop(root: Path) -> None:

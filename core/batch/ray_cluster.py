@@ -103,8 +103,8 @@ class _Run:
             self.board.end(face, WAITING if state.state == WAITING else STOPPED, state.words())
             return False
         has_gpu = self._ray.cluster_resources().get("GPU", 0) > 0 and face.chosen().device != "cpu"
-        before, found = None, lease.holder(face.capture.lock) if state.state == WORKING and not again else None
-        stranger = str((found or {}).get("token", ""))
+        before, holder = None, lease.holder(face.capture.lock) if state.state == WORKING and not again else None
+        stranger = str((holder or {}).get("token", ""))
         for group in self._groups[self._groups.index(state.group):]:
             task = self._call.options(name=f"{face.name}.{group.name}", num_cpus=self._cores, memory=_bytes(group),
                                       num_gpus=int(has_gpu and group.on_device), max_retries=-1, retry_exceptions=False)
@@ -142,10 +142,10 @@ class _Run:
             self._asked, self._heard = self._post.take.remote(), time.monotonic()
         if self._asked is None or not self._ray.wait([self._asked], timeout=0)[0]:
             return
-        asked, self._asked = self._asked, None
+        request, self._asked = self._asked, None
         working = {face.name: face for face, _, _ in self._tasks.values()}
         with contextlib.suppress(self._ray.exceptions.RayError):
-            places, lines = self._ray.get(asked)
+            places, lines = self._ray.get(request)
             self._places |= {name: node for name, node in places.items() if name in working}
             for name in lines.keys() & working.keys():
                 self.board.hear(working[name], from_line(lines[name]))
@@ -245,7 +245,7 @@ def _examine_nodes(ray, batch: Batch, cores: int) -> None:
                       "Start one with `ray start` and its --num-cpus and --memory, or have each task take fewer cores "
                       "with --cores.")
     call, words = _define_call(ray), ("examine", None, str(batch.root), __version__, hash_file(batch.root / NAME))
-    asked = [
+    pending = [
         call.options(
             num_cpus=0,
             scheduling_strategy=ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(
@@ -254,7 +254,7 @@ def _examine_nodes(ray, batch: Batch, cores: int) -> None:
         ).remote(None, str(ROOT), *words)
         for node in fit
     ]
-    answered, _ = ray.wait(asked, num_returns=len(asked), timeout=EXAMINE_S)
+    answered, _ = ray.wait(pending, num_returns=len(pending), timeout=EXAMINE_S)
     for ref in answered:
         with contextlib.suppress(ray.exceptions.RayError):  # a node that has just gone harms nobody
             outcome = ray.get(ref)

@@ -86,8 +86,8 @@ def _outlast(capture: Capture, stranger: str, stopped: list) -> None:
     has not been heard of for a term."""
     deadline = time.monotonic() + 2 * lease.TERM_S
     while not stopped:
-        found = lease.holder(capture.lock)
-        if found is None or found.get("token") == stranger:
+        holder = lease.holder(capture.lock)
+        if holder is None or holder.get("token") == stranger:
             return
         try:
             with capture.locked():

@@ -144,16 +144,17 @@ def read_rows(batch: Batch) -> list[ReviewRow]:
         with contextlib.suppress(Problem):
             record = face.capture.read()
         stages = record["stages"]
-        found = [finding for finding in report.findings(record) if not finding["stopped"]]
-        values = {measure.label: stages[measure.stage]["figures"].get(measure.figure) for measure in MEASURES
-                  if measure.stage in stages}
+        findings = [finding for finding in report.findings(record) if not finding["stopped"]]
+        figures = {measure.label: stages[measure.stage]["figures"].get(measure.figure) for measure in MEASURES
+                   if measure.stage in stages}
         # NaN says nothing
-        values = {label: value for label, value in values.items() if isinstance(value, int | float) and value == value}
-        told.append(({FINDINGS: len(found), **values} if stages else {},
-                     sum(entry["seconds"] for entry in stages.values()), found))
-    ranks = rank([values for values, _, _ in told])
-    return [ReviewRow(face, derive_state(batch, face), seconds, values, own, found)
-            for face, (values, seconds, found), own in zip(batch.faces, told, ranks, strict=True)]
+        figures = {label: value for label, value in figures.items()
+                   if isinstance(value, int | float) and value == value}
+        told.append(({FINDINGS: len(findings), **figures} if stages else {},
+                     sum(entry["seconds"] for entry in stages.values()), findings))
+    ranks = rank([figures for figures, _, _ in told])
+    return [ReviewRow(face, derive_state(batch, face), seconds, figures, own, findings)
+            for face, (figures, seconds, findings), own in zip(batch.faces, told, ranks, strict=True)]
 
 
 def rank(values: list[dict[str, float]]) -> list[dict[str, float]]:
@@ -161,10 +162,10 @@ def rank(values: list[dict[str, float]]) -> list[dict[str, float]]:
     ranks: list[dict[str, float]] = [{} for _ in values]
     for measure in MEASURES:
         known = [own[measure.label] * measure.worse for own in values if measure.label in own]
-        for own, found in zip(values, ranks, strict=True):
+        for own, shares in zip(values, ranks, strict=True):
             if measure.label in own:
                 mine = own[measure.label] * measure.worse
-                found[measure.label] = sum(other < mine for other in known) / max(len(known) - 1, 1)
+                shares[measure.label] = sum(other < mine for other in known) / max(len(known) - 1, 1)
     return ranks
 
 
@@ -193,10 +194,10 @@ def _card(row: ReviewRow, batch: Batch) -> str:
     words = f"{_duration(row.seconds)} of work{still}" + (f"; on {state.who}" if state.who else "")
     problem = (f'<p class="problem">{html.escape(state.problem)} <b>{html.escape(state.remedy)}</b></p>'
                if state.state == STOPPED else "")
-    found = "".join(f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>"
-                    for finding in row.findings)
+    bullets = "".join(f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>"
+                      for finding in row.findings)
     told = (f"<details><summary>{len(row.findings)} "
-            f"finding{'' if len(row.findings) == 1 else 's'}</summary><ul>{found}</ul></details>" if found else "")
+            f"finding{'' if len(row.findings) == 1 else 's'}</summary><ul>{bullets}</ul></details>" if bullets else "")
     return (f'<article><div class="told"><h3>{title} <span class="badge '
             f'{_kind(state.state)}">{STATES[state.state]}</span></h3>'
             f'<p class="when">{html.escape(words)}</p>{problem}{_bars(row)}{told}</div><div '
@@ -225,15 +226,15 @@ def _shown(row: ReviewRow, label: str) -> str:
 
 
 def _thumbnails(capture: Capture, link: str) -> str:
-    found = [(stage, path, words) for stage, pattern, words in PICTURES
-             for path in sorted(capture.pictures.glob(pattern))[:1]]
+    pictures = [(stage, path, words) for stage, pattern, words in PICTURES
+                for path in sorted(capture.pictures.glob(pattern))[:1]]
     renders = [path for path in capture.renders.glob("[!.]*") if path.suffix.lower() in (".jpg", ".jpeg", ".png")]
-    found += [("", path, "Render") for path in sorted(renders, key=lambda path: path.stat().st_mtime)[-1:]]
-    if not found:
+    pictures += [("", path, "Render") for path in sorted(renders, key=lambda path: path.stat().st_mtime)[-1:]]
+    if not pictures:
         stage, pattern, words = FIRST_PICTURE
-        found = [(stage, path, words) for path in sorted(capture.pictures.glob(pattern))[:1]]
+        pictures = [(stage, path, words) for path in sorted(capture.pictures.glob(pattern))[:1]]
     shown = ""
-    for stage, path, words in found:
+    for stage, path, words in pictures:
         with contextlib.suppress(Problem, OSError):  # a damaged picture is left out
             content, aspect = shrink(path)
             picture = (f'<img loading="lazy" alt="{html.escape(capture.root.stem)}: {words}" title="{words}" '

@@ -61,15 +61,15 @@ def _rows_of_folder(folder: Path, root: Path) -> list[tuple[str, dict[str, str]]
     except OSError as error:
         raise storage_problem(error, folder) from error
     stems = [path.stem for path in inside]
-    found = []
+    rows = []
     for path in inside:
         ours = any((path / name).exists() for name in (NAME, "capture.json"))
         if path.is_dir() and path.absolute() != root and not ours and any(path.iterdir()):
-            found.append((path.name, {"video": path.name}))
+            rows.append((path.name, {"video": path.name}))
         elif path.is_file() and path.suffix.lower() in VIDEOS:
-            found.append((path.name,
-                          {"video": path.name, "name": path.stem if stems.count(path.stem) == 1 else path.name}))
-    return found
+            rows.append((path.name,
+                         {"video": path.name, "name": path.stem if stems.count(path.stem) == 1 else path.name}))
+    return rows
 
 
 def _rows_of_table(table: Path) -> list[tuple[str, dict[str, str]]]:
@@ -133,31 +133,31 @@ def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: d
     if not plain_name(name) or name.startswith("-") or not name.isprintable():
         raise Problem(f"{name!r} cannot be the name of a folder.",
                       "Use letters, digits, spaces, hyphens and underscores.")
-    values = {stage: dict(own) if isinstance(own, dict) else own for stage, own in shared.items()}
+    settings = {stage: dict(own) if isinstance(own, dict) else own for stage, own in shared.items()}
     if row.get("settings"):
         for stage, own in read_file(Path(absolute_path(row["settings"], folder.absolute()))).items():
-            values[stage] = {**values.get(stage, {}), **own} if isinstance(own, dict) else own
+            settings[stage] = {**settings.get(stage, {}), **own} if isinstance(own, dict) else own
     for column, (stage, setting) in COLUMNS.items():
         if row.get(column):
             value = absolute_path(row[column], folder.absolute()) if column == "template" else row[column]
             if column != "template":
                 _check_colour(column, value)
-            values[stage] = {**values.get(stage, {}), setting: value}
-    template = values.get("registration", {}).get("template")
+            settings[stage] = {**settings.get(stage, {}), setting: value}
+    template = settings.get("registration", {}).get("template")
     if template and not Path(template).exists():
         raise Problem(f"There is no head mesh at {template}.",
                       "Check its name, or leave the cell empty for the built-in head.")
     chosen = row.get("quality") or quality
-    known.from_json(values, known.preset(chosen))
-    return BatchFace(name, source, root / f"{name}.wildcap", chosen, values)
+    known.from_json(settings, known.preset(chosen))
+    return BatchFace(name, source, root / f"{name}.wildcap", chosen, settings)
 
 
 def _check_colour(column: str, text: str) -> None:
     """Raises Problem for what is neither auto nor three numbers: the stage that reads it would find out only after
     minutes."""
     try:
-        parts = [float(part) for part in text.split(",")] if text != "auto" else [0.5] * 3
+        parts = [float(channel) for channel in text.split(",")] if text != "auto" else [0.5] * 3
     except ValueError:
         parts = []
-    if len(parts) != 3 or not all(0 <= part <= (1 if column == "tone" else 1e3) for part in parts):
+    if len(parts) != 3 or not all(0 <= channel <= (1 if column == "tone" else 1e3) for channel in parts):
         raise Problem(f"The {column} {text!r} is no R,G,B.", "Write three numbers as \"0.8,0.6,0.5\", or auto.")

@@ -41,8 +41,8 @@ def _slim(options: argparse.Namespace) -> int:
     capture = Capture(options.folder)
     if options.undo:
         return _undo([capture])
-    found = (slimming.slim if options.yes else slimming.plan)(capture, last_settings(capture))
-    print(*slimming.lines(found, capture), sep="\n")
+    removal = (slimming.slim if options.yes else slimming.plan)(capture, last_settings(capture))
+    print(*slimming.lines(removal, capture), sep="\n")
     if not options.yes:
         print("Nothing was removed; --yes does it.")
     return 0
@@ -57,13 +57,13 @@ def _slim_batch(batch: Batch, yes: bool) -> int:
             print(f"{face.name:20} left, for it is not done: {state.words()}", flush=True)
             continue
         try:
-            found = (slimming.slim if yes else slimming.plan)(face.capture, face.chosen())
+            removal = (slimming.slim if yes else slimming.plan)(face.capture, face.chosen())
         except Problem as problem:
             print(f"{face.name:20} left: {problem.problem} {problem.remedy}", flush=True)
             continue
-        size, count = size + found.size, count + bool(found.going)
-        print(f"{face.name:20} {len(found.going)} files, {megabytes(found.size)}"
-              + "".join(f"; {note}" for note in found.notes), flush=True)
+        size, count = size + removal.size, count + bool(removal.going)
+        print(f"{face.name:20} {len(removal.going)} files, {megabytes(removal.size)}"
+              + "".join(f"; {note}" for note in removal.notes), flush=True)
     print(f"{count} of {len(batch.faces)} faces, {megabytes(size)}"
           + ("" if yes else ". Nothing was removed; --yes does it."))
     return 0

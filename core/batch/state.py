@@ -84,9 +84,9 @@ def deliver_settings(batch: Batch, face: BatchFace) -> dict:
     """The settings of a face with those of the delivery, as a job has them: with its mesh, which is OBJ where no
     Blender writes it. In a folder that all deliver to each face has one of its own: plain names may be alike where
     names are not (delivery_plan.safe_name)."""
-    asked = {"format": "obj", "whole": True, **(batch.deliver or {})}
-    folder = {"folder": str(Path(asked["folder"]) / face.name)} if asked.get("folder") else {}
-    return {**to_json(face.chosen()), "deliver": {**asked, **folder}}
+    delivery = {"format": "obj", "whole": True, **(batch.deliver or {})}
+    folder = {"folder": str(Path(delivery["folder"]) / face.name)} if delivery.get("folder") else {}
+    return {**to_json(face.chosen()), "deliver": {**delivery, **folder}}
 
 
 def is_delivered(batch: Batch, face: BatchFace) -> bool:

@@ -91,12 +91,12 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
     model = import_cameras(path, frames, capture.frames, report)
     names = {image.name for image in model.images.values()}
     records = [record for record in frames.records if record.name in names and record.yaw_deg is not None]
-    found = find_landmarks(coverage.spread_evenly(records, MOST_FACES), capture.frames, report)
-    width = float(np.median([face.box[2] - face.box[0] for face in found.values()] or [1.0]))
+    faces = find_landmarks(coverage.spread_evenly(records, MOST_FACES), capture.frames, report)
+    width = float(np.median([face.box[2] - face.box[0] for face in faces.values()] or [1.0]))
 
     def checked(model) -> tuple[HeadFrame, float]:
         """The head, and by how many times what is allowed these cameras miss it."""
-        head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
+        head = find_head(model, faces, settings.cameras.interpupillary_mm / 1000)
         return head, max(head.miss / IMPORT_MISS_SHARE, head.error_px / width / IMPORT_MISS_SHARE,
                          head.unlike_m / IMPORT_UNLIKE_M)
 
@@ -104,7 +104,7 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
     if 1 <= off < IMPORT_NEAR_RATIO and len(frames.records) <= ALL_PAIRS_FRAMES:
         report.log("The imported cameras are a little off; they are refined by what matches in these pictures.")
         matches = solve_structure(frames, capture, False, settings.cameras.matching, settings.seed, report)[1]
-        model = refine(model, found, matches, False, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
+        model = refine(model, faces, matches, False, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
         head, off = checked(model)
     if not off < 1:
         raise Problem(f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by "
@@ -113,7 +113,7 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
                       f"{1000 * head.unlike_m:.0f} mm.",
                       "Import the cameras that were solved from these very pictures, not cropped, under the same "
                       "names; or empty the setting.")
-    return Solved(model, "imported", head, found)
+    return Solved(model, "imported", head, faces)
 
 
 def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarray, report: Reporter) -> None:

@@ -81,8 +81,8 @@ def read_cameras(path: Path) -> list[Calibrated]:
     for camera in cameras:
         sized = (camera.width, camera.height) == (0, 0) or min(camera.width, camera.height) > 0
         # false for NaN, too
-        finite = all((np.abs(values) <= FARTHEST_UNITS).all()
-                     for values in (camera.params, camera.rotation, camera.translation))
+        finite = all((np.abs(parameters) <= FARTHEST_UNITS).all()
+                     for parameters in (camera.params, camera.rotation, camera.translation))
         focal = min(camera.params[:PIXELS[camera.model] - 2], default=0.0)
         if not (sized and finite and focal > LEAST_FOCAL_SHARE * (max(camera.width, camera.height) or 1)
                 and np.allclose(camera.rotation @ camera.rotation.T, np.eye(3), atol=1e-4)
@@ -98,14 +98,14 @@ def _match(cameras: list[Calibrated], frames: Frames) -> list[tuple[FrameRecord,
     by_name = {PurePath(camera.name.replace("\\", "/")).stem.lower(): camera for camera in cameras}
     by_name |= {camera.name.lower(): camera for camera in cameras}
     by_frame = {camera.frame: camera for camera in cameras if camera.frame is not None}
-    found = []
+    pairs = []
     for record in frames.records:
         camera = next((by_name[known] for known in _known_as(record) if known in by_name), None)
         if camera is None and frames.kind == VIDEO:
             camera = by_frame.get(record.video_frame)
         if camera is not None:
-            found.append((record, camera))
-    return found
+            pairs.append((record, camera))
+    return pairs
 
 
 def _known_as(record: FrameRecord) -> list[str]:

@@ -181,7 +181,7 @@ def _map_photographs(job: dict) -> list[pycolmap.Reconstruction]:
     """The models from every focal length of FOCALS, where one is not told; what comes after the matches takes little
     time."""
     unknown = [(camera_id, group) for camera_id, group in enumerate(job["groups"], 1) if not group["focal_px"]]
-    found = []
+    models = []
     for factor in FOCALS if unknown else (PHONE,):
         with pycolmap.Database.open(job["database"]) as stored:
             for camera_id, group in unknown:
@@ -189,8 +189,8 @@ def _map_photographs(job: dict) -> list[pycolmap.Reconstruction]:
                 camera.params = [factor * max(group["width"], group["height"]), group["width"] / 2, group["height"] / 2,
                                  0]
                 stored.update_camera(camera)
-        found += _map(job)
-    return found
+        models += _map(job)
+    return models
 
 
 def _worth(model: pycolmap.Reconstruction) -> tuple[int, int]:

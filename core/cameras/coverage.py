@@ -40,26 +40,27 @@ def missing(centres: np.ndarray) -> list[tuple[str, str]]:
     only."""
     azimuth, elevation = angles(centres)
     azimuth = np.sort(azimuth)
-    found = []
+    findings = []
     for side, reach in (("left", azimuth[-1]), ("right", -azimuth[0])):
         if reach >= WANTED_DEG:
             continue
         other = "right" if side == "left" else "left"
         where = (f"{_degrees(reach)} to the person's {side} of the nose" if reach > 1
                  else f"before the nose, on the person's {other}")
-        found.append((f"{'Nothing' if reach < SIDE_DEG else 'Little'} was seen from the person's {side} side: the "
-                      f"pictures end {where}.",
-                      f"Go on around the face until the person's {side} ear is in the middle of the picture; that side "
-                      "is guessed otherwise."))
+        findings.append((f"{'Nothing' if reach < SIDE_DEG else 'Little'} was seen from the person's {side} side: the "
+                         f"pictures end {where}.",
+                         f"Go on around the face until the person's {side} ear is in the middle of the picture; that "
+                         "side is guessed otherwise."))
     for low, high in zip(azimuth[:-1], azimuth[1:], strict=True):
         if high - low > GAP_DEG:
-            found.append((f"Between {_place(low)} and {_place(high)} there is no picture: a gap of {high - low:.0f} "
-                          "degrees.",
-                          "Take a picture at least every 15 degrees on the way around the face."))
+            findings.append((f"Between {_place(low)} and {_place(high)} there is no picture: a gap of {high - low:.0f} "
+                             "degrees.",
+                             "Take a picture at least every 15 degrees on the way around the face."))
     if len(centres) >= 6 and np.ptp(elevation) < LEVEL_DEG:
-        found.append(("All pictures were taken from one height: under the chin and the nose little was seen.",
-                      "Go around the face once more from a little below, or move the camera up and down on the way."))
-    return found
+        findings.append(("All pictures were taken from one height: under the chin and the nose little was seen.",
+                         "Go around the face once more from a little below, or move the camera up and down on the "
+                         "way."))
+    return findings
 
 
 def _degrees(value: float) -> str:

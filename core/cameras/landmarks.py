@@ -63,7 +63,7 @@ def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporte
                    text: str = "finding the face") -> dict[str, faces.Face]:
     """Name -> face of each of `records` where one is found; a turned head is followed from the frame before and the one
     after it, which are near in a film: in a photograph that is only done where no face is found otherwise."""
-    found: dict[str, faces.Face] = {}
+    face_by_name: dict[str, faces.Face] = {}
     last = None
     for done, record in enumerate(records):
         report.progress(done, len(records), text)
@@ -73,14 +73,14 @@ def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporte
             face = faces.detect(srgb, last)
         last = face
         if last is not None:
-            found[record.name] = last
+            face_by_name[record.name] = last
     for record, following in zip(records[-2::-1], records[:0:-1], strict=True):
-        if record.name not in found and following.name in found:
-            face = faces.detect(images.read_srgb(folder / record.name), found[following.name])
+        if record.name not in face_by_name and following.name in face_by_name:
+            face = faces.detect(images.read_srgb(folder / record.name), face_by_name[following.name])
             if face is not None:
-                found[record.name] = face
+                face_by_name[record.name] = face
         report.check()
-    return found
+    return face_by_name
 
 
 def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray,

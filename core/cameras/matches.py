@@ -66,7 +66,7 @@ def tracks(matches: Matches) -> list[list[tuple[str, int]]]:
     links = np.concatenate(links)
     _, label = connected_components(coo_array((np.ones(len(links)), links.T), (total, total)), directed=False)
     owner = np.repeat(np.arange(len(names)), [len(matches.keypoints[name]) for name in names])
-    found: dict[int, list[tuple[str, int]]] = {}
+    components: dict[int, list[tuple[str, int]]] = {}
     for node in np.unique(links):
-        found.setdefault(int(label[node]), []).append((names[owner[node]], int(node - start[names[owner[node]]])))
-    return [track for track in found.values() if len({name for name, _ in track}) == len(track) > 1]
+        components.setdefault(int(label[node]), []).append((names[owner[node]], int(node - start[names[owner[node]]])))
+    return [track for track in components.values() if len({name for name, _ in track}) == len(track) > 1]

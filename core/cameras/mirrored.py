@@ -81,14 +81,14 @@ def _minority(relation: dict[tuple[str, str], int], suspects: list[str], trusted
 def _beside(features: tuple, face: faces.Face, flip: bool, size: tuple[int, int]) -> tuple:
     """Those of a picture's features that do not lie on the head; size: width and height of the picture that the face
     was found in."""
-    points, values = features
+    points, descriptors = features
     x0, y0, x1, y1 = face.box
     w, h = x1 - x0, y1 - y0
     x0, x1 = (size[0] - x1, size[0] - x0) if flip else (x0, x1)
     at = points / min(1.0, LONG_SIDE_PX / max(size))
     off = ((at[:, 0] < x0 - 0.6 * w) | (at[:, 0] > x1 + 0.6 * w) | (at[:, 1] < y0 - 0.7 * h) if len(points)
            else np.zeros(0, bool))
-    return points[off], values[off]
+    return points[off], descriptors[off]
 
 
 def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -97,10 +97,10 @@ def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
     grey = images.resize(srgb @ np.array([0.299, 0.587, 0.114], np.float32), round(srgb.shape[1] * scale),
                          round(srgb.shape[0] * scale))
     grey = np.ascontiguousarray((np.clip(grey[:, ::-1] if flip else grey, 0, 1) * 255).astype(np.uint8))
-    points, values = cv2.SIFT_create(MOST_FEATURES, contrastThreshold=0.02).detectAndCompute(grey, None)
-    if values is None:
+    points, descriptors = cv2.SIFT_create(MOST_FEATURES, contrastThreshold=0.02).detectAndCompute(grey, None)
+    if descriptors is None:
         return np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)
-    described = np.sqrt(values / np.maximum(values.sum(1, keepdims=True), 1e-9))
+    described = np.sqrt(descriptors / np.maximum(descriptors.sum(1, keepdims=True), 1e-9))
     return np.array([point.pt for point in points], np.float32), described
 
 
@@ -108,11 +108,11 @@ def _agreeing(a: tuple, b: tuple) -> int:
     """How many matches between two pictures lie on one epipolar geometry."""
     if min(len(a[0]), len(b[0])) < LEAST_MATCHES:
         return 0
-    found = [pair[0] for pair in cv2.BFMatcher(cv2.NORM_L2).knnMatch(a[1], b[1], k=2) if len(pair) == 2
-             and pair[0].distance < 0.8 * pair[1].distance]
-    if len(found) < LEAST_MATCHES:
+    matches = [pair[0] for pair in cv2.BFMatcher(cv2.NORM_L2).knnMatch(a[1], b[1], k=2) if len(pair) == 2
+               and pair[0].distance < 0.8 * pair[1].distance]
+    if len(matches) < LEAST_MATCHES:
         return 0
     cv2.setRNGSeed(0)
-    _, good = cv2.findFundamentalMat(a[0][[m.queryIdx for m in found]], b[0][[m.trainIdx for m in found]],
+    _, good = cv2.findFundamentalMat(a[0][[m.queryIdx for m in matches]], b[0][[m.trainIdx for m in matches]],
                                      cv2.FM_RANSAC, 1.5, 0.999)
     return 0 if good is None else int(good.sum())

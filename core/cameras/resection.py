@@ -88,11 +88,11 @@ def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, r
 def _trusted(names: list[str], matches: Matches, used: list) -> bool:
     """Whether every frame is held by tracks, and they are a good part of all that matches: chance agreements are few
     among many."""
-    held = Counter(name for track in used for name, _ in track)
+    track_counts = Counter(name for track in used for name, _ in track)
     track_of = {member: number for number, track in enumerate(used) for member in track}
     pairs = [(a, b, index) for (a, b), index in matches.pairs.items() if a in names and b in names]
     agree = [track_of.get((a, i), -1) == track_of.get((b, j), -2) for a, b, index in pairs for i, j in index.tolist()]
-    return all(held[name] >= ENOUGH_TRACKS for name in names) and np.mean(agree) > AGREED_SHARE
+    return all(track_counts[name] >= ENOUGH_TRACKS for name in names) and np.mean(agree) > AGREED_SHARE
 
 
 def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -> Bundle:
@@ -192,7 +192,7 @@ def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: 
     match."""
     marks = len(template_landmarks().mean)
     place = {member: bundle.points[marks + i] for i, track in enumerate(used) for member in track}
-    found = {}
+    poses = {}
     for name in sorted(set(group_of) - set(names)):
         points, pixels = [], []
         for (first, second), index in matches.pairs.items():
@@ -212,8 +212,8 @@ def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: 
         if good and inliers is not None and len(inliers) >= LEAST_MATCHES:
             turn, shift = cv2.solvePnPRefineLM(np.array(points)[inliers[:, 0]], np.array(pixels)[inliers[:, 0]], matrix,
                                                None, turn, shift)
-            found[name] = cv2.Rodrigues(turn)[0], shift[:, 0]
-    return found
+            poses[name] = cv2.Rodrigues(turn)[0], shift[:, 0]
+    return poses
 
 
 def _model(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], seen: Observations,

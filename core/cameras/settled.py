@@ -116,12 +116,12 @@ def _with_others(cameras: HeadCameras, room: pycolmap.Reconstruction, everything
     the room if they show too few."""
     alone, bundle, tracks = cameras.model, cameras.bundle, cameras.tracks
     names = [image.name for image in registered]
-    found = {image.name: pose_of(image) for image in alone.images.values()}
+    pose_by_name = {image.name: pose_of(image) for image in alone.images.values()}
     points = np.array([alone.points3D[number].xyz for number in sorted(alone.points3D)])
-    bundle = replace(bundle, rotations=np.array([found[name].rotation.matrix() for name in names]),
-                     translations=np.array([found[name].translation for name in names]),
+    bundle = replace(bundle, rotations=np.array([pose_by_name[name].rotation.matrix() for name in names]),
+                     translations=np.array([pose_by_name[name].translation for name in names]),
                      points=np.concatenate([bundle.points[:len(bundle.points) - len(points)], points]))
-    others = [image for image in everything if image.name not in found]
+    others = [image for image in everything if image.name not in pose_by_name]
     groups = [{"names": [image.name for image in others if image.camera_id == number], "width": camera.width,
                "height": camera.height, "lens": number}
               for number, camera in sorted(room.cameras.items())]
@@ -212,9 +212,9 @@ def _with_poses(bundle: Bundle, model: pycolmap.Reconstruction, names: list[str]
     The world stays the head's."""
     shown = Counter(name for track in tracks for name, _ in track)
     firm = np.array([shown[name] >= LEAST_MATCHES for name in names])
-    found = {image.name: pose_of(image) for image in model.images.values()}
-    rotations = np.array([found[name].rotation.matrix() for name in names])
-    translations = np.array([found[name].translation for name in names])
+    pose_by_name = {image.name: pose_of(image) for image in model.images.values()}
+    rotations = np.array([pose_by_name[name].rotation.matrix() for name in names])
+    translations = np.array([pose_by_name[name].translation for name in names])
     centres, before = (-np.einsum("nij,ni->nj", r, t)
                        for r, t in ((rotations, translations), (bundle.rotations, bundle.translations)))
     scale, turn, shift = similarity(centres[firm], before[firm], np.ones(int(firm.sum())))

@@ -102,14 +102,14 @@ def place_others(model: pycolmap.Reconstruction, database: Path, names: Sequence
 def _points_of(model: pycolmap.Reconstruction, matched: list[tuple[int, np.ndarray]]) -> dict[int, int]:
     """Point -> keypoint of the frame that shows it, by the matches with mapped frames; each keypoint and each point
     once."""
-    found, taken = {}, set()
+    keypoints, taken = {}, set()
     for one, index in matched:
         seen = model.images[one].points2D
         for theirs, own in index:
-            if seen[theirs].has_point3D() and own not in taken and seen[theirs].point3D_id not in found:
-                found[seen[theirs].point3D_id] = int(own)
+            if seen[theirs].has_point3D() and own not in taken and seen[theirs].point3D_id not in keypoints:
+                keypoints[seen[theirs].point3D_id] = int(own)
                 taken.add(own)
-    return found
+    return keypoints
 
 
 def _place(model: pycolmap.Reconstruction, image: pycolmap.Image, keypoints: np.ndarray, points: dict[int, int],

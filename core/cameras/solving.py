@@ -72,14 +72,15 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
     """Raises Problem with what is wrong, as precisely as can be told."""
     records = frames.records
     few = len(records) <= FEW_PHOTOGRAPHS
-    found = find_landmarks(records if few else _spread(records), capture.frames, report)
-    if frames.kind == VIDEO and not few and surroundings_stay(found, capture.frames):
-        asked = spread_over(records)
+    face_by_name = find_landmarks(records if few else _spread(records), capture.frames, report)
+    if frames.kind == VIDEO and not few and surroundings_stay(face_by_name, capture.frames):
+        to_place = spread_over(records)
         report.log(f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in "
-                   f"{len(asked)} of {len(records)} frames.")
-        found = find_landmarks(_spread(asked), capture.frames, report)
-        return replace(_solve(Frames(asked, frames.kind), found, capture, settings, report, stood=True), to_place=asked)
-    return _solve(frames, found, capture, settings, report)
+                   f"{len(to_place)} of {len(records)} frames.")
+        face_by_name = find_landmarks(_spread(to_place), capture.frames, report)
+        return replace(_solve(Frames(to_place, frames.kind), face_by_name, capture, settings, report, stood=True),
+                       to_place=to_place)
+    return _solve(frames, face_by_name, capture, settings, report)
 
 
 def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, settings: Settings, report: Reporter,

@@ -65,12 +65,12 @@ def _share_that_stays(one: tuple, other: tuple, face: faces.Face, turned: faces.
     off = ~_on_head(at / scale, face) & ~_on_head(at / scale, turned)
     if off.sum() < LEAST_MATCHES:
         return None
-    there, found, _ = cv2.calcOpticalFlowPyrLK(first, second, corners[off], None)
+    there, tracked, _ = cv2.calcOpticalFlowPyrLK(first, second, corners[off], None)
     back, again, _ = cv2.calcOpticalFlowPyrLK(second, first, there, None)
     moved = np.linalg.norm((there - corners[off]).reshape(-1, 2), axis=1)
     still = moved < STILL_DIAGONAL_SHARE * np.hypot(*first.shape)
     returned = np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1)
-    sure = (found.ravel() > 0) & (again.ravel() > 0) & (returned < 1)
+    sure = (tracked.ravel() > 0) & (again.ravel() > 0) & (returned < 1)
     return float((still & sure).mean())
 
 

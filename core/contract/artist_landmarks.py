@@ -59,7 +59,7 @@ def put(capture: Capture, points: Mapping) -> dict[int, tuple[float, float, floa
 
 
 def _checked(points: Mapping, whose: str) -> dict[int, tuple[float, float, float]]:
-    found = {}
+    landmarks = {}
     for key, point in points.items():
         index = _index(key, whose)
         try:
@@ -69,8 +69,8 @@ def _checked(points: Mapping, whose: str) -> dict[int, tuple[float, float, float
         if not all(abs(v) <= FARTHEST_M for v in (x, y, z)):  # false for nan, too
             raise Problem(f"{whose}: landmark {index} is at {point!r:.60}, which is no place on the head.",
                           "Give x, y and z in metres; the origin lies between the eyes.")
-        found[index] = (x, y, z)
-    return found
+        landmarks[index] = (x, y, z)
+    return landmarks
 
 
 def _index(key, whose: str) -> int:

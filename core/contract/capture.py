@@ -281,18 +281,18 @@ class Capture:
 
     def check_free(self) -> None:
         """Raises Problem naming the worker that works here, if one does; a dead process's lock does not count."""
-        found = lease.holder(self.lock)
-        if found is not None:
-            raise lease.refuse(found, self.lock)
+        holder = lease.holder(self.lock)
+        if holder is not None:
+            raise lease.refuse(holder, self.lock)
 
     @contextlib.contextmanager
     def locked(self, tell: Callable[[str], None] = lambda text: None):
         """Keeps every other worker out, and clears away what killed ones left. Raises Problem naming who works here,
         and for a folder that is no capture; `tell` hears of a longer wait (lease.hold)."""
         self.claim()
-        with contextlib.ExitStack() as held:
+        with contextlib.ExitStack() as stack:
             try:
-                held.enter_context(lease.hold(self.root, tell))
+                stack.enter_context(lease.hold(self.root, tell))
                 ownership.clear_leftovers(self.root)
             except OSError as error:
                 raise storage_problem(error, self.root) from error

@@ -85,13 +85,13 @@ def _written_fields(kind: type[ast.AST]) -> list[tuple[str, str]]:
 def _closure(module: str, core: Path) -> dict[str, Module]:
     """File relative to core/ -> module, for the module itself and all it imports, in order of name."""
     first = _file_of(core, module.split(".")[1:])
-    found, waiting = {}, [first]
+    closure, waiting = {}, [first]
     while waiting:
         file = waiting.pop()
-        if file not in found:
-            found[file] = _read_module(core, file, (core / file).stat().st_mtime_ns)
-            waiting += found[file].imports
-    return dict(sorted(found.items()))
+        if file not in closure:
+            closure[file] = _read_module(core, file, (core / file).stat().st_mtime_ns)
+            waiting += closure[file].imports
+    return dict(sorted(closure.items()))
 
 
 @cache

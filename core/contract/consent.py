@@ -81,9 +81,9 @@ def answer(capture: Capture, content: str, preview: bool) -> Path:
 
 def lines(plan: Sending, translated=str) -> list[str]:
     """What the artist is told, whole sentences; `translated` looks a template up."""
-    values = {"pictures": f"{len(plan.frames)} frame{'' if len(plan.frames) == 1 else 's'}", "company": service.COMPANY,
+    fields = {"pictures": f"{len(plan.frames)} frame{'' if len(plan.frames) == 1 else 's'}", "company": service.COMPANY,
               "host": plan.host, "website": service.WEBSITE, "credits": service.amount(plan.credits), "kept": plan.kept}
-    return [translated(line).format(**values) for line in (*TOLD, *([TOLD_AGAIN] if plan.kept else []))]
+    return [translated(line).format(**fields) for line in (*TOLD, *([TOLD_AGAIN] if plan.kept else []))]
 
 
 def give(capture: Capture, plan: Sending) -> None:

@@ -87,13 +87,13 @@ def delete(capture: Capture) -> Deletion:
     cannot be deleted."""
     _require(capture)
     with capture.locked():
-        found = plan(capture)
+        deletion = plan(capture)
         try:
             # which says whose the others are
-            for inside in sorted(found.going, key=lambda inside: PurePosixPath(inside).name == PROVENANCE):
+            for inside in sorted(deletion.going, key=lambda inside: PurePosixPath(inside).name == PROVENANCE):
                 if inside not in ownership.BOOKS:
                     (capture.root / inside).unlink(missing_ok=True)
-            for folder in sorted({folder for inside in (*found.going, *FOLDERS) for folder in _folders(inside)},
+            for folder in sorted({folder for inside in (*deletion.going, *FOLDERS) for folder in _folders(inside)},
                                  reverse=True):
                 with contextlib.suppress(OSError):  # it is not there, or somebody's files are in it
                     (capture.root / folder).rmdir()
@@ -104,7 +104,7 @@ def delete(capture: Capture) -> Deletion:
             raise storage_problem(error, capture.root) from error
     with contextlib.suppress(OSError):  # somebody's files are in it
         capture.root.rmdir()
-    return found
+    return deletion
 
 
 def _is_ours(capture: Capture, path: Path, inside: str) -> bool:

@@ -74,12 +74,12 @@ def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> 
     the source for the first stage."""
     names = (*stage.reads, *stage.optional_reads,
              *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
-    found = {name: _digest(hash_artefact(root, record, name)) for name in names}
-    found |= {f"{stage.name}.{name}": _digest(_hash_place(name, path))
-              for name, path in result_paths(getattr(settings, stage.name)).items()}
+    hashes = {name: _digest(hash_artefact(root, record, name)) for name in names}
+    hashes |= {f"{stage.name}.{name}": _digest(_hash_place(name, path))
+               for name, path in result_paths(getattr(settings, stage.name)).items()}
     if not stage.reads:
-        found[SOURCE] = record.get("source_stamp", [])
-    return found
+        hashes[SOURCE] = record.get("source_stamp", [])
+    return hashes
 
 
 def _hash_place(name: str, path: str) -> dict[str, str] | str:

@@ -63,8 +63,8 @@ def holder(path: Path) -> dict | None:
     """Who holds the lease in the file `path`, as far as can be told at once: None where nobody does, or a process that
     has ended."""
     _refuse_stranger(path)
-    found = _read(path)
-    return None if found is None or found and is_gone(found) else found
+    lease_holder = _read(path)
+    return None if lease_holder is None or lease_holder and is_gone(lease_holder) else lease_holder
 
 
 def refuse(found: dict, path: Path, what: str = "capture") -> Problem:
@@ -130,14 +130,14 @@ def _wait_out(path: Path, tell: Callable[[str], None], what: str) -> tuple[dict,
     _refuse_stranger(path)
     first, began, told = _stamp(path), time.monotonic(), False
     while True:
-        found = _read(path)
-        if found is None or found and is_gone(found):
-            return None if found is None else (found, first)
-        if _stamp(path) != first or found and is_at_work(found):
-            raise refuse(_read(path) or found, path, what)
+        lease_holder = _read(path)
+        if lease_holder is None or lease_holder and is_gone(lease_holder):
+            return None if lease_holder is None else (lease_holder, first)
+        if _stamp(path) != first or lease_holder and is_at_work(lease_holder):
+            raise refuse(_read(path) or lease_holder, path, what)
         waited = time.monotonic() - began
         if waited > TERM_S:
-            return found, first
+            return lease_holder, first
         if waited > 1 and not told:
             tell(f"Looking whether the worker that holds this {what} is still at work ...")
             told = True
@@ -168,9 +168,9 @@ def _take_over(lease: Lease, expired: dict, stamp: tuple | None) -> None:
 def _clear(succession: Path) -> None:
     """Waits a moment for whoever is taking the lease over; removes what one that was killed in the middle of it has
     left."""
-    found, stamp, began = _read(succession), _stamp(succession), time.monotonic()
+    lease_holder, stamp, began = _read(succession), _stamp(succession), time.monotonic()
     while _stamp(succession) == stamp and stamp is not None:
-        if found and is_gone(found) or time.monotonic() - began > TERM_S:
+        if lease_holder and is_gone(lease_holder) or time.monotonic() - began > TERM_S:
             succession.unlink(missing_ok=True)
             return
         time.sleep(LOOK_S / 10)
@@ -179,8 +179,8 @@ def _clear(succession: Path) -> None:
 def _clear_asides(path: Path) -> None:
     """Removes what one that was killed while it took a lease over has left beside it, of processes that have ended."""
     for left in path.parent.glob(f"{path.name}.*"):
-        found = _read(left)
-        if found and is_gone(found):
+        lease_holder = _read(left)
+        if lease_holder and is_gone(lease_holder):
             left.unlink(missing_ok=True)
 
 
@@ -195,10 +195,10 @@ def _refresh(lease: Lease, ended: threading.Event) -> None:
 def _read(path: Path) -> dict | None:
     """What the file says; {} where it is empty or half written, None where it is not there."""
     try:
-        found = json.loads(require_regular(path).read_bytes())
-        if isinstance(found, dict) and "start" in found:  # by WildCap 0.1.0
-            found["since"] = found.pop("start")
-        return found if isinstance(found, dict) and {"host", "pid", "since"} <= found.keys() else {}
+        content = json.loads(require_regular(path).read_bytes())
+        if isinstance(content, dict) and "start" in content:  # by WildCap 0.1.0
+            content["since"] = content.pop("start")
+        return content if isinstance(content, dict) and {"host", "pid", "since"} <= content.keys() else {}
     except FileNotFoundError:
         return None
     except (OSError, ValueError, RecursionError):

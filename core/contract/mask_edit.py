@@ -42,9 +42,9 @@ def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     chosen = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
     files = {name: hash_artefact(capture.root, record, name) for name in (*stage.reads, *stage.optional_reads)
              if "mask" not in name}
-    found = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
+    inputs = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
     return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest()
-            for name, value in found.items()}
+            for name, value in inputs.items()}
 
 
 def _stored(path: Path) -> dict | None:

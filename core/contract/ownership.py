@@ -217,10 +217,10 @@ def _was_left_before(inside: str) -> bool:
     """Whether a path is a temporary one of 0.1.0's, for a file or a folder that it wrote. Others have files of such
     names, too."""
     path = PurePosixPath(inside)
-    found = LEFT_BEFORE.fullmatch(path.name)
-    if not found:
+    name_match = LEFT_BEFORE.fullmatch(path.name)
+    if not name_match:
         return False
-    final = str(path.with_name(found["old"] or found["stem"] + (found["suffix"] or "")))
+    final = str(path.with_name(name_match["old"] or name_match["stem"] + (name_match["suffix"] or "")))
     return any(fnmatch.fnmatchcase(final, each) or PurePosixPath(final) in PurePosixPath(each).parents
                for each in FIRST_FORMAT)
 

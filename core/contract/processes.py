@@ -84,8 +84,8 @@ def _ask_beginning(pid: int) -> str:
         # Linux: clock ticks since the machine was started
         return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2].split()[19].decode()
     with contextlib.suppress(OSError, subprocess.SubprocessError):
-        asked = subprocess.run(["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, timeout=5)
-        return asked.stdout.strip()
+        completed = subprocess.run(["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, timeout=5)
+        return completed.stdout.strip()
     return ""
 
 

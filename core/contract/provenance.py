@@ -66,13 +66,13 @@ def packages() -> dict[str, str]:
     listed = HERE.parent / "requirements" / "worker.txt"
     names = (re.findall(r"^([A-Za-z0-9_-]+)==", listed.read_text(encoding="utf-8"), flags=re.MULTILINE)
              if listed.is_file() else [])
-    found = {}
+    versions = {}
     for name in names:
         try:
-            found[name] = metadata.version(name)
+            versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
-    return found
+    return versions
 
 
 def sha256(path: Path, tick: Callable[[], None]) -> str:
@@ -87,12 +87,12 @@ def sha256(path: Path, tick: Callable[[], None]) -> str:
 def _sources(source: Path | None, record: dict, tick: Callable[[], None]) -> list[dict]:
     """The video or the photographs: name, size and hash; without the hash where they are not there any more, or have
     changed since."""
-    found = []
+    sources = []
     for name, size, known in record.get("source_stamp", []):
         file = source / name if source is not None and source.is_dir() else source
         there = file is not None and same_source([[name, size, known]], hash_source(file))
-        found.append({"name": name, "bytes": size, "sha256": sha256(file, tick) if there else "not there any more"})
-    return found
+        sources.append({"name": name, "bytes": size, "sha256": sha256(file, tick) if there else "not there any more"})
+    return sources
 
 
 def _stage(done: dict) -> dict:
@@ -108,13 +108,13 @@ def _weights(record: dict, settings: Settings, tick: Callable[[], None]) -> list
     them, from their cards."""
     read = [name for stage in stages.STAGES if stage.name in record["stages"] for name in data_files(stage.module)]
     names = dict.fromkeys(name for name in read if name.endswith(".safetensors"))
-    found = []
+    networks = []
     for name in names:
         file, card = HERE / name, (HERE / name).with_suffix(".json")
         told = json.loads(card.read_text(encoding="utf-8")) if card.is_file() else {}
         if file.is_file():
             said = {key: told[key] for key in ("licence", "data", "command", "notices") if key in told}
-            found.append({"name": file.name, "sha256": sha256(file, tick), **said})
+            networks.append({"name": file.name, "sha256": sha256(file, tick), **said})
     if settings.solve.prior:
-        found.append({"name": "the authors' prior, from a folder of the artist's", "licence": "its authors'"})
-    return found
+        networks.append({"name": "the authors' prior, from a folder of the artist's", "licence": "its authors'"})
+    return networks

@@ -42,22 +42,22 @@ def findings(record: dict) -> list[dict]:
     First the problem that stopped the chain, if any, then what the stages found, in their order.
     """
     stopped = record.get("stopped")
-    found = ([{"stage": stopped["stage"], "problem": stopped["problem"], "remedy": stopped["remedy"], "frames": [],
-               "stopped": True}] if stopped else [])
+    faults = ([{"stage": stopped["stage"], "problem": stopped["problem"], "remedy": stopped["remedy"], "frames": [],
+                "stopped": True}] if stopped else [])
     for name in stages.NAMES:
         here = record["stages"].get(name, {}).get("findings", [])
         if stopped and stopped["stage"] == name:
             here = here + stopped["findings"]
-        found += [{"stage": name, **finding, "stopped": False} for finding in here]
-    return found
+        faults += [{"stage": name, **finding, "stopped": False} for finding in here]
+    return faults
 
 
 def _doctor(record: dict) -> str:
     """The section on what is wrong with the video and how to shoot it again."""
-    found = findings(record)
-    if not found:
+    faults = findings(record)
+    if not faults:
         return ""
-    items = "".join(map(_finding, found))
+    items = "".join(map(_finding, faults))
     return f'<section id="doctor"><h2>What is wrong with this capture</h2><ul>{items}</ul></section>'
 
 

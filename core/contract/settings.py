@@ -79,7 +79,7 @@ def preset(quality: str) -> Settings:
     """The settings of a quality preset. Raises Problem for an unknown name."""
     if quality not in _PRESETS:
         raise Problem(f"There is no quality named {quality!r}.", f"Choose one of {', '.join(QUALITIES)}.")
-    return from_json({stage: values for stage, values in _PRESETS[quality].items()})
+    return from_json({stage: overrides for stage, overrides in _PRESETS[quality].items()})
 
 
 def to_json(settings: Settings) -> dict:
@@ -150,9 +150,9 @@ def find_setting(name: str) -> Field:
 def tooltips(kind: type) -> dict[str, str]:
     """Field name -> the docstring under it, in one line, read from the class's source."""
     body = ast.parse(inspect.getsource(kind)).body[0].body
-    found = {}
+    docstrings = {}
     for node, following in zip(body, body[1:], strict=False):
         described = isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant)
         if isinstance(node, ast.AnnAssign) and described:
-            found[node.target.id] = " ".join(following.value.value.split())
-    return found
+            docstrings[node.target.id] = " ".join(following.value.value.split())
+    return docstrings

@@ -39,9 +39,9 @@ def makers(record: dict, steps: Iterable[Stage]) -> list[Stage]:
     step itself writes does not count."""
     gone, steps = hashes_of(record), tuple(steps)
     wanted = {name for step in steps for name in (*step.reads, *step.optional_reads)}
-    found: list[Stage] = []
+    stages: list[Stage] = []
     for stage in reversed(STAGES):
         if stage not in steps and any(name in gone and name in wanted for name in stage.writes):
-            found.insert(0, stage)
+            stages.insert(0, stage)
             wanted |= {*stage.reads, *stage.optional_reads}
-    return found
+    return stages

@@ -93,18 +93,18 @@ def slim(capture: Capture, settings: Settings) -> Slimming:
     deleted."""
     plan(capture, settings)  # before the lock makes a capture of what is none
     with capture.locked():
-        found = plan(capture, settings)
-        if found.hashes:
-            capture.keep_hashes(found.hashes)
+        removal = plan(capture, settings)
+        if removal.hashes:
+            capture.keep_hashes(removal.hashes)
         try:
-            for inside in found.going:
+            for inside in removal.going:
                 (capture.root / inside).unlink(missing_ok=True)
             for name in stages.SLIMMED:
                 if name in slimmed.hashes_of(capture.read()):
                     ownership.remove_empty_folders(capture.root / name)
         except OSError as error:
             raise storage_problem(error, capture.root) from error
-    return found
+    return removal
 
 
 def lines(found: Slimming, capture: Capture) -> list[str]:

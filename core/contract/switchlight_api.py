@@ -83,12 +83,12 @@ def keep_key() -> None:
 def key() -> str:
     """The artist's key. Raises Problem where there is none, or it cannot be one; its text is never part of a
     message."""
-    found = (os.environ.get(KEY_VARIABLE) or _kept).strip()
-    if not found:
+    api_key = (os.environ.get(KEY_VARIABLE) or _kept).strip()
+    if not api_key:
         raise Problem("SwitchLight needs a key, and there is none.",
                       f"Get one at {WEBSITE} and put it into the extension's preferences, or into the environment "
                       f"variable {KEY_VARIABLE}.")
-    if not (found.isascii() and found.isprintable()) or " " in found:
+    if not (api_key.isascii() and api_key.isprintable()) or " " in api_key:
         raise Problem("This is no key of SwitchLight: it holds spaces or other characters that no key has.",
                       f"Copy it again from {WEBSITE}.")
-    return found
+    return api_key

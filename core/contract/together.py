@@ -22,18 +22,18 @@ def captures_in(named: str) -> list[Path]:
     if not named:
         return []
     folder = Path(named).expanduser()
-    found = [folder] if (folder / RECORD).is_file() else sorted(path.parent for path in folder.glob(f"*/{RECORD}"))
-    if not found:
+    captures = [folder] if (folder / RECORD).is_file() else sorted(path.parent for path in folder.glob(f"*/{RECORD}"))
+    if not captures:
         raise Problem(f"{folder} is no capture, and holds none.",
                       "Name the folder of another capture of the same person, usually NAME.wildcap.")
-    return found
+    return captures
 
 
 def hash_told(named: str) -> dict[str, str] | str:
     """Hash by capture and file of all that a solve reads of the captures that a setting names; of what is no capture,
     of all there is."""
     try:
-        found = captures_in(named)
+        roots = captures_in(named)
     except Problem:
         return hash_tree(Path(named), sample_file)
-    return {f"{root.name}/{name}": hash_file(root / name) for root in found for name in TOLD if (root / name).is_file()}
+    return {f"{root.name}/{name}": hash_file(root / name) for root in roots for name in TOLD if (root / name).is_file()}

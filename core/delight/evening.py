@@ -44,8 +44,8 @@ def even_out(head: LitHead, views: list[View], looks: list[ShadingEstimate]) -> 
         return looks
     surface = head.head.unfold(UV_TEXELS)
     texel = np.flatnonzero(surface.covered)
-    found = [_opinion(surface, view, look) for view, look in zip(views, looks, strict=True)]
-    opinions, weights = (np.stack(part) for part in zip(*found, strict=True))
+    per_view = [_opinion(surface, view, look) for view, look in zip(views, looks, strict=True)]
+    opinions, weights = (np.stack(arrays) for arrays in zip(*per_view, strict=True))
     level = estimate_exposures(opinions, weights)
     mean = robust_mean(opinions - level[:, None], weights)
     known = np.zeros(UV_TEXELS**2, np.float32)
@@ -69,10 +69,10 @@ def _opinion(surface: Unfolded, view: View, look: ShadingEstimate) -> tuple[np.n
     inside = ((at > 1) & (at < side - 1)).all(1) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
     seen = np.flatnonzero((cosine > 0.2) & inside)
     seen = seen[visible_from(surface.caster, points[seen], normals[seen], view.centre)]
-    values, weight = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
-    values[seen] = sample(look.log - look.shading, at[seen])
+    log_albedo, weight = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
+    log_albedo[seen] = sample(look.log - look.shading, at[seen])
     weight[seen] = cosine[seen] ** 2
-    return values, weight
+    return log_albedo, weight
 
 
 def _agreeing(head: LitHead, look: ShadingEstimate, albedo: np.ndarray, known: np.ndarray) -> ShadingEstimate:

@@ -81,7 +81,7 @@ def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
         look, log = _look_at_view(net, view, head)
         looks.append(look)
         fitted.append(log)
-    skins, hair = ([_seen(head, values, look) for look in looks] for values in (head.skin, head.hair))
+    skins, hair = ([_seen(head, shares, look) for look in looks] for shares in (head.skin, head.hair))
     return Answers(head, views, even_out(head, views, looks), fitted, skins, hair)
 
 
@@ -162,8 +162,8 @@ def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
     device = next(net.parameters()).device
     both = torch.from_numpy(np.stack([layers, mirrored])).to(device, memory_format=torch.channels_last)
     shading, shadow = net(both)
-    shading, shadow = ((part[0] + part[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2
-                       for part in (shading, shadow.sigmoid()))
+    shading, shadow = ((output[0] + output[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2
+                       for output in (shading, shadow.sigmoid()))
     small = cv2.resize(images.srgb_to_linear(picture), (SIDE_PX // 2, SIDE_PX // 2), interpolation=cv2.INTER_AREA)
     return ShadingEstimate(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, MIN_LINEAR)))
 
@@ -194,7 +194,7 @@ def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = Non
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]
     within = np.minimum(at, size - at).min(1).reshape(srgb.shape[:2])  # pixels to the square's border
     inside = within >= 0
-    shading, shadow = (sample(part, at).reshape(*srgb.shape[:2], *part.shape[2:]) for part in (shading, shadow))
+    shading, shadow = (sample(layer, at).reshape(*srgb.shape[:2], *layer.shape[2:]) for layer in (shading, shadow))
     shadow = shadow * inside
     if fitted is not None:
         share = np.clip(within / (FADE_SHARE * size), 0, 1).astype(np.float32)

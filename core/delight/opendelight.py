@@ -35,7 +35,7 @@ def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Itera
     """The selected frames in which a face is found. Raises Problem where none is, and for a checkpoint that is none."""
     checkpoint = load(settings.delight.checkpoint, settings.compute_device)
     views = read_views(capture, selected_only=True)
-    face, found = None, 0
+    face, face_count = None, 0
     for i, view in enumerate(views):
         def step(i: int = i) -> None:
             report.progress(i, len(views), f"Delighting frame {i + 1} of {len(views)}")
@@ -46,11 +46,11 @@ def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Itera
         if face is None:
             report.log(f"No face was found in frame {view.name}; it is left out.")
             continue
-        found += 1
+        face_count += 1
         yield Delit(view, delight_face(srgb, face, checkpoint, settings.compute_device, step))
-    report.figure("frames_without_face", len(views) - found)
+    report.figure("frames_without_face", len(views) - face_count)
     report.figure("detail_enhanced", checkpoint.enhancer is not None)
-    if not found:
+    if not face_count:
         raise Problem("OpenDelight found no face in any of the selected frames.", "Choose another delighter.")
 
 

@@ -55,7 +55,7 @@ def _read(path: Path, shapes: Callable, fault: Callable[[dict], str], device: st
                  if name not in state] + [f"{name} is not part of it" for name in state if name not in wanted]
         wrong += [f"{name} is {_size(state[name].shape)}, not {_size(shape)}" for name, shape in wanted.items()
                   if name in state and state[name].shape != shape]
-        wrong += [found] if (found := fault(state)) else []
+        wrong += [defect] if (defect := fault(state)) else []
     except (KeyError, IndexError, TypeError, AttributeError) as error:
         what = error.args[0] if isinstance(error, KeyError) else "its first tensors"
         wrong = [f"{what} is missing or of another kind"]

@@ -185,10 +185,10 @@ def _positions(side: int, width: int) -> Tensor:
 
 def _count(state: State, name: str, stride: int) -> int:
     """How many layers of that name follow each other from 0 in steps of `stride`."""
-    found = 0
-    while name.format(found * stride) in state:
-        found += 1
-    return found
+    count = 0
+    while name.format(count * stride) in state:
+        count += 1
+    return count
 
 
 def _norm(state: State, name: str, x: Tensor) -> Tensor:

@@ -89,8 +89,8 @@ def _without_doubts(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     seen = np.isfinite(shares[..., :1]).sum(0)
     mean = np.nansum(shares, 0) / np.maximum(seen, 1)
     for name in ("beard", "hair"):
-        part = ASKED.index(name)
-        mean[:, part] = keep_present(mean[:, part])
+        column = ASKED.index(name)
+        mean[:, column] = keep_present(mean[:, column])
     present = (mean > 0).any(0)
     return np.nansum(shares * present, -1) > 0.5, mean
 

@@ -65,21 +65,21 @@ def albedo(account: Account, data: bytes, suffix: str, preview: bool, silence_s:
     boundary = uuid.uuid4().hex
     request = _request(account, service.ALBEDO, _multipart(boundary, data, suffix, service.form(preview)))
     request.add_header("Content-Type", f"multipart/form-data; boundary={boundary}")
-    found = _answer(account, request, silence_s, time.monotonic() + call_s, stopped)
-    if not is_whole_png(found):
-        raise _refusal(account, 200, found) or AgainError("an answer that is no whole picture", spoiled=True)
-    return found
+    answer = _answer(account, request, silence_s, time.monotonic() + call_s, stopped)
+    if not is_whole_png(answer):
+        raise _refusal(account, 200, answer) or AgainError("an answer that is no whole picture", spoiled=True)
+    return answer
 
 
 def balance(account: Account, silence_s: float = 10.0) -> float | None:
     """Credits left on the account, None where the service does not say. Raises Problem where it refuses the key or
     cannot be reached at all."""
     try:
-        found = json.loads(_answer(account, _request(account, service.CREDITS), silence_s, time.monotonic() + silence_s,
+        reply = json.loads(_answer(account, _request(account, service.CREDITS), silence_s, time.monotonic() + silence_s,
                                    lambda: False))
         for name in service.BALANCE:
-            found = found[name]
-        return float(found)
+            reply = reply[name]
+        return float(reply)
     except AgainError as error:
         if not error.reached:
             raise Problem(f"SwitchLight cannot be used now: {error.reason}. Nothing was sent.",
@@ -162,14 +162,14 @@ def _answer(account: Account, request: urllib.request.Request, silence_s: float,
 
 def _read(response, end: float, stopped: Callable[[], bool]) -> bytes:
     parts = []
-    while part := response.read1(1 << 16):
-        parts.append(part)
+    while chunk := response.read1(1 << 16):
+        parts.append(chunk)
         if time.monotonic() > end or stopped():
             raise TimeoutError
-    found, told = b"".join(parts), response.headers.get("Content-Length")
-    if told is not None and len(found) != int(told):
-        raise http.client.IncompleteRead(b"", int(told) - len(found))
-    return found
+    body, told = b"".join(parts), response.headers.get("Content-Length")
+    if told is not None and len(body) != int(told):
+        raise http.client.IncompleteRead(b"", int(told) - len(body))
+    return body
 
 
 def _start(error: urllib.error.HTTPError) -> bytes:
@@ -198,8 +198,8 @@ def _refusal(account: Account, status: int, body: bytes) -> Problem | None:
 def _said(body: bytes) -> str:
     """What a JSON answer has to say, in one line; '' for none."""
     try:
-        found = json.loads(body)
-        text = found.get("message") or found.get("detail") or found.get("error") or found
+        answer = json.loads(body)
+        text = answer.get("message") or answer.get("detail") or answer.get("error") or answer
     except (ValueError, AttributeError):
         return ""
     return " ".join((text if isinstance(text, str) else json.dumps(text)).split())[:200].rstrip(".")

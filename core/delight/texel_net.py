@@ -90,8 +90,8 @@ def _place(side: int, device: torch.device) -> tuple[torch.Tensor, torch.Tensor]
     v, u = (np.mgrid[0:side, 0:side] + 0.5) * 2 / side - 1
     masks = [template.mask(name, side) for name in ("brows", "lips", "eyes", "nostrils")]
     layers = np.stack([*masks, np.abs(u), v]).astype(np.float32)
-    return tuple(torch.from_numpy(part.astype(np.float32)).to(device)
-                 for part in (layers[None], template.mask("face", side)))
+    return tuple(torch.from_numpy(array.astype(np.float32)).to(device)
+                 for array in (layers[None], template.mask("face", side)))
 
 
 class TexelNet(Trunk):

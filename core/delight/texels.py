@@ -119,5 +119,5 @@ def measure_border_distance(lit: np.ndarray) -> np.ndarray:
     from BORDER_TEXELS on, 0 where there is no sun."""
     if not lit.any() or lit.all():
         return np.zeros(lit.shape, np.float32)
-    within, beyond = (cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (lit, ~lit))
+    within, beyond = (cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5) for mask in (lit, ~lit))
     return np.tanh(np.where(lit, within, -beyond) * SIDE_TEXELS / len(lit) / BORDER_TEXELS).astype(np.float32)

@@ -57,11 +57,11 @@ def whole_head(capture: Capture, settings: Settings, report: Reporter, weights: 
                       "Choose Network or Shading to delight with.")
     head = fit_lit_head(filmed, views, report)
     texels = gather_texels(head, views, lambda done, of: report.progress(2 * of + done, 4 * of, READING))
-    found = predict_shading(net, texels)
-    found = Shading(found.log + np.log(_exposure(texels, found)), found.shadow, found.spread)
+    shading = predict_shading(net, texels)
+    shading = Shading(shading.log + np.log(_exposure(texels, shading)), shading.shadow, shading.spread)
     for i, view in enumerate(views):
         report.progress(3 * len(views) + i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
-        yield _delit(view, head, found)
+        yield _delit(view, head, shading)
 
 
 def read_answers(net: TexelNet, head: LitHead, views: list[View], looks: list[ShadingEstimate],
@@ -93,7 +93,7 @@ def predict_shading(net: TexelNet, texels: Texels) -> Shading:
     turned[:, 5] *= -1
     parts = net(*(torch.cat(pair).contiguous(memory_format=torch.channels_last)
                   for pair in ((layers, turned), (light, light.flip(-1)))))
-    shading, shadow, spread = ((part[0] + part[1].flip(-1)) / 2 for part in (parts[0], parts[1].sigmoid(), parts[2]))
+    shading, shadow, spread = ((batch[0] + batch[1].flip(-1)) / 2 for batch in (parts[0], parts[1].sigmoid(), parts[2]))
     return Shading((shading + middle[0]).permute(1, 2, 0).cpu().numpy(), shadow[0].cpu().numpy(),
                    spread.exp().cpu().numpy())
 

@@ -95,26 +95,26 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
     albedo."""
     delivery = capture.delivery
     if plan.what == "scan":
-        found = {HEAD_TILE: {"albedo": delivery / "scan_albedo.png", "lit": delivery / "scan_lit.png"}}
+        files = {HEAD_TILE: {"albedo": delivery / "scan_albedo.png", "lit": delivery / "scan_lit.png"}}
     elif plan.what == "own_mesh":
         numbers = [int(path.suffixes[-2][1:]) for path in sorted(delivery.glob("own_diffuse_albedo.????.png"))]
-        found = {number
+        files = {number
                  or HEAD_TILE: {name: delivery / f"own_{file}{f'.{number}' if number else ''}.png" for name, file in
                                 (("albedo", "diffuse_albedo"), ("normal", "normal"), ("specular", "specular_albedo"))}
                  for number in numbers or [0]}
     else:
         folder = _newest(capture)
-        found = {HEAD_TILE: {"albedo": folder / "diffuse_albedo.png", "normal": folder / "normal.png",
+        files = {HEAD_TILE: {"albedo": folder / "diffuse_albedo.png", "normal": folder / "normal.png",
                              "specular": folder / "specular_albedo.png", "displacement": delivery / "displacement.exr",
                              **{name: folder / f"{name}.png" for name in ("brows", "lashes", "beard")},
                              "clean": folder / "clean_albedo.png"}}
-    found = {tile: {name: path for name, path in paths.items() if path.is_file()} for tile, paths in found.items()}
-    if not all("albedo" in paths for paths in found.values()):
+    files = {tile: {name: path for name, path in paths.items() if path.is_file()} for tile, paths in files.items()}
+    if not all("albedo" in paths for paths in files.values()):
         raise Problem("This capture has no albedo for that mesh.", advise_again("transfer"))
-    if plan.what == "head" and settings.deliver.clean and "clean" not in found[HEAD_TILE]:
+    if plan.what == "head" and settings.deliver.clean and "clean" not in files[HEAD_TILE]:
         raise Problem("This capture has no albedo without hair.",
                       "Run the stage 4K Maps again, or deliver the albedo as it is.")
-    return found
+    return files
 
 
 def _newest(capture: Capture) -> Path:

@@ -49,9 +49,9 @@ class Sources:
     def channel(self, term: str) -> np.ndarray:
         """One channel float32 [S, S]: linear light of albedo, clean and lit, x, y, z of the normal in [-1, 1], stored
         values of the rest."""
-        name, _, part = term.partition(".")
-        if part:
-            return self._file(name)[..., "rgbxyz".index(part) % 3]
+        name, _, component = term.partition(".")
+        if component:
+            return self._file(name)[..., "rgbxyz".index(component) % 3]
         if term in ("0", "1"):
             return np.full((self.size, self.size), float(term), np.float32)
         if term in ("roughness", "smoothness"):
@@ -64,8 +64,8 @@ class Sources:
             level = np.clip(0.5 * self._file("specular") / max(self.mean, 1e-6), 0, 1)
             scale = {"level": 1.0, "weight": 2.0, "f0": 2 * F0, "unreal_specular": 2 * F0 / UNREAL_F0}[term]
             return (level * scale).astype(np.float32)
-        values = self._file(term)
-        return values / self.unit if term == "displacement" else values
+        pixels = self._file(term)
+        return pixels / self.unit if term == "displacement" else pixels
 
     def check(self, name: str) -> None:
         """Raises Problem for a file that is cut off or damaged, or no square."""

@@ -80,10 +80,10 @@ def presence(small: np.ndarray, usual: float, bare: np.ndarray, grows: np.ndarra
     stroked = cv2.dilate((small < -OUTSTANDING * usual).astype(np.float32), disc(AROUND / width))
     around = cv2.GaussianBlur(stroked, (0, 0), 4.0 / width)
     own = np.percentile(around[bare], 75) if bare.any() else 0.0
-    found = np.clip((around - own - STROKED[0]) / (STROKED[1] - STROKED[0]), 0, 1) * grows
-    if float((found * texel**2).sum()) < LEAST * float((grows * texel**2).sum()):
+    confidence = np.clip((around - own - STROKED[0]) / (STROKED[1] - STROKED[0]), 0, 1) * grows
+    if float((confidence * texel**2).sum()) < LEAST * float((grows * texel**2).sum()):
         return np.zeros_like(grows)
-    return found.astype(np.float32)
+    return confidence.astype(np.float32)
 
 
 def fine(light: np.ndarray, texel: float) -> np.ndarray:

@@ -110,14 +110,14 @@ def detect_others(srgb: np.ndarray, face: Face) -> list[Face]:
     """Every other face of an sRGB picture that both networks are sure of, the most prominent first."""
     image = np.clip(np.asarray(srgb, np.float32), 0, 1)
     x, y = _middle(face)
-    found = []
+    others = []
     for region in _detect_regions(image, 0.0):
         if np.hypot(region[0] - x, region[1] - y) > 0.5 * max(face.width, region[2] / 1.5):
             other = _landmarks(image, region)
             sure = other is not None and other.score > 0.8
             if sure and np.hypot(*np.subtract(_middle(other), (x, y))) > 0.5 * face.width:
-                found.append(other)
-    return found
+                others.append(other)
+    return others
 
 
 def prominence(face: Face, width: int, height: int) -> float:

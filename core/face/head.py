@@ -65,8 +65,8 @@ class Head:
     def unfold(self, size: int) -> Unfolded:
         face, bary = self.raster(size)
         inside = face >= 0
-        points, normals = (raster.interpolate(values, self.mesh.faces, face[inside], bary[inside])
-                           for values in (self.mesh.vertices, self.normals))
+        points, normals = (raster.interpolate(attribute, self.mesh.faces, face[inside], bary[inside])
+                           for attribute in (self.mesh.vertices, self.normals))
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), SHORTEST)
         return Unfolded(self, face, bary, _shared(points), _shared(normals))
 

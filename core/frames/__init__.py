@@ -179,17 +179,17 @@ def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photo
 
 
 def _report(capture: Capture, records: list[FrameRecord], dropped: list[str], report: Reporter) -> None:
-    found = [r for r in records if r.face_box]
-    yaws = [r.yaw_deg for r in found]
+    with_face = [r for r in records if r.face_box]
+    yaws = [r.yaw_deg for r in with_face]
     gains = np.array([r.gain for r in records])
     report.figure("frames", len(records))
     report.figure("frames_dropped_as_blurred", len(dropped))
     report.figure("frames_with_a_blink", sum(r.blink for r in records))
     report.figure("views_selected", sum(r.selected for r in records))
-    report.figure("share_with_face", round(len(found) / len(records), 3))
-    report.figure("median_sharpness", round(float(np.median([r.sharpness for r in found])), 4))
-    report.figure("median_blur", round(float(np.median([r.blur for r in found])), 3))
-    report.figure("face_width_px", round(float(np.median([r.face_box[2] - r.face_box[0] for r in found]))))
+    report.figure("share_with_face", round(len(with_face) / len(records), 3))
+    report.figure("median_sharpness", round(float(np.median([r.sharpness for r in with_face])), 4))
+    report.figure("median_blur", round(float(np.median([r.blur for r in with_face])), 3))
+    report.figure("face_width_px", round(float(np.median([r.face_box[2] - r.face_box[0] for r in with_face]))))
     report.figure("exposure_drift_percent", round(100 * float((gains.max(0) / gains.min(0)).max() - 1), 1))
     report.figure("yaw_from_deg", min(yaws))
     report.figure("yaw_to_deg", max(yaws))

@@ -59,17 +59,17 @@ def blurred(records: list[FrameRecord], around: int = 10) -> np.ndarray:
     usual = np.array([np.median(blur[max(0, i - around):i + around + 1]) for i in range(len(blur))])
     worse = np.where(blur > 0.55, blur - usual - 0.08, 0)
     most = max(0, min(len(blur) // 3, len(blur) - FEW))
-    found = np.zeros(len(blur), bool)
-    found[np.argsort(-worse, kind="stable")[:most]] = True
-    return found & (worse > 0)
+    worst = np.zeros(len(blur), bool)
+    worst[np.argsort(-worse, kind="stable")[:most]] = True
+    return worst & (worse > 0)
 
 
 def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, report: Reporter) -> None:
     """Reports a finding for each shortcoming of the kept frames; `dropped` names those left out as blurred. Raises
     Problem where it is not clear whose face is meant."""
-    found = [r for r in records if r.face_box]
+    with_face = [r for r in records if r.face_box]
     count, shots = len(records), "photographs" if photographs else "frames"
-    _other_faces(found, report)
+    _other_faces(with_face, report)
     if count < FEW:
         there = f"There are only {count} {shots}" if count > 1 else f"There is only one {shots[:-1]}"
         report.finding(f"{there}: expect a rough head with holes at the sides and a texture from few directions.",
@@ -79,9 +79,9 @@ def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, 
         report.finding(f"No face was found in {len(lost)} of {count} {shots}.",
                        "Keep the whole face in the picture all the time, upright and well lit.", lost)
     _angles(records, photographs, report)
-    _size(found, report)
-    _light(found, report)
-    _sharpness(found, dropped, count, shots, report)
+    _size(with_face, report)
+    _light(with_face, report)
+    _sharpness(with_face, dropped, count, shots, report)
 
 
 def _other_faces(found: list[FrameRecord], report: Reporter) -> None:

@@ -23,9 +23,9 @@ def blinks(openings: list[tuple[float, float] | None], times: list[float | None]
     opening = np.array([(np.nan, np.nan) if o is None else o for o in openings], float).reshape(-1, 2)
     seen = np.isfinite(opening[:, 0])
     time = np.zeros(len(opening)) if any(t is None for t in times) else np.array(times, float)
-    found = np.zeros(len(opening), bool)
+    blinking = np.zeros(len(opening), bool)
     for i in np.flatnonzero(seen):
         # above the middle: a blink may take a third of them
         usual = np.percentile(opening[seen & (np.abs(time - time[i]) <= AROUND_S)], 70, axis=0)
-        found[i] = (usual > OPEN).all() and (opening[i] < SHUT * usual).all()
-    return found
+        blinking[i] = (usual > OPEN).all() and (opening[i] < SHUT * usual).all()
+    return blinking

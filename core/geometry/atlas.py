@@ -72,16 +72,16 @@ def faults(mesh: Mesh) -> list[str]:
     if mesh.uvs is None:
         return ["It has no UVs, or some of its polygons have none."]
     of = tiles(mesh)
-    found = []
+    defects = []
     if of.min() < 0 or of[:, 0].max() > 9:
-        found.append("Some UVs lie left of, below or more than ten tiles right of the first tile.")
+        defects.append("Some UVs lie left of, below or more than ten tiles right of the first tile.")
     collapsed = (np.abs(_double_areas(mesh.uvs[mesh.face_uvs])) < 1e-12).mean()
     if collapsed > 0.05:
-        found.append(f"{100 * collapsed:.0f} percent of its triangles have no area in the UVs.")
+        defects.append(f"{100 * collapsed:.0f} percent of its triangles have no area in the UVs.")
     overlap = overlap_share(mesh)
     if overlap > MOST_OVERLAP_SHARE:
-        found.append(f"{100 * overlap:.0f} percent of its UVs overlap.")
-    return found
+        defects.append(f"{100 * overlap:.0f} percent of its UVs overlap.")
+    return defects
 
 
 def overlap_share(mesh: Mesh, size: int = CHECK_SIDE_TEXELS) -> float:
@@ -89,10 +89,10 @@ def overlap_share(mesh: Mesh, size: int = CHECK_SIDE_TEXELS) -> float:
     of = tiles(mesh)
     covered = doubled = 0
     for tile in np.unique(of, axis=0):
-        part = in_tile(mesh, tile, (of == tile).all(1))
-        first, _ = raster.rasterize_uv(part, size)
-        last, _ = raster.rasterize_uv(replace(part, faces=part.faces[::-1], face_uvs=part.face_uvs[::-1]), size)
-        last = np.where(last >= 0, len(part.faces) - 1 - last, -1)
+        patch = in_tile(mesh, tile, (of == tile).all(1))
+        first, _ = raster.rasterize_uv(patch, size)
+        last, _ = raster.rasterize_uv(replace(patch, faces=patch.faces[::-1], face_uvs=patch.face_uvs[::-1]), size)
+        last = np.where(last >= 0, len(patch.faces) - 1 - last, -1)
         covered += (first >= 0).sum()
         doubled += (first != last).sum()
     return float(doubled / max(covered, 1))

@@ -62,8 +62,8 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
     where = (atlas.tiles(whole) == np.asarray(tile)).all(1) & (True if painted is None else painted)
     tangent, hand = surfaces.tangents(whole)
     tangent, hand, normals = tangent[where], hand[where], vertex_normals(whole)
-    part = atlas.in_tile(whole, tile, where)
-    low, high = _rows(part, size)
+    patch = atlas.in_tile(whole, tile, where)
+    low, high = _rows(patch, size)
     uv = np.full((size, size, 2), np.nan, np.float32)
     turn = np.zeros((size, size), np.float32)
     mirrored, covered = np.zeros((size, size), bool), np.zeros((size, size), bool)
@@ -73,22 +73,22 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
         crossing = (high >= row) & (low <= end)
         if not crossing.any():
             continue
-        strip = atlas.in_tile(part, (0, 0), crossing)
+        strip = atlas.in_tile(patch, (0, 0), crossing)
         face, bary = raster.rasterize_uv(strip, size, (row, end))
         inside = face >= 0
         covered[row:end] = inside
         face, bary = np.flatnonzero(crossing)[face[inside]], bary[inside].astype(np.float64)
-        points = raster.interpolate(part.vertices, part.faces, face, bary)
-        t, b, n = surfaces.frames(normals, part.faces, tangent, hand, face, bary)
+        points = raster.interpolate(patch.vertices, patch.faces, face, bary)
+        t, b, n = surfaces.frames(normals, patch.faces, tangent, hand, face, bary)
         there, at = source.surface.partners(points, n, farthest)
-        found = there >= 0
-        read = (source.mesh.uvs[source.mesh.face_uvs[there[found]]] * at[found, :, None]).sum(1)
-        angle = _turn(source, there[found], at[found], t[found], b[found], n[found])
-        mirror = source.hand[there[found]] != hand[face[found]]
-        for array, values in ((uv, read), (turn, angle), (mirrored, mirror)):
+        matched = there >= 0
+        read = (source.mesh.uvs[source.mesh.face_uvs[there[matched]]] * at[matched, :, None]).sum(1)
+        angle = _turn(source, there[matched], at[matched], t[matched], b[matched], n[matched])
+        mirror = source.hand[there[matched]] != hand[face[matched]]
+        for array, samples in ((uv, read), (turn, angle), (mirrored, mirror)):
             view = array[row:end]
             flat = view[inside]
-            flat[found] = values
+            flat[matched] = samples
             view[inside] = flat
     return TexelPartners(uv, turn, mirrored, covered)
 
@@ -117,14 +117,14 @@ def bake_normals(packed: np.ndarray, at: TexelPartners) -> np.ndarray:
     """
     out = bake(packed, at)
     for row in range(0, len(out), STRIP_ROWS):
-        part = np.s_[row:row + STRIP_ROWS]
-        vectors = out[part] * 2 - 1
-        turn, known = at.turn[part], at.known[part]
-        x, y = vectors[..., 0].copy(), vectors[..., 1] * np.where(at.mirrored[part], -1, 1)
+        rows = np.s_[row:row + STRIP_ROWS]
+        vectors = out[rows] * 2 - 1
+        turn, known = at.turn[rows], at.known[rows]
+        x, y = vectors[..., 0].copy(), vectors[..., 1] * np.where(at.mirrored[rows], -1, 1)
         c, s = np.cos(turn), np.sin(turn)
         vectors[..., 0], vectors[..., 1] = c * x - s * y, s * x + c * y
         vectors = np.where(known[..., None], vectors, [0, 0, 1])
-        out[part] = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-6) * 0.5 + 0.5
+        out[rows] = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-6) * 0.5 + 0.5
     return bled(out, at)
 
 

@@ -47,12 +47,12 @@ def damaged(path: Path, what: str) -> Problem:
 
 def find_fault(vertices: np.ndarray, faces: np.ndarray, uvs: np.ndarray | None, face_uvs: np.ndarray | None) -> str:
     """What is wrong with the arrays of a Mesh, in a few words; '' where nothing is."""
-    for values, width, what in ((vertices, 3, "vertex"), (uvs, 2, "UV")):
-        if values is not None and (values.ndim != 2 or values.shape[1] != width):
+    for coordinates, width, what in ((vertices, 3, "vertex"), (uvs, 2, "UV")):
+        if coordinates is not None and (coordinates.ndim != 2 or coordinates.shape[1] != width):
             return f"not every {what} has {width} numbers"
         # false for NaN, too
-        sound = values is None or not values.size or (
-            values.min() >= -FARTHEST_UNITS and values.max() <= FARTHEST_UNITS)
+        sound = coordinates is None or not coordinates.size or (
+            coordinates.min() >= -FARTHEST_UNITS and coordinates.max() <= FARTHEST_UNITS)
         if not sound:
             return f"it has a {what} of values that are no numbers (NaN), infinite or beyond {FARTHEST_UNITS:g}"
     for indices, count, what in ((faces, len(vertices), "vertex"), (face_uvs, 0 if uvs is None else len(uvs), "UV")):

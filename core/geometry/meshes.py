@@ -218,13 +218,13 @@ def _corner(word: str, vertices: int, uvs: int, known: dict[str, tuple[int, int]
     `vertices` and `uvs` have been read so far, from which negative numbers count back. Raises ValueError for what is
     none."""
     vertex, uv = (word.split("/") + [""])[:2]
-    found = [int(text) - 1 if not text.startswith("-") else int(text) + count
-             for text, count in ((vertex, vertices), (uv or "0", uvs))]
-    if found[0] < 0 or uv and found[1] < 0:
+    indices = [int(text) - 1 if not text.startswith("-") else int(text) + count
+               for text, count in ((vertex, vertices), (uv or "0", uvs))]
+    if indices[0] < 0 or uv and indices[1] < 0:
         raise ValueError(word)
     if "-" not in word:
-        known[word] = found[0], found[1]
-    return found[0], found[1]
+        known[word] = indices[0], indices[1]
+    return indices[0], indices[1]
 
 
 def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:

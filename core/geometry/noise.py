@@ -26,8 +26,8 @@ def noise(points: np.ndarray, wavelength: float, rng: np.random.Generator, smoot
         # 1 / mean deviation
         return map_coordinates(lattice, at, np.float32, order=3, mode="grid-wrap", prefilter=False) * np.float32(3.03)
     node = np.floor(at)
-    part = at - node
-    at = node + part * part * (3 - 2 * part)
+    fraction = at - node
+    at = node + fraction * fraction * (3 - 2 * fraction)
     return map_coordinates(lattice, at, np.float32, order=1, mode="grid-wrap") * np.float32(1.57)
 
 

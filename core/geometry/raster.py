@@ -138,8 +138,8 @@ def render_view(caster: RayCaster, view: View, scale: float = 1.0) -> tuple[np.n
     pixels = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) * [view.width / width, view.height / height]
     directions = view.rays(pixels)
     hits = caster.first_hits(np.repeat(view.centre[None], len(directions), 0), directions)
-    for whole, part in zip((face, bary, distance), hits, strict=True):
-        whole[box] = part.reshape(*x.shape, *part.shape[1:])
+    for whole, patch in zip((face, bary, distance), hits, strict=True):
+        whole[box] = patch.reshape(*x.shape, *patch.shape[1:])
     return face, bary, distance
 
 

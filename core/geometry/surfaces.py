@@ -193,8 +193,8 @@ def frames(normals: np.ndarray, faces: np.ndarray, tangent: np.ndarray, hand: np
 
 def _angles(corners: np.ndarray) -> np.ndarray:
     """Angles [F, 3] at the corners [F, 3, 3] of triangles, radians."""
-    found = []
+    angles = []
     for i in range(3):
         a, b = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
-        found.append(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(1)))
-    return np.stack(found, 1)
+        angles.append(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(1)))
+    return np.stack(angles, 1)

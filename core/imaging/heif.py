@@ -73,7 +73,7 @@ def parse_exif(block: bytes) -> dict[int, float]:
     """Tag -> number, of the first folder and of EXIF's own; what is damaged is passed over."""
     start = 6 if block.startswith(b"Exif\0\0") else 0
     order = {b"II": "<", b"MM": ">"}.get(block[start:start + 2])
-    found: dict[int, float] = {}
+    tags: dict[int, float] = {}
     try:
         folders = [struct.unpack_from(order + "I", block, start + 4)[0]] if order else []
         for at in folders:  # grows by EXIF's folder, once
@@ -82,15 +82,15 @@ def parse_exif(block: bytes) -> dict[int, float]:
                 if tag == EXIF_FOLDER and len(folders) == 1:
                     folders.append(value)
                 elif kind == 3 and count == 1:
-                    found[tag] = float(struct.unpack_from(order + "H", block, start + at + 10 + 12 * i)[0])
+                    tags[tag] = float(struct.unpack_from(order + "H", block, start + at + 10 + 12 * i)[0])
                 elif kind == 4 and count == 1:
-                    found[tag] = float(value)
+                    tags[tag] = float(value)
                 elif kind == 5 and count == 1:
                     above, below = struct.unpack_from(order + "II", block, start + value)
-                    found[tag] = above / below if below else 0.0
+                    tags[tag] = above / below if below else 0.0
     except struct.error:
         pass
-    return found
+    return tags
 
 
 def focal_35mm(tags: dict[int, float], width: int, height: int) -> float | None:

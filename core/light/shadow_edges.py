@@ -52,10 +52,10 @@ def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: flo
     if not inside.any() or inside.all():
         return nothing
     box = _box(inside, (OUTWARD + 3 * WINDOW) / texel)
-    found = _place(np.clip(light[box], 0, 4).astype(np.float32), painted[box], weight[box].astype(np.float32), texel)
-    if found is None:
+    edge = _place(np.clip(light[box], 0, 4).astype(np.float32), painted[box], weight[box].astype(np.float32), texel)
+    if edge is None:
         return nothing
-    alpha, sure, colour = found
+    alpha, sure, colour = edge
     whole = Edge(painted.copy(), np.zeros_like(painted), colour)
     whole.alpha[box], whole.found[box] = alpha, sure
     return whole

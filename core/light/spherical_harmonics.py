@@ -40,12 +40,12 @@ def sh_basis(directions: Array, bands: Bands = ORTHONORMAL, axis: int = -1) -> A
     """
     one, *first, xy, yz, zz, xz, xx_yy = sh_polynomials(directions, axis)
     b0, b1, b2 = bands
-    values = [b0 * one, *(b1 * p for p in first), *(b2 * p for p in (xy, yz, zz / (2 * 3**0.5), xz, xx_yy / 2))]
+    harmonics = [b0 * one, *(b1 * p for p in first), *(b2 * p for p in (xy, yz, zz / (2 * 3**0.5), xz, xx_yy / 2))]
     if isinstance(directions, np.ndarray):
-        return np.stack(values, axis)
+        return np.stack(harmonics, axis)
     import torch  # who has a tensor has it loaded: for arrays numpy is enough
 
-    return torch.stack(values, axis)
+    return torch.stack(harmonics, axis)
 
 
 def sh_polynomials(directions: Array, axis: int = -1) -> list[Array]:

@@ -90,9 +90,9 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
         for i, direction in enumerate(candidates):
             step(i, len(candidates))
             cosine = np.maximum(normals @ direction, 0)
-            found = _expectation_maximisation(skin, cosine, reaches(direction), best[5] if spread else None)
-            if found[0] > best[0]:
-                best, best_direction = found, direction
+            fitted = _expectation_maximisation(skin, cosine, reaches(direction), best[5] if spread else None)
+            if fitted[0] > best[0]:
+                best, best_direction = fitted, direction
     if best[0] - none[0] <= SUN_GAIN * weights.sum():
         best, best_direction = none, np.array([0.0, 0.0, 1.0])
     cosine, visible = ((np.maximum(normals @ best_direction, 0), reaches(best_direction)) if best is not none

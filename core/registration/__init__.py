@@ -62,12 +62,12 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     given = artist_landmarks.read(capture.landmarks_artist)
     views = read_views(capture)
     surface = meshes.read_ply(capture.scan, or_points=True)
-    found = landmarks.find(views, report, STEPS)
+    face_marks = landmarks.find(views, report, STEPS)
     if not len(surface.faces):
-        subject = _subject(landmarks.with_artists(found, given), report)
+        subject = _subject(landmarks.with_artists(face_marks, given), report)
         _by_views(capture, settings, views, subject, report)
         return
-    subject = _subject(landmarks.with_artists(landmarks.onto_surface(found, views, surface), given), report)
+    subject = _subject(landmarks.with_artists(landmarks.onto_surface(face_marks, views, surface), given), report)
     photographs = read_frames(capture).kind == PHOTOGRAPHS
     try:
         head = _by_scan(capture, settings, views, surface, subject,
@@ -78,7 +78,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         if not photographs:
             raise
         report.log(f"{problem.problem} It is fitted without the scan.")
-        _by_views(capture, settings, views, _subject(landmarks.with_artists(found, given), report), report)
+        _by_views(capture, settings, views, _subject(landmarks.with_artists(face_marks, given), report), report)
 
 
 @dataclass(frozen=True)
@@ -107,12 +107,12 @@ def _subject(found: landmarks.Landmarks, report: Reporter) -> Subject:
 
 
 def _by_views(capture: Capture, settings: Settings, views: list[View], subject: Subject, report: Reporter) -> None:
-    model, found = subject.model, subject.found
+    model, face_marks = subject.model, subject.found
     fitted = unscanned.fit(model, _shown(capture, views, subject, report), report, 10, 0.9 * STEPS)
     placed = _as_bust(model.mesh, fitted.pose.apply(model.mesh.vertices))
     aligned = _as_bust(model.mesh, fitted.pose.apply(model.shape(fitted.coefficients)))
     head = model.mesh.moved(_finished(placed, aligned, fitted.vertices, report))
-    quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), found,
+    quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), face_marks,
                     subject.follow)
     quality.figures_of_views(report, fitted, views, head)
     quality.judge_views(head, fitted)
@@ -140,16 +140,16 @@ def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, repo
 
 def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject,
              least_share: float, report: Reporter) -> meshes.Mesh:
-    found, model = subject.found, subject.model
+    face_marks, model = subject.found, subject.model
     follow, shaped, trust = subject.follow, subject.shaped, subject.trust
     report.progress(10, STEPS, "placing the head")
-    pose, coefficients = alignment.fit_landmarks(model, found.points, trust)
+    pose, coefficients = alignment.fit_landmarks(model, face_marks.points, trust)
     report.progress(12, STEPS, "telling hair from skin")
     scan = Scan(hair.without_hair(surface, views, model.mesh.moved(pose.apply(model.shape(coefficients))), report))
     report.progress(15, STEPS, "finding the nearest head")
-    pose, coefficients = alignment.fit_scan(model, pose, coefficients, found.points, trust, scan, shaped)
+    pose, coefficients = alignment.fit_scan(model, pose, coefficients, face_marks.points, trust, scan, shaped)
     start = pose.apply(model.shape(coefficients))
-    targets = nonrigid.LandmarkTargets(found.points, trust, subject.hold, found.put)
+    targets = nonrigid.LandmarkTargets(face_marks.points, trust, subject.hold, face_marks.put)
 
     def tell(share: float) -> None:
         report.progress(20 + (0.6 * STEPS - 20) * share, STEPS, "fitting the head to the scan")
@@ -165,7 +165,7 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
 
     head = model.mesh.moved(vertices)
     distances = scan.distances(vertices[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
-    quality.figures(report, model, quality.HeadFit(head, aligned, coefficients, distances), found, follow)
+    quality.figures(report, model, quality.HeadFit(head, aligned, coefficients, distances), face_marks, follow)
     quality.judge(report, head, scan, distances, follow, least_share)
     _finish(capture, settings, views, head, subject, report)
     return head
@@ -189,24 +189,24 @@ def _finished(placed: meshes.Mesh, aligned: meshes.Mesh, vertices: np.ndarray, r
 
 def _finish(capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject,
             report: Reporter) -> None:
-    found = subject.found
+    face_marks = subject.found
     remove_file(capture.head_open)
     remove_file(capture.eyes)
-    if eyes.are_open(found.opening):
-        looks = eye_looks.look(views, found, report)
-        seen = eyeballs.fit(head, eyeballs.mark_rims(looks, head, found.opening, report), found.opening)
+    if eyes.are_open(face_marks.opening):
+        looks = eye_looks.look(views, face_marks, report)
+        seen = eyeballs.fit(head, eyeballs.mark_rims(looks, head, face_marks.opening, report), face_marks.opening)
         head = seen.head
         meshes.write_obj(capture.head_open, seen.opened.skin)
         write_eyes(capture, *seen.records())
         eyeballs.figures(report, seen)
         images.write_srgb(capture.picture("registration", "eyes"),
-                          drawing.eyes_overlay(views, found, looks, seen.opened))
+                          drawing.eyes_overlay(views, face_marks, looks, seen.opened))
     meshes.write_obj(capture.head, head)
-    write_json(capture.landmarks, landmarks.to_json(found))
+    write_json(capture.landmarks, landmarks.to_json(face_marks))
     own_template.run(capture, settings, head,
                      own_template.BuiltIn(subject.model, subject.follow, subject.shaped, subject.hold), report)
     images.write_srgb(capture.picture("registration", "wireframe"),
-                      drawing.overlay(drawing.three_views(views, found), head, found))
+                      drawing.overlay(drawing.three_views(views, face_marks), head, face_marks))
 
 
 def load_model() -> alignment.HeadModel:
@@ -226,8 +226,8 @@ def weights_of(model: alignment.HeadModel) -> tuple[np.ndarray, np.ndarray, np.n
     follow = _per_vertex(model.mesh, template.mask(FOLLOWED, 512))
     shaped = np.max([strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SHAPED.items()],
                     axis=0)
-    held = np.max([_per_vertex(model.mesh, template.mask(name, 512)) for name in HELD], axis=0)
-    return follow, shaped, 1 + 9 * (model.at_landmarks(held[:, None])[:, 0] > 0.3)
+    hold_mask = np.max([_per_vertex(model.mesh, template.mask(name, 512)) for name in HELD], axis=0)
+    return follow, shaped, 1 + 9 * (model.at_landmarks(hold_mask[:, None])[:, 0] > 0.3)
 
 
 def _per_vertex(mesh: meshes.Mesh, mask: np.ndarray) -> np.ndarray:

@@ -58,9 +58,9 @@ def _smooth(border: np.ndarray) -> np.ndarray:
     radius, angle = np.hypot(x, y), np.arctan2(y, x)
     steps = np.angle(np.exp(1j * (np.roll(angle, -1) - angle)))
     way = np.sign(steps.sum())
-    held = np.maximum(way * steps, LEAST_STEP * 2 * np.pi / len(border))
-    held *= 2 * np.pi / held.sum()
-    placed = way * np.append(0, np.cumsum(held[:-1]))
+    increments = np.maximum(way * steps, LEAST_STEP * 2 * np.pi / len(border))
+    increments *= 2 * np.pi / increments.sum()
+    placed = way * np.append(0, np.cumsum(increments[:-1]))
     placed += np.angle(np.exp(1j * (angle - placed)).mean())
     waves = np.concatenate([[np.ones(len(border))], *([np.cos(k * placed), np.sin(k * placed)]
                                                       for k in range(1, HARMONICS + 1))]).T

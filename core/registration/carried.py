@@ -35,8 +35,8 @@ def along(start: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.nda
     shift = np.zeros_like(start)
     shift[skin] = fitted - start[skin]
     final[others] += field(start[centres], shift[centres], start[others], report)
-    for part in np.unique(label[others]):
-        index = np.flatnonzero(label == part)
+    for component in np.unique(label[others]):
+        index = np.flatnonzero(label == component)
         if len(index) > 30 and _is_ball(start[index]):
             final[index] = similarity(start[index], final[index], np.ones(len(index))).apply(start[index])
     return final

@@ -96,13 +96,13 @@ def from_points(mesh: Mesh, follow: np.ndarray, points: np.ndarray, towards: np.
         return none()
     normals, index = vertex_normals(mesh), np.flatnonzero(follow > 0.02)
     near, nearest = cKDTree(mesh.vertices[index]).query(points, distance_upper_bound=2 * reach)
-    found = np.isfinite(near)
-    vertex = index[nearest[found]]
+    in_reach = np.isfinite(near)
+    vertex = index[nearest[in_reach]]
     direction = normals[vertex]
-    distance = ((points[found] - mesh.vertices[vertex]) * direction).sum(1)
-    aside = np.linalg.norm(points[found] - mesh.vertices[vertex] - distance[:, None] * direction, axis=1)
+    distance = ((points[in_reach] - mesh.vertices[vertex]) * direction).sum(1)
+    aside = np.linalg.norm(points[in_reach] - mesh.vertices[vertex] - distance[:, None] * direction, axis=1)
     spacing = np.median(np.linalg.norm(mesh.vertices[mesh.faces[:, 0]] - mesh.vertices[mesh.faces[:, 1]], axis=1))
-    facing = (towards[found] * direction).sum(1) > np.cos(np.radians(MOST_ANGLE_DEG))
+    facing = (towards[in_reach] * direction).sum(1) > np.cos(np.radians(MOST_ANGLE_DEG))
     good = (np.abs(distance) < reach) & (aside < 3 * spacing) & facing
     weight = np.clip(1 - (distance / reach) ** 2, 0, 1) ** 2 * follow[vertex]
     corners = np.repeat(vertex[:, None], 3, 1)

@@ -31,14 +31,14 @@ class Scan:
         A local patch (the mean of the nearest scan points, nearer ones counting more) takes out the scan's noise.
         """
         distance, index = self._tree.query(points, NEIGHBOURS, distance_upper_bound=farthest, workers=-1)
-        found = np.isfinite(distance)
-        distance, index = np.where(found, distance, 0), np.where(found, index, 0)
-        near = found * np.exp(-0.5 * ((distance - distance[:, :1]) / (1.5 * self.spacing)) ** 2)
+        in_reach = np.isfinite(distance)
+        distance, index = np.where(in_reach, distance, 0), np.where(in_reach, index, 0)
+        near = in_reach * np.exp(-0.5 * ((distance - distance[:, :1]) / (1.5 * self.spacing)) ** 2)
         total = np.maximum(near.sum(1, keepdims=True), 1e-12)
         centre = (self.points[index] * near[..., None]).sum(1) / total
         normal = (self.normals[index] * near[..., None]).sum(1) / total
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-        compatible = found[:, 0] & ((normal * normals).sum(1) > np.cos(np.radians(MOST_ANGLE_DEG)))
+        compatible = in_reach[:, 0] & ((normal * normals).sum(1) > np.cos(np.radians(MOST_ANGLE_DEG)))
         sideways = np.linalg.norm(points - centre - ((points - centre) * normal).sum(1, keepdims=True) * normal, axis=1)
         compatible &= sideways < 3 * self.spacing  # beyond: past the rim of a hole
         signed = ((centre - points) * normal).sum(1)

@@ -84,20 +84,20 @@ def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: floa
     openness = tuple(_openness(head, balls, side, rims[side], opening) for side in (0, 1))
     opened = lids.open_around(head, balls, openness)
     shift = np.zeros_like(opened.skin.vertices)
-    for side, found in enumerate(rims):
-        if found is not None:
-            shift += _towards_rims(opened, side, found)
-    radius = np.array([found.iris_radius if found is not None else np.nan for found in rims])
+    for side, rim in enumerate(rims):
+        if rim is not None:
+            shift += _towards_rims(opened, side, rim)
+    radius = np.array([rim.iris_radius if rim is not None else np.nan for rim in rims])
     return OpenEyes(head, lids.open_around(head, balls, openness, shift), openness, radius,
-                    tuple(found.views if found is not None else 0 for found in rims))
+                    tuple(rim.views if rim is not None else 0 for rim in rims))
 
 
 def _with_corners(head: Mesh, rims: tuple) -> Mesh:
     """The head with the corners of its eyes where they are seen, and the face close around along with them."""
     vertices = head.vertices.copy()
-    for found, (outer, inner) in zip(rims, lids.corners(), strict=True):
-        if found is not None:
-            for corner, aim in ((outer, found.upper[0]), (inner, found.upper[-1])):
+    for rim, (outer, inner) in zip(rims, lids.corners(), strict=True):
+        if rim is not None:
+            for corner, aim in ((outer, rim.upper[0]), (inner, rim.upper[-1])):
                 near = np.exp(-0.5
                               * (np.linalg.norm(head.vertices - head.vertices[corner], axis=1) / CORNER_REACH_M) ** 2)
                 vertices += near[:, None] * (aim - head.vertices[corner])

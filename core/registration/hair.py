@@ -56,7 +56,7 @@ def hidden_share(points: np.ndarray, normals: np.ndarray, views: list[View], hea
         there = facing & (depth > 0) & (at > 0).all(1) & (at < [view.width, view.height]).all(1)
         if visible is not None:
             there &= visible(view)
-        known, share = (raster.sample(part, at[there] * scale) for part in (parts.known(), parts.of("hair", "clothes")))
+        known, share = (raster.sample(mask, at[there] * scale) for mask in (parts.known(), parts.of("hair", "clothes")))
         total[there] += known
         votes[there] += known * share
     return np.where(total > 0.5, votes / np.maximum(total, 1e-9), np.nan)

@@ -40,10 +40,10 @@ def mended(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.nda
         if free.all():
             break
         moved = vertices - placed.vertices
-        part, rest = np.flatnonzero(free), np.flatnonzero(~free)
-        solved = spsolve(laplacian[part][:, part].tocsc(), -(laplacian[part][:, rest] @ moved[rest]))
-        moved[part] = solved.reshape(-1, 3)
-        vertices[part] = placed.vertices[part] + moved[part]
+        movable, rest = np.flatnonzero(free), np.flatnonzero(~free)
+        solved = spsolve(laplacian[movable][:, movable].tocsc(), -(laplacian[movable][:, rest] @ moved[rest]))
+        moved[movable] = solved.reshape(-1, 3)
+        vertices[movable] = placed.vertices[movable] + moved[movable]
     return vertices
 
 
@@ -52,9 +52,9 @@ def intersecting(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     corners = vertices[faces]
     centre = corners.mean(1)
     radius = np.linalg.norm(corners - centre[:, None], axis=-1).max(1)
-    found = cKDTree(centre).query_ball_point(centre, 2 * radius, workers=-1)
-    larger = np.repeat(np.arange(len(faces)), [len(f) for f in found])
-    smaller = np.concatenate([np.asarray(f, np.int64) for f in found])
+    neighbours = cKDTree(centre).query_ball_point(centre, 2 * radius, workers=-1)
+    larger = np.repeat(np.arange(len(faces)), [len(f) for f in neighbours])
+    smaller = np.concatenate([np.asarray(f, np.int64) for f in neighbours])
     order = (radius[smaller] < radius[larger]) | ((radius[smaller] == radius[larger]) & (smaller < larger))
     larger, smaller = larger[order], smaller[order]
     low, high = corners.min(1), corners.max(1)

@@ -49,9 +49,9 @@ def fit_iris(looks: list[EyeLook], ball: PosedEyeball) -> tuple[np.ndarray, floa
             off.append((inside - share) * np.sqrt(ball_share * INDEPENDENT / len(rays)) / SHARE_SIGMA)
         return np.concatenate(off)
 
-    found = least_squares(misses, start, diff_step=1e-3).x
-    middle, _, radius = placed(found)
-    return middle, float(radius), 1e-3 * found[3:]
+    solution = least_squares(misses, start, diff_step=1e-3).x
+    middle, _, radius = placed(solution)
+    return middle, float(radius), 1e-3 * solution[3:]
 
 
 def _rays(one: EyeLook) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:

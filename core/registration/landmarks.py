@@ -47,21 +47,21 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
 
     `steps` is the stage's total for the progress bar, of which detection is the first tenth.
     """
-    chosen, found, seen = spread(views, MOST_VIEWS), [], {}
+    chosen, detections, seen = spread(views, MOST_VIEWS), [], {}
     for i, view in enumerate(chosen):
         report.progress(0.1 * steps * i / len(chosen), steps, f"looking for the face in {view.name}")
         srgb = images.read_srgb(view.path)
         face = faces.detect(srgb)
         if face is not None:
             scale = np.array([view.width / srgb.shape[1], view.height / srgb.shape[0]])
-            found.append((view, face.landmarks[:, :2] * scale))
+            detections.append((view, face.landmarks[:, :2] * scale))
             seen[view.name] = (face.yaw_deg, *(eye.scaled(scale) for eye in faces.find_eyes(srgb, face)))
-    if len(found) < min(3 if len(chosen) > FEW_VIEWS else 2, len(chosen)):
-        raise Problem(f"A face was found in only {len(found)} of the {len(chosen)} frames that were looked at.",
+    if len(detections) < min(3 if len(chosen) > FEW_VIEWS else 2, len(chosen)):
+        raise Problem(f"A face was found in only {len(detections)} of the {len(chosen)} frames that were looked at.",
                       "Film the face larger, in better light and from the front too, then start again from the video.")
-    lifted = triangulate([view for view, _ in found], np.stack([pixels for _, pixels in found]))
+    lifted = triangulate([view for view, _ in detections], np.stack([pixels for _, pixels in detections]))
     if not np.isfinite(lifted.points).any():  # a single view, or several from one side
-        lifted = lift_alone(*min(found, key=lambda pair: abs(seen[pair[0].name][0])))
+        lifted = lift_alone(*min(detections, key=lambda pair: abs(seen[pair[0].name][0])))
     return replace(lifted,
                    opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in seen.values()]),
                    eyes=seen)

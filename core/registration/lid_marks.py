@@ -65,7 +65,7 @@ def _all_expected(looks: list[EyeLook], opened: lids.OpenHead, side: int, shift:
                   report: Reporter) -> list[np.ndarray]:
     """For each look the ball's share [SIDE, SIDE] of the crop's pixels as a head shows it that is moved by `shift`
     [3]."""
-    parts = [part.moved(part.vertices + shift) for part in (opened.skin, opened.balls[side].mesh)]
+    parts = [mesh.moved(mesh.vertices + shift) for mesh in (opened.skin, opened.balls[side].mesh)]
     caster, first = raster.RayCaster(joined(parts)), len(opened.skin.faces)
     y, x = (np.mgrid[0:SIDE * OVER, 0:SIDE * OVER] + 0.5) / OVER
     expected = []
@@ -87,7 +87,7 @@ def _offset(looks: list[EyeLook], expected: list[np.ndarray], centre: np.ndarray
         seen, move = one.shares.ball, one.shares.move
         if min(seen.sum(), share.sum()) < LEAST_SEEN_PX:
             continue
-        middles = np.array([[(part * x).sum() / part.sum(), (part * y).sum() / part.sum()] for part in (share, seen)])
+        middles = np.array([[(mask * x).sum() / mask.sum(), (mask * y).sum() / mask.sum()] for mask in (share, seen)])
         rays = one.view.rays((middles - move[:, 2]) @ np.linalg.inv(move[:, :2]).T)
         axes.append(one.view.rotation[:2])
         misses.append(axes[-1] @ (rays[1] - rays[0]) * np.linalg.norm(centre - one.view.centre))

@@ -75,10 +75,10 @@ def fit(model: HeadModel, start: np.ndarray, scan: Scan, follow: np.ndarray, tar
     vertices = start.copy()
     for step in range(iterations):
         progress(step / iterations)
-        part = step / max(iterations - 1, 1)
-        length = STIFF_M * (SOFT_M / STIFF_M) ** part
+        ramp = step / max(iterations - 1, 1)
+        length = STIFF_M * (SOFT_M / STIFF_M) ** ramp
         normals = vertex_normals(model.mesh.moved(vertices))
-        reach = FAR_M * (NEAR_M / FAR_M) ** part
+        reach = FAR_M * (NEAR_M / FAR_M) ** ramp
         signed, scan_normals = scan.match(vertices, normals, 1.5 * reach)
         data = trimmed(np.where(follow > 0.02, signed, np.nan), reach) * follow
         aim = vertices + scan_normals * np.nan_to_num(signed)[:, None]
@@ -90,7 +90,7 @@ def fit(model: HeadModel, start: np.ndarray, scan: Scan, follow: np.ndarray, tar
         seen = np.where(put, 0, marks @ data)[:, None]
         miss -= seen * (miss * surface).sum(1, keepdims=True) * surface  # in depth the scan knows better
         robust = 1 / (1 + (np.linalg.norm(miss, axis=1) / 0.005) ** 2)
-        pin = LANDMARK_AREA_M2[0] * (LANDMARK_AREA_M2[1] / LANDMARK_AREA_M2[0]) ** part * np.maximum(1, hold * part)
+        pin = LANDMARK_AREA_M2[0] * (LANDMARK_AREA_M2[1] / LANDMARK_AREA_M2[0]) ** ramp * np.maximum(1, hold * ramp)
         pin = np.where(known, pin * robust * trust * model.landmark_weight, 0)
 
         pin[put] = PUT_AREA_M2
@@ -115,7 +115,7 @@ def operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
     """Area of each vertex [V] in square metres, and the cotangent Laplacian [V, V] (integrated: divide by the area for
     a mean)."""
     count = len(mesh.vertices)
-    area, rows, columns, values = np.zeros(count), [], [], []
+    area, rows, columns, cotangents = np.zeros(count), [], [], []
     for i in range(3):
         a, b, c = (mesh.faces[:, (i + k) % 3] for k in range(3))
         u, v = mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a]
@@ -124,9 +124,9 @@ def operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
         rows.append(b)
         columns.append(c)
         # thin triangles must not turn stiffness into tearing
-        values.append(np.clip((u * v).sum(1) / double, 0.02, 5) / 2)
-    rows, columns, values = (np.concatenate(x) for x in (rows, columns, values))
-    half = sparse.coo_matrix((values, (rows, columns)), (count, count)).tocsr()
+        cotangents.append(np.clip((u * v).sum(1) / double, 0.02, 5) / 2)
+    rows, columns, cotangents = (np.concatenate(x) for x in (rows, columns, cotangents))
+    half = sparse.coo_matrix((cotangents, (rows, columns)), (count, count)).tocsr()
     weights = half + half.T
     floor = np.median(area[area > 0]) * 0.05
     return np.maximum(area, floor), (sparse.diags(np.asarray(weights.sum(1)).ravel()) - weights).tocsr()

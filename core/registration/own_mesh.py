@@ -63,9 +63,9 @@ def with_usable_uvs(own: OwnMesh, skin: np.ndarray, allowed: bool, size: int) ->
 
     Raises Problem, saying what is wrong with its UVs, unless a new atlas is `allowed`.
     """
-    part = replace(own.mesh, faces=own.mesh.faces[skin],
-                   face_uvs=None if own.mesh.face_uvs is None else own.mesh.face_uvs[skin])
-    wrong = atlas.faults(part)
+    skin_mesh = replace(own.mesh, faces=own.mesh.faces[skin],
+                        face_uvs=None if own.mesh.face_uvs is None else own.mesh.face_uvs[skin])
+    wrong = atlas.faults(skin_mesh)
     if not wrong:
         return own, "the artist's"
     if not allowed:
@@ -137,7 +137,7 @@ def _is_identity(path: Path) -> bool:
 
 
 def _numbers(path: Path) -> list:
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.stem.lower())]
+    return [int(token) if token.isdigit() else token for token in re.split(r"(\d+)", path.stem.lower())]
 
 
 def _positions(path: Path) -> np.ndarray:

@@ -102,12 +102,12 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     whole, index = surfaces.welded(own.mesh)
     first = np.full(len(whole.vertices), -1)
     first[index[::-1]] = np.arange(len(index))[::-1]  # an old vertex of each welded one
-    pose, found, pictures = render_landmarks.find(_outwards(whole), report)
+    pose, landmarks, pictures = render_landmarks.find(_outwards(whole), report)
     whole = _outwards(whole.moved(render_landmarks.to_ours(whole.vertices, pose)))
     shapes = (own.shapes[:, first] @ pose.turn.T.astype(np.float32)) * np.float32(render_landmarks.FACE_M / pose.width)
 
-    known = np.flatnonzero(np.isfinite(found.points).all(1))
-    seen = found.points[known]
+    known = np.flatnonzero(np.isfinite(landmarks.points).all(1))
+    seen = landmarks.points[known]
     # any side of the surface will do
     at, bary = surfaces.Surface(whole, 0.004).nearest(seen, np.tile([0.0, -1.0, 0.0], (len(seen), 1)), 0.02, -1.0)
     label = _components(whole)
@@ -118,14 +118,14 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     skin = Mesh(whole.vertices[used], np.searchsorted(used, whole.faces[label[whole.faces[:, 0]] == main]))
     good = (at >= 0) & (label[whole.faces[np.maximum(at, 0), 0]] == main)
     of_skin = np.cumsum(label[whole.faces[:, 0]] == main) - 1  # triangle of the whole -> of the skin
-    count, told = len(found.points), known[good]
+    count, told = len(landmarks.points), known[good]
     weight, marks_at, marks_bary = np.zeros(count), np.zeros(count, int), np.full((count, 3), 1 / 3)
-    weight[told], marks_at[told], marks_bary[told] = found.trust[told], of_skin[at[good]], bary[good]
+    weight[told], marks_at[told], marks_bary[told] = landmarks.trust[told], of_skin[at[good]], bary[good]
     model = alignment.HeadModel(skin, shapes[:, used], marks_at, marks_bary, weight)
 
     target = template.landmark_points(head)
     trust = template.landmark_weights().copy()
-    eyes = _open_eyes(found.points) != _open_eyes(target)
+    eyes = _open_eyes(landmarks.points) != _open_eyes(target)
     if eyes and not len(shapes):
         trust[list(LID_MARKS)] = 0
     report.progress(0, 1, "placing the artist's mesh")

@@ -56,7 +56,7 @@ def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, l
     pictures they were found in, sRGB. Raises Problem where no face is found."""
     pose = _find_pose(mesh, report)
     posed = mesh.moved(to_ours(mesh.vertices, pose))
-    colours, found, pictures = np.tile(SKIN, (len(mesh.vertices), 1)), None, []
+    colours, landmarks, pictures = np.tile(SKIN, (len(mesh.vertices), 1)), None, []
     caster, normals = raster.RayCaster(posed), vertex_normals(posed)
     for sides in (VIEWS_DEG[:5], VIEWS_DEG):
         for portrait in PORTRAIT_SIDES_FACE_WIDTHS:
@@ -75,9 +75,9 @@ def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, l
                 break
         else:
             raise _no_face()
-        found = onto_surface(triangulate(views, np.stack(pixels)), views, posed)
-        colours = _painted(posed, found.points)
-    return pose, found, pictures
+        landmarks = onto_surface(triangulate(views, np.stack(pixels)), views, posed)
+        colours = _painted(posed, landmarks.points)
+    return pose, landmarks, pictures
 
 
 def to_ours(points: np.ndarray, pose: Pose) -> np.ndarray:

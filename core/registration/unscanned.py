@@ -114,8 +114,8 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
     -------
     The fit, in the world of the views, metres.
     """
-    found = shown.landmarks
-    pose, coefficients = fit_landmarks(model, found.points, shown.trust)
+    landmarks = shown.landmarks
+    pose, coefficients = fit_landmarks(model, landmarks.points, shown.trust)
     start = model.mesh.moved(pose.apply(model.shape(coefficients)))
     constraints = _view_constraints(model, start, shown, lambda share, what: report.progress(
         first + 0.4 * (steps - first) * share, steps, what))
@@ -125,21 +125,21 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
         mesh = model.mesh.moved(pose.apply(model.shape(coefficients)))
         parts = constraints.of(mesh, np.interp(step, [0, ROUNDS - 1], REACH_M))
         rows = []
-        for name, part in parts.items():
-            basis = part.at(model.identity)  # [K, M, 3]
-            weight = part.weight * min(1.0, INDEPENDENT[name] / max(part.weight.sum(), 1)) / SIGMA_M[name] ** 2
-            rows.append((part.at(mesh.vertices), basis, part.direction, part.distance, weight))
+        for name, ties in parts.items():
+            basis = ties.at(model.identity)  # [K, M, 3]
+            weight = ties.weight * min(1.0, INDEPENDENT[name] / max(ties.weight.sum(), 1)) / SIGMA_M[name] ** 2
+            rows.append((ties.at(mesh.vertices), basis, ties.direction, ties.distance, weight))
         pose, coefficients = stepped(pose, coefficients, rows)
     vertices = pose.apply(model.shape(coefficients))
 
     def tell(step: int) -> None:
         report.progress(first + (steps - first) * (0.7 + 0.3 * step / STEPS), steps, "fitting the head to the views")
 
-    vertices = _relaxed(model, vertices, lambda mesh: constraints.of(mesh, REACH_M[1]), found, tell)
+    vertices = _relaxed(model, vertices, lambda mesh: constraints.of(mesh, REACH_M[1]), landmarks, tell)
     parts = constraints.of(model.mesh.moved(vertices), REACH_M[1])
-    return FittedHead(pose, coefficients, vertices, {name: len(part) for name, part in parts.items()},
-                      {name: float(np.median(np.abs(part.distance))) if len(part) else float("nan")
-                       for name, part in parts.items()})
+    return FittedHead(pose, coefficients, vertices, {name: len(ties) for name, ties in parts.items()},
+                      {name: float(np.median(np.abs(ties.distance))) if len(ties) else float("nan")
+                       for name, ties in parts.items()})
 
 
 def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, shown: ShownByViews, report: Reporter,
@@ -168,7 +168,7 @@ def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, sho
         report.progress(first + (steps - first) * (0.8 + 0.2 * step / STEPS), steps, "fitting the head beyond the scan")
 
     def told(mesh: Mesh) -> dict[str, Constraints]:
-        return {name: part for name, part in constraints.of(mesh, REACH_M[0]).items() if name != "landmarks"}
+        return {name: ties for name, ties in constraints.of(mesh, REACH_M[0]).items() if name != "landmarks"}
 
     return _relaxed(model, vertices, told, shown.landmarks, tell, np.where(on_scan, HELD, PULL))
 
@@ -195,19 +195,19 @@ def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks,
         tick(step)
         length = STIFF_M * (SOFT_M / STIFF_M) ** (step / (STEPS - 1))
         matrix, right = length**4 * bending + sparse.diags(pull * area), np.zeros_like(start)
-        for name, part in constraints(model.mesh.moved(vertices)).items():
-            if not len(part):
+        for name, ties in constraints(model.mesh.moved(vertices)).items():
+            if not len(ties):
                 continue
-            weight = part.weight * min(MOST_AREA_M2, AREA_M2[name] / max(part.weight.sum(), 1e-9))
-            picked = sparse.coo_matrix((part.bary.ravel(), (np.repeat(np.arange(len(part)), 3), part.corners.ravel())),
-                                       (len(part), len(start))).tocsr()
+            weight = ties.weight * min(MOST_AREA_M2, AREA_M2[name] / max(ties.weight.sum(), 1e-9))
+            picked = sparse.coo_matrix((ties.bary.ravel(), (np.repeat(np.arange(len(ties)), 3), ties.corners.ravel())),
+                                       (len(ties), len(start))).tocsr()
             matrix = matrix + picked.T @ sparse.diags(weight) @ picked
-            aim = picked @ (vertices - start) + part.direction * part.distance[:, None]
+            aim = picked @ (vertices - start) + ties.direction * ties.distance[:, None]
             right += picked.T @ (weight[:, None] * aim)
         if found.put.any():
-            held = sparse.diags(np.where(found.put, nonrigid.PUT_AREA_M2, 0.0))
-            matrix = matrix + anchors.T @ held @ anchors
-            right += anchors.T @ (held @ (np.nan_to_num(found.points) - anchors @ start))
+            pins = sparse.diags(np.where(found.put, nonrigid.PUT_AREA_M2, 0.0))
+            matrix = matrix + anchors.T @ pins @ anchors
+            right += anchors.T @ (pins @ (np.nan_to_num(found.points) - anchors @ start))
         solver = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                       options={"SymmetricMode": True})
         vertices = start + solver.solve(right)

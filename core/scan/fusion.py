@@ -81,14 +81,14 @@ def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float,
     # a cube counts when all its corners are known: at an unknown one there is no crossing, but a curtain
     for axis in range(3):
         known &= np.roll(known, -1, axis)
-    found = _surface(field, known, low, voxel)
-    return (None if found is None
-            else Fused(found[0], float((at_surface & ~agreeing).sum() / max(at_surface.sum(), 1)), found[1]))
+    surface = _surface(field, known, low, voxel)
+    return (None if surface is None
+            else Fused(surface[0], float((at_surface & ~agreeing).sum() / max(at_surface.sum(), 1)), surface[1]))
 
 
 def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel: float) -> np.ndarray:
     """Flat indices of the blocks that any map's surface comes within the truncation of."""
-    found = np.zeros(shape, bool)
+    occupied = np.zeros(shape, bool)
     for seen in maps:
         y, x = np.nonzero(np.isfinite(seen.depth[::2, ::2]))
         z = seen.depth[::2, ::2][y, x]
@@ -96,8 +96,8 @@ def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel
                           (2 * y + 0.5 + seen.origin[1]) * z / seen.focal, z], -1)
         cell = np.floor((local @ seen.rotation + seen.centre - low) / (voxel * SIDE)).astype(int)
         cell = cell[((cell >= 0) & (cell < shape)).all(1)]
-        found[tuple(cell.T)] = True
-    return np.flatnonzero(binary_dilation(found, np.ones((3, 3, 3), bool)))
+        occupied[tuple(cell.T)] = True
+    return np.flatnonzero(binary_dilation(occupied, np.ones((3, 3, 3), bool)))
 
 
 def _integrate(seen: DepthMap, points: np.ndarray, voxel: float, precision: float, sums: np.ndarray) -> None:
@@ -105,8 +105,8 @@ def _integrate(seen: DepthMap, points: np.ndarray, voxel: float, precision: floa
     the voxels [3, N] or just behind."""
     cosine = _cosine(seen)
     for first in range(0, points.shape[1], VOXELS):
-        part = np.s_[:, first:first + VOXELS]
-        _integrate_part(seen, cosine, points[part], voxel, precision, sums[part])
+        chunk = np.s_[:, first:first + VOXELS]
+        _integrate_part(seen, cosine, points[chunk], voxel, precision, sums[chunk])
 
 
 def _integrate_part(seen: DepthMap, cosine: np.ndarray, points: np.ndarray, voxel: float, precision: float,

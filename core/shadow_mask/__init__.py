@@ -70,9 +70,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         seen = over_brows(lift_shadows(head, *shadow_frames(capture, settings, source), report), evidence.judged,
                           evidence.brows) > 0.5
     report.progress(7, 8, "Looking for shadows in the texture")
-    found = propose(evidence, seen, settings.shadow_mask.sensitivity, settings.shadow_mask.dilate_px)
-    images.write_data(capture.shadow_mask_auto, np.clip(images.resize(found.mask, width, width), 0, 1))
-    _leave_figures(capture, report, source or "nothing", evidence, found)
+    proposal = propose(evidence, seen, settings.shadow_mask.sensitivity, settings.shadow_mask.dilate_px)
+    images.write_data(capture.shadow_mask_auto, np.clip(images.resize(proposal.mask, width, width), 0, 1))
+    _leave_figures(capture, report, source or "nothing", evidence, proposal)
 
 
 @dataclass(frozen=True)
@@ -105,10 +105,10 @@ def still_dark(texture: np.ndarray, normals: np.ndarray, judged: np.ndarray, ski
     """bool [S, S]: shadow in a linear texture [S, S, 3] with unit normals [S, S, 3]; judged, skin bool [S, S]: what is
     looked at, and plain skin."""
     odds = np.full(judged.shape, -12.0)
-    found, _, step = find_shadow(texture[judged], normals[judged], skin[judged])
+    log_odds, _, step = find_shadow(texture[judged], normals[judged], skin[judged])
     if not step.any():
         return np.zeros_like(judged)
-    odds[judged] = found
+    odds[judged] = log_odds
     # what is not skin follows its neighbours
     return cohere(np.where(skin, np.clip(odds + 6 * (sensitivity - 0.5), -12, 12), 0), judged)
 

@@ -70,11 +70,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         # the split knows its places on the built-in head
         evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), free_recipe(recipe)
     _check_often(prior, report)
-    part = (solve_edited(capture, head, settings, recipe, prior, evidence, report) if settings.edited_part
-            and elsewhere is None else None)
-    if part is not None:
-        iris.measure_irises(capture, head, part[0].diffuse, report)
-        _leave_figures(capture, evidence, *part, report)
+    edited = (solve_edited(capture, head, settings, recipe, prior, evidence, report) if settings.edited_part
+              and elsewhere is None else None)
+    if edited is not None:
+        iris.measure_irises(capture, head, edited[0].diffuse, report)
+        _leave_figures(capture, evidence, *edited, report)
         return
     conditions = mask_edit.conditions(capture, settings)
     witness = (lambda marks: confirm_marks(capture, head, marks, evidence.size)) if elsewhere is None else list
@@ -90,10 +90,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
                       drawing.draw_edges_and_marks(evidence, start.alpha, start.marks))
     stored = capture.checkpoints / "solve.safetensors"
     state = _sampled(capture, settings, start, denoiser, stored, _key(evidence, settings, start), report)
-    result, found = _finished(denoiser, state, evidence, start, settings.seed, report)
+    result, solution = _finished(denoiser, state, evidence, start, settings.seed, report)
     delivered = (result if elsewhere is None
                  else elsewhere.returned(result, known, state.lights, start.exposure, start.tone))
-    maps.write_maps(capture, delivered, found, conditions)
+    maps.write_maps(capture, delivered, solution, conditions)
     iris.measure_irises(capture, head, delivered.diffuse, report)
     comparison.write_comparison(capture, known, delivered.diffuse)
     maps.write_preview(capture, state, start.observations, report)

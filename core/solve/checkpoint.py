@@ -109,7 +109,7 @@ def _save(path: Path, tensors: dict[str, torch.Tensor], metadata: dict[str, str]
             save_file(tensors, temporary, metadata=metadata)
         except SafetensorError as error:
             # which tells the system's error in words alone: "No space left on device (os error 28)"
-            found = re.search(r"os error (\d+)", str(error))
-            number = int(found[1]) if found else 0
+            code_match = re.search(r"os error (\d+)", str(error))
+            number = int(code_match[1]) if code_match else 0
             raise (OSError(0, str(error), str(path), number) if os.name == "nt"
                    else OSError(number, str(error), str(path))) from error

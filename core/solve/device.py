@@ -37,12 +37,12 @@ class Proof:
 @cache
 def prove() -> Proof:
     """The first device that computes what the CPU computes, and faster; the CPU where none does."""
-    found = list_devices()
-    if not found:
+    devices = list_devices()
+    if not devices:
         return Proof("cpu", "PyTorch finds no graphics card that it can use.")
     expected, cpu_s = run_pass("cpu")
     reasons = []
-    for device in found:
+    for device in devices:
         try:
             result, seconds = run_pass(device)
         except Exception as error:  # whatever a driver says: the CPU is there

@@ -40,12 +40,12 @@ def draw_loss_curve(losses: list[tuple[int, float]], steps: int) -> np.ndarray:
     so far; a line at every tenfold."""
     height, width = CURVE_PX
     picture = np.full((height, width, 3), 0.12, np.float32)
-    values = np.log10(np.maximum([loss for _, loss in losses], 1e-6))
-    low, high = float(values.min()) - 0.05, float(values.max()) + 0.05
+    log_losses = np.log10(np.maximum([loss for _, loss in losses], 1e-6))
+    low, high = float(log_losses.min()) - 0.05, float(log_losses.max()) + 0.05
     for decade in range(int(np.ceil(low)), int(np.floor(high)) + 1):
         row = round((high - decade) / (high - low) * (height - 1))
         picture[row] = 0.3
     points = [(round((step - 1) / max(steps - 1, 1) * (width - 1)), round((high - value) / (high - low) * (height - 1)))
-              for (step, _), value in zip(losses, values, strict=True)]
+              for (step, _), value in zip(losses, log_losses, strict=True)]
     cv2.polylines(picture, [np.array(points, np.int32)], False, LAID_RGB, 2, cv2.LINE_AA)
     return picture

@@ -40,26 +40,26 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     try:
         if earlier is None:
             raise ValueError(obstacle or "What the last solve left behind is damaged.")
-        part = find_window(earlier.painted, evidence.alpha, grid_cells(cell), prior.multiple, REFERENCE_TEXELS)
+        window = find_window(earlier.painted, evidence.alpha, grid_cells(cell), prior.multiple, REFERENCE_TEXELS)
     except ValueError as reason:
         report.log(f"The whole map is solved. {reason}")
         return None
     began = time.monotonic()
     near = torch.zeros_like(evidence.alpha)
-    if part is not None:
-        near[part.inside] = 1
+    if window is not None:
+        near[window.inside] = 1
     start = initial.start_again(prior, evidence, earlier, cell, recipe, near,
                                 lambda marks: confirm_marks(capture, head, marks, evidence.size))
-    found = (earlier if part is None
-             else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, part, report))
-    state = State(0, None, found.denoised, found.lights)
-    result = maps.finish_maps(state, evidence, start, found.spread, found.gain)
-    if part is None:
+    solution = (earlier if window is None
+                else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, window, report))
+    state = State(0, None, solution.denoised, solution.lights)
+    result = maps.finish_maps(state, evidence, start, solution.spread, solution.gain)
+    if window is None:
         report.log("The mask is the last solve's: nothing was solved again.")
     else:
-        maps.write_maps(capture, result, found, conditions, part.inside)
+        maps.write_maps(capture, result, solution, conditions, window.inside)
         maps.write_preview(capture, state, start.observations, report)
-        height, width = (s.stop - s.start for s in part.inside)
+        height, width = (s.stop - s.start for s in window.inside)
         report.log(f"{width} x {height} texels were solved again in {time.monotonic() - began:.1f} s.")
     return result, earlier.tone
 

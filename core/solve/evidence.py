@@ -110,7 +110,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
         raise Problem("The head's UV coordinates cover no texel.", advise_again("registration"))
     normal = raster.bleed(head.interpolate(head.normals, size), covered)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-    mask, asked = _shadow_mask(capture, size)
+    mask, added = _shadow_mask(capture, size)
     protected = (_sized(images.read_mask(capture.protect_mask), size) if capture.protect_mask.is_file()
                  else np.zeros_like(mask))
     alpha = soften_mask(mask) * (1 - protected)
@@ -124,7 +124,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     trust = np.minimum(1 - (1 - FEATURE_TRUST) * unlike_skin, 1 - (1 - BEARD_TRUST) * bearded)
     parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32))
              for a in (skin, trust, protected, np.zeros_like(alpha))]
-    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, asked=torch.from_numpy(asked))
+    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, asked=torch.from_numpy(added))
 
 
 def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -151,7 +151,7 @@ def make_observations(evidence: Evidence, exposure: float, cell: float, multiple
     Maps coarser than a quarter of REFERENCE_TEXELS are left out: the prior has not seen them.
     """
     cells, extent = grid_cells(cell), evidence.extent
-    found = {}
+    levels = {}
     for factor in extent.factors:
         size = evidence.size // factor
         if factor > 1 and (size < REFERENCE_TEXELS // 4 or size % multiple or evidence.size % factor):
@@ -171,11 +171,11 @@ def make_observations(evidence: Evidence, exposure: float, cell: float, multiple
         top, left = (start * whole // REFERENCE_TEXELS for start in (extent.top, extent.left))
         coords = coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
-        held = 1.0 if evidence.asked is None else 1 - torch.from_numpy(_sized(evidence.asked.numpy(), size))
+        restraint = 1.0 if evidence.asked is None else 1 - torch.from_numpy(_sized(evidence.asked.numpy(), size))
         missing = 0.0 if evidence.missing is None else torch.from_numpy(_sized(evidence.missing.numpy(), size))
-        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size,
-                                    held, missing)
-    return found
+        levels[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size,
+                                     restraint, missing)
+    return levels
 
 
 def grid_cells(cell: float) -> tuple[int, int]:

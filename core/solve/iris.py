@@ -71,14 +71,14 @@ def measure_iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, 
         return None
     towards = np.array([view.centre for view in views]) - eye.centre
     facing = towards @ np.array(eye.gaze) / np.linalg.norm(towards, axis=1)
-    found = []
+    colours = []
     for i in np.argsort(-facing, kind="stable")[:MAX_VIEWS]:
         report.check()
         if facing[i] < MIN_FACING_COSINE:
             break
-        found.append(_in_frame(views[i], head, side, eye, skin, known))
-    found = [colour for colour in found if colour is not None]
-    return tuple(round(float(v), 4) for v in np.clip(np.median(found, 0), 0.001, 1)) if found else None
+        colours.append(_in_frame(views[i], head, side, eye, skin, known))
+    colours = [colour for colour in colours if colour is not None]
+    return tuple(round(float(v), 4) for v in np.clip(np.median(colours, 0), 0.001, 1)) if colours else None
 
 
 def find_iris_pixels(view: View, eye: Eyeball, seen: EyeShares,
@@ -89,7 +89,7 @@ def find_iris_pixels(view: View, eye: Eyeball, seen: EyeShares,
     (middle,), (depth,) = view.project(np.array(eye.centre)[None])
     reach = 1.5 * eye.radius * view.camera.mean_focal_length() / depth
     low, high = (np.clip(np.round((middle + off) * shrink), 0, shape[1::-1]).astype(int) for off in (-reach, reach))
-    rows, columns = (part.ravel() for part in np.mgrid[low[1]:high[1], low[0]:high[0]])
+    rows, columns = (grid.ravel() for grid in np.mgrid[low[1]:high[1], low[0]:high[0]])
     pixels = np.stack([columns, rows], 1) + 0.5
     rays, gaze = view.rays(pixels / shrink), np.array(eye.gaze)
     disc = np.array(eye.centre) + np.sqrt(max(eye.radius**2 - eye.iris_radius**2, 0.0)) * gaze

@@ -61,16 +61,16 @@ class Layout:
         """The evidence in the window; with `boxes` the tone, the texture and M count within the released masks' bounds
         alone."""
         weight = self._there(e.weight) * torch.from_numpy(self.there.known)
-        found = {f.name: self._there(getattr(e, f.name)) for f in fields(e)
-                 if isinstance(getattr(e, f.name), torch.Tensor)}
-        found |= {"texture": self._there(e.texture * e.weight) / self._there(e.weight).clamp_min(1e-4),
-                  "weight": weight, "extent": WINDOW,
-                  "normal": torch.nn.functional.normalize(found["normal"], dim=0),
-                  "covered": torch.from_numpy(self.there.known)}
+        changes = {f.name: self._there(getattr(e, f.name)) for f in fields(e)
+                   if isinstance(getattr(e, f.name), torch.Tensor)}
+        changes |= {"texture": self._there(e.texture * e.weight) / self._there(e.weight).clamp_min(1e-4),
+                    "weight": weight, "extent": WINDOW,
+                    "normal": torch.nn.functional.normalize(changes["normal"], dim=0),
+                    "covered": torch.from_numpy(self.there.known)}
         if boxes:
             tone, face, shadow = (_box(box, len(weight)) for box in (TONE_BOX, FACE_BOX, SHADOW_BOX))
-            found |= {"skin": tone, "weight": weight * face, "alpha": found["alpha"] * shadow}
-        return replace(e, **found)
+            changes |= {"skin": tone, "weight": weight * face, "alpha": changes["alpha"] * shadow}
+        return replace(e, **changes)
 
     def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: float, tone: SkinTone) -> Maps:
         """The window's maps in the built-in UVs. Beyond the window the albedo is the texture under the solved global
@@ -118,9 +118,9 @@ class Layout:
 
     def _there(self, maps: torch.Tensor) -> torch.Tensor:
         """A map [S, S] or [C, S, S] of the built-in UVs in the window."""
-        values = maps.float().numpy()
-        baked = baking.bake(values if values.ndim == 2 else values.transpose(1, 2, 0), self.there)
-        return torch.from_numpy(baked) if values.ndim == 2 else _planes(baked)
+        texels = maps.float().numpy()
+        baked = baking.bake(texels if texels.ndim == 2 else texels.transpose(1, 2, 0), self.there)
+        return torch.from_numpy(baked) if texels.ndim == 2 else _planes(baked)
 
 
 def round_size(asked: int, multiple: int) -> int:
@@ -159,8 +159,8 @@ def make_layout(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int
     face: Layout's."""
     there = baking.places(own, (0, 0), baking.Source(head), size, MAX_DISTANCE_M, tick, skin)
     top, left, side = (v * size // REFERENCE_TEXELS for v in (WINDOW.top, WINDOW.left, WINDOW.side))
-    part = np.s_[top:top + side, left:left + side]
-    there = baking.TexelPartners(there.uv[part], there.turn[part], there.mirrored[part], there.covered[part])
+    window = np.s_[top:top + side, left:left + side]
+    there = baking.TexelPartners(there.uv[window], there.turn[window], there.mirrored[window], there.covered[window])
     source = baking.Source(replace(own, faces=own.faces[skin], face_uvs=own.face_uvs[skin]))
     back = baking.places(head, (0, 0), source, size, MAX_DISTANCE_M, tick)
     uv = np.stack([(back.uv[..., 0] * size - left) / side, 1 - ((1 - back.uv[..., 1]) * size - top) / side], -1)

@@ -58,9 +58,9 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     elif recipe.tv:
         loss = loss + recipe.tv * total_variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
     if recipe.faint:
-        held, missing = (value[o.shader.box] if isinstance(value, torch.Tensor) else value
-                         for value in (o.held, o.missing))
-        loss = loss + recipe.faint * brightness * (held * (local + missing * o.shader.box_alpha) ** 2).sum()
+        restraint, missing = (value[o.shader.box] if isinstance(value, torch.Tensor) else value
+                              for value in (o.held, o.missing))
+        loss = loss + recipe.faint * brightness * (restraint * (local + missing * o.shader.box_alpha) ** 2).sum()
     if recipe.smooth:
         # a shadow's own edge is in M and costs nothing
         free = o.shader.unmodulated(lights) if recipe.sharp_edges else local

@@ -80,7 +80,7 @@ class Shader:
 
     def part(self, rows: slice, columns: slice, cells: tuple[slice, slice]) -> Shader:
         """The shader of a part of the map, whose own grid are these cells of V."""
-        count = tuple(part.stop - part.start for part in cells)
+        count = tuple(span.stop - span.start for span in cells)
         return Shader(self.normal[:, rows, columns], self.alpha[rows, columns], count, self.bilinear)
 
     def main(self, lights: Lights) -> torch.Tensor:

@@ -122,14 +122,14 @@ def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) 
 def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.ndarray,
           normals: np.ndarray) -> np.ndarray:
     """Linear colours [N, 3] of surface points in an sRGB frame, nan where it does not see them or is burnt out."""
-    found = np.full((len(points), 3), np.nan)
+    colours = np.full((len(points), 3), np.nan)
     facing = np.flatnonzero(find_visible(view, caster, points, normals))
     if len(facing):
         pixels, _ = view.project(points[facing])
         smooth = cv2.GaussianBlur(images.srgb_to_linear(frame), (0, 0), SMOOTHING_SHARE * max(frame.shape[:2]))
         whole = raster.sample(frame.max(-1), pixels) < BURNT_SRGB
-        found[facing[whole]] = raster.sample(smooth, pixels[whole])
-    return found
+        colours[facing[whole]] = raster.sample(smooth, pixels[whole])
+    return colours
 
 
 def _surroundings(frame: np.ndarray) -> np.ndarray | None:

@@ -138,9 +138,9 @@ def _blobs(value: np.ndarray, where: np.ndarray, texel: float) -> list[_Blob]:
     around[:-1] = np.maximum(around[:-1], highest[1:])
     stands_out = (stack > 0.7 * MIN_CONTRAST_LOG) & (stack > STANDING_OUT_RATIO * np.stack(usual))
     is_blob = (stack >= around) & (stack > LIKE_SHARE * MIN_CONTRAST_LOG) & (np.stack(compact) > MIN_COMPACTNESS)
-    found = np.nonzero(is_blob & where[None])
+    peaks = np.nonzero(is_blob & where[None])
     return [_Blob(r, c, radii[k], float(stack[k, r, c]), bool(stands_out[k, r, c]))
-            for k, r, c in zip(*(i.tolist() for i in found), strict=True)]
+            for k, r, c in zip(*(i.tolist() for i in peaks), strict=True)]
 
 
 def _usual(values: np.ndarray, reach: float) -> np.ndarray:

@@ -118,8 +118,8 @@ class UNet(nn.Module):
 
     def lower(self, dtype: torch.dtype) -> UNet:
         """Everything that works on maps in `dtype`, channels last; the noise level's few numbers stay as they are."""
-        for part in (self.proj_in, self.proj_out, self.u_net):
-            part.to(dtype=dtype, memory_format=MEMORY_FORMAT)
+        for module in (self.proj_in, self.proj_out, self.u_net):
+            module.to(dtype=dtype, memory_format=MEMORY_FORMAT)
         return self
 
     def forward(self, x: torch.Tensor, sigma: torch.Tensor,

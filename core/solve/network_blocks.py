@@ -71,15 +71,15 @@ class Shaped(torch.autograd.Function):
     def backward(ctx, gradient: torch.Tensor) -> tuple:
         (x, mapped), (norm, convolution) = ctx.saved_tensors, ctx.layers
         # of its input only the shape counts, which is x's
-        found, *_ = torch.ops.aten.convolution_backward(
+        input_gradient, *_ = torch.ops.aten.convolution_backward(
             gradient, x, convolution.weight, None, convolution.stride, convolution.padding, convolution.dilation,
             False, [0, 0], 1, [True, False, False])
         for rows in norm.strips(x):
             with torch.enable_grad():
-                part = x[:, :, rows].detach().requires_grad_()
-                inner = functional.gelu(norm(part, mapped))
-            found[:, :, rows] = torch.autograd.grad(inner, part, found[:, :, rows])[0]
-        return found, None, None, None
+                strip = x[:, :, rows].detach().requires_grad_()
+                inner = functional.gelu(norm(strip, mapped))
+            input_gradient[:, :, rows] = torch.autograd.grad(inner, strip, input_gradient[:, :, rows])[0]
+        return input_gradient, None, None, None
 
 
 class Norm(nn.Module):

@@ -120,15 +120,15 @@ def _stretched(tones: np.ndarray, weight: np.ndarray, source: str) -> SkinTone:
     """The posterior over the tones [N, 3] as an estimate without the prior's pull: for Gaussians of prior variance P
     and posterior variance V the likelihood's own centre is P / (P - V) times as far from the prior's mean, with
     variance P V / (P - V). Along L*; a* and b* follow as they go with it under the posterior."""
-    values = to_lab(tones)
-    prior, mean = values.mean(0), weight @ values
-    covariance = (values - mean).T @ ((values - mean) * weight[:, None])
-    variance, before = max(covariance[0, 0], 1e-6), values[:, 0].var()
+    lab = to_lab(tones)
+    prior, mean = lab.mean(0), weight @ lab
+    covariance = (lab - mean).T @ ((lab - mean) * weight[:, None])
+    variance, before = max(covariance[0, 0], 1e-6), lab[:, 0].var()
     factor = min(before / max(before - variance, 1e-6), MAX_STRETCH)
-    lightness = np.clip(prior[0] + factor * (mean[0] - prior[0]), values[:, 0].min(), values[:, 0].max())
+    lightness = np.clip(prior[0] + factor * (mean[0] - prior[0]), lab[:, 0].min(), lab[:, 0].max())
     moved = mean + covariance[:, 0] / variance * (lightness - mean[0])
     linear = from_lab(moved)
-    error = weight @ color.deltaE_ciede2000(values, np.broadcast_to(to_lab(linear), values.shape))
+    error = weight @ color.deltaE_ciede2000(lab, np.broadcast_to(to_lab(linear), lab.shape))
     deviation = float(np.hypot(np.sqrt(factor * variance), MIN_SIGMA_L))
     rounded = [round(float(value), DECIMALS) for value in images.linear_to_srgb(linear)]
     return SkinTone.from_srgb(rounded, source, deviation=deviation, error=float(error), group=name_group(linear))

@@ -63,8 +63,8 @@ class Prior:
     def to(self, device: torch.device | str) -> Prior:
         """Moves the network, in place, and all that `condition_at` reads."""
         self.network.to(device)
-        self.mean_face, self.spread = (None if part is None else part.to(device)
-                                       for part in (self.mean_face, self.spread))
+        self.mean_face, self.spread = (None if tensor is None else tensor.to(device)
+                                       for tensor in (self.mean_face, self.spread))
         return self
 
     def of_tone(self, tone: SkinTone) -> ConditionedPrior:
@@ -257,7 +257,7 @@ def coordinates(size: int, rows: slice, columns: slice, centred: bool = True) ->
 
 def positional_encoding(coords: torch.Tensor, octaves: int) -> torch.Tensor:
     """[N, 2, H, W] -> [N, 2 + 4 octaves, H, W]: the coordinates, then sines and cosines of 1, 2, 4 ... times them."""
-    waves = [part for k in range(octaves) for part in (torch.sin(coords * 2**k), torch.cos(coords * 2**k))]
+    waves = [wave for k in range(octaves) for wave in (torch.sin(coords * 2**k), torch.cos(coords * 2**k))]
     return torch.cat([coords, *waves], 1)
 
 

@@ -105,11 +105,11 @@ def read_noise(folder: Path) -> torch.Tensor | None:
         or shape[1] != shape[2]
         or not 1 <= shape[1] <= MOST_NOISE_SIDE
         or stored.dtype.kind != "f"
-        or not np.isfinite(values := stored.astype(np.float32)).all()
+        or not np.isfinite(noise := stored.astype(np.float32)).all()
     ):
         raise Problem(f"{path} is of shape {shape}, or holds values that are no numbers.",
                       "Save the map of the whole UV square, of shape 3, S, S.")
-    return torch.from_numpy(values)[None]
+    return torch.from_numpy(noise)[None]
 
 
 def _harmless() -> list:

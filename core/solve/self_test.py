@@ -51,9 +51,9 @@ def measure(capture: Capture, settings: Settings, report: Reporter) -> tuple[flo
     started = time.monotonic()
     solve.run(capture, settings, report)
     seconds = time.monotonic() - started
-    found = images.read_srgb(capture.maps / "diffuse_albedo.png")
-    size = len(found)
+    solved = images.read_srgb(capture.maps / "diffuse_albedo.png")
+    size = len(solved)
     shipped = images.resize(images.read_srgb(SHIPPED / "maps" / "diffuse_albedo.png"), size, size)
     weight = (template.mask("face", size) * template.mask("skin", size))[..., None]
-    error = (weight * (found - shipped) ** 2).sum() / (3 * weight.sum())
+    error = (weight * (solved - shipped) ** 2).sum() / (3 * weight.sum())
     return float(-10 * np.log10(max(error, 1e-12))), seconds

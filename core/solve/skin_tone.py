@@ -62,13 +62,13 @@ def parse_skin_tone(setting: str) -> SkinTone | None:
     if setting == "auto":
         return None
     try:
-        values = [float(part) for part in setting.split(",")]
+        channels = [float(text) for text in setting.split(",")]
     except ValueError:
-        values = []
-    if len(values) != 3 or not all(0 < v <= 1 for v in values):
+        channels = []
+    if len(channels) != 3 or not all(0 < v <= 1 for v in channels):
         raise Problem(f"The skin tone {setting!r} is not a colour.",
                       "Give three numbers between 0 and 1 as sRGB, such as 0.69,0.54,0.45, or auto.")
-    return SkinTone.from_srgb(values, GIVEN)
+    return SkinTone.from_srgb(channels, GIVEN)
 
 
 def format_skin_tone(tone: SkinTone) -> str:

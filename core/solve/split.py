@@ -138,8 +138,8 @@ class Covariances:
     def covariance(self, scales: Scales, axis: int) -> np.ndarray:
         """Of all parts together, along an axis."""
         sizes = np.square(AXIS_DEVIATIONS[axis] * np.array(tuple(scales)))
-        parts = sum(size * part
-                    for size, part in zip(sizes, (self.traits, self.light, self.local, self.noise), strict=True))
+        parts = sum(size * component
+                    for size, component in zip(sizes, (self.traits, self.light, self.local, self.noise), strict=True))
         return parts + LEVEL_DEVIATION**2 * self.level + 1e-6 * np.eye(*self.level.shape)
 
 
@@ -148,15 +148,15 @@ def split_captures(captures: list[Shapes], typical: Scales = TYPICAL_SCALES) -> 
     scales' prior."""
     fewer = len(captures) ** -0.5
     most = captures[0].weight.shape[0] // MIN_CELL_TEXELS
-    seen, values = join_seen([average_cells(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures])
-    scales = find_scales(model_covariances(seen, seen), values, typical)
+    seen, ratios = join_seen([average_cells(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures])
+    scales = find_scales(model_covariances(seen, seen), ratios, typical)
     return infer_split([average_cells(shapes, round(min(CELLS, most) * fewer)) for shapes in captures], scales)
 
 
 def average_cells(shapes: Shapes, count: int) -> Cells:
     """A capture as count x count cells."""
     weight = shapes.weight.numpy().astype(np.float32)
-    texture, reference = (np.log(np.maximum(part.numpy(), MIN_LINEAR)) for part in (shapes.texture, shapes.reference))
+    texture, reference = (np.log(np.maximum(image.numpy(), MIN_LINEAR)) for image in (shapes.texture, shapes.reference))
     ratio = texture - reference
     share = _shrunk(weight, count)
     mean = _shrunk(ratio.transpose(1, 2, 0) * weight[..., None], count) / np.maximum(share, 1e-4)[..., None]
@@ -228,18 +228,18 @@ def log_probability(together: Covariances, values: np.ndarray, scales: Scales,
 
 def infer_split(captures: list[Cells], scales: Scales) -> Split:
     """The posterior mean of each part of the first capture, under the scales."""
-    first, (seen, values) = captures[0], join_seen(captures)
+    first, (seen, ratios) = captures[0], join_seen(captures)
     among = model_covariances(seen, seen)
     beyond = model_covariances(Places(first.places, first.normal, np.zeros(len(first.places), int)), seen)
     basis = SH_SCALE * sh_basis(first.normal[first.seen])
     traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
     for axis, size in enumerate(AXIS_DEVIATIONS):
-        told = cho_solve(cho_factor(among.covariance(scales, axis)), values[:, axis])
+        told = cho_solve(cho_factor(among.covariance(scales, axis)), ratios[:, axis])
         traits[axis] = (scales.traits * size) ** 2 * beyond.traits @ told
         local[axis] = (scales.local * size) ** 2 * beyond.local @ told
         prior = (scales.light * size * ORDER_DEVIATIONS) ** 2 + LEVEL_DEVIATION**2 * (ORDER_DEVIATIONS == 0)
         coefficients[axis] = SH_SCALE * prior * (basis.T @ told[seen.own == 0])
-    maps = (_spread(COLOUR_AXES.T @ part, first.covered) for part in (traits, local))
+    maps = (_spread(COLOUR_AXES.T @ field, first.covered) for field in (traits, local))
     return Split(COLOUR_AXES.T @ coefficients, *maps, scales)
 
 

@@ -78,10 +78,10 @@ def estimate_from_texture(texture: torch.Tensor, weight: torch.Tensor, tones: li
     light's colour) and its lightness kept within the human range. Light and lightness cannot be told apart, so a given
     tone is always better.
     """
-    values = texture[:, weight > 0.5 * weight.max().clamp_min(1e-6)]  # [3, N]
-    if values.shape[1] == 0:
+    colours = texture[:, weight > 0.5 * weight.max().clamp_min(1e-6)]  # [3, N]
+    if colours.shape[1] == 0:
         return SkinTone.from_linear(np.median(tones, 0) if tones else UNKNOWN_TONE_LINEAR, TEXTURE)
-    bright = values[:, values[1] >= values[1].median()]
+    bright = colours[:, colours[1] >= colours[1].median()]
     tone = bright[:, bright[1] <= bright[1].quantile(0.9)].mean(1) if bright.shape[1] < 2**24 else bright.mean(1)
     tone = tone.clamp_min(1e-3)
     if tones:

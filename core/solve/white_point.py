@@ -33,20 +33,20 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     ColorChecker."""
     frames = sorted(capture.frames.glob("*.jpg"))
     frames = frames[:: max(1, len(frames) // MAX_FRAMES)]
-    found = {}
+    whites = {}
     for i, path in enumerate(frames):
         report.progress(i, len(frames), f"looking for a ColorChecker in frame {i + 1} of {len(frames)}")
         white = measure_chart_white(images.read_srgb(path))
         if white is not None:
-            found[path.name] = white
-        if len(found) == ENOUGH_CHARTS:
+            whites[path.name] = white
+        if len(whites) == ENOUGH_CHARTS:
             break
-    if not found:
+    if not whites:
         raise Problem("No ColorChecker was found in the frames.",
                       "Film it flat, in focus, at least a fifth of the picture wide, or point at a grey card or white "
                       "paper instead.")
-    report.figure("white_point", [round(float(v), 4) for v in np.median(list(found.values()), 0)])
-    report.figure("white_point_frame", next(iter(found)))
+    report.figure("white_point", [round(float(v), 4) for v in np.median(list(whites.values()), 0)])
+    report.figure("white_point_frame", next(iter(whites)))
 
 
 def measure_chart_white(srgb: np.ndarray) -> np.ndarray | None:
@@ -92,10 +92,10 @@ def parse_white(setting: str) -> np.ndarray | None:
     if setting == "auto":
         return None
     try:
-        values = np.array([float(part) for part in setting.split(",")])
+        white = np.array([float(number) for number in setting.split(",")])
     except ValueError:
-        values = np.zeros(0)
-    if values.shape != (3,) or not ((values > 1e-3) & (values < 100)).all():
+        white = np.zeros(0)
+    if white.shape != (3,) or not ((white > 1e-3) & (white < 100)).all():
         raise Problem(f"The white point {setting!r} is not a colour.",
                       "Give three numbers above 0 as linear light, as `core white` prints them, or auto.")
-    return values
+    return white

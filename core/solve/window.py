@@ -68,14 +68,14 @@ def find_window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int],
         within = _grown(int(hit[0]), int(hit[-1]) + 1, MARGIN_TEXELS * size // reference, 4, size)
         around = _grown(within.start, within.stop, CONTEXT_TEXELS * size // reference, whole, size)
         wide = size // count
-        part = slice(around.start // wide, -(-around.stop // wide))
-        cell = torch.arange(part.start, part.stop)
+        span = slice(around.start // wide, -(-around.stop // wide))
+        cell = torch.arange(span.start, span.stop)
         low, high = (cell - 1.5) * wide, (cell + 2.5) * wide  # texels that read a cell, by the cubic kernel
         moving.append(((low >= within.start) | (within.start == 0)) & ((high <= within.stop) | (within.stop == size)))
         inside.append(within)
         seen.append(around)
-        cells_seen.append(part)
-    share = math.prod(part.stop - part.start for part in inside) / size**2
+        cells_seen.append(span)
+    share = math.prod(span.stop - span.start for span in inside) / size**2
     if share > MAX_SHARE:
         raise ValueError(f"The edit touches {share:.0%} of the map.")
     return Window(tuple(inside), tuple(seen), tuple(cells_seen), moving[0][:, None] & moving[1][None])
@@ -121,10 +121,10 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
     local = replace(recipe, steps=min(recipe.steps, MAX_STEPS), phases=(("cells", 0.0, last),), refit=0.0)
     state = sample_within_memory(Sampler(prior, local, seed_noise(seed, device), with_known), here, state, keep_frozen,
                                  report.log)
-    found = restore_maps(prior, state.denoised, observations[1].coords.to(device), recipe, seed, part.seen)
+    restored = restore_maps(prior, state.denoised, observations[1].coords.to(device), recipe, seed, part.seen)
     solved, moved = denoised.clone(), lights.grid.clone()
     moved[(..., *part.cells)] = state.lights.grid.cpu()
-    solved[(..., *part.seen)] = torch.where(inside > 0, found, known).cpu()
+    solved[(..., *part.seen)] = torch.where(inside > 0, restored, known).cpu()
     return solved, Lights(lights.glob, moved, lights.chroma)
 
 

@@ -28,7 +28,7 @@ def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) ->
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return marks
     covered = head.raster(size)[0] >= 0
-    points, normals = (head.interpolate(values, size) for values in (head.mesh.vertices, head.normals))
+    points, normals = (head.interpolate(vectors, size) for vectors in (head.mesh.vertices, head.normals))
     at = tuple(np.round([[mark.row, mark.column] for mark in marks]).astype(int).clip(0, size - 1).T)
     there = points[at], normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
     seen, agreed = np.zeros(len(marks), int), np.zeros(len(marks), int)

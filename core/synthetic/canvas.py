@@ -80,9 +80,9 @@ class Canvas:
         """All texels closer than radius [M] mm to points [M, 3]: texel int [K], point int [K], distance [K] in mm."""
         if not len(points):
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
-        found = self.tree.query_ball_point(points, radius, return_sorted=False)
-        counts = np.fromiter(map(len, found), np.int64, len(found))
-        texel = np.concatenate([np.asarray(f, np.int64) for f in found if f] or [np.zeros(0, np.int64)])
+        neighbours = self.tree.query_ball_point(points, radius, return_sorted=False)
+        counts = np.fromiter(map(len, neighbours), np.int64, len(neighbours))
+        texel = np.concatenate([np.asarray(f, np.int64) for f in neighbours if f] or [np.zeros(0, np.int64)])
         point = np.repeat(np.arange(len(points)), counts)
         return texel, point, np.linalg.norm(self.position[texel] - points[point], axis=1)
 

@@ -69,4 +69,4 @@ def fitted_light(transfer: np.ndarray, smooth: np.ndarray, lamps: list[LampOnHea
         strength = np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
         direct = np.maximum(normal @ towards, 0)[:, None] * lamps[main].colour * strength
         sunlit = lit + direct * lamps[main].reach[:, None]
-    return FittedLight(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal)
+    return FittedLight(*((shading * tone).astype(np.float32) for shading in (lit, sunlit)), normal)

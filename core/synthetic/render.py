@@ -67,10 +67,10 @@ def render_frames(scene: bpy.types.Scene, camera: bpy.types.Object, job: dict,
             continue
         place(number)
         camera.matrix_world = Matrix(job["cameras"][number])
-        part = path.with_suffix(f".part{job['suffix']}")
-        scene.render.filepath = str(part)
+        temporary = path.with_suffix(f".part{job['suffix']}")
+        scene.render.filepath = str(temporary)
         bpy.ops.render.render(write_still=True)
-        os.replace(part, path)
+        os.replace(temporary, path)
         print(f"frame {number}", flush=True)
 
 

@@ -52,13 +52,13 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--samples", type=int, default=7)
     parser.add_argument("--only", help="render these frames only, and write nothing else")
-    asked = parser.parse_args()
-    wanted = [int(n) for n in asked.only.split(",")] if asked.only else list(range(asked.frames))
-    skin = make_skin(sample_parameters(asked.seed), MAPS)
-    render_frames(asked.work, asked.seed, skin,
-                  scene.Shot(scene.camera_path(asked.seed, asked.frames), wanted, asked.samples))
-    if not asked.only:
-        write_sample(asked.out, asked.work, asked.seed, skin, asked.frames)
+    options = parser.parse_args()
+    wanted = [int(n) for n in options.only.split(",")] if options.only else list(range(options.frames))
+    skin = make_skin(sample_parameters(options.seed), MAPS)
+    render_frames(options.work, options.seed, skin,
+                  scene.Shot(scene.camera_path(options.seed, options.frames), wanted, options.samples))
+    if not options.only:
+        write_sample(options.out, options.work, options.seed, skin, options.frames)
 
 
 def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: bool = True,

@@ -131,7 +131,7 @@ def look(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, 
     y, x = np.mgrid[0:view.height, 0:view.width]
     rays = view.rays(np.stack([x.ravel(), y.ravel()], -1) + 0.5).reshape(view.height, view.width, 3)
     vertices, local = np.unique(corner, return_inverse=True)
-    single = [np.asarray(values, np.float32) for values in (bary, albedo, shine, normal, smooth, position)]
+    single = [np.asarray(pixels, np.float32) for pixels in (bary, albedo, shine, normal, smooth, position)]
     return Sight(view.width, np.flatnonzero(hit).astype(np.int32), vertices.astype(np.int32),
                  local.reshape(corner.shape).astype(np.int32), *single,
                  view.centre, view.rotation, rays.astype(np.float32), masks.astype(np.float32), lamps, radius, reach)

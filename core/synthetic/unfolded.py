@@ -58,8 +58,8 @@ def make_person(seed: int) -> UnlitPerson:
     mesh = person_mesh(seed)
     stage, face, bary = light_stage(mesh), *template_raster(SIDE)
     inside = face >= 0
-    points, normals = (raster.interpolate(values, mesh.faces, face[inside], bary[inside])
-                       for values in (mesh.vertices, stage.normals))
+    points, normals = (raster.interpolate(vectors, mesh.faces, face[inside], bary[inside])
+                       for vectors in (mesh.vertices, stage.normals))
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-6)
     lamps, radius = _lamps(rng), np.exp(rng.uniform(np.log(0.004), np.log(0.1), LAMPS))
     caster = raster.RayCaster(mesh)
@@ -85,12 +85,12 @@ def load(path: Path) -> UnlitPerson:
 
 def _lamps(rng: np.random.Generator) -> np.ndarray:
     """Unit directions [LAMPS, 3]: seldom from behind the person, seldom from below."""
-    found: list[np.ndarray] = []
-    while len(found) < LAMPS:
+    lamps: list[np.ndarray] = []
+    while len(lamps) < LAMPS:
         way = unit(rng.normal(size=3) + [0, -0.5, 0.35])
         if way[1] < 0.5 and way[2] > -0.5:
-            found.append(way)
-    return np.stack(found)
+            lamps.append(way)
+    return np.stack(lamps)
 
 
 @cache

@@ -83,12 +83,12 @@ def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, rep
                         f"blending {o.name}, {what}")
         o = o.enlarged(size, covered)
         seen, share = o.weight > 0, o.weight / largest
-        for band, (values, (reach, exponent)) in enumerate(zip(bands_of(o.log_colour, seen), BANDS, strict=True)):
+        for band, (log_colour, (reach, exponent)) in enumerate(zip(bands_of(o.log_colour, seen), BANDS, strict=True)):
             weight = share ** exponent
             # feathered where the best view changes, but nothing taken from where the view is blind
             if np.isfinite(reach):
                 weight = _feathered(weight, reach, scale) * np.minimum(1, 4 * share)
-            sums[band] += values * weight[..., None]
+            sums[band] += log_colour * weight[..., None]
             norms[band] += weight[..., None]
     return sum(s / np.maximum(n, 1e-12) for s, n in zip(sums, norms, strict=True)).astype(np.float32)
 

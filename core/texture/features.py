@@ -106,14 +106,14 @@ def _efficientnet(state: dict[str, Tensor]) -> Features:
 
     def layers(picture: Tensor) -> list[Tensor]:
         x = functional.relu6(_same(_normalised(picture), *stem, stride=2))
-        found = [x]
+        features = [x]
         for stride, expand, depthwise, project in blocks:
             y = functional.relu6(functional.conv2d(x, *expand)) if expand else x
             y = functional.relu6(_same(y, *depthwise, stride=stride, groups=y.shape[1]))
             y = functional.conv2d(y, *project)
             x = x + y if stride == 1 and x.shape == y.shape else y
-            found.append(x)
-        return [found[i] for i in (0, 1, 3, 5)]
+            features.append(x)
+        return [features[i] for i in (0, 1, 3, 5)]
 
     return Features("EfficientNet-Lite0 features", layers)
 
@@ -122,7 +122,7 @@ def _vgg(state: dict[str, Tensor], linear: list[Tensor] | None) -> Features:
     name = _vgg_name(state)
 
     def layers(picture: Tensor) -> list[Tensor]:
-        x, found = _normalised(picture), []
+        x, features = _normalised(picture), []
         for layer in VGG_LAYERS:
             if layer is None:
                 x = functional.max_pool2d(x, 2)
@@ -130,8 +130,8 @@ def _vgg(state: dict[str, Tensor], linear: list[Tensor] | None) -> Features:
             weight, bias = (state[name.format(layer, kind)] for kind in ("weight", "bias"))
             x = functional.relu(functional.conv2d(x, weight, bias, padding=1))
             if layer in VGG_TAPS:
-                found.append(x)
-        return found
+                features.append(x)
+        return features
 
     return Features("LPIPS (VGG16)" if linear is not None else "VGG16 features", layers, linear)
 

@@ -110,9 +110,9 @@ def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Unfolded) 
     _, labels = cv2.connectedComponents(cv2.morphologyEx(strange.astype(np.uint8), cv2.MORPH_CLOSE, disc))
     rim = cv2.dilate(_rim(surface, neck), disc) > 0
     at_rim = np.unique(labels[cv2.dilate(rim.astype(np.uint8), disc).astype(bool) & strange])
-    found = cv2.dilate(np.isin(labels, at_rim[at_rim > 0]).astype(np.uint8), disc).astype(bool) | rim
+    cloth = cv2.dilate(np.isin(labels, at_rim[at_rim > 0]).astype(np.uint8), disc).astype(bool) | rim
     return np.clip(1.5
-                   * cv2.GaussianBlur(found.astype(np.float32), (0, 0), radius / 3, borderType=cv2.BORDER_REPLICATE), 0,
+                   * cv2.GaussianBlur(cloth.astype(np.float32), (0, 0), radius / 3, borderType=cv2.BORDER_REPLICATE), 0,
                    1) * surface.covered
 
 

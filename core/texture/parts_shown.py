@@ -38,11 +38,11 @@ def tell_parts(observations: list[UnwrappedView], surface: Unfolded, report: Rep
     votes, hidden = np.zeros((*total.shape, len(ASKED)), np.float32), []
     for i, observation in enumerate(observations):
         report.progress(i, len(observations), f"telling hair from skin in {observation.name}")
-        found = _look(observation, surface)
-        if found is None:
+        parsed = _look(observation, surface)
+        if parsed is None:
             hidden.append(None)
             continue
-        shares, known = found
+        shares, known = parsed
         weight = observation.weight * known
         total += weight
         votes += weight[..., None] * shares
@@ -62,8 +62,8 @@ def _look(observation: UnwrappedView, surface: Unfolded) -> tuple[np.ndarray, np
     parts = parser.parse(srgb, landmarks)
     height, width = observation.picture.shape[:2]
     at = [observation.pixels[..., k] - 0.5 for k in range(2)]
-    *shares, known = (cv2.remap(images.resize(part, width, height), *at, cv2.INTER_LINEAR)
-                      for part in (*(parts.of(name) for name in ASKED), parts.known()))
+    *shares, known = (cv2.remap(images.resize(mask, width, height), *at, cv2.INTER_LINEAR)
+                      for mask in (*(parts.of(name) for name in ASKED), parts.known()))
     return np.stack(shares, -1), known
 
 

@@ -134,7 +134,7 @@ def _tile(target: Target, rng: np.random.Generator, device: str) -> tuple[Tensor
     y, x = np.unravel_index(rng.choice(np.flatnonzero(target.trust.ravel() > 0.2 * target.trust.max())),
                             target.trust.shape)
     rows, columns = _span(y, height), _span(x, width)
-    fine = tuple(slice(OVER * part.start, OVER * part.stop) for part in (rows, columns))
+    fine = tuple(slice(OVER * span.start, OVER * span.stop) for span in (rows, columns))
     grid = torch.from_numpy(target.grid[fine].copy())[None].to(device)
     return _tensor(target.picture[rows, columns], device), grid, _tensor(target.trust[rows, columns], device)
 

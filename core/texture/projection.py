@@ -69,9 +69,9 @@ def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float
     pixels, quality, distance = np.empty((count, 2), np.float32), np.empty(count), np.empty(count)
     seen, silhouette = np.empty(count, bool), _silhouette_distance(surface.caster, view)
     for first in range(0, count, POINTS):
-        part = slice(first, first + POINTS)
-        xy, quality[part], distance[part], seen[part] = _look(view, surface, part, silhouette)
-        pixels[part] = np.nan_to_num(xy, nan=-1) * scale
+        chunk = slice(first, first + POINTS)
+        xy, quality[chunk], distance[chunk], seen[chunk] = _look(view, surface, chunk, silhouette)
+        pixels[chunk] = np.nan_to_num(xy, nan=-1) * scale
     pixels = surface.spread(pixels)
     reference = np.median(distance[seen]) if seen.any() else 1.0
     weight = quality ** 2 * sharpness * (reference / distance) ** 2

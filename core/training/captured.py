@@ -48,8 +48,8 @@ def expose(radiance: torch.Tensor, where: torch.Tensor, dice: Dice) -> tuple[tor
     gains = exposure * torch.exp(-cast + dice.normal(0, [[0.10, 0.04, 0.14]], n, 3)[..., None, None])
     bright = torch.where(where > 0, (radiance * gains).amax(1, keepdim=True), torch.nan).flatten(1)
     bright = bright.nanquantile(0.9, dim=1).clamp_min(1e-6)[:, None, None, None]
-    held = dice.happens(0.9, n, 1, 1, 1)
-    gains = gains * torch.where(held > 0, (1.6 / bright).clamp_max(1), 1.0)
+    protected = dice.happens(0.9, n, 1, 1, 1)
+    gains = gains * torch.where(protected > 0, (1.6 / bright).clamp_max(1), 1.0)
     return (radiance * gains).clamp(0, 1), gains
 
 
@@ -126,7 +126,7 @@ def as_captured(log: torch.Tensor, apart: torch.Tensor, seen: torch.Tensor, fitt
     """What a capture would know: all that comes from the head's shape moved by how far registration is off."""
     names, parts = zip(*fitted.items(), strict=True)
     beside = moved(torch.cat(parts, 1), dice.spread(0.4, 2.5, len(log)), dice)
-    known = dict(zip(names, beside.split([part.shape[1] for part in parts], 1), strict=True))
+    known = dict(zip(names, beside.split([layer.shape[1] for layer in parts], 1), strict=True))
     there = (seen > 0.02).float()
     return UnfoldedMaps(log=log * there, spread=apart * there, seen=seen,
                     **known | {"normal": unit(known["normal"])})

@@ -49,15 +49,15 @@ def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, tra
               prepare: Callable[[str, Path, Reporter], None] | None = None) -> int:
     """Trains, or exports an earlier training: those options that no TrainingRun has are `train`'s keyword arguments.
     Returns the exit code. `prepare` answers to --prepare, where a training has that option."""
-    asked = vars(options.parse_args(arguments))
+    flags = vars(options.parse_args(arguments))
     report = Reporter("train",
                       emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None)
-    exports, prepares = asked.pop("export"), asked.pop("prepare", False)
+    exports, prepares = flags.pop("export"), flags.pop("prepare", False)
     if exports:
-        export(asked["work"], asked["out"])
+        export(flags["work"], flags["out"])
     elif prepares:
-        prepare(asked["config"], asked["work"], report)
+        prepare(flags["config"], flags["work"], report)
     else:
-        run = TrainingRun(**{field.name: asked.pop(field.name) for field in fields(TrainingRun) if field.name in asked})
-        train(report=report, run=run, **asked)
+        run = TrainingRun(**{field.name: flags.pop(field.name) for field in fields(TrainingRun) if field.name in flags})
+        train(report=report, run=run, **flags)
     return 0

@@ -54,7 +54,7 @@ def gather_crowd(people: list[UnlitPerson], device: str) -> Crowd:
     reach = stacked("reach").reshape(len(people), LAMPS, SIDE, SIDE)
     parts = (stacked("vertices"), np.stack(normals), stacked("visible"), stacked("lamps"), reach, maps("skin"),
              maps("growth"))
-    return Crowd(*(torch.from_numpy(np.ascontiguousarray(part)).to(device) for part in parts))
+    return Crowd(*(torch.from_numpy(np.ascontiguousarray(array)).to(device) for array in parts))
 
 
 def joined(one: Crowd, other: Crowd) -> Crowd:
@@ -65,7 +65,7 @@ def paint_anew(crowd: Crowd, who: torch.Tensor, props: Props, side: int, dice: D
     """Linear albedo [N, 3, S, S] of these of the crowd [N] with other tones, hair of other colours, stains, moles and
     tufts, far beyond the plausible: a delighter must not take pigment for light."""
     n = len(who)
-    albedo, growth = (resized(part[who].float() / 255, side) for part in (crowd.skin, crowd.growth))
+    albedo, growth = (resized(layer[who].float() / 255, side) for layer in (crowd.skin, crowd.growth))
     albedo = srgb_to_linear(albedo) * torch.exp(dice.normal(0, 0.3, n, 1, 1, 1) + dice.normal(0, 0.08, n, 3, 1, 1))
     log = _stains(side, dice, n) * dice.happens(STAINED, n, 1, 1, 1)
     for marks, share in ((props.moles, MOLED), (props.tufts, TUFTED)):
@@ -75,13 +75,13 @@ def paint_anew(crowd: Crowd, who: torch.Tensor, props: Props, side: int, dice: D
     albedo = albedo * torch.exp(log)
     colours = on_device(albedo.device, BROWS)
     common = colours[dice.whole(len(colours), n)]
-    for part in range(len(GROWTH)):
+    for layer in range(len(GROWTH)):
         alike = dice.happens(0.6, n, 1)
         own = alike * common + (1 - alike) * colours[dice.whole(len(colours), n)]
         own = own * torch.exp(dice.normal(0, 0.35, n, 1) + dice.normal(0, 0.08, n, 3))
         strands = blurred(dice.noise(n, 1, side, side), dice.rng.uniform(0.5, 1.5, (n, 1)) * side / SIDE)
         strands = strands / strands.flatten(1).std(1).clamp_min(1e-6)[:, None, None, None]
-        share = growth[:, part:part + 1] * dice.uniform(0.4, 1.2, n, 1, 1, 1)
+        share = growth[:, layer:layer + 1] * dice.uniform(0.4, 1.2, n, 1, 1, 1)
         share = (share * (1 + dice.uniform(0.1, 0.5, n, 1, 1, 1) * strands)).clamp(0, 1)
         albedo = albedo * (1 - share) + own[..., None, None] * share
     return albedo.clamp(0.003, 0.92)

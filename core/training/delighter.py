@@ -154,11 +154,11 @@ def figures(average: dict, config: str, batch: PortraitBatch, device: str) -> di
             layers[:, 6:] = 0
         chosen = batch.layers[:, 15].amax((1, 2)) > 0
         with torch.autocast(device, torch.bfloat16, enabled=_fast(device)):
-            answers = [network(part.to(device, memory_format=torch.channels_last)) for part in layers[chosen].split(8)]
+            answers = [network(rows.to(device, memory_format=torch.channels_last)) for rows in layers[chosen].split(8)]
         shading, shadow = (torch.cat([answer[k].cpu() for answer in answers]) for k in (0, 1))
         told[name] = mean_deviation(shading - batch.shading[chosen], batch.weight[chosen])
-        found, true, sure = shadow > 0, batch.shadow[chosen] > 0.5, batch.shadow_weight[chosen] > 0.9
-        told[f"iou_{name}"] = ((found & true & sure).sum() / ((found | true) & sure).sum().clamp_min(1)).item()
+        predicted, true, sure = shadow > 0, batch.shadow[chosen] > 0.5, batch.shadow_weight[chosen] > 0.9
+        told[f"iou_{name}"] = ((predicted & true & sure).sum() / ((predicted | true) & sure).sum().clamp_min(1)).item()
     told["none"] = mean_deviation(batch.shading[chosen], batch.weight[chosen])
     return {name: round(float(value), 4) for name, value in told.items()}
 

@@ -127,7 +127,7 @@ class Eyes:
             picture, ball = eye_sights.photograph_eye(sight, rng, self.panoramas)
             for batch in batches:
                 batch.append(example(picture, ball, sight, rng, augment))
-        return [tuple(torch.from_numpy(np.stack(part)) for part in zip(*batch, strict=True)) for batch in batches]
+        return [tuple(torch.from_numpy(np.stack(arrays)) for arrays in zip(*batch, strict=True)) for batch in batches]
 
 
 def example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, rng: np.random.Generator,
@@ -164,13 +164,13 @@ def figures(average: dict, config: str, batch: tuple, device: str) -> dict[str, 
     network = ParseNet(**CONFIGS[config]["model"], parts=len(CLASSES))
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()
-    found = torch.cat([network(part.to(device)).argmax(1).cpu() for part in batch[0].split(32)])
+    predicted = torch.cat([network(chunk.to(device)).argmax(1).cpu() for chunk in batch[0].split(32)])
     true = batch[1].argmax(1)
 
     def overlap(a: torch.Tensor, b: torch.Tensor) -> float:
         return round(float((a & b).sum() / (a | b).sum().clamp_min(1)), 4)
 
-    return {"ball": overlap(found > 0, true > 0), "iris": overlap(found == 2, true == 2)}
+    return {"ball": overlap(predicted > 0, true > 0), "iris": overlap(predicted == 2, true == 2)}
 
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:

@@ -65,12 +65,12 @@ class Bands:
 
 def train(figures: int, pictures: int, work: Path, out: Path, hdri: Path | None, report: Reporter) -> dict:
     """Writes the plane to `out` and its card beside it, which is returned. `pictures` are drawn of each figure."""
-    learnt, held = seeds(figures)
-    prepare(learnt + held, work, report)
+    learnt, held_out = seeds(figures)
+    prepare(learnt + held_out, work, report)
     panoramas = read_panoramas(hdri)
     seen = draw(learnt, pictures, work, panoramas, 1)
     plane, offset = fit(np.array([describe(strip) for strip in seen.pictures]), seen.worn)
-    judged = draw(held, pictures, work, panoramas, 2)
+    judged = draw(held_out, pictures, work, panoramas, 2)
     told = np.array([describe(strip) for strip in judged.pictures]) @ plane + offset
     with replacing(out) as temporary, open(temporary, "wb") as file:
         np.savez_compressed(file, plane=plane.astype(np.float32), offset=np.float32(offset))
@@ -79,7 +79,7 @@ def train(figures: int, pictures: int, work: Path, out: Path, hdri: Path | None,
                     "without drawn glasses; light from procedural environments and lamps"
             + (f" and {len(panoramas)} panoramas (CC0)" if panoramas else ""), "licence": "GPL-3.0-or-later",
             "command": f"python -m core train glasses --figures {figures} --pictures {pictures}" + " --hdri hdri"
-            * bool(panoramas), "seeds": learnt, "held_out_seeds": held, "pictures": len(seen.worn), "ridge": RIDGE,
+            * bool(panoramas), "seeds": learnt, "held_out_seeds": held_out, "pictures": len(seen.worn), "ridge": RIDGE,
             "held_out": {"what": "single photographs of held-out figures, share that is told to wear glasses",
                          "pictures": len(judged.worn),
                          "with_percent": round(100 * float((told[judged.worn] > 0).mean()), 1),
@@ -158,9 +158,9 @@ def fit(described: np.ndarray, worn: np.ndarray, ridge: float = RIDGE) -> tuple[
         value = np.logaddexp(0, -margin).sum() + 0.5 * ridge * (state[:-1] ** 2).sum()
         return value, np.append(described.T @ pull + ridge * state[:-1], pull.sum())
 
-    found = minimize(cost, np.zeros(described.shape[1] + 1), jac=True, method="L-BFGS-B", options={"maxiter": 400}).x
-    plane = found[:-1] / spread
-    return plane, float(found[-1] - plane @ middle)
+    solution = minimize(cost, np.zeros(described.shape[1] + 1), jac=True, method="L-BFGS-B", options={"maxiter": 400}).x
+    plane = solution[:-1] / spread
+    return plane, float(solution[-1] - plane @ middle)
 
 
 def _before(figure, rng: np.random.Generator) -> View:

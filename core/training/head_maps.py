@@ -22,8 +22,8 @@ TEXEL_MM = 0.8
 def at_texels(values: torch.Tensor, side: int) -> torch.Tensor:
     """Per-vertex values [N, V, C] as maps [N, C, S, S]."""
     corners, bary = _raster(side, values.device)
-    found = sum(values[:, corners[:, k]] * bary[:, k:k + 1] for k in range(3))
-    return found.transpose(1, 2).reshape(len(values), -1, side, side)
+    texels = sum(values[:, corners[:, k]] * bary[:, k:k + 1] for k in range(3))
+    return texels.transpose(1, 2).reshape(len(values), -1, side, side)
 
 
 @cache

@@ -118,11 +118,11 @@ def figures(average: dict, config: str, batch: SnapshotBatch, device: str) -> di
     network = ParseNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()
-    found = torch.cat([network(part.to(device)).argmax(1).cpu() for part in batch.layers.split(8)])
+    predicted = torch.cat([network(chunk.to(device)).argmax(1).cpu() for chunk in batch.layers.split(8)])
     true, known = batch.shares.argmax(1), batch.known[:, 0] > 0.5
     told = {}
     for k, name in enumerate(PARTS):
-        both, either = ((found == k) & (true == k) & known).sum(), (((found == k) | (true == k)) & known).sum()
+        both, either = ((predicted == k) & (true == k) & known).sum(), (((predicted == k) | (true == k)) & known).sum()
         told[name] = round(float(both / either.clamp_min(1)), 4)
     return told
 

@@ -129,14 +129,14 @@ def mean_map(skins: Skins, size: int = 256) -> torch.Tensor:
 def reference_skins(skins: Skins, count: int = 16, size: int = 128) -> torch.Tensor:
     """The first `count` whole skins in the mean face's form [count, 7, size, size]: albedo over tone, normal, 2 *
     specular - 1."""
-    factor, found = SIZE // SCALES[1] // size, []
+    factor, references = SIZE // SCALES[1] // size, []
     for maps, area, tone in zip(skins.maps[SCALES[1]], skins.known[SCALES[1]], skins.tones, strict=True):
-        if area is None and len(found) < count:
+        if area is None and len(references) < count:
             small = torch.from_numpy(shrink(maps.numpy(), factor))[:7].float()
             small[:3] = (small[:3] + 1) / 2 / tone[:, None, None]
             small[3:6] /= small[3:6].norm(dim=0).clamp_min(1e-6)
-            found.append(small)
-    return torch.stack(found)
+            references.append(small)
+    return torch.stack(references)
 
 
 def spread_about(windows: Windows, mean: torch.Tensor, patch: int) -> torch.Tensor:

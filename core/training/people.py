@@ -57,7 +57,7 @@ class People:
                 lit = portraits.portray(stage, colours, rng, self.panoramas)
                 picture = stage.here.shape
                 normal = lit.fitted.normal @ stage.unlit.rotation.T
-                parts = [part.reshape(*picture, 3) for part in (lit.fitted.ambient, lit.fitted.sunlit, normal)]
+                parts = [pixels.reshape(*picture, 3) for pixels in (lit.fitted.ambient, lit.fitted.sunlit, normal)]
                 drawn.append(example(lit, (*parts, stage.here.astype(np.float32)), rng))
         return stacked(drawn)
 

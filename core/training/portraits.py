@@ -95,7 +95,7 @@ class Portraits:
                     lit.fitted.normal @ seen.rotation.T.astype(np.float32),
                     np.ones(len(seen.pixel), np.float32),
                 )
-                yield lit, tuple(seen.picture(part) for part in parts)
+                yield lit, tuple(seen.picture(pixels) for pixels in parts)
 
     def _stage(self, seed: int) -> LightStage:
         if seed not in self.heads:
@@ -108,7 +108,7 @@ class Portraits:
 
 def stacked(examples: list[tuple[np.ndarray, ...]]) -> PortraitBatch:
     """Examples as one batch, in their order."""
-    return PortraitBatch(*(torch.from_numpy(np.stack(part)) for part in zip(*examples, strict=True)))
+    return PortraitBatch(*(torch.from_numpy(np.stack(arrays)) for arrays in zip(*examples, strict=True)))
 
 
 def example(portrait: Portrait, known: tuple[np.ndarray, ...], rng: np.random.Generator) -> tuple[np.ndarray, ...]:
@@ -118,8 +118,8 @@ def example(portrait: Portrait, known: tuple[np.ndarray, ...], rng: np.random.Ge
     if rng.random() < WITH_GEOMETRY:
         # a registered head lies a pixel off
         slip = np.float32([[1, 0, rng.normal(0, 0.8)], [0, 1, rng.normal(0, 0.8)]])
-        geometry = [cv2.warpAffine(np.ascontiguousarray(part, np.float32), slip, (len(part), len(part)))
-                    for part in known]
+        geometry = [cv2.warpAffine(np.ascontiguousarray(array, np.float32), slip, (len(array), len(array)))
+                    for array in known]
     layers, middle = network_input(portrait.srgb, *geometry)
     sure = (_half(portrait.head) > 0.99) & (_half(portrait.albedo).min(-1) > 0.002)
     shading = np.log(np.maximum(_half(portrait.even), LEAST)) - middle
@@ -128,7 +128,7 @@ def example(portrait: Portrait, known: tuple[np.ndarray, ...], rng: np.random.Ge
     trust = 1.0 if strong > 0.4 or strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
     parts = (layers, shading.transpose(2, 0, 1), weight[None], _half(portrait.shadow)[None] * (strong > 0.2),
              (sure * trust)[None])
-    parts = [np.ascontiguousarray(part, np.float32) for part in parts]
+    parts = [np.ascontiguousarray(array, np.float32) for array in parts]
     return tuple(parts)
 
 

@@ -50,7 +50,7 @@ def make_props(count: int, panoramas: Path | None, seed: int, processes: int) ->
     """`count` gobos, as many moles and tufts, and ten times as many environments, some of a folder of panoramas."""
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         drawn = list(pool.map(partial(_draw, folder=panoramas), [[seed, 96, k] for k in range(count)]))
-    return Props(*(torch.from_numpy(np.concatenate(part)) for part in zip(*drawn, strict=True)))
+    return Props(*(torch.from_numpy(np.concatenate(arrays)) for arrays in zip(*drawn, strict=True)))
 
 
 def save_props(path: Path, props: Props) -> None:

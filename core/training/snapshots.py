@@ -80,7 +80,7 @@ class Snapshots:
             srgb, shares = photograph(sight, rng, self.panoramas)
             for batch in batches:
                 batch.append(example(srgb, shares, sight.landmarks, rng, augment))
-        return [SnapshotBatch(*(torch.from_numpy(np.stack(part)) for part in zip(*batch, strict=True)))
+        return [SnapshotBatch(*(torch.from_numpy(np.stack(arrays)) for arrays in zip(*batch, strict=True)))
                 for batch in batches]
 
 

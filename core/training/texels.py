@@ -116,8 +116,8 @@ def losses(network: TexelNet, batch: TexelBatch, device: str) -> dict[str, torch
     """The terms of the loss, each a scalar."""
     low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
     with torch.autocast(device, torch.bfloat16, enabled=low):
-        shading, shadow, spread = network(*(part.to(device, memory_format=torch.channels_last)
-                                            for part in (batch.layers, batch.light)))
+        shading, shadow, spread = network(*(tensor.to(device, memory_format=torch.channels_last)
+                                            for tensor in (batch.layers, batch.light)))
     weight = batch.weight.to(device)
     tone, error = split_tone(shading - batch.shading.to(device), weight)
     terms = {"shading": mean_size(error, weight), "tone": TONE * tone.abs().mean(),
@@ -133,14 +133,14 @@ def losses(network: TexelNet, batch: TexelBatch, device: str) -> dict[str, torch
 def bands_of(error: torch.Tensor, weight: torch.Tensor) -> list[tuple[torch.Tensor, torch.Tensor]]:
     """The luminance's part of an error [N, 3, S, S] in each of BANDS, fine to coarse, [N, 1, h, h] of S divided by the
     band's texels, and their weights."""
-    luminance, side, found = error.mean(1, keepdim=True), error.shape[-1], []
+    luminance, side, bands = error.mean(1, keepdim=True), error.shape[-1], []
     for k, texels in enumerate(BAND_TEXELS):
         here, base = _pooled(luminance, weight, max(1, texels * side // SIDE_TEXELS))
         if k + 1 < len(BAND_TEXELS):
             coarse, _ = _pooled(luminance, weight, max(2, BAND_TEXELS[k + 1] * side // SIDE_TEXELS))
             here = here - functional.interpolate(coarse, size=here.shape[-2:], mode="bilinear", align_corners=False)
-        found.append((here, base))
-    return found
+        bands.append((here, base))
+    return bands
 
 
 def _pooled(values: torch.Tensor, weight: torch.Tensor, by: int) -> tuple[torch.Tensor, torch.Tensor]:
@@ -163,9 +163,9 @@ def figures(average: dict, config: str, batch: TexelBatch, device: str) -> dict[
     network = TexelNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()
-    found = [network(*(part.to(device) for part in pair))
-             for pair in zip(batch.layers.split(4), batch.light.split(4), strict=True)]
-    shading, spread = (torch.cat([each[k] for each in found]) for k in (0, 2))
+    outputs = [network(*(tensor.to(device) for tensor in pair))
+               for pair in zip(batch.layers.split(4), batch.light.split(4), strict=True)]
+    shading, spread = (torch.cat([each[k] for each in outputs]) for k in (0, 2))
     told = {"network": mean_deviation(shading - batch.shading, batch.weight),
             "none": mean_deviation(batch.shading, batch.weight)}
     _, error = split_tone(shading - batch.shading, batch.weight)

@@ -81,7 +81,7 @@ def scenes_of(seed: int) -> list[LitSkin]:
     tone = np.average(skin_map.reshape(-1, 3), axis=0, weights=facial.ravel())
     where, points, normals, ambient, caster = _head()
     weight = weigh_skin(SIZE, np.zeros((SIZE, SIZE), np.float32))[where]
-    found = []
+    skins = []
     for k in range(LIGHTS):
         rng = np.random.default_rng([seed, k, 31])
         drawn = light.random_light(rng)
@@ -99,9 +99,9 @@ def scenes_of(seed: int) -> list[LitSkin]:
         turned /= np.linalg.norm(turned)
         card = np.maximum((sh_basis(turned) * per_function(LAMBERT)) @ sky, 0.005) + max(turned @ sun, 0) * colour
         used = (weight > 0.05) & ~shadowed
-        found.append(LitSkin(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright,
+        skins.append(LitSkin(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright,
                              card))
-    return found
+    return skins
 
 
 @cache
@@ -142,18 +142,18 @@ def fitted(scenes: list[LitSkin]) -> dict:
     subjects = scenes[::LIGHTS]
     result = {"tones": np.concatenate([[each.tone for each in subjects], beyond(subjects)]), "slope": solution[:3].T,
               "offset": solution[3], "covariance": np.cov((np.array(shown) - system @ solution).T)}
-    return {name: np.round(values, 5).tolist() for name, values in result.items()}
+    return {name: np.round(array, 5).tolist() for name, array in result.items()}
 
 
 def beyond(scenes: list[LitSkin]) -> np.ndarray:
     """Tones [K, 3] a little lighter and darker than the outermost subjects', by their melanin: else the ends of the
     population would be drawn inwards."""
-    found = []
+    tones = []
     for each in scenes:
         subject, angle = sample_parameters(each.seed), float(pigment.typology_angle(each.tone))
         factor = 0.45 if angle > 42 else 1.8 if angle < -38 else None
         if factor is not None:
             now, then = pigment.reflectance(subject.melanin * np.array([1, factor]), np.full(2, subject.blood),
                                             subject.oxygen, subject.scattering, subject.slope, subject.chroma)
-            found.append(np.clip(each.tone * then / now, 1e-3, 0.95))
-    return np.array(found).reshape(-1, 3)
+            tones.append(np.clip(each.tone * then / now, 1e-3, 0.95))
+    return np.array(tones).reshape(-1, 3)

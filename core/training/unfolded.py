@@ -85,8 +85,8 @@ def light_up(crowd: Crowd, who: torch.Tensor, albedo: torch.Tensor, props: Props
     turned = (facing / 0.06).clamp(0, 1)
     lost = (strength[..., None, None] * (1 - turned * lamps.arrives)).sum(1, keepdim=True)
     lost = lost / strength.sum(1).clamp_min(1e-6)[:, None, None, None]
-    found = fit_light(carried, radiance, lamps, tone * gains, normal, dice)
-    maps = as_captured(log, apart, seen, found, dice)
+    fitted = fit_light(carried, radiance, lamps, tone * gains, normal, dice)
+    maps = as_captured(log, apart, seen, fitted, dice)
     strong = (0.6 * strength.sum(1) / mean_over(diffuse, skin).mean(1).flatten().clamp_min(1e-6)).clamp_max(1)
     return LitPeople(maps, even - tone.clamp_min(MIN_LINEAR).log(), lost, strong)
 

@@ -96,8 +96,8 @@ def _error(network: Rcan, pairs: tuple[torch.Tensor, torch.Tensor], device: str,
     small, large = (x.to(device, memory_format=torch.channels_last) for x in pairs)
     missing = large - bicubic(small)
     with torch.autocast(device, torch.bfloat16, enabled=device == "cuda" or fast_dtype("cpu") == torch.bfloat16):
-        found = network(small, depth)
-    return (found.float() - missing).abs().mean((0, 2, 3)) / torch.tensor(MISSED, device=device)
+        predicted = network(small, depth)
+    return (predicted.float() - missing).abs().mean((0, 2, 3)) / torch.tensor(MISSED, device=device)
 
 
 @torch.no_grad()
@@ -107,7 +107,7 @@ def figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor]
     network = Rcan(**CONFIGS[config]["model"]).to(device, memory_format=torch.channels_last)
     network.load_state_dict(average)
     parts = [tuple(x[i:i + 4] for x in pairs) for i in range(0, len(pairs[0]), 4)]
-    error = sum(_error(network, part, device, None).cpu() for part in parts) / len(parts)
+    error = sum(_error(network, chunk, device, None).cpu() for chunk in parts) / len(parts)
     missed = (pairs[1] - bicubic(pairs[0])).abs().mean((0, 2, 3)) / torch.tensor(MISSED)
     return {name: round(float(error[channels].sum() / missed[channels].sum()), 4)
             for name, channels in (("diffuse", slice(0, 3)), ("normal", slice(3, 6)), ("specular", slice(6, 7)))}

@@ -136,8 +136,8 @@ def displacement(head: Mesh, scan: Mesh, size: int, tick: Callable[[float], None
         n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-9)
         hit, _, distance = surface.along(points + FAR_M * n, -n, n)
         there = (hit >= 0) & (distance < 2 * FAR_M)
-        values = np.where(there, FAR_M - np.where(there, distance, 0), 0)
-        out[row:end][inside], known[row:end][inside] = values, there
+        heights = np.where(there, FAR_M - np.where(there, distance, 0), 0)
+        out[row:end][inside], known[row:end][inside] = heights, there
     return _faded(out, known)
 
 

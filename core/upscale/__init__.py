@@ -48,7 +48,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("size_px", size)
     report.figure("frames_detail", "used" if guided else "none")
     report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
-    maps, found, hairs = _whole(capture, maps, settings, report)
+    maps, hair_maps, hairs = _whole(capture, maps, settings, report)
     share = SHARES[method]
     large = enlarged(maps, size, method, settings.compute_device,
                      lambda done: report.progress(share * done, 1, "enlarging"))
@@ -64,8 +64,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             lambda: images.write_data(folder / "normal.png",
                                       _mapped(large[..., 3:6], lambda vectors: vectors * 0.5 + 0.5), bits=16,
                                       check=report.check),
-            *([] if found is None
-              else [lambda: hair.write(folder, srgb, *found, report.check),
+            *([] if hair_maps is None
+              else [lambda: hair.write(folder, srgb, *hair_maps, report.check),
                     lambda: grooming.write(folder / STRANDS, hairs)]),
             lambda: images.write_linear(folder / "diffuse_albedo.exr", _mapped(srgb, images.srgb_to_linear),
                                         check=report.check),
@@ -95,21 +95,21 @@ def _whole(capture: Capture, maps: HeadMaps, settings: Settings,
     report.progress(0, 1, "finding brows, lashes and beard")
     parts = read_parts(capture, surface.size)
     report.figure("hair_told_by", "strokes" if parts is None else "frames and strokes")
-    found = hair.find(maps, surface, parts, report.check)
+    masks = hair.find(maps, surface, parts, report.check)
     report.check()
-    cleaned, share = hair.clean(maps, found, surface, settings.seed, report.check)
+    cleaned, share = hair.clean(maps, masks, surface, settings.seed, report.check)
     for name in ("brows", "lashes", "beard"):
-        report.figure(f"{name}_cm2", round(float((getattr(found, name) * surface.texel**2).sum()) / 100, 2))
-    behind = round(100 * float((found.hidden * found.brows).sum() / max(found.brows.sum(), 1e-6)))
+        report.figure(f"{name}_cm2", round(float((getattr(masks, name) * surface.texel**2).sum()) / 100, 2))
+    behind = round(100 * float((masks.hidden * masks.brows).sum() / max(masks.brows.sum(), 1e-6)))
     if behind:
         report.figure("brows_hidden_percent", behind)
         report.log(f"Hair lies before {behind} % of the brows: there they are grown like the other side, or as brows "
                    "usually are.")
-    images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, found, cleaned))
+    images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, masks, cleaned))
     report.progress(0, 1, "growing hair")
-    hairs = grooming.groom(maps, found, cleaned, surface, settings.seed, check=report.check)
+    hairs = grooming.groom(maps, masks, cleaned, surface, settings.seed, check=report.check)
     report.figure("hairs", sum(len(strands.points) for strands in hairs.values()))
-    return maps, (found, cleaned, share), hairs
+    return maps, (masks, cleaned, share), hairs
 
 
 def enlarged(maps: HeadMaps, size: int, method: str, device: str, progress) -> np.ndarray:

@@ -65,8 +65,8 @@ def _strip(network: Rcan, small: torch.Tensor, features: torch.Tensor, rows: sli
     first, end = max(rows.start - HALO, 0), min(rows.stop + HALO, small.shape[2])
     inner = slice(FACTOR * (rows.start - first), FACTOR * (rows.stop - first))
     details = network.details(features[:, :, first:end])[:, :, inner].float()
-    found = (bicubic(small[:, :, first:end])[:, :, inner] + details)[0]
-    found[3:6] /= found[3:6].norm(dim=0).clamp_min(1e-6)
+    strip = (bicubic(small[:, :, first:end])[:, :, inner] + details)[0]
+    strip[3:6] /= strip[3:6].norm(dim=0).clamp_min(1e-6)
     for bounded in (slice(0, 3), slice(6, 7)):
-        found[bounded].clamp_(0, 1)
-    return found
+        strip[bounded].clamp_(0, 1)
+    return strip

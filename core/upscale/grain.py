@@ -47,18 +47,18 @@ def measure(channels: np.ndarray, slopes: np.ndarray, weight: np.ndarray, surfac
     where = weight > 0.99
     texel = float(np.median(surface.texel[where])) if where.any() else 1.0
     parts = [bands(picture, weight, texel) for picture in (channels, slopes)]
-    found = [[np.cov(_clipped(band[where]), rowvar=False) if where.sum() > 100 else np.zeros((band.shape[-1],) * 2)
-              for band in part] for part in parts]
+    moments = [[np.cov(_clipped(band[where]), rowvar=False) if where.sum() > 100 else np.zeros((band.shape[-1],) * 2)
+                for band in picture_bands] for picture_bands in parts]
     answer, answer_slope = _answers(surface, where, texel, np.random.default_rng([seed, 1]))
     mix, tie = np.zeros((len(WAVELENGTHS), 4, 4)), np.ones(len(WAVELENGTHS))
-    strength = np.stack([nnls(answer, [cov[i, i] for cov in found[0]])[0] for i in range(4)], 1)  # [K, 4] variances
+    strength = np.stack([nnls(answer, [cov[i, i] for cov in moments[0]])[0] for i in range(4)], 1)  # [K, 4] variances
     for k, variance in enumerate(strength):
-        deviation = np.sqrt(np.maximum(np.diag(found[0][k]), 1e-12))
-        together = found[0][k] / np.outer(deviation, deviation)
-        values, vectors = np.linalg.eigh(together * np.sqrt(np.outer(variance, variance)))
-        mix[k] = (vectors * np.sqrt(np.maximum(values, 0)))[:, ::-1]
+        deviation = np.sqrt(np.maximum(np.diag(moments[0][k]), 1e-12))
+        together = moments[0][k] / np.outer(deviation, deviation)
+        eigenvalues, vectors = np.linalg.eigh(together * np.sqrt(np.outer(variance, variance)))
+        mix[k] = (vectors * np.sqrt(np.maximum(eigenvalues, 0)))[:, ::-1]
         tie[k] = 1.0 if mix[k][:3, 0].sum() >= 0 else -1.0
-    slope = np.sqrt(nnls(answer_slope, [np.trace(cov) / 2 for cov in found[1]])[0])
+    slope = np.sqrt(nnls(answer_slope, [np.trace(cov) / 2 for cov in moments[1]])[0])
     return Grain(mix, slope, tie)
 
 
@@ -83,12 +83,12 @@ def paint(grain: Grain, surface: HeadSurface, where: np.ndarray, seed: int = 0) 
 def bands(picture: np.ndarray, weight: np.ndarray, texel: float) -> list[np.ndarray]:
     """The bands [S, S, C] of a picture, fine to coarse, by means that count texels by their weight [S, S]; texel in
     mm."""
-    found, finer = [], picture
+    levels, finer = [], picture
     for sigma in SIGMAS:
         coarser = blurred(picture, weight, sigma / texel)
-        found.append(finer - coarser)
+        levels.append(finer - coarser)
         finer = coarser
-    return found
+    return levels
 
 
 def blurred(picture: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray:
@@ -105,20 +105,20 @@ def _answers(surface: HeadSurface, where: np.ndarray, texel: float,
     side = int(min(np.sqrt(SAMPLE), surface.size))
     top, left = (int(np.clip(np.median(at) - side / 2, 0, surface.size - side)) if len(at) else 0
                  for at in (rows, columns))
-    part = np.s_[top:top + side, left:left + side]
-    points, inner = surface.position[part].reshape(-1, 3), np.ones((side, side), np.float32)
+    window = np.s_[top:top + side, left:left + side]
+    points, inner = surface.position[window].reshape(-1, 3), np.ones((side, side), np.float32)
     there = np.zeros(surface.covered.shape, bool)
-    there[part] = True
+    there[window] = True
     tangent = surface.frames(there)[0].astype(np.float32)
-    found = np.zeros((2, len(SIGMAS), len(WAVELENGTHS)))
+    variances = np.zeros((2, len(SIGMAS), len(WAVELENGTHS)))
     for k, wavelength in enumerate(WAVELENGTHS):
         seed = int(rng.integers(1 << 31))
         height = noise(points, wavelength, np.random.default_rng(seed))
         rise = (noise(points + np.float32(STEP) * tangent, wavelength, np.random.default_rng(seed)) - height) / STEP
         both = np.stack([height, rise], 1).reshape(side, side, 2)
         for b, band in enumerate(bands(both, inner, texel)):
-            found[:, b, k] = band.reshape(-1, 2).var(0)
-    return found[0], found[1]
+            variances[:, b, k] = band.reshape(-1, 2).var(0)
+    return variances[0], variances[1]
 
 
 def _begun(seed: int, wavelength: int, part: int) -> np.random.Generator:

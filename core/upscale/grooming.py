@@ -78,7 +78,7 @@ def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface,
     """The hairs of each part that has any, by its name; metres, on the head with closed lids. cleaned: linear albedo
     [S, S, 3] of the skin below; trust: how clear strokes must be to outweigh the usual direction. `check` may raise to
     cancel."""
-    found, landmarks = {}, template.landmark_points(surface.mesh)
+    hairs, landmarks = {}, template.landmark_points(surface.mesh)
     for number, kind in enumerate(KINDS):
         check()
         cover = getattr(hair, kind.name)
@@ -91,12 +91,12 @@ def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface,
         way = strokes.choose_ways(tensors, texels, ways.usual(kind.name, texels.position, landmarks), trust)
         colours = _unmix(maps.diffuse, cleaned, cover * where * seen, COLOUR_REACH / texel)[where]
         check()
-        found[kind.name] = _grown(kind, cover[where], colours, texels, way, surface,
+        hairs[kind.name] = _grown(kind, cover[where], colours, texels, way, surface,
                                   np.random.default_rng([seed, number]))
-    if "brows" in found:
-        found["lashes"] = _lashes(found["brows"].colour.mean(0), surface.mesh.vertices / 1000,
+    if "brows" in hairs:
+        hairs["lashes"] = _lashes(hairs["brows"].colour.mean(0), surface.mesh.vertices / 1000,
                                   np.random.default_rng([seed, len(KINDS)]))
-    return found
+    return hairs
 
 
 def write(path: Path, found: dict[str, Strands]) -> None:
@@ -172,7 +172,7 @@ def _unmix(albedo: np.ndarray, skin: np.ndarray, cover: np.ndarray, reach: float
     share = cover[..., None]
     mixed, square = (share * (albedo - (1 - share) * skin)).astype(np.float32), (share**2).astype(np.float32)
     whole = mixed.sum((0, 1)) / square.sum() if square.sum() > FEWEST else np.float32(BROWN)
-    mixed, square = (cv2.GaussianBlur(part, (0, 0), reach) for part in (mixed, square))
+    mixed, square = (cv2.GaussianBlur(picture, (0, 0), reach) for picture in (mixed, square))
     mixed = (mixed + LEAST_SEEN * whole) / (square[..., None] + LEAST_SEEN)
     return np.minimum.accumulate(np.maximum(mixed, DARKEST), -1)
 

@@ -92,8 +92,8 @@ def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0,
     check()
     painted, _ = grain.paint(learnt, surface, where, seed + 1)
     below = np.clip(np.exp((skin[where] + painted)[:, :3]), 0, 1)
-    cleaned, part = maps.diffuse.copy(), share[where][:, None]
-    cleaned[where] = maps.diffuse[where] * (1 - part) + below * part
+    cleaned, blend = maps.diffuse.copy(), share[where][:, None]
+    cleaned[where] = maps.diffuse[where] * (1 - blend) + below * blend
     return cleaned, share * surface.covered
 
 

@@ -33,14 +33,14 @@ def read_maps(folder: Path) -> HeadMaps:
              "specular": folder / "specular_albedo.png",
              "confidence": folder / "confidence.png", "shading": folder / "shading.exr"}
     normal = images.read_normals(paths["normal"])
-    found = HeadMaps(images.read_linear(paths["diffuse"]),
-                     normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
-                     images.read_mask(paths["specular"]), images.read_mask(paths["confidence"]),
-                     images.read_linear(paths["shading"]))
-    side = len(found.diffuse)
-    for name, pixels in vars(found).items():
+    maps = HeadMaps(images.read_linear(paths["diffuse"]),
+                    normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
+                    images.read_mask(paths["specular"]), images.read_mask(paths["confidence"]),
+                    images.read_linear(paths["shading"]))
+    side = len(maps.diffuse)
+    for name, pixels in vars(maps).items():
         if pixels.shape[:2] != (side, side):
             raise Problem(f"{paths[name]} is {pixels.shape[1]} x {pixels.shape[0]} pixels, but {paths['diffuse'].name} "
-                          f"is {found.diffuse.shape[1]} x {side}.",
+                          f"is {maps.diffuse.shape[1]} x {side}.",
                           advise_again("solve"))
-    return found
+    return maps

@@ -23,7 +23,7 @@ def usual(part: str, position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
 
 
 def _brows(position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
-    found = np.zeros_like(position)
+    directions = np.zeros_like(position)
     for brow, here in ((LEFT_BROW, position[:, 0] >= 0), (RIGHT_BROW, position[:, 0] < 0)):
         line = np.array([landmarks[list(pair)].mean(0) for pair in brow])
         axis = np.gradient(line, axis=0)
@@ -32,8 +32,8 @@ def _brows(position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
         x = np.abs(position[here, 0])
         along = np.stack([np.interp(x, outer, axis[:, k]) for k in range(3)], 1)
         done = np.clip((x - outer[0]) / (outer[-1] - outer[0]), 0, 1)
-        found[here] = along + np.clip(1 - 3 * done, 0, 1)[:, None] * [0, 0, 1.5]
-    return found
+        directions[here] = along + np.clip(1 - 3 * done, 0, 1)[:, None] * [0, 0, 1.5]
+    return directions
 
 
 def _beard(position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:

@@ -68,9 +68,9 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     share, own = seen[holes][:, None], channels - _low(channels, seen, surface)
     # two grains that know nothing of each other would cancel where they mix
     loud = 1 / np.sqrt(share**2 + (1 - share) ** 2)
-    found = tone[holes] + (channels - own - tone)[holes] * share + (own[holes] * share + painted * (1 - share)) * loud
+    filled = tone[holes] + (channels - own - tone)[holes] * share + (own[holes] * share + painted * (1 - share)) * loud
     tilted = (slopes[holes] * share + tilt * (1 - share)) * loud
-    return joined(maps, holes, found, tilted)
+    return joined(maps, holes, filled, tilted)
 
 
 def seen_well(confidence: np.ndarray, surface: HeadSurface) -> np.ndarray:

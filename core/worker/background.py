@@ -48,11 +48,11 @@ class BackgroundTask:
         if self.running and self._cancelled_at is not None:
             self.running = self._thread.is_alive() and time.monotonic() - self._cancelled_at < GRACE_S
             return [] if self.running else [Cancelled(self.name)]
-        found = []
+        messages = []
         while self.running and not self._messages.empty():
-            found.append(self._messages.get())
-            self.running = not isinstance(found[-1], FINAL)
-        return found
+            messages.append(self._messages.get())
+            self.running = not isinstance(messages[-1], FINAL)
+        return messages
 
     def cancel(self) -> None:
         self._cancelled_at = self._cancelled_at or time.monotonic()

@@ -71,8 +71,8 @@ def _status(options: argparse.Namespace) -> int:
 
 def _delete(options: argparse.Namespace) -> int:
     capture = Capture(options.capture)
-    found = deletion.delete(capture) if options.yes else deletion.plan(capture)
-    print(*deletion.lines(found), sep="\n")
+    removal = deletion.delete(capture) if options.yes else deletion.plan(capture)
+    print(*deletion.lines(removal), sep="\n")
     if not options.yes:
         print("Nothing was deleted; --yes does it.")
     return 0

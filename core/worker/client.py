@@ -80,7 +80,7 @@ class Worker:
             return []
         if self._cancelled_at is not None and time.monotonic() - self._cancelled_at > GRACE_S:
             self._kill()
-        found: list[Message] = []
+        messages: list[Message] = []
         while not self._ended:
             try:
                 message = self._messages.get_nowait()
@@ -90,8 +90,8 @@ class Worker:
                 message = self._without_farewell(message)
             self._stage = getattr(message, "stage", self._stage)
             self._ended = isinstance(message, FINAL)
-            found.append(message)
-        return found
+            messages.append(message)
+        return messages
 
     def cancel(self) -> None:
         """Asks the worker to stop at its next report; `poll` ends it after the grace time and then says Cancelled."""

@@ -55,17 +55,17 @@ def read_options(options: argparse.Namespace, command: str) -> dict:
     --set and flags lie over the file. Raises Problem for what is no setting or of another command, for a value that
     cannot be, a file that cannot be read, and where one setting is to have two values.
     """
-    values = read_file(options.settings_file) if options.settings_file else {}
-    asked: dict[str, tuple[str, object]] = {}
+    settings = read_file(options.settings_file) if options.settings_file else {}
+    overrides: dict[str, tuple[str, object]] = {}
     for words, name, value in [*_flags(options), *(_assignment(text, command) for text in options.assignments)]:
-        if name in asked and asked[name][1] != value:
-            raise Problem(f"{asked[name][0]} and {words} ask for two values of {name}.", "Leave one of them out.")
-        asked[name] = (words, value)
-    for name, (_, value) in asked.items():
+        if name in overrides and overrides[name][1] != value:
+            raise Problem(f"{overrides[name][0]} and {words} ask for two values of {name}.", "Leave one of them out.")
+        overrides[name] = (words, value)
+    for name, (_, value) in overrides.items():
         stage, _, own = name.rpartition(".")
-        (values.setdefault(stage, {}) if stage else values)[own] = value
-    from_json(values)
-    return values
+        (settings.setdefault(stage, {}) if stage else settings)[own] = value
+    from_json(settings)
+    return settings
 
 
 def read_file(path: Path) -> dict:
@@ -73,14 +73,14 @@ def read_file(path: Path) -> dict:
     not there or not of settings."""
     path = Path(absolute_path(str(path)))
     try:
-        values = read_json(path)
+        settings = read_json(path)
     except (OSError, ValueError) as error:
         raise Problem(f"The settings file {path} cannot be read ({error}).",
                       'It is a JSON file like {"solve": {"steps": 30}, "seed": 1}.') from error
-    from_json(values)
+    from_json(settings)
     return {stage: {name: absolute_path(value, path.parent) if "path" in find_setting(f"{stage}.{name}").metadata
                     else value for name, value in own.items()}
-            if stage in STAGE_KINDS else own for stage, own in values.items()}
+            if stage in STAGE_KINDS else own for stage, own in settings.items()}
 
 
 def refuse_lone_flags(options: argparse.Namespace, values: dict) -> None:

@@ -33,12 +33,12 @@ def examine(root: Path, python: Path, importing: bool = True) -> Findings:
     """The findings about `python` and the code under `root`. Raises Problem for a Python that cannot be run.
     Without `importing` a broken package may go unseen, and it takes a second in place of ten."""
     requirements = root / "requirements"
-    found = environment.survey(python, requirements, importing)
+    probe = environment.survey(python, requirements, importing)
     lines = [f"WildCap       {__version__} at {root}",
-             f"Python        {found['python'][0]}.{found['python'][1]} at {python}",
-             f"device        {found['device'] or 'not tried'}" + (f"  ({found['reason']})" if found["reason"] else "")]
+             f"Python        {probe['python'][0]}.{probe['python'][1]} at {python}",
+             f"device        {probe['device'] or 'not tried'}" + (f"  ({probe['reason']})" if probe["reason"] else "")]
     for name, version in environment.required(requirements).items():
-        has = found["versions"][name]
+        has = probe["versions"][name]
         lines.append(f"  {name:32} {has or 'missing':14}"
                      + ("" if has and has.partition("+")[0] == version else f" {version} is needed"))
     of_files = shipped_files.find_faults(root / "core")
@@ -46,7 +46,7 @@ def examine(root: Path, python: Path, importing: bool = True) -> Findings:
     lines.append(f"own files     {count - len(of_files)} of {count} whole")
     lines += [f"weights       {path.name}: {_described(path)}"
               for path in sorted((root / "core" / "weights").glob("*.safetensors"))]
-    of_packages = environment.judge(found, requirements)
+    of_packages = environment.judge(probe, requirements)
     remedies = []
     if of_packages:
         remedies.append(f"{python} -m pip install -r {requirements / 'worker.txt'}")

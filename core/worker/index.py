@@ -53,13 +53,13 @@ def plan(requirements: Path, base: Path, compute: str, source: str, run: Callabl
         if wheels is None:
             # one that reads descriptions without downloading packages; an old one works, slowly
             run([*pip, "--quiet", "--upgrade", "pip"])
-        found, report = {}, Path(folder) / "report.json"
+        packages, report = {}, Path(folder) / "report.json"
 
         def ask(words: tuple[str, ...]) -> tuple[int, str]:
             code, error = run([*pip, "--dry-run", "--quiet", "--ignore-installed", "--report", report, *words])
             for entry in json.loads(report.read_text(encoding="utf-8"))["install"] if not code else ():
-                found[locks.normal(entry["metadata"]["name"])] = (entry["metadata"]["version"],
-                                                                  entry["download_info"]["url"])
+                packages[locks.normal(entry["metadata"]["name"])] = (entry["metadata"]["version"],
+                                                                     entry["download_info"]["url"])
             return code, error
 
         todo = pip_steps.steps(requirements, lock, compute, source, Path(folder), wheels)
@@ -70,9 +70,9 @@ def plan(requirements: Path, base: Path, compute: str, source: str, run: Callabl
                           f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
                           "Check the network connection, and try again.")
     known = locks.known_sizes(requirements, lock.name)
-    sizes = [known[f"{name}=={version}"] for name, (version, _) in found.items()]
-    hosts = sorted({urllib.parse.urlsplit(url).hostname or "this disk" for _, url in found.values()})
-    return InstallationPlan({name: version for name, (version, _) in found.items()}, tuple(hosts),
+    sizes = [known[f"{name}=={version}"] for name, (version, _) in packages.items()]
+    hosts = sorted({urllib.parse.urlsplit(url).hostname or "this disk" for _, url in packages.values()})
+    return InstallationPlan({name: version for name, (version, _) in packages.items()}, tuple(hosts),
                             sum(size for size, _ in sizes), sum(disk for _, disk in sizes))
 
 

@@ -95,10 +95,10 @@ def find_python() -> Path | None:
 
 def base_python() -> Path:
     """As `find_python`. Raises Problem when there is none: what is wrong with Blender's own."""
-    found = find_python()
-    if found is None:
+    python = find_python()
+    if python is None:
         locks.lock_name(answer(sys.executable, locks.DESCRIBE))
-    return found
+    return python
 
 
 @dataclass(frozen=True)

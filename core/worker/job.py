@@ -44,15 +44,15 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
     worker is at the capture: job.json is the record of what that one was asked.
     """
     chosen = convert_settings(settings or {}, lambda path: write_portable(path, capture.root))
-    values = {"capture": ".", "source": write_portable(source, capture.root) if str(source) else "", "from": first,
-              "until": last, "settings": chosen, "quality": quality, **({"tool": tool} if tool else {})}
+    job = {"capture": ".", "source": write_portable(source, capture.root) if str(source) else "", "from": first,
+           "until": last, "settings": chosen, "quality": quality, **({"tool": tool} if tool else {})}
     _check_names(capture.root, source)
-    _job(values, capture.root)
+    _job(job, capture.root)
     if str(source):
         capture.refuse_inside(source)
     capture.claim()
     capture.check_free()
-    write_json(capture.job, values)
+    write_json(capture.job, job)
     return capture.job
 
 

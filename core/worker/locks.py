@@ -126,11 +126,11 @@ def beside(requirements: Path, name: str, compute: str) -> Path | None:
 
 def known_sizes(requirements: Path, name: str) -> dict[str, tuple[int, int]]:
     """Lock.sizes of a lock and of what lies beside it."""
-    found = dict(read(requirements, name).sizes)
+    sizes = dict(read(requirements, name).sizes)
     for compute in ("cpu", "cuda"):
         if beside(requirements, name, compute) is not None:
-            found |= read(requirements, f"{name}-{compute}").sizes
-    return found
+            sizes |= read(requirements, f"{name}-{compute}").sizes
+    return sizes
 
 
 def check_path(lock: Lock, folder: Path, limited: bool) -> None:
@@ -149,4 +149,4 @@ def normal(name: str) -> str:
 
 
 def _numbers(version: str) -> tuple[int, ...]:
-    return tuple(int(part) for part in re.findall(r"\d+", version)[:2])
+    return tuple(int(digits) for digits in re.findall(r"\d+", version)[:2])

@@ -114,10 +114,10 @@ def _without_paths(line: str) -> str:
     """A line without its absolute paths. Nobody can tell where one that holds blanks ends, but by the quote that it
     began with: the rest of the line goes."""
     done = ""
-    while found := ABSOLUTE.search(line):
-        quote = line[found.start() - 1] if found.start() and line[found.start() - 1] in "'\"`" else ""
-        end = line.find(quote, found.end()) if quote else -1
-        done += line[:found.start()] + "<path>"
+    while path_match := ABSOLUTE.search(line):
+        quote = line[path_match.start() - 1] if path_match.start() and line[path_match.start() - 1] in "'\"`" else ""
+        end = line.find(quote, path_match.end()) if quote else -1
+        done += line[:path_match.start()] + "<path>"
         line = line[end:] if end >= 0 else ""
     return done + line
 
@@ -131,25 +131,25 @@ def _forms(text: str) -> set[str]:
 
 def _own_names() -> set[str]:
     """The user's, the home's and the machine's."""
-    found = {platform.node(), platform.node().partition(".")[0], Path.home().name}
+    names = {platform.node(), platform.node().partition(".")[0], Path.home().name}
     with contextlib.suppress(OSError, KeyError, ImportError):
-        found |= {getpass.getuser(), socket.gethostname()}
-    return {name for name in found if name}
+        names |= {getpass.getuser(), socket.gethostname()}
+    return {name for name in names if name}
 
 
 def _names_of(capture: Capture) -> set[str]:
     """The capture's, those of its source and of the folders they lie in, and of the photographs."""
-    found = {capture.root.stem, *capture.root.absolute().parts}
+    names = {capture.root.stem, *capture.root.absolute().parts}
     with contextlib.suppress(Problem, OSError):
         source = capture.source
         if source is not None:
-            found |= {source.stem, *source.absolute().parts}
+            names |= {source.stem, *source.absolute().parts}
     with contextlib.suppress(Problem, OSError):
         for record in read_frames(capture).records:
-            found |= {record.source, PurePosixPath(record.source).stem} if record.source else set()
+            names |= {record.source, PurePosixPath(record.source).stem} if record.source else set()
     with contextlib.suppress(Problem, OSError):
-        found |= {str(stamp[0]) for stamp in capture.read().get("source_stamp", [])}
-    return {name for name in found if name.strip("/\\") and not name.isdigit()}
+        names |= {str(stamp[0]) for stamp in capture.read().get("source_stamp", [])}
+    return {name for name in names if name.strip("/\\") and not name.isdigit()}
 
 
 def _examined(root: Path, python: Path | None) -> str:
@@ -163,12 +163,12 @@ def _examined(root: Path, python: Path | None) -> str:
 
 def _logs(capture: Capture | None) -> dict[str, str]:
     """Name in the zip -> text, of the logs that are there; those of others are not ours to send."""
-    found = {}
+    logs = {}
     for name in sorted(LOGS) if capture is not None else ():
         with contextlib.suppress(OSError), open(capture.root / name, "rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
-            found[name] = file.read().decode("utf-8", "replace")
-    return found
+            logs[name] = file.read().decode("utf-8", "replace")
+    return logs
 
 
 def _described(capture: Capture | None) -> dict:

@@ -115,10 +115,10 @@ def frames(triangles: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.n
 
 def _rotation_and_scale(covariance: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Umeyama's similarity: covariance [..., 3, 3] of target with source, variance [...] of the source."""
-    u, values, vt = np.linalg.svd(covariance)
-    sign = np.ones_like(values)
+    u, singular_values, vt = np.linalg.svd(covariance)
+    sign = np.ones_like(singular_values)
     sign[..., 2] = np.sign(np.linalg.det(u @ vt))
-    scale = (values * sign).sum(-1) / np.maximum(variance, 1e-12)
+    scale = (singular_values * sign).sum(-1) / np.maximum(variance, 1e-12)
     return (u * sign[..., None, :]) @ vt * scale[..., None, None]
 
 

@@ -78,14 +78,14 @@ def drive(obj, empty) -> None:
         x, y, z = (f"({name} - {value:.6f})" for name, value in zip("xyz", eye.centre, strict=True))
         yaw, pitch = f"atan2({outwards} * {x}, -{y})", f"atan2({z}, sqrt({x} * {x} + {y} * {y}))"
         for way in WAYS:
-            asked, angle = (yaw, _yaw) if way in ("Out", "In") else (pitch, _pitch)
+            gaze_angle, angle = (yaw, _yaw) if way in ("Out", "In") else (pitch, _pitch)
             rest, full = angle(eye.ahead, outwards), angle(eye.turned[way], outwards)
             key = obj.data.shape_keys.key_blocks[f"eyeLook{way}{side}"]
             key.driver_remove("value")
             key.slider_max = MOST
             driver = key.driver_add("value").driver
             driver.type = 'SCRIPTED'
-            driver.expression = f"max(0, min({MOST}, ({asked} - {rest:.6f}) / {full - rest:.6f}))"
+            driver.expression = f"max(0, min({MOST}, ({gaze_angle} - {rest:.6f}) / {full - rest:.6f}))"
             for axis in "XYZ":
                 variable = driver.variables.new()
                 variable.name, variable.type = axis.lower(), 'TRANSFORMS'

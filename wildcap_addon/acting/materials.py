@@ -60,9 +60,9 @@ def colour_of(obj) -> tuple[float, float, float]:
 
 
 def _material(name: str, kind: str, colour: tuple, roughness: float, coat: float) -> bpy.types.Material:
-    found = bpy.data.materials.get(name)
-    if found is not None and found.get(KEY) == kind:
-        return found
+    existing = bpy.data.materials.get(name)
+    if existing is not None and existing.get(KEY) == kind:
+        return existing
     material = bpy.data.materials.new(name)
     material[KEY] = kind
     shader = next(n for n in node_trees.of(material).nodes if n.type == 'BSDF_PRINCIPLED')

@@ -168,9 +168,9 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        found = batches.state_of(captures.root(captures.active(context)))
+        face_state = batches.state_of(captures.root(captures.active(context)))
         return super().poll(context) and cls.allowed(
-            found is not None and found.state == WAITING, "This face's mask does not wait: click Next Mask")
+            face_state is not None and face_state.state == WAITING, "This face's mask does not wait: click Next Mask")
 
     def work(self, context):
         root = captures.root(captures.require(context))

@@ -47,9 +47,9 @@ class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
             column.operator("wildcap.accept_mask", icon='CHECKMARK')
             column.operator("wildcap.next_mask", icon='FORWARD')
         face = known.face(captures.root(captures.active(context)))
-        found = known.states.get(face.name) if face else None
-        if found is not None and found.state == STOPPED:
-            problems.draw(layout, Problem(found.problem, found.remedy), width)
+        face_state = known.states.get(face.name) if face else None
+        if face_state is not None and face_state.state == STOPPED:
+            problems.draw(layout, Problem(face_state.problem, face_state.remedy), width)
 
 
 def count_words(known: batches.BatchView) -> str:

@@ -38,12 +38,12 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
     def tell() -> tuple[str, ...] | None:
         capture = captures.folder(captures.require(bpy.context))
         key = ("deletion", str(capture.root))
-        found = asking.answer(key)
+        removal = asking.answer(key)
         asking.forget(key)  # whoever closes the dialog and comes back is told what is there then
-        if found is None:
+        if removal is None:
             asking.ask(key, lambda task: look_at(task, capture), "delete_face")
             return None
-        return (*deletion.lines(found, iface_),
+        return (*deletion.lines(removal, iface_),
                 "A head in the scene stays as a mesh and loses its maps: deliver it first to keep them.")
 
     def work(self, context):

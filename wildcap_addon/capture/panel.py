@@ -15,9 +15,9 @@ class WILDCAP_UL_captures(bpy.types.UIList):
         # the active head decides
         layout.prop(item, "name", text="", emboss=False,
                     icon='CHECKMARK' if item == captures.active(context) else 'USER')
-        found = batches.state_of(captures.root(item))
-        if found is not None:
-            layout.label(text="", icon=batches.ICONS[found.state])
+        face_state = batches.state_of(captures.root(item))
+        if face_state is not None:
+            layout.label(text="", icon=batches.ICONS[face_state.state])
 
 
 class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
@@ -57,15 +57,15 @@ class WILDCAP_PT_frames(CapturePanel, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
-        found = strip.of(captures.active(context))
-        if found is None:
+        frame_strip = strip.of(captures.active(context))
+        if frame_strip is None:
             layout.label(text="No frames yet: they are taken from the video by Reconstruct", icon='INFO')
             return
-        counts = iface_("{} frames, {} in the texture").format(found.count, found.used)
-        blurred = iface_(", {} blurred").format(found.blurred) if found.blurred else ""
+        counts = iface_("{} frames, {} in the texture").format(frame_strip.count, frame_strip.used)
+        blurred = iface_(", {} blurred").format(frame_strip.blurred) if frame_strip.blurred else ""
         layout.label(text=counts + blurred, translate=False)
         grid = layout.grid_flow(row_major=True, columns=4, even_columns=True, align=True)
-        for frame in found.frames:
+        for frame in frame_strip.frames:
             column = grid.column(align=True)
             column.template_icon(icon_value=frame.icon, scale=3.5)
             column.alert = frame.blurred

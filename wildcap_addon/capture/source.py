@@ -80,7 +80,7 @@ class WILDCAP_FH_source(bpy.types.FileHandler):
 def sources(chosen: list[Path]) -> list[Path]:
     """What was meant by some files: each video by itself, and for photographs the folder that they lie in. Raises
     Problem where there is nothing to see."""
-    found = []
+    paths = []
     for path in chosen:
         if not path.exists() or path == Path():
             raise Problem(f"There is no file or folder {path}.", "Choose a video, or a folder of photographs.")
@@ -91,8 +91,8 @@ def sources(chosen: list[Path]) -> list[Path]:
                           f"Choose one of {', '.join(s[1:] for s in VIDEOS)}, or a folder of photographs.")
         if path.is_dir() and not any(file.suffix.lower() in PHOTOGRAPHS for file in path.iterdir()):
             raise Problem(f"There are no photographs in {path}.", "Choose a video, or a folder of photographs.")
-        found.append(path.absolute())
-    return list(dict.fromkeys(found))
+        paths.append(path.absolute())
+    return list(dict.fromkeys(paths))
 
 
 def new_folder(parent: Path, source: Path) -> Path:

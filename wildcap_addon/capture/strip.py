@@ -67,15 +67,15 @@ def _read(capture: Capture) -> Strip | None:
         return None
     if not frames:
         return None
-    values = [frame.sharpness for frame in frames]
+    sharpness = [frame.sharpness for frame in frames]
     used = [i for i, frame in enumerate(frames) if frame.selected]
-    limit = BLURRED * sorted(values)[len(values) // 2]
+    limit = BLURRED * sorted(sharpness)[len(sharpness) // 2]
     choice = used or list(range(len(frames)))
     shown = [choice[i * len(choice) // min(MOST, len(choice))] for i in range(min(MOST, len(choice)))]
-    sharpest = max(values) or 1.0
-    return Strip(tuple(Frame(frames[i].name.rpartition(".")[0], values[i] / sharpest, values[i] < limit,
+    sharpest = max(sharpness) or 1.0
+    return Strip(tuple(Frame(frames[i].name.rpartition(".")[0], sharpness[i] / sharpest, sharpness[i] < limit,
                              frame_icons.load(capture.frames / frames[i].name))
-                       for i in shown), len(frames), len(used), sum(value < limit for value in values))
+                       for i in shown), len(frames), len(used), sum(value < limit for value in sharpness))
 
 
 def _tick() -> float:

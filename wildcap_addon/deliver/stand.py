@@ -75,7 +75,7 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
 def _hairs(plan: DeliveryPlan, source: bpy.types.Object, obj) -> list[bpy.types.Object]:
     """Copies of the head's hair at rest, children of the copy `obj`, in one plain colour each: USD's preview material
     reads no attribute."""
-    found = []
+    copies = []
     for hair in captures.hair(source):
         copy = bpy.data.objects.new(f"{plan.name}_{hair[captures.HAIR_KEY]}", hair.data.copy())
         copy.data.name, copy.parent, copy.data.surface = copy.name, obj, None
@@ -83,8 +83,8 @@ def _hairs(plan: DeliveryPlan, source: bpy.types.Object, obj) -> list[bpy.types.
         material, shader = _new(copy.name)
         shader.inputs["Base Color"].default_value = (*_mean_colour(copy.data), 1)
         copy.data.materials.append(material)
-        found.append(copy)
-    return found
+        copies.append(copy)
+    return copies
 
 
 def _mean_colour(data: bpy.types.Curves) -> list[float]:

@@ -34,8 +34,8 @@ DEFORM = "WildCap Hair on Head"
 
 def of(obj) -> list[bpy.types.Object]:
     """The hair of a head, by part."""
-    found = {hair[captures.HAIR_KEY]: hair for hair in captures.hair(obj)}
-    return [found[part] for part in TITLES if part in found]
+    hairs = {hair[captures.HAIR_KEY]: hair for hair in captures.hair(obj)}
+    return [hairs[part] for part in TITLES if part in hairs]
 
 
 def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bool:
@@ -85,8 +85,8 @@ def follow(hair, obj) -> None:
     if known.all() and np.abs(moved).max() < 1e-6:
         return
     position += np.repeat(moved, np.diff(offsets), 0)
-    for name, values in (("position", position), (ROOT, places), (UVS, uv)):
-        data.attributes[name].data.foreach_set("vector", values.astype(np.float32).ravel())
+    for name, vectors in (("position", position), (ROOT, places), (UVS, uv)):
+        data.attributes[name].data.foreach_set("vector", vectors.astype(np.float32).ravel())
     data.update_tag()
     if not combed:
         hair[GROWN] = _digest(data)
@@ -133,12 +133,12 @@ def _nearest(mesh, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """UVs [M, 2] and places [M, 3] of the skin nearest to roots [M, 3]; sockets, eyes and mouth are no skin."""
     corners, places, uvs = _skin(mesh)
     tree = BVHTree.FromPolygons(places.tolist(), corners.tolist())
-    uv, found = np.zeros((len(roots), 2)), np.zeros((len(roots), 3))
+    uv, nearest = np.zeros((len(roots), 2)), np.zeros((len(roots), 3))
     for k, root in enumerate(roots.tolist()):
         place, _, face, _ = tree.find_nearest(root)
         weights = np.array(poly_3d_calc([Vector(places[i]) for i in corners[face]], place))
-        uv[k], found[k] = weights @ uvs[face], place
-    return uv, found
+        uv[k], nearest[k] = weights @ uvs[face], place
+    return uv, nearest
 
 
 def _places(mesh, uv: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
@@ -146,13 +146,13 @@ def _places(mesh, uv: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
     corners, places, uvs = _skin(mesh)
     flat = np.concatenate([uvs.reshape(-1, 2), np.zeros((3 * len(corners), 1))], 1)
     tree = BVHTree.FromPolygons(flat.tolist(), np.arange(len(flat)).reshape(-1, 3).tolist())
-    found = otherwise.copy()
+    positions = otherwise.copy()
     for k, (u, v) in enumerate(uv.tolist()):
         place, _, face, distance = tree.find_nearest((u, v, 0))
         if place is not None and distance < 1e-3:
             weights = np.array(poly_3d_calc([Vector(flat[3 * face + i]) for i in range(3)], place))
-            found[k] = weights @ places[corners[face]]
-    return found
+            positions[k] = weights @ places[corners[face]]
+    return positions
 
 
 def _skin(mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -188,9 +188,9 @@ def _material(name: str, mean: np.ndarray) -> bpy.types.Material:
 
     Opaque: what was measured is an albedo. Principled Hair's colour is that of a whole head of hair, and single hairs
     of it over light skin come out blond."""
-    found = bpy.data.materials.get(name)
-    if found is not None and MATERIAL in found:
-        return found
+    existing = bpy.data.materials.get(name)
+    if existing is not None and MATERIAL in existing:
+        return existing
     material = bpy.data.materials.new(name)
     material[MATERIAL] = True
     material.diffuse_color = (*mean.tolist(), 1)

@@ -86,13 +86,13 @@ def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np
             if sum(entry.file_size for entry in archive.infolist()) > MOST_BYTES:
                 raise ValueError(f"it holds more than {MOST_BYTES >> 20} MB")
         with np.load(path, allow_pickle=False) as stored:
-            found = {part: tuple(stored[f"{part}_{name}"].astype(np.float32) for name in ("points", "radius", "colour"))
+            hairs = {part: tuple(stored[f"{part}_{name}"].astype(np.float32) for name in ("points", "radius", "colour"))
                      for part in curves.TITLES if f"{part}_points" in stored.files}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise Problem(f"{path} is damaged ({error}).", AGAIN) from error
-    for points, radius, colour in found.values():
+    for points, radius, colour in hairs.values():
         shape = points.shape
-        finite = all(np.isfinite(values).all() for values in (points, radius, colour))
+        finite = all(np.isfinite(array).all() for array in (points, radius, colour))
         if (
             len(shape) != 3
             or shape[1] < 2
@@ -102,10 +102,10 @@ def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np
             or not finite
         ):
             raise Problem(f"{path} is damaged (what it holds are no hairs).", AGAIN)
-    if not found:
+    if not hairs:
         raise Problem("No brows and no beard were found on this face.",
                       "Hair that is as light as the skin is not told from it; comb curves of your own.")
-    return found
+    return hairs
 
 
 CLASSES = (WILDCAP_OT_grow_hair,)

@@ -97,9 +97,9 @@ def pixels(image: bpy.types.Image, into: np.ndarray | None = None) -> np.ndarray
     """All that Blender keeps of a mask, float32 [H, W, channels], rows from the bottom; in the array `into` where that
     has the shape."""
     shape = image.size[1], image.size[0], image.channels
-    found = into if into is not None and into.shape == shape else np.empty(shape, np.float32)
-    image.pixels.foreach_get(found.ravel())
-    return found
+    buffer = into if into is not None and into.shape == shape else np.empty(shape, np.float32)
+    image.pixels.foreach_get(buffer.ravel())
+    return buffer
 
 
 def from_top(found: np.ndarray) -> np.ndarray:

@@ -23,10 +23,10 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         layout = self.layout
         column = layout.column(align=True)
         here = 'SHEET' if session.on_sheet() else 'HEAD'
-        for name, values in (("mask", (("Shadow", 'SHADOW'), ("Protect", 'PROTECT'))),
-                             ("on", (("On the Head", 'HEAD'), ("On the Flat Sheet", 'SHEET')))):
+        for name, choices in (("mask", (("Shadow", 'SHADOW'), ("Protect", 'PROTECT'))),
+                              ("on", (("On the Head", 'HEAD'), ("On the Flat Sheet", 'SHEET')))):
             row = column.row(align=True)
-            for text, value in values:
+            for text, value in choices:
                 options = {"mask": session.painted_kind(), "on": here, name: value}
                 button = row.operator("wildcap.paint_mask", text=text,
                                       depress=options == {"mask": session.painted_kind(), "on": here})
@@ -53,12 +53,12 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
                 column = layout.column(align=True)
                 column.label(text=item.shadow_mask.bl_rna.properties["softened"].name)
                 column.prop(item.shadow_mask, "softened", text="")
-            found = session.offered()
-            if found == 'SNAPPED':
+            offer = session.offered()
+            if offer == 'SNAPPED':
                 take = layout.operator("wildcap.edit_mask", text="Take Snapped Mask", icon='CHECKMARK', depress=True)
-                take.kind = found
-            text = "Take Detected Mask" if found == 'PROPOSAL' else "Back to Proposal"
-            back = layout.operator("wildcap.edit_mask", text=text, icon='LOOP_BACK', depress=found == 'PROPOSAL')
+                take.kind = offer
+            text = "Take Detected Mask" if offer == 'PROPOSAL' else "Back to Proposal"
+            back = layout.operator("wildcap.edit_mask", text=text, icon='LOOP_BACK', depress=offer == 'PROPOSAL')
             back.kind = 'PROPOSAL'
 
 

@@ -45,12 +45,12 @@ def draw(layout, item, width: int) -> None:
 
 def lacks(item, name: str) -> list[str]:
     """Why a delighter cannot run as things are, one sentence each, {} for the service's website; asks no disk."""
-    found = list(delighter_cards.missing(item.delight, name))
+    reasons = list(delighter_cards.missing(item.delight, name))
     if name == "switchlight" and not preferences.has_switchlight_key():
-        found.append("There is no key. Get one at {}, and enter it above.")
+        reasons.append("There is no key. Get one at {}, and enter it above.")
     if name == "switchlight" and not bpy.app.online_access:
-        found.append("Blender is set to work offline (Preferences, System, Network).")
-    return found
+        reasons.append("Blender is set to work offline (Preferences, System, Network).")
+    return reasons
 
 
 def _draw_facts(layout, card: delighter_cards.Card, width: int, folded: bool) -> None:

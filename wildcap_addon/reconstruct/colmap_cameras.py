@@ -42,10 +42,10 @@ class FrameCamera:
 def read(folder: Path) -> list[FrameCamera]:
     """The registered frames by name. Raises Problem where there are none, or the files are damaged."""
     try:
-        found = sorted(_read(folder), key=lambda camera: camera.name)
-        for camera in found:
+        cameras = sorted(_read(folder), key=lambda camera: camera.name)
+        for camera in cameras:
             _check(camera)
-        return found
+        return cameras
     except FileNotFoundError as error:
         raise Problem("This capture has no cameras yet.",
                       "Click Reconstruct: they are found from the frames.") from error
@@ -67,7 +67,7 @@ def _check(camera: FrameCamera) -> None:
 def _read(folder: Path) -> list[FrameCamera]:
     lenses = _lenses((folder / "cameras.bin").read_bytes())
     data = (folder / "images.bin").read_bytes()
-    (count,), at, found = struct.unpack_from("<Q", data), 8, []
+    (count,), at, cameras = struct.unpack_from("<Q", data), 8, []
     for _ in range(count):
         *pose, lens = struct.unpack_from("<7dI", data, at + 4)
         end = data.index(b"\0", at + 64)
@@ -75,16 +75,16 @@ def _read(folder: Path) -> list[FrameCamera]:
         (points,) = struct.unpack_from("<Q", data, end + 1)
         at = end + 9 + 24 * points
         to_camera = Matrix.Translation(pose[4:]) @ Quaternion(pose[:4]).normalized().to_matrix().to_4x4()
-        found.append(FrameCamera(name, *lenses[lens], to_camera.inverted() @ Matrix.Diagonal((1, -1, -1, 1))))
-    return found
+        cameras.append(FrameCamera(name, *lenses[lens], to_camera.inverted() @ Matrix.Diagonal((1, -1, -1, 1))))
+    return cameras
 
 
 def _lenses(data: bytes) -> dict[int, tuple]:
     """Camera's number -> (width, height, focal length, principal point)."""
-    (count,), at, found = struct.unpack_from("<Q", data), 8, {}
+    (count,), at, lenses = struct.unpack_from("<Q", data), 8, {}
     for _ in range(count):
         number, model, width, height = struct.unpack_from("<iiQQ", data, at)
-        values = struct.unpack_from(f"<{PARAMETERS[model]}d", data, at + 24)
+        parameters = struct.unpack_from(f"<{PARAMETERS[model]}d", data, at + 24)
         at += 24 + 8 * PARAMETERS[model]
-        found[number] = width, height, values[0], values[2:4] if model in TWO_FOCALS else values[1:3]
-    return found
+        lenses[number] = width, height, parameters[0], parameters[2:4] if model in TWO_FOCALS else parameters[1:3]
+    return lenses

@@ -35,10 +35,10 @@ def show(capture: Capture, which: int, wipe: float) -> None:
     """Reads a frame before and after delighting. `which` counts the delit frames and goes round. Raises Problem where
     there is none."""
     global _pair
-    found = frames(capture)
-    if not found:
+    frame_names = frames(capture)
+    if not frame_names:
         raise Problem("No frame has been delit yet.", "Click Reconstruct: it is a stage of it.")
-    name = found[which % len(found)]
+    name = frame_names[which % len(frame_names)]
     before = next((path for path in capture.frames.glob(f"{name}.*")), None)
     if before is None:
         raise Problem(f"The frame {name} is not in this capture any more.", advise_again("frames"))

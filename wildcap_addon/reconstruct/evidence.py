@@ -27,19 +27,19 @@ def bring_in_cameras(context, item, every: bool = False) -> int:
     """A camera for each frame that the texture uses, or for every registered one, in place of those that are there.
     Returns how many. Raises Problem where the capture has none."""
     capture = captures.folder(item)
-    found = colmap_cameras.read(capture.cameras)
+    cameras = colmap_cameras.read(capture.cameras)
     if not every:
         chosen = _chosen(capture)
-        found = [camera for camera in found if camera.name in chosen] or found
+        cameras = [camera for camera in cameras if camera.name in chosen] or cameras
     _remove(item, 'camera')
     collection = bpy.data.collections.new(f"{item.name} Cameras")
     context.scene.collection.children.link(collection)
-    for camera in found:
+    for camera in cameras:
         collection.objects.link(_camera(context, item, capture, camera))
     if context.scene.camera is None:
         context.scene.camera = collection.objects[0]
     local_view.join(context, collection.objects)
-    return len(found)
+    return len(cameras)
 
 
 def bring_in_scan(context, item) -> bpy.types.Object:

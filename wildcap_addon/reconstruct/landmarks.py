@@ -85,8 +85,8 @@ def hide() -> None:
 def _known(capture: Capture) -> dict[int, list[float]]:
     """Where the landmarks are: as found, and over that as the artist has put them."""
     try:
-        found = read_json(capture.landmarks)["points"]
-        points = {int(index): [float(v) for v in point] for index, point in found.items()}
+        detected = read_json(capture.landmarks)["points"]
+        points = {int(index): [float(v) for v in point] for index, point in detected.items()}
     except FileNotFoundError as error:
         raise Problem("This capture has no landmarks.",
                       "Click Reconstruct first: they are found in the frames.") from error

@@ -66,10 +66,10 @@ class WILDCAP_OT_withdraw_consent(CaptureOperator, bpy.types.Operator):
 def plan(item) -> consent.Sending:
     """What would be sent of a capture. Raises Problem where nothing can be, or need be."""
     preferences.require_online("choose another delighter")
-    found = consent.sending(captures.folder(item), properties.settings(item).delight.switchlight_preview)
-    if not found.frames:
+    sending = consent.sending(captures.folder(item), properties.settings(item).delight.switchlight_preview)
+    if not sending.frames:
         raise Problem("There is nothing to send: every chosen frame has its answer.", "Click Reconstruct to go on.")
-    return found
+    return sending
 
 
 CLASSES = (WILDCAP_OT_allow_sending, WILDCAP_OT_withdraw_consent)

@@ -53,14 +53,14 @@ def skin(context) -> bpy.types.Material | None:
     """The assembled material of the active capture's head."""
     item = captures.active(context)
     obj = captures.head(context, item) if item is not None else None
-    found = obj.active_material if obj is not None else None
-    return found if found is not None and material.KEY in found and ALBEDO in found.node_tree.nodes else None
+    active = obj.active_material if obj is not None else None
+    return active if active is not None and material.KEY in active and ALBEDO in active.node_tree.nodes else None
 
 
 def shown_picture(context) -> str:
     """Which of SHOWN the head shows."""
-    found = skin(context)
-    image = found.node_tree.nodes[ALBEDO].image if found is not None else None
+    skin_material = skin(context)
+    image = skin_material.node_tree.nodes[ALBEDO].image if skin_material is not None else None
     name = bpy.path.basename(image.filepath) if image is not None else ""
     return next((kind for kind, (_, file_name, _) in SHOWN.items() if file_name == name), 'SOLVED')
 

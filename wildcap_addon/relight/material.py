@@ -71,10 +71,10 @@ def _fingerprint(material) -> str:
     told = []
     for node in sorted(material.node_tree.nodes, key=lambda node: node.name):
         if node.name != head.PREVIEW:  # comes and goes with a running solve
-            values = [_plain(socket.default_value) for socket in node.inputs if hasattr(socket, "default_value")]
+            defaults = [_plain(socket.default_value) for socket in node.inputs if hasattr(socket, "default_value")]
             links = [[link.from_node.name, link.from_socket.identifier] for socket in node.inputs
                      for link in socket.links]
-            told.append([node.name, node.bl_idname, node.mute, values, links])
+            told.append([node.name, node.bl_idname, node.mute, defaults, links])
     return hashlib.blake2b(json.dumps(told).encode(), digest_size=16).hexdigest()
 
 
@@ -82,7 +82,7 @@ def _plain(value):
     if isinstance(value, float):
         return round(value, 5)
     return (str(value) if isinstance(value, (str, int)) or not hasattr(value, "__len__")
-            else [round(float(part), 5) for part in value])
+            else [round(float(component), 5) for component in value])
 
 
 def _material(obj) -> bpy.types.Material:

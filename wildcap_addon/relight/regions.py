@@ -26,15 +26,15 @@ def write(mesh: bpy.types.Mesh) -> None:
     shares = _shares()
     uvs = read_field(mesh.uv_layers[0].data, "uv", 2)
     texel = np.clip((uvs * len(shares)).astype(int), 0, len(shares) - 1)
-    values = np.zeros(len(mesh.vertices), np.float32)
-    values[read_field(mesh.loops, "vertex_index", kind=np.int32)] = shares[texel[:, 1], texel[:, 0]]
+    roughness = np.zeros(len(mesh.vertices), np.float32)
+    roughness[read_field(mesh.loops, "vertex_index", kind=np.int32)] = shares[texel[:, 1], texel[:, 0]]
     attribute = mesh.attributes.get(ATTRIBUTE)
     if attribute is not None and (attribute.domain, attribute.data_type) != ('POINT', 'FLOAT'):
         mesh.attributes.remove(attribute)
         attribute = None
     if attribute is None:
         attribute = mesh.attributes.new(ATTRIBUTE, 'FLOAT', 'POINT')
-    attribute.data.foreach_set("value", values)
+    attribute.data.foreach_set("value", roughness)
 
 
 @cache

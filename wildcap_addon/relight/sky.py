@@ -37,16 +37,16 @@ def even(colour: tuple[float, float, float]) -> Sky:
 
 def world() -> bpy.types.World:
     """The relight scene's world, with a background at strength 1 and nothing before it."""
-    found = bpy.data.worlds.get(WORLD) or bpy.data.worlds.new(WORLD)
-    tree = node_trees.of(found)
+    sky_world = bpy.data.worlds.get(WORLD) or bpy.data.worlds.new(WORLD)
+    tree = node_trees.of(sky_world)
     stop_animation(tree)
     for node in [n for n in tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:
         tree.nodes.remove(node)
     background = next(n for n in tree.nodes if n.type == 'BACKGROUND')
     background.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
     background.inputs["Strength"].default_value = 1.0
-    found.cycles.sampling_method = 'AUTOMATIC'
-    return found
+    sky_world.cycles.sampling_method = 'AUTOMATIC'
+    return sky_world
 
 
 def show(found: bpy.types.World, sky: Sky, frame: Matrix) -> None:

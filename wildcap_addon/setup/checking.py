@@ -23,9 +23,9 @@ _checks: list[BackgroundTask] = []  # the one under way or done, if any
 def judge(python: Path, importing: bool) -> tuple[str, str]:
     """The device that a Python computes on, and why; '' if its packages are not loaded. Raises Problem where it cannot
     run the solver."""
-    found = environment.survey(python, REQUIREMENTS, importing)
-    refuse(python, environment.judge(found, REQUIREMENTS))
-    return (found["device"], found["reason"]) if importing else ("", "")
+    probe = environment.survey(python, REQUIREMENTS, importing)
+    refuse(python, environment.judge(probe, REQUIREMENTS))
+    return (probe["device"], probe["reason"]) if importing else ("", "")
 
 
 def refuse(python: Path, faults: list[str]) -> None:

@@ -48,11 +48,11 @@ class WILDCAP_OT_pick_skin_tone(BaseOperator, bpy.types.Operator):
             return {'PASS_THROUGH' if event.type in ('MIDDLEMOUSE', 'WHEELUPMOUSE', 'WHEELDOWNMOUSE')
                     else 'RUNNING_MODAL'}
         context.window.cursor_modal_restore()
-        found = uv_under(context.window, event, captures.require_head(context, captures.require(context)))
-        if found is None:
+        uv = uv_under(context.window, event, captures.require_head(context, captures.require(context)))
+        if uv is None:
             self.report({'WARNING'}, "There is no head under the cursor: nothing was picked.")
             return {'CANCELLED'}
-        self.uv = found
+        self.uv = uv
         return self.execute(context)
 
     def work(self, context):
@@ -84,14 +84,14 @@ def uv_on(head, origin: Vector, direction: Vector) -> tuple[float, float] | None
         return None
     mesh = head.evaluated_get(bpy.context.evaluated_depsgraph_get()).data  # as it is shown: a face may be made
     mesh.calc_loop_triangles()
-    found = []
+    candidates = []
     for triangle in (t for t in mesh.loop_triangles if t.polygon_index == face):
         corners = [mesh.vertices[v].co for v in triangle.vertices]
         weights = barycentric_transform(point, *corners, Vector((1, 0, 0)), Vector((0, 1, 0)), Vector((0, 0, 1)))
         uv = sum((w * mesh.uv_layers[0].data[loop].uv for w, loop in zip(weights, triangle.loops, strict=True)),
                  Vector((0, 0)))
-        found.append((min(weights), tuple(uv)))
-    u, v = max(found)[1]  # the one triangle of the polygon that the point is inside of
+        candidates.append((min(weights), tuple(uv)))
+    u, v = max(candidates)[1]  # the one triangle of the polygon that the point is inside of
     return (u, v) if 0 <= u <= 1 and 0 <= v <= 1 else None
 
 

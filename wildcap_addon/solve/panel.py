@@ -72,7 +72,7 @@ def tone_words(item) -> str:
 def _draw_white_point(layout, item) -> None:
     measured = item.solve.white_point != "auto"
     row = layout.row(align=True)
-    words = ", ".join(part[:4] for part in item.solve.white_point.split(",")) if measured else iface_("from the scene")
+    words = ", ".join(band[:4] for band in item.solve.white_point.split(",")) if measured else iface_("from the scene")
     row.label(text=iface_("White Point: {}").format(words))
     if measured:
         row.operator("wildcap.clear_white_point", text="", icon='X')

@@ -19,11 +19,11 @@ _loaded: dict[str, int] = {}  # picture -> modification time of what is shown
 def draw(layout, capture: Capture) -> None:
     """The preview pictures that there are, side by side, each as it is on disk now."""
     paths = [capture.preview / f"{name}.png" for name in NAMES]
-    found = [path for path in paths if path.is_file()]
+    pictures = [path for path in paths if path.is_file()]
     row = layout.row(align=True)
-    for path in found:
+    for path in pictures:
         column = row.column(align=True)
-        column.template_icon(icon_value=icon(path), scale=ROW_SCALE / len(found))  # as high as a column is wide
+        column.template_icon(icon_value=icon(path), scale=ROW_SCALE / len(pictures))  # as high as a column is wide
         column.label(text=path.stem.title())
 
 

@@ -28,7 +28,7 @@ def read(text: str, name: str) -> list[Calibrated]:
     if not isinstance(record, dict) or not isinstance(record.get("cameras"), list):
         raise Problem(f"{name} is JSON, but no list of Blender's cameras.",
                       "Write the cameras from Blender's scene with the add-on.")
-    found = []
+    cameras = []
     for index, camera in enumerate(record["cameras"]):
         label = str(camera.get("name", camera.get("frame", index))) if isinstance(camera, dict) else str(index)
         try:
@@ -40,5 +40,6 @@ def read(text: str, name: str) -> list[Calibrated]:
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise Problem(f"Camera {label} in {name} is incomplete ({error}).",
                           "Each camera needs matrix_world and, once or for each, width, height, focal_px.") from error
-        found.append(Calibrated(label, frame, "PINHOLE", (focal, focal, *centre), width, height, *rigid(matrix, label)))
-    return found
+        cameras.append(Calibrated(label, frame, "PINHOLE", (focal, focal, *centre), width, height,
+                                  *rigid(matrix, label)))
+    return cameras

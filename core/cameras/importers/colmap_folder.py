@@ -16,8 +16,8 @@ from ..calibrated import PIXELS, Calibrated, trailing_number
 
 def read(folder: Path) -> list[Calibrated]:
     """Raises Problem where there is no model, it is damaged, or its lens model is one of fisheyes."""
-    places = [folder / part for part in (".", "sparse", "sparse/0", "0")
-              if any((folder / part / f"images.{kind}").is_file() for kind in ("bin", "txt"))]
+    places = [folder / subfolder for subfolder in (".", "sparse", "sparse/0", "0")
+              if any((folder / subfolder / f"images.{kind}").is_file() for kind in ("bin", "txt"))]
     if not places:
         raise Problem(f"The folder {folder.name} holds no COLMAP model (cameras.bin and images.bin, or .txt).",
                       "Choose the folder that COLMAP wrote; in its window: File, Export model.")
@@ -26,7 +26,7 @@ def read(folder: Path) -> list[Calibrated]:
     except (OSError, ValueError) as error:
         raise Problem(f"The COLMAP model in {places[0]} cannot be read ({str(error).splitlines()[0]}).",
                       "Export the model again, all its files together.") from error
-    found = []
+    cameras = []
     for image in sorted(model.images.values(), key=lambda image: image.name):
         if not image.has_pose:
             continue
@@ -36,6 +36,6 @@ def read(folder: Path) -> list[Calibrated]:
             raise Problem(f"The COLMAP model has a lens of kind {kind}, which is not supported.",
                           f"Solve it with one of {', '.join(PIXELS)}.")
         pose = pose_of(image)
-        found.append(Calibrated(image.name, trailing_number(image.name), kind, tuple(camera.params), camera.width,
-                                camera.height, pose.rotation.matrix(), np.array(pose.translation)))
-    return found
+        cameras.append(Calibrated(image.name, trailing_number(image.name), kind, tuple(camera.params), camera.width,
+                                  camera.height, pose.rotation.matrix(), np.array(pose.translation)))
+    return cameras

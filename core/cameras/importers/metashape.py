@@ -33,8 +33,8 @@ def read(text: str, name: str) -> list[Calibrated]:
     try:
         sensors = {sensor.get("id"): _lens(sensor, name) for sensor in chunk.iter("sensor")}
         world = _placed(chunk.find("transform"))
-        components = {part.get("id"): _placed(part.find("transform")) for part in chunk.iter("component")}
-        found = []
+        components = {element.get("id"): _placed(element.find("transform")) for element in chunk.iter("component")}
+        cameras = []
         for camera in chunk.find("cameras").iter("camera"):
             transform = camera.find("transform")
             if transform is None:
@@ -50,11 +50,11 @@ def read(text: str, name: str) -> list[Calibrated]:
                 matrix = np.block([[rotation @ matrix[:3, :3], (scale * rotation @ matrix[:3, 3] + shift)[:, None]],
                                    [np.zeros((1, 3)), np.ones((1, 1))]])
             label = camera.get("label")
-            found.append(Calibrated(label, trailing_number(label), *lens, *rigid(matrix, label)))
+            cameras.append(Calibrated(label, trailing_number(label), *lens, *rigid(matrix, label)))
     except (ValueError, KeyError, AttributeError, TypeError) as error:
         raise Problem(f"{name} is damaged: a part of it is missing or no number ({error}).",
                       "Export the cameras from Metashape again.") from error
-    return found
+    return cameras
 
 
 def _lens(sensor, name: str) -> tuple[str, tuple, int, int] | None:

@@ -37,7 +37,7 @@ def read(text: str, name: str) -> list[Calibrated]:
         raise Problem(f"{name} is no list of RealityScan's camera parameters: the column {missing[0]} is missing.",
                       "In RealityScan choose Alignment, Export, Registration, and the format Internal/External camera "
                       "parameters.")
-    found = []
+    cameras = []
     for line, row in enumerate(rows[1:], 2):
         try:
             value = {key: float(cell) for key, cell in zip(columns, row, strict=True) if key != "name"}
@@ -55,8 +55,8 @@ def read(text: str, name: str) -> list[Calibrated]:
         matrix = np.eye(4)
         matrix[:3, :3] = turned(value["heading"], value["pitch"], value["roll"]) @ np.diag([1.0, -1.0, -1.0])
         matrix[:3, 3] = value["x"], value["y"], value["alt"]
-        found.append(Calibrated(label, trailing_number(label), "FULL_OPENCV", params, 0, 0, *rigid(matrix, label)))
-    return found
+        cameras.append(Calibrated(label, trailing_number(label), "FULL_OPENCV", params, 0, 0, *rigid(matrix, label)))
+    return cameras
 
 
 def turned(heading: float, pitch: float, roll: float) -> np.ndarray:

@@ -47,11 +47,11 @@ def fields(folder: Path) -> np.ndarray:
     distance, nearest = cKDTree(neutral[:FACE_AND_HEAD]).query(placed + fade * warp(placed), NEIGHBOURS)
     weight = 1 / (distance + 0.05)
     weight /= weight.sum(1, keepdims=True)
-    found = []
+    displacements = []
     for path in sorted(model.glob("identity*.obj")):
         moved = (_vertices(path) - neutral)[nearest]
-        found.append((weight[..., None] * moved).sum(1) @ turn / scale)
-    return np.stack(found)
+        displacements.append((weight[..., None] * moved).sum(1) @ turn / scale)
+    return np.stack(displacements)
 
 
 def _vertices(path: Path) -> np.ndarray:
@@ -61,8 +61,8 @@ def _vertices(path: Path) -> np.ndarray:
 
 def _landmarks(path: Path) -> list[int]:
     """The 68 vertex numbers, wherever in the file they stand."""
-    found = json.loads(path.read_text(encoding="utf-8"))
-    for value in found.values() if isinstance(found, dict) else [found]:
+    indices = json.loads(path.read_text(encoding="utf-8"))
+    for value in indices.values() if isinstance(indices, dict) else [indices]:
         if isinstance(value, list) and len(value) == len(OURS):
             return value
     raise ValueError(f"{path} lists no {len(OURS)} landmarks")
@@ -71,7 +71,7 @@ def _landmarks(path: Path) -> list[int]:
 def _similarity(source: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     """Scale, rotation [3, 3] and translation [3] of source [N, 3] onto target [N, 3] (Umeyama 1991)."""
     a, b = source - source.mean(0), target - target.mean(0)
-    u, values, vt = np.linalg.svd(b.T @ a)
+    u, singular_values, vt = np.linalg.svd(b.T @ a)
     sign = np.array([1, 1, np.sign(np.linalg.det(u @ vt))])
-    turn, scale = u * sign @ vt, float((values * sign).sum() / (a**2).sum())
+    turn, scale = u * sign @ vt, float((singular_values * sign).sum() / (a**2).sum())
     return scale, turn, target.mean(0) - scale * turn @ source.mean(0)

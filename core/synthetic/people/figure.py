@@ -71,23 +71,23 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
         growth["beard"] = beards.beard_density(person.beard, on, np.random.default_rng([person.seed, 65]))
     if person.hair != "none":
         growth["hair"] = head_hair.scalp_density(on, person.seed)
-    for part, where in growth.items():
-        colour = np.asarray(person.brow_colour if part == "brows" else person.hair_colour, np.float32)
-        share = (UNDER[part] if person.beard != "stubble" or part != "beard" else 0.1) * where[:, None]
+    for region, where in growth.items():
+        colour = np.asarray(person.brow_colour if region == "brows" else person.hair_colour, np.float32)
+        share = (UNDER[region] if person.beard != "stubble" or region != "beard" else 0.1) * where[:, None]
         diffuse = diffuse * (1 - share) + np.minimum(colour, diffuse) * share
-    grows = {part: on.spread(where.astype(np.float32)) for part, where in growth.items()}
+    grows = {region: on.spread(where.astype(np.float32)) for region, where in growth.items()}
     return skin, on.spread(diffuse.astype(np.float32)), grows
 
 
 def grown(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:
     """All hairs of a person: brows, lashes, and beard and hair where there are any."""
     ground, skin = ground_of(head), SkinSurface(head)
-    found = [brows.brows(person, ground, skin, _rng(person, 0)), brows.lashes(person, opened, _rng(person, 1))]
+    strands = [brows.brows(person, ground, skin, _rng(person, 0)), brows.lashes(person, opened, _rng(person, 1))]
     if person.beard != "none":
-        found.append(beards.beard(person, ground, skin, _rng(person, 2)))
+        strands.append(beards.beard(person, ground, skin, _rng(person, 2)))
     if person.hair != "none":
-        found.append(head_hair.head_hair(person, ground, SkinSurface(joined([head, cloth])), _rng(person, 3)))
-    return tuple(found)
+        strands.append(head_hair.head_hair(person, ground, SkinSurface(joined([head, cloth])), _rng(person, 3)))
+    return tuple(strands)
 
 
 def _rng(person: Person, growth: int) -> np.random.Generator:

@@ -82,10 +82,10 @@ def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Pa
 def skin_part(work: Path, mesh: Mesh, albedo: np.ndarray, specular: np.ndarray, normal: np.ndarray) -> dict:
     """A skin for render_parts: a mesh with UVs, its linear albedo [S, S, 3], Specular IOR Level [S, S] and unit tangent
     normals [S, S, 3]."""
-    part = _written(work, "skin", mesh, "skin", albedo)
+    skin = _written(work, "skin", mesh, "skin", albedo)
     images.write_data(work / "specular.png", specular, bits=16)
     images.write_data(work / "normal.png", normal / 2 + 0.5, bits=16)
-    return part | {"specular": str(work / "specular.png"), "normal": str(work / "normal.png")}
+    return skin | {"specular": str(work / "specular.png"), "normal": str(work / "normal.png")}
 
 
 def _written(work: Path, name: str, mesh: Mesh, kind: str, albedo: np.ndarray) -> dict:

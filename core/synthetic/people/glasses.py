@@ -54,7 +54,7 @@ def sample_glasses(landmarks: np.ndarray, rng: np.random.Generator, kind: str = 
     level = eyes[:, 2].mean() - rng.uniform(0.0, 0.007)
     lean, wrap, drop = np.tan(np.radians(rng.uniform(2, 12))), rng.uniform(0.2, 1.5), rng.uniform(-0.2, 0.25)
     turn = np.linspace(0, 2 * np.pi, STEPS, endpoint=False)
-    along, up = (np.sign(part) * np.abs(part) ** (2 / square) for part in (np.cos(turn), np.sin(turn)))
+    along, up = (np.sign(component) * np.abs(component) ** (2 / square) for component in (np.cos(turn), np.sin(turn)))
 
     def place(x: np.ndarray, z: np.ndarray, ahead: float | np.ndarray = 0.0) -> np.ndarray:
         """Points of the front from across the middle and from the rims' middle, metres."""

@@ -249,7 +249,7 @@ def _softened(direct: np.ndarray, there: np.ndarray, radius: float) -> np.ndarra
     the red."""
     channels = []
     for share in (1.0, 0.4, 0.2):
-        lit, base = (cv2.GaussianBlur(part, (0, 0), max(share * radius, 0.3)) for part in (direct * there, there))
+        lit, base = (cv2.GaussianBlur(picture, (0, 0), max(share * radius, 0.3)) for picture in (direct * there, there))
         channels.append(lit / np.maximum(base, 1e-3))
     return np.stack(channels, -1)
 
@@ -282,8 +282,8 @@ def _fitted(stage: RelightableView, environment: Environment, lamps: list[int], 
     smooth = stage.normal.reshape(-1, 3).astype(np.float32) / 127
     shining = [LampOnHead(stage.unlit.lamps[k], tint, stage.reach[..., k].ravel().astype(np.float32)[here] / 255)
                for k, tint in zip(lamps, tints, strict=True)]
-    found = fitted_light(transfer[here], smooth[here], shining, environment, tone, rng)
+    light = fitted_light(transfer[here], smooth[here], shining, environment, tone, rng)
     whole = [np.zeros((len(here), 3), np.float32) for _ in range(3)]
-    for target, values in zip(whole, (found.ambient, found.sunlit, found.normal), strict=True):
-        target[here] = values
+    for target, pixels in zip(whole, (light.ambient, light.sunlit, light.normal), strict=True):
+        target[here] = pixels
     return FittedLight(*whole)

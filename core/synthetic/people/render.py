@@ -43,8 +43,8 @@ def build(job: dict) -> tuple[bpy.types.Scene, bpy.types.Object]:
     scene.cycles_curves.shape = 'RIBBONS'
     body = bpy.data.objects.new("head", None)
     scene.collection.objects.link(body)
-    for name, part in job["meshes"].items():
-        _add(name, part).parent = body
+    for name, mesh in job["meshes"].items():
+        _add(name, mesh).parent = body
     for path in job["strands"]:
         _add_strands(Path(path)).parent = body
     if job["leaves"]:

@@ -51,7 +51,7 @@ def symmetry(field: np.ndarray, on: Canvas) -> float:
     """Share of the variance of a field [N] over the bare skin that is alike on both sides."""
     picture, skin = on.spread(field), on.spread(regions(on)["bald"])
     even, odd = (picture + picture[:, ::-1]) / 2, (picture - picture[:, ::-1]) / 2
-    variance = [float(np.average((part - np.average(part, weights=skin)) ** 2, weights=skin)) for part in (even, odd)]
+    variance = [float(np.average((half - np.average(half, weights=skin)) ** 2, weights=skin)) for half in (even, odd)]
     return variance[0] / sum(variance)
 
 
@@ -81,6 +81,6 @@ def _with_sides(field: np.ndarray, on: Canvas, rng: np.random.Generator) -> np.n
     even = (picture + picture[:, ::-1]) / 2
     odd = on.spread(on.soft(lambda at: octaves(at, WAVELENGTHS_MM, rng, smooth=True)))
     odd = odd - odd[:, ::-1]
-    spread = [np.sqrt(np.average((part - np.average(part, weights=skin)) ** 2, weights=skin)) for part in (even, odd)]
+    spread = [np.sqrt(np.average((half - np.average(half, weights=skin)) ** 2, weights=skin)) for half in (even, odd)]
     share = rng.uniform(*SYMMETRIC)
     return (even + odd * spread[0] / max(spread[1], 1e-9) * np.sqrt((1 - share) / share))[on.covered].astype(np.float32)

@@ -44,16 +44,16 @@ class Scene:
 
     def __init__(self, figure: Figure, blockers: Mesh | None = None):
         body = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)]
-        meshes, part = [*body, figure.shirt], [SKIN, EYES, EYES, CLOTHES]
+        meshes, tags = [*body, figure.shirt], [SKIN, EYES, EYES, CLOTHES]
         flat = [*(np.zeros((len(mesh.faces), 3), np.float32) for mesh in body),
                 np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
         for strands in figure.strands:
             mesh = prisms(strands)
             meshes.append(mesh)
-            part.append(PARTS.index(strands.part))
+            tags.append(PARTS.index(strands.part))
             flat.append(np.repeat(strands.colour, len(mesh.faces) // len(strands.colour), 0))
         self.figure = figure
-        self.part = np.concatenate([np.full(len(mesh.faces), p, np.int8) for mesh, p in zip(meshes, part, strict=True)])
+        self.part = np.concatenate([np.full(len(mesh.faces), p, np.int8) for mesh, p in zip(meshes, tags, strict=True)])
         self.colour = np.concatenate(flat)
         self.uv = np.concatenate([mesh.uvs[mesh.face_uvs] for mesh in body])
         self.body = raster.RayCaster(joined(body))
@@ -65,8 +65,8 @@ class Scene:
     def albedo(self, face: np.ndarray, bary: np.ndarray, skin: np.ndarray) -> np.ndarray:
         """Linear albedo [N, 3] of what rays hit, `skin` [S, S, 3] being the skin's."""
         out = self.colour[face]
-        for part, picture in ((SKIN, skin), (EYES, self.figure.eye)):
-            here = self.part[face] == part
+        for label, picture in ((SKIN, skin), (EYES, self.figure.eye)):
+            here = self.part[face] == label
             uv = (self.uv[face[here]] * bary[here, :, None]).sum(1)
             out[here] = raster.sample_uv(picture, uv)
         return out

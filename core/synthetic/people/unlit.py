@@ -149,9 +149,9 @@ def load(path: Path) -> Unlit:
 def _shares(scene: Scene, triangle: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """What each hit belongs to [N, len(PARTS)]: the skin where hair grows belongs to the hair as far as it is dense
     there."""
-    part = scene.part[triangle]
-    shares = true_shares(np.eye(len(GROWN), dtype=np.float32)[part])
-    skin = np.flatnonzero(part == GROWN.index("skin"))
+    labels = scene.part[triangle]
+    shares = true_shares(np.eye(len(GROWN), dtype=np.float32)[labels])
+    skin = np.flatnonzero(labels == GROWN.index("skin"))
     uv = (scene.uv[triangle[skin]] * weight[skin, :, None]).sum(1)
     at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1)
     left = np.ones(len(skin), np.float32)
@@ -165,12 +165,12 @@ def _shares(scene: Scene, triangle: np.ndarray, weight: np.ndarray) -> np.ndarra
 
 def _lamps(view: View, rng: np.random.Generator) -> np.ndarray:
     """Unit directions [LAMPS, 3] to lamps: seldom from behind the person, seldom from below."""
-    found: list[np.ndarray] = []
-    while len(found) < LAMPS:
+    lamps: list[np.ndarray] = []
+    while len(lamps) < LAMPS:
         way = _unit(rng.normal(size=3) + [0, -0.5, 0.35])
         if way @ -view.axis > -0.6 and way[2] > -0.5:
-            found.append(way)
-    return np.stack(found)
+            lamps.append(way)
+    return np.stack(lamps)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -80,5 +80,5 @@ def _drop(kept, blocks) -> None:
 def _irises(obj) -> tuple[float, float]:
     """Radii of both irises in metres: those that were filmed, where they were seen."""
     seen = mesh.filmed_eyes(obj, load())
-    found = [eye.iris_radius for eye in seen.eyes] if seen is not None else [0.0, 0.0]
-    return tuple(radius if radius > 0 else shapes.IRIS_M for radius in found)
+    radii = [eye.iris_radius for eye in seen.eyes] if seen is not None else [0.0, 0.0]
+    return tuple(radius if radius > 0 else shapes.IRIS_M for radius in radii)

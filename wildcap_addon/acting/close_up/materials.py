@@ -178,9 +178,9 @@ def _uneven(tree, shader, scale: float, strength: float, distance: float) -> Non
 def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
     """The material of a name and its shader; None for the shader of one that is there and keeps the artist's
     changes."""
-    found = bpy.data.materials.get(name)
-    if found is not None and found.get(materials.KEY) == kind:
-        return found, None
+    existing = bpy.data.materials.get(name)
+    if existing is not None and existing.get(materials.KEY) == kind:
+        return existing, None
     material = bpy.data.materials.new(name)
     material[materials.KEY] = kind
     material.diffuse_color = (*colour, 1)

@@ -66,19 +66,19 @@ def bands(asset: FaceUnits) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows, among the inner vertices, of the upper teeth, the lower ones and the tongue: the parts that move with the
     jaws, each joined by its faces."""
     first = len(asset.template) + len(asset.copies)
-    part = np.arange(len(asset.parts))
+    labels = np.arange(len(asset.parts))
     edges = np.concatenate([asset.faces[:, [a, (a + 1) % 4]] for a in range(4)]) - first
     edges = edges[(edges >= 0).all(1)]
     for _ in range(60):  # the least row that is joined to each
-        least = part.copy()
-        np.minimum.at(least, edges[:, 0], part[edges[:, 1]])
-        np.minimum.at(least, edges[:, 1], part[edges[:, 0]])
+        least = labels.copy()
+        np.minimum.at(least, edges[:, 0], labels[edges[:, 1]])
+        np.minimum.at(least, edges[:, 1], labels[edges[:, 0]])
         least = least[least]
-        if (least == part).all():
+        if (least == labels).all():
             break
-        part = least
+        labels = least
     jaws = np.flatnonzero(asset.kind == JAWS)
-    groups = sorted((jaws[part[jaws] == one] for one in np.unique(part[jaws])), key=len)
+    groups = sorted((jaws[labels[jaws] == one] for one in np.unique(labels[jaws])), key=len)
     upper, lower = sorted(groups[:2], key=lambda rows: -asset.parts[rows, 2].mean())
     return upper, lower, groups[2]
 
@@ -136,7 +136,7 @@ def _teeth(jaw: str, arch: _Arch, up: float) -> list[tuple[np.ndarray, np.ndarra
     turn = np.arange(AROUND) * 2 * np.pi / AROUND
     c, s = np.cos(turn), np.sin(turn)
     square = np.sign(c) * np.abs(c) ** 0.62, np.sign(s) * np.abs(s) ** 0.72  # a rounded rectangle
-    found = []
+    teeth = []
     for number in range(len(WIDTHS_MM[jaw])):
         h = np.concatenate([np.linspace(-0.45, 0.9, ALONG), [0.965, 1.0]])  # 0 at the gum, 1 at the edge
         front = number <= CANINE
@@ -169,8 +169,8 @@ def _teeth(jaw: str, arch: _Arch, up: float) -> list[tuple[np.ndarray, np.ndarra
             last = (len(h) - 1) * AROUND
             half = np.arange(AROUND // 2 - 1)
             cap = np.stack([last + half, last + half + 1, last + (AROUND - 2 - half), last + (AROUND - 1 - half)], 1)
-            found.append((points, np.concatenate([*quads, cap])))
-    return found
+            teeth.append((points, np.concatenate([*quads, cap])))
+    return teeth
 
 
 def _gum(jaw: str, arch: _Arch, up: float) -> tuple[np.ndarray, np.ndarray]:

@@ -176,10 +176,10 @@ def _lid(tree, head) -> tuple:
     """Where a vertex' rim is, the one opposite, and its share of the way across."""
     surface = add(tree, 'GeometryNodeObjectInfo', {"Object": head}, transform_space='RELATIVE').outputs["Geometry"]
     place = add(tree, 'GeometryNodeInputPosition').outputs[0]
-    found = [add(tree, 'GeometryNodeSampleIndex',
-                 {"Geometry": surface, "Value": place, "Index": _attribute(tree, name, 'INT')},
-                 data_type='FLOAT_VECTOR', domain='POINT').outputs[0] for name in ("rim", "opposite")]
-    return *found, _attribute(tree, "across", 'FLOAT')
+    positions = [add(tree, 'GeometryNodeSampleIndex',
+                     {"Geometry": surface, "Value": place, "Index": _attribute(tree, name, 'INT')},
+                     data_type='FLOAT_VECTOR', domain='POINT').outputs[0] for name in ("rim", "opposite")]
+    return *positions, _attribute(tree, "across", 'FLOAT')
 
 
 def _attribute(tree, name: str, kind: str):

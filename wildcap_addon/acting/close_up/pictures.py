@@ -118,8 +118,8 @@ def _noise(rng: np.random.Generator, size: tuple[int, int], rows: float, columns
     white = np.fft.rfft2(rng.normal(size=(2 * size[0], size[1])))
     down, round_ = np.fft.fftfreq(2 * size[0])[:, None] * size[0], np.fft.rfftfreq(size[1])[None] * size[1]
     soft = np.exp(-0.5 * ((down / rows) ** 2 + (round_ / columns) ** 2)) * (round_ > 0)
-    found = np.fft.irfft2(white * soft, s=(2 * size[0], size[1]))[:size[0]]
-    return found / found.std()
+    noise = np.fft.irfft2(white * soft, s=(2 * size[0], size[1]))[:size[0]]
+    return noise / noise.std()
 
 
 def _blur(picture: np.ndarray, sigma: float) -> np.ndarray:
@@ -136,14 +136,14 @@ def _smooth(value: np.ndarray, low: np.ndarray | float, high: np.ndarray | float
 
 
 def _image(name: str, pattern) -> bpy.types.Image:
-    found = bpy.data.images.get(name)
-    if found is not None and found.packed_file is not None:
-        return found
-    values = pattern()
-    rows, columns = values.shape[:2]
-    found = bpy.data.images.new(name, columns, rows, is_data=True)
-    colours.as_data(found)
-    found.pixels.foreach_set(np.concatenate([values, np.ones((rows, columns, 1))], 2).astype(np.float32).ravel())
-    found.update()
-    found.pack()
-    return found
+    image = bpy.data.images.get(name)
+    if image is not None and image.packed_file is not None:
+        return image
+    pixels = pattern()
+    rows, columns = pixels.shape[:2]
+    image = bpy.data.images.new(name, columns, rows, is_data=True)
+    colours.as_data(image)
+    image.pixels.foreach_set(np.concatenate([pixels, np.ones((rows, columns, 1))], 2).astype(np.float32).ravel())
+    image.update()
+    image.pack()
+    return image
