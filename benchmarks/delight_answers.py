@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each of the delighter's answers is worth in captures, that of the whole head's network too, and how far they are
-best believed beside the frames' own (core/delight/second_opinion.py), chosen by leaving one person out.
+"""What each of the delighter's answers is worth in captures, that of the whole head's network too, and each step that
+puts them together; and how far they are best believed beside the frames' own (core/delight/second_opinion.py), chosen
+by leaving one person out.
 
     python -m benchmarks.delight_answers FOLDER [--truths FOLDER] [--only PREFIX ...] [--sample CAPTURE]
     [--eyes FOLDER [--facekit FOLDER]] [--json PATH]
@@ -27,8 +28,8 @@ from core.contract.capture import Capture
 from core.contract.files import replacing
 from core.contract.messages import Reporter
 from core.contract.settings import Settings
-from core.delight.evening import ShadingEstimate
-from core.delight.network import ask
+from core.delight.evening import ShadingEstimate, even_out
+from core.delight.network import ask, put_together
 from core.delight.second_opinion import FITTED, Weighing, weigh_in
 from core.delight.whole_head import load_texel_net, read_answers
 from core.face import template
@@ -49,22 +50,25 @@ GRID = tuple(Weighing(share, doubt) for share, doubt in product(SHARES, DOUBTS))
 BARE = 0.5  # share of bare skin in a cell from which it counts, as in second_opinion.weigh_in
 DARKEST = 2e-3
 HAIRED = 0.3  # density of hair from which a map of skin is no truth of what is seen there
-ROWS = {"filmed": "doing nothing", "frames": "the frames' own", "fitted": "the fitted light",
-        "whole": "the whole head's", "with_fitted": "frames and fitted light"}
+ROWS = {"filmed": "doing nothing", "alone": "each frame alone", "frames": "evened out", "fitted": "the fitted light",
+        "whole": "the whole head's", "with_fitted": "evened out and fitted light", "together": "put together"}
 """What is told apart, and its heading."""
-ANSWERS = ("true", "frames", "fitted", "whole")
+ANSWERS = ("true", "alone", "frames", "fitted", "whole", "together")
 
 
 @dataclass(frozen=True)
 class Judged:
     """A capture's answers on its cells of bare skin whose albedo is known, in natural log [N, 3] less their mean: the
-    true light, and that of the frames' own answer, of the fitted light and of the whole head."""
+    true light, and that of the network for each frame, of the same evened out over the head, of the fitted light, of
+    the whole head, and of all that the delighter puts together, hues of light taken out as well."""
 
     person: str
     true: np.ndarray
+    alone: np.ndarray
     frames: np.ndarray
     fitted: np.ndarray
     whole: np.ndarray
+    together: np.ndarray
 
     def error(self, light: np.ndarray) -> float:
         """Deviation of a light [N, 3] from the true one."""
@@ -93,7 +97,8 @@ def main() -> int:
     rows, chosen = score(judged)
     print(table(rows), "", choices(chosen), sep="\n")
     if asked.json:
-        figures.write(asked.json, "delight_answers", COMMAND, {"rows": rows, "chosen": chosen})
+        figures.write(asked.json, "delight_answers", COMMAND,
+                      {"rows": rows, "chosen": chosen, "over_people": over_people(rows)})
     return 0
 
 
@@ -128,11 +133,14 @@ def keep(path: Path, capture: Capture, albedo: np.ndarray, known: np.ndarray) ->
     albedo = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), SIZE, SIZE), DARKEST))
     maps = np.concatenate([albedo, known[..., None]], -1).astype(np.float32)
     mesh, cells = answers.head.mesh, {key: [] for key in ANSWERS}
-    for look, fitted, whole, skin in zip(answers.looks, answers.fitted, whole_head, answers.skins, strict=True):
+    evened = even_out(answers.head, answers.views, answers.looks)
+    for look, even, fitted, whole, final, skin in zip(answers.looks, evened, answers.fitted, whole_head,
+                                                      put_together(answers), answers.skins, strict=True):
         uv = interpolate(mesh.uvs, mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
         seen = sample(maps, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * SIZE).reshape(*look.face.shape, 4)
         where = (look.face >= 0) & (skin > BARE) & (seen[..., 3] > 0.99)
-        for key, light in zip(ANSWERS, (look.log - seen[..., :3], look.shading, fitted, whole), strict=True):
+        lights = look.log - seen[..., :3], look.shading, even.shading, fitted, whole, final.shading
+        for key, light in zip(ANSWERS, lights, strict=True):
             cells[key].append(light[where])
     joined = {key: np.concatenate(parts) for key, parts in cells.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -153,8 +161,8 @@ def score(judged: dict[str, Judged]) -> tuple[dict, dict]:
     head's beside the frames' with the fitted light."""
     before = {name: each.frames for name, each in judged.items()}
     with_fitted = {name: weighed(each.frames, each.fitted, FITTED) for name, each in judged.items()}
-    rows = {name: {"person": each.person, "filmed": each.error(0 * each.true), "frames": each.error(each.frames),
-                   "fitted": each.error(each.fitted), "whole": each.error(each.whole),
+    rows = {name: {"person": each.person, "filmed": each.error(0 * each.true),
+                   **{key: each.error(getattr(each, key)) for key in ANSWERS if key != "true"},
                    "with_fitted": each.error(with_fitted[name])} for name, each in judged.items()}
     return rows, {"fitted": choose(judged, before, "fitted", FITTED),
                   "whole": choose(judged, with_fitted, "whole", Weighing(0.0, DOUBTS[0]))}
@@ -186,14 +194,20 @@ def choose(judged: dict[str, Judged], before: dict[str, np.ndarray], answer: str
             "people": len(persons)}
 
 
-def table(rows: dict[str, dict]) -> str:
-    """The errors in Markdown, and their mean over people."""
+def over_people(rows: dict[str, dict]) -> dict[str, float]:
+    """The geometric mean over people of each error of ROWS; a person's is the mean of its captures."""
     persons = dict.fromkeys(row["person"] for row in rows.values())
-    means = [float(np.mean([np.mean([row[key] for row in rows.values() if row["person"] == person])
-                            for person in persons])) for key in ROWS]
+    of_person = {key: [np.mean([row[key] for row in rows.values() if row["person"] == person]) for person in persons]
+                 for key in ROWS}
+    return {key: float(np.exp(np.mean(np.log(errors)))) for key, errors in of_person.items()}
+
+
+def table(rows: dict[str, dict]) -> str:
+    """The errors in Markdown, and their geometric mean over people."""
+    means = over_people(rows)
     return figures.markdown(["capture", *ROWS.values()],
                             [*([name, *(f"{row[key]:.3f}" for key in ROWS)] for name, row in rows.items()),
-                             ["**mean over people**", *(f"{mean:.3f}" for mean in means)]])
+                             ["**over people**", *(f"{means[key]:.3f}" for key in ROWS)]])
 
 
 def choices(chosen: dict[str, dict]) -> str:

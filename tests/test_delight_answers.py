@@ -19,7 +19,9 @@ def judged(person, frames_error, fitted_error, whole_error=1.0, cells=4000):
         return np.repeat(grey - grey.mean(), 3, 1).astype(np.float32)
 
     true = noise(0.5)
-    return Judged(person, true, true + noise(frames_error), true + noise(fitted_error), true + noise(whole_error))
+    frames = true + noise(frames_error)
+    return Judged(person, true, true + noise(2 * frames_error), frames, true + noise(fitted_error),
+                  true + noise(whole_error), frames)
 
 
 @pytest.fixture(scope="module")
@@ -30,12 +32,20 @@ def people():
 def test_of_two_equal_and_independent_answers_the_mean_is_best(people):
     rows, chosen = delight_answers.score(people)
     assert rows["anna"]["frames"] == pytest.approx(0.1, rel=0.05) == rows["anna"]["fitted"]
+    assert rows["anna"]["alone"] == pytest.approx(0.2, rel=0.05) and rows["anna"]["together"] == rows["anna"]["frames"]
     fitted = chosen["fitted"]
     weight = fitted["share"] / (1 + 2 * 0.1**2 / fitted["doubt"] ** 2)
     assert weight == pytest.approx(0.5, abs=0.07)
     assert fitted["best"] == pytest.approx(0.1 / np.sqrt(2), rel=0.03) and fitted["people_better"] == 3
     assert fitted["without"] == pytest.approx(0.1, rel=0.03)
     assert fitted["left_out"] == pytest.approx(fitted["best"], rel=0.03)
+
+
+def test_people_count_alike_however_often_they_were_filmed():
+    rows = {name: {"person": person, **dict.fromkeys(delight_answers.ROWS, error)}
+            for name, person, error in (("a", "anna", 0.1), ("b", "ben", 0.3), ("c", "ben", 0.5))}
+    means = delight_answers.over_people(rows)
+    assert means["frames"] == pytest.approx(0.2) and "| **over people** | 0.200 |" in delight_answers.table(rows)
 
 
 def test_an_answer_that_knows_nothing_is_left_out(people):

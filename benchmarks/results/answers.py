@@ -15,16 +15,20 @@ RECORDS = ("delight_answers",)
 
 
 def sections(answers: Figures) -> Sections:
-    fitted, whole = answers.chosen.fitted, answers.chosen.whole
+    fitted, whole, over = answers.chosen.fitted, answers.chosen.whole, answers.over_people
     return [("", prose(f"""
         In a capture the delighter *network* has two answers (`core/delight/network.py`): its own for each frame, evened
-        over the head, and the light that was fitted to all frames. A third, the whole head's (`whole_head.py`), was
-        asked, too, until this was measured. Each is compared with the true light of every frame, the picture less the
-        true albedo: the deviation of the difference in natural log, over bare facial skin, after one gain per channel
-        and capture. The people with a name of letters are filmed, with heads from their films; those with a number are
-        synthetic people in ten frames with true cameras; the scan is a real head, whose own map holds light.
-        {fitted.people} people.
-        """, delight_answers.table(answers.rows))),
+        out over the head, and the light that was fitted to all frames. A third, the whole head's (`whole_head.py`), was
+        asked, too, until this was measured. *Put together* is what the frames are divided by: both answers, and hues of
+        the light taken out by that of skin (`casts.py`). Each is compared with the true light of every frame, the
+        picture less the true albedo: the deviation of the difference in natural log, over bare facial skin, after one
+        gain per channel and capture. The people with a name of letters are filmed, with heads from their films; those
+        with a number are synthetic people in ten frames with true cameras; the scan is a real head, whose own map holds
+        light. {fitted.people} people.
+        """, delight_answers.table(answers.rows), f"""
+        Over people, by the geometric mean: each frame alone {over.alone:.4f}, evened out {over.frames:.4f}, with the
+        fitted light {over.with_fitted:.4f}, put together {over.together:.4f}.
+        """)),
         ("How far to believe them", prose("""
         An answer counts by *share* where it agrees with what there is, and by half of it where the two are *doubt*
         apart over the capture (`core/delight/second_opinion.py`). *Best* is the best of a grid over people, whose mean

@@ -47,9 +47,8 @@ FADE_SHARE = 0.06  # of the square's side: along its border it gives way to the 
 
 @dataclass(frozen=True)
 class Answers:
-    """What is told of a capture's selected frames: the head and its light; the views; looks: the network's answers,
-    evened out over the head; and for each look the log-shading of the fitted light, [h, h, 3], and the bare skin and
-    the hair in it, [h, h]."""
+    """What is told of a capture's selected frames: the head and its light; the views; looks: the network's answers; and
+    for each look the log-shading of the fitted light, [h, h, 3], and the bare skin and the hair in it, [h, h]."""
 
     head: LitHead
     views: list[View]
@@ -82,12 +81,13 @@ def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
         looks.append(look)
         fitted.append(log)
     skins, hair = ([_seen(head, shares, look) for look in looks] for shares in (head.skin, head.hair))
-    return Answers(head, views, even_out(head, views, looks), fitted, skins, hair)
+    return Answers(head, views, looks, fitted, skins, hair)
 
 
 def put_together(answers: Answers) -> list[ShadingEstimate]:
     """One shading for each frame out of both answers."""
-    looks = weigh_in(answers.looks, answers.fitted, answers.skins)
+    looks = even_out(answers.head, answers.views, answers.looks)
+    looks = weigh_in(looks, answers.fitted, answers.skins)
     looks = [fill_hair(*told) for told in zip(looks, answers.fitted, answers.hair, strict=True)]
     return remove_casts(looks, answers.skins)
 
