@@ -40,6 +40,9 @@ ROOT = Path(__file__).resolve().parent.parent
 def main(arguments: list[str] | None = None) -> int:
     """Runs one command line; returns its exit code: 0, 2 for a problem, 130 after Ctrl-C."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    for stream in (sys.stdout, sys.stderr):  # a log on Windows does not take every name
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
     try:
         if arguments[:1] == ["train"]:  # its options are its own
             return _train(arguments[1:])
@@ -132,6 +135,7 @@ def _run(options: argparse.Namespace) -> int:
     # sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     capture = Capture(options.capture)
+    capture.outwait(lambda text: print(text, flush=True))
     job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first,
                     last=options.last, settings=run_settings, quality=options.quality)
     return terminal.follow(ROOT, capture, job, consent.by_flag(capture) if options.send_frames else {})

@@ -3,12 +3,13 @@
 """Light knows no brows: what the network says of them is replaced by what it says of the skin around."""
 
 import importlib
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from core.delight.below_hair import complete_shading, fill_features
+from core.delight.below_hair import complete_shading, fill_features, fill_hair
 from core.delight.evening import ShadingEstimate
 from core.imaging import images
 
@@ -68,3 +69,18 @@ def test_a_photograph_keeps_a_brow_where_the_parser_sees_one(monkeypatch):
     hair = images.srgb_to_linear(0.25) / images.srgb_to_linear(0.5)
     assert albedo[96, 100].mean() / skin == pytest.approx(float(hair), rel=0.1)
     assert albedo[166, 100].mean() / skin == pytest.approx(1, rel=0.1)
+
+
+def test_below_hair_the_mean_of_network_and_fit_counts_however_far_the_fit_counts_on_skin():
+    side = 20
+    share = np.zeros((side, side), np.float32)
+    share[8:12, 8:12] = 1
+    here, even = np.zeros((side, side), int), np.zeros((side, side, 3), np.float32)
+    own = ShadingEstimate((0, 0, side), np.where(share[..., None] > 0, 0.4, even), share, even, here)
+    fitted = np.where(share[..., None] > 0, -0.2, even) - 1  # at another level, as its tone is a guess
+    for weight in (0.0, 0.6):
+        weighed = replace(own, shading=own.shading + weight * (fitted + 1 - own.shading))
+        filled = fill_hair(weighed, own, fitted, share)
+        assert filled.shading[10, 10] == pytest.approx(0.1, abs=1e-6)
+        assert filled.shading[2, 2] == pytest.approx(0, abs=1e-6)
+        assert filled.shadow[10, 10] == pytest.approx(0, abs=1e-6)

@@ -5,6 +5,7 @@
 
 import pytest
 
+from core.contract import mask_history
 from core.contract.capture import FORMAT, Capture
 from core.contract.files import replacing, replacing_folder, write_json
 from core.contract.messages import Problem
@@ -84,3 +85,27 @@ def test_a_file_in_the_way_of_the_folder_is_told(tmp_path):
         pass
     with pytest.raises(Problem):
         write_json(Capture(tmp_path / "x.wildcap").job, {})
+
+
+@pytest.mark.parametrize("name", ["3:4 view.mov", "A:B.mov", "a\\b.mov", "  film.mov"])
+def test_a_source_may_have_any_name_that_its_system_takes(tmp_path, name):
+    film = tmp_path / name
+    film.write_bytes(b"film")
+    capture = Capture(tmp_path / "a.wildcap")
+    capture.set_source(film)
+    assert capture.read()["source_stamp"][0][0] == name and capture.source == film
+
+
+def test_copies_of_masks_are_kept_in_the_order_in_which_they_were_made_wherever_the_clock_stands(tmp_path, monkeypatch):
+    """A copy is not the oldest because the clock was set back, or the traveller flew west."""
+    capture, clock = Capture(tmp_path / "a.wildcap"), iter(range(40, 0, -1))
+    capture.claim()
+    monkeypatch.setattr(mask_history.time, "time_ns", lambda: next(clock) * 3600 * 10**9)
+    contents = [b"mask %d" % i for i in range(14)]
+    for content in contents:
+        copy = mask_history.keep(capture, capture.shadow_mask, content)
+        assert copy.read_bytes() == content
+    kept = [path.read_bytes() for path in sorted(capture.mask_history.iterdir())]
+    assert kept == contents[-mask_history.KEPT:]
+    (capture.mask_history / "shadow_mask_99999999_999999_999.png").write_bytes(b"named by somebody")
+    assert mask_history.keep(capture, capture.shadow_mask, b"one more").exists()

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from core.contract import hashes
 from core.contract.capture import Capture
 
 from . import standin
@@ -78,9 +79,9 @@ def test_drops_are_taken_where_the_tab_is_shown(addon):
     source = addon("capture.source")
     # not imported: it needs OpenCV
     stage = ast.parse((Path(__file__).parents[1] / "core" / "frames" / "photographs.py").read_text(encoding="utf-8"))
-    known = {node.targets[0].id: ast.literal_eval(node.value) for node in stage.body if isinstance(node, ast.Assign)
-             and node.targets[0].id.isupper()}
-    assert set(source.PHOTOGRAPHS) == {*known["SUFFIXES"], *known["RAW"]}
+    raw = next(ast.literal_eval(node.value) for node in stage.body
+               if isinstance(node, ast.Assign) and node.targets[0].id == "RAW")
+    assert set(source.PHOTOGRAPHS) == {*hashes.PHOTOGRAPHS, *raw}
 
     def taken(tab: str) -> bool:
         space = SimpleNamespace(show_region_ui=bool(tab))

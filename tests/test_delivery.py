@@ -18,10 +18,10 @@ from scipy.spatial import cKDTree
 
 from core import deliver
 from core.__main__ import main
-from core.contract import delivery_plan, delivery_presets, skin_regions
+from core.contract import delivery_plan, delivery_presets, skin_regions, stages
 from core.contract.capture import Capture
 from core.contract.messages import Cancelled, Done, Failed, Problem
-from core.contract.settings import DeliverSettings
+from core.contract.settings import DeliverSettings, Settings
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
@@ -29,6 +29,7 @@ from core.imaging import images
 from . import delivered
 from .conftest import ROOT
 from .delivered import NORMALS, OBJ, SIDE, folder
+from .recorded import record
 
 
 @pytest.fixture
@@ -143,18 +144,19 @@ def test_maps_are_made_smaller_but_never_larger(capture):
     assert np.allclose(images.read_linear(capture.root / "colour.png"), light, atol=3e-4), "averaged as light"
 
 
-def test_the_enlarged_maps_are_delivered_unless_the_solved_ones_are_newer(capture):
-    shutil.copytree(capture.maps, capture.maps_4k)
-    images.write_srgb(capture.maps_4k / "diffuse_albedo.png", np.full((SIDE, SIDE, 3), 0.5), 16)
-    for path in capture.maps_4k.iterdir():
-        os.utime(path, (2e9, 2e9))
+def test_the_enlarged_maps_are_delivered_where_they_were_made_of_the_solved_ones_whatever_times_files_have(capture):
     delivered.deliver(capture, **OBJ)
     made = folder(capture) / "textures" / "Zoe_et_moi_albedo.png"
-    assert made.read_bytes() == (capture.maps_4k / "diffuse_albedo.png").read_bytes()
-    for path in capture.maps.iterdir():
+    assert made.read_bytes() == (capture.maps / "diffuse_albedo.png").read_bytes()
+    shutil.copytree(capture.maps, capture.maps_4k)
+    images.write_srgb(capture.maps_4k / "diffuse_albedo.png", np.full((SIDE, SIDE, 3), 0.5), 16)
+    record(capture, stages.by_name("upscale"), Settings())
+    for path in capture.maps.iterdir():  # a copy of a folder may be of any times
         os.utime(path, (3e9, 3e9))
     delivered.deliver(capture, **OBJ)
-    assert made.read_bytes() == (capture.maps / "diffuse_albedo.png").read_bytes()
+    assert made.read_bytes() == (capture.maps_4k / "diffuse_albedo.png").read_bytes()
+    images.write_srgb(capture.maps / "diffuse_albedo.png", np.full((SIDE, SIDE, 3), 0.3), 16)
+    assert isinstance(delivered.deliver(capture, **OBJ), Failed), "another solve, which nobody enlarged"
 
 
 def test_hair_masks_and_clean_skin_go_along_where_there_are_some(capture):

@@ -102,3 +102,17 @@ def test_killed_at_any_rename_a_delivery_loses_nothing_of_others(capture, at, mo
     notes = {path.name: path.read_text() for path in place.glob("* notes.txt")}
     assert notes == {name: name for name in ("a notes.txt", "b notes.txt")}
     assert [path.name for path in capture.exports.iterdir()] == [place.name]
+
+
+def test_another_captures_delivery_is_refused_by_name_and_given_up_when_asked(tmp_path):
+    """Names that no program takes in a file's name become alike."""
+    ivan, maria = (delivered.make(tmp_path / f"{name}.wildcap") for name in ("Иван", "Мария"))
+    to = str(tmp_path / "heads")
+    assert isinstance(delivered.deliver(ivan, **OBJ, folder=to), Done)
+    place = tmp_path / "heads" / "head_head_blender_obj"
+    before = {path.name: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    ended = delivered.deliver(maria, **OBJ, folder=to)
+    assert isinstance(ended, Failed) and "Иван.wildcap" in ended.problem and "--replace" in ended.remedy
+    assert {path.name: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
+    assert isinstance(delivered.deliver(ivan, **OBJ, folder=to), Done), "its own is replaced as ever"
+    assert isinstance(delivered.deliver(maria, **OBJ, folder=to, replace=True), Done)

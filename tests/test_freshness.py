@@ -135,8 +135,10 @@ def test_photographs_are_known_by_name_and_content_and_hidden_files_do_not_count
     for name in ("a.jpg", "b.jpg"):
         (folder / name).write_bytes(name.encode())
     before = hash_source(folder)
-    (folder / ".DS_Store").write_bytes(b"x")
+    for name in (".DS_Store", "Thumbs.db", "a.jpg.xmp", "notes.txt"):
+        (folder / name).write_bytes(b"x")
     assert same_source(before, hash_source(folder))
+    assert same_source([*before, ["Thumbs.db", 7, "what an older WildCap recorded, too"]], hash_source(folder))
     os.rename(folder / "a.jpg", folder / "c.jpg")  # the order is another one now
     assert not same_source(before, hash_source(folder))
 

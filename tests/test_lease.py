@@ -3,6 +3,7 @@
 """The lock of a capture: never two inside, the dead replaced at once, the sleeping after a term, and who was replaced
 writes nothing more."""
 
+import errno
 import json
 import os
 import signal
@@ -16,7 +17,7 @@ import pytest
 from core.contract import lease, processes
 from core.contract.capture import Capture
 from core.contract.files import replacing, write_json
-from core.contract.messages import Problem
+from core.contract.messages import CancelledError, Problem
 
 from . import kept_capture
 
@@ -106,6 +107,31 @@ def test_a_refresh_that_is_seen_keeps_the_lease_whatever_time_it_tells(capture, 
         pass
     beat.wait()
     assert capture.lock.exists()
+
+
+def test_a_wait_for_another_machine_is_cancelled_and_ends_by_itself_before_a_command(capture, soon):
+    capture.lock.write_text(written_by(host="another machine"))
+    began = time.monotonic()
+    with pytest.raises(CancelledError), capture.locked(cancelled=lambda: True):
+        pass
+    assert time.monotonic() - began < 0.4 and capture.lock.exists()
+    capture.outwait(lambda text: None)
+    assert not capture.lock.exists()
+    capture.outwait(lambda text: None)  # nobody is here
+
+
+def test_a_disk_that_does_not_answer_for_a_moment_costs_nobody_the_lease(capture, monkeypatch):
+    read = lease.require_regular
+
+    def away(path):
+        raise OSError(errno.EIO, "the server is away", str(path))
+
+    with capture.locked():
+        monkeypatch.setattr(lease, "require_regular", away)
+        with pytest.raises(Problem, match="could not be written"):  # of the disk, not of another worker
+            write_json(capture.root / "texture.json", 1)
+        monkeypatch.setattr(lease, "require_regular", read)
+        write_json(capture.root / "texture.json", 1)
 
 
 def test_the_holder_refreshes_and_gives_back_only_its_own(capture, soon):

@@ -63,13 +63,20 @@ def _rows_of_folder(folder: Path, root: Path) -> list[tuple[str, dict[str, str]]
     stems = [path.stem for path in inside]
     rows = []
     for path in inside:
-        ours = any((path / name).exists() for name in (NAME, "capture.json"))
-        if path.is_dir() and path.absolute() != root and not ours and any(path.iterdir()):
+        if path.is_dir() and path.absolute() != root and _holds_photographs(path):
             rows.append((path.name, {"video": path.name}))
         elif path.is_file() and path.suffix.lower() in VIDEOS:
             rows.append((path.name,
                          {"video": path.name, "name": path.stem if stems.count(path.stem) == 1 else path.name}))
     return rows
+
+
+def _holds_photographs(folder: Path) -> bool:
+    """Whether it holds something, and is neither a batch nor a capture; what may not be looked into is the system's."""
+    try:
+        return not any((folder / name).exists() for name in (NAME, "capture.json")) and any(folder.iterdir())
+    except PermissionError:
+        return False
 
 
 def _rows_of_table(table: Path) -> list[tuple[str, dict[str, str]]]:

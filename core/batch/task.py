@@ -19,7 +19,7 @@ from pathlib import Path
 
 from ..contract import switchlight_api
 from ..contract.capture import Capture
-from ..contract.messages import Cancelled, Done, Failed, Log, Message, Problem
+from ..contract.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem
 from ..worker.client import THREAD_VARIABLES, Worker
 from ..worker.job import read_job, write_job
 from .groups import DELIVER, GROUPS, StageGroup
@@ -42,23 +42,17 @@ def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[M
             raise Problem(f"The shadow mask of {face.name} waits to be looked at.",
                           f"Open the batch in Blender, or accept it as it is: `python -m core batch accept "
                           f"{batch.root} {face.name}`.")
-        _wait_for_lease(capture, hear)
+        capture.outwait(lambda text: hear(Log(text)), cancelled)
         job = write_job(capture, source=face.source if group is GROUPS[0] else "", last=group.last,
                         settings=face.settings, quality=face.quality)
         final = _follow(capture, job, hear, cancelled, environment)
         if group.name == DELIVER and isinstance(final, Done):
             final = _deliver(batch, face, hear, cancelled, environment)
+    except CancelledError:
+        return Cancelled(group.last)
     except Problem as problem:
         return Failed("", problem.problem, problem.remedy)
     return Done(round(time.monotonic() - began, 2)) if isinstance(final, Done) else final
-
-
-def _wait_for_lease(capture: Capture, hear: Callable[[Message], None]) -> None:
-    """Sees to it that nobody holds the capture: one that is left by a machine that has gone is taken over when its term
-    is out. Raises Problem where somebody works there."""
-    if capture.json.is_file() and capture.lock.exists():
-        with capture.locked(lambda text: hear(Log(text))):
-            pass
 
 
 def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancelled: Callable[[], bool],
@@ -71,7 +65,7 @@ def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancel
         if again or not worker.died:
             return final
         hear(Log(f"{final.problem} It is begun once more."))
-        _wait_for_lease(capture, hear)
+        capture.outwait(lambda text: hear(Log(text)), cancelled)
     raise AssertionError
 
 

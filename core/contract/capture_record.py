@@ -7,7 +7,7 @@ Ground floor: standard library only.
 
 from __future__ import annotations
 
-from .json_files import is_number, plain_name
+from .json_files import is_number
 
 ENTRY = {"finished": str, "version": str, "settings": dict, "seed": int, "device": str, "figures": dict,
          "findings": list, "inputs": dict, "code": str}
@@ -47,8 +47,14 @@ def _is_stop(stopped) -> bool:
 def _is_stamp(value) -> bool:
     """Whether it is a source's stamp: [name, size, content hash, or time] of each file."""
     return isinstance(value, list) and all(
-        isinstance(file, list) and len(file) == 3 and plain_name(file[0]) and is_number(file[1], 0)
+        isinstance(file, list) and len(file) == 3 and _names_file(file[0]) and is_number(file[1], 0)
         and (isinstance(file[2], str) or is_number(file[2])) for file in value)
+
+
+def _names_file(value) -> bool:
+    """Whether it may be a file's name on some system: none has a slash in it, and what else one takes, as a colon or a
+    backslash, another does not."""
+    return isinstance(value, str) and "/" not in value and value not in ("", ".", "..")
 
 
 def _are_hashes(value) -> bool:

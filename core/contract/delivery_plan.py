@@ -33,11 +33,13 @@ MADE_BY = "WildCap for Blender"
 
 @dataclass(frozen=True)
 class DeliveryPlan:
-    """`name` begins every file's name; `pictures` is 'png8', 'png16' or 'exr'; `colour` 'srgb' or 'linear'; `normals`
-    'opengl' or 'directx'; `unit` 'm' or 'cm'; `target` is the folder, `staged` what it is until it is whole; `replace`:
-    files of an older delivery that were changed since are given up."""
+    """`name` begins every file's name, `capture` is that of the capture's folder; `pictures` is 'png8', 'png16' or
+    'exr'; `colour` 'srgb' or 'linear'; `normals` 'opengl' or 'directx'; `unit` 'm' or 'cm'; `target` is the folder,
+    `staged` what it is until it is whole; `replace`: another delivery there, and files of it that were changed since,
+    are given up."""
 
     name: str
+    capture: str
     what: str
     preset: DeliveryPreset
     format: Format
@@ -87,8 +89,8 @@ def plan(capture: Capture, settings: DeliverSettings) -> DeliveryPlan:
     base = Path(settings.folder).expanduser() if settings.folder else capture.exports
     target = base / f"{name}_{settings.what}_{settings.preset}_{format_name}"
     numbered = preset.numbered if settings.udim == "preset" else settings.udim == "numbered"
-    return DeliveryPlan(name, settings.what, preset, format, pictures, colour, format.normals or preset.normals,
-                        format.unit or preset.unit, numbered,
+    return DeliveryPlan(name, capture.root.name, settings.what, preset, format, pictures, colour,
+                        format.normals or preset.normals, format.unit or preset.unit, numbered,
                         target, target.with_name(f".{target.name}.staged"), settings.replace)
 
 
@@ -139,8 +141,8 @@ def discard(plan: DeliveryPlan) -> None:
 
 
 def check_target(plan: DeliveryPlan) -> None:
-    """Raises Problem for a folder that no delivery has made, for files of an older delivery that somebody changed
-    since, unless the plan replaces those, and for files of others that are in the way."""
+    """Raises Problem for a folder that no delivery has made, for a delivery of another capture and files of an older
+    one that somebody changed since, unless the plan replaces those, and for files of others that are in the way."""
     target = plan.target
     if not target.exists() or target.is_dir() and not any(target.iterdir()):
         return
@@ -148,6 +150,11 @@ def check_target(plan: DeliveryPlan) -> None:
     if delivered is None:
         raise Problem(f"{target} holds files that no delivery has put there.",
                       "Move them away, or choose another folder to deliver to.")
+    other = _delivered_capture(target)
+    if other not in ("", plan.capture) and not plan.replace:
+        raise Problem(f"{target} holds the delivery of another capture, {other}.",
+                      "Deliver to another folder, rename the capture, or deliver again with Replace Changed Files "
+                      "(--replace) to give the other delivery up.")
     changed = [name for name, digest in delivered.items() if (target / name).is_file()
                and not is_as_delivered(target / name, digest)]
     if changed and not plan.replace:
@@ -193,6 +200,15 @@ def read_delivered(target: Path) -> dict[str, str] | None:
         return {PROVENANCE: "", **told.get("files", {})} if told.get("made_by") == MADE_BY else None
     except (OSError, ValueError, AttributeError, TypeError):
         return None
+
+
+def _delivered_capture(target: Path) -> str:
+    """The name of the capture that a folder was delivered from; '' where its provenance tells none."""
+    try:
+        name = json.loads((target / PROVENANCE).read_text(encoding="utf-8"))["capture"]["name"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
+    return name if isinstance(name, str) else ""
 
 
 def is_as_delivered(path: Path, digest: str) -> bool:

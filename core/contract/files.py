@@ -15,6 +15,7 @@ import json
 import os
 import re
 import shutil
+import time
 from pathlib import Path
 
 from . import ownership
@@ -30,6 +31,8 @@ _UMASK = os.umask(0o022)
 os.umask(_UMASK)
 MODE = 0o666 & ~_UMASK
 """Of every file of a capture: as the user's other files."""
+OPEN_ELSEWHERE_S = 1.0
+"""How long another program may have a file open that is to be replaced."""
 
 
 @contextlib.contextmanager
@@ -47,7 +50,7 @@ def replacing(path: Path):
         if root is not None:
             ownership.note_temporary(root, temporary)
         yield temporary
-        with open(temporary, "rb") as file:
+        with open(temporary, "rb+") as file:  # Windows flushes none that was opened to be read
             os.fsync(file.fileno())
         place_file(temporary, path)
     except OSError as error:
@@ -87,7 +90,7 @@ def place_file(temporary: Path, path: Path) -> None:
             ownership.keep_aside(root, path)
         ownership.note_written(root, {ownership.path_inside(root, path): read_hash(temporary)})
     check_lease(root or path.parent)
-    os.replace(temporary, path)
+    _rename(temporary, path)
 
 
 def place_folder(temporary: Path, path: Path) -> None:
@@ -109,12 +112,26 @@ def place_folder(temporary: Path, path: Path) -> None:
                                 for file in written})
         check_lease(root)
     if path.exists():
-        os.replace(path, old)
-    os.replace(temporary, path)
+        _rename(path, old)
+    _rename(temporary, path)
     if root is None:
         shutil.rmtree(old, ignore_errors=True)
     else:
         ownership.clear_replaced(root, old, path)
+
+
+def _rename(path: Path, into: Path) -> None:
+    """os.replace. Windows refuses while another program, such as a virus scanner, has the file open, which may be for a
+    moment only."""
+    ends = time.monotonic() + (OPEN_ELSEWHERE_S if os.name == "nt" else 0)
+    while True:
+        try:
+            os.replace(path, into)
+            return
+        except PermissionError:
+            if time.monotonic() >= ends:
+                raise
+            time.sleep(0.05)
 
 
 def remove_file(path: Path) -> None:
@@ -138,6 +155,9 @@ def storage_problem(error: OSError, path: Path) -> Problem:
         return Problem(f"The disk is full: {path} could not be written.",
                        "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        if os.name == "nt":  # which says the same of a file that is in use
+            return Problem(f"{path} cannot be written: the folder is read-only, or another program has the file open.",
+                           "Close it there, or choose a folder you may write to.")
         return Problem(f"{path} cannot be written: the folder is read-only.",
                        "Choose a folder you may write to, or change its permissions.")
     if error.errno in AWAY or error.errno == errno.ENOENT and not Path(path.anchor).exists():

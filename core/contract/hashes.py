@@ -20,6 +20,8 @@ WHOLE_BYTES = 64 << 20
 """Size up to which a source's file is read whole: every photograph, and a phone's video of half a minute."""
 BLOCKS, BLOCK_BYTES = 64, 1 << 20
 """What is read of a longer one, spread evenly from its first byte to its last."""
+PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif", ".avif")
+"""Suffixes of the files in a folder of photographs that are read; others may lie beside them."""
 _hashes: dict[tuple, str] = {}
 
 
@@ -64,21 +66,27 @@ def hash_tree(path: Path, hash_one: Callable[[Path], str] = hash_file) -> str | 
 def hash_source(source: Path | None) -> list:
     """[name, size, content hash by `sample_file`] of each file of a source, which is a video or a folder of
     photographs; [] where it is gone."""
-    inside = (sorted(source.iterdir()) if source is not None and source.is_dir() else [source] if source is not None
-              else [])
-    files = [p for p in inside if p.is_file() and not p.name.startswith(".")]
-    return [[p.name, p.stat().st_size, sample_file(p)] for p in files]
+    if source is None:
+        return []
+    files = ([path for path in sorted(source.iterdir()) if path.is_file() and _is_photograph(path.name)]
+             if source.is_dir() else [source] if source.is_file() else [])
+    return [[path.name, path.stat().st_size, sample_file(path)] for path in files]
+
+
+def _is_photograph(name: str) -> bool:
+    return name.lower().endswith(PHOTOGRAPHS) and not name.startswith(".")
 
 
 def same_source(recorded: list, present: list) -> bool:
     """Whether two answers of `hash_source` mean the same pictures. A video may be renamed; the names of photographs
-    count, for they tell their order.
+    count, for they tell their order; what an older WildCap recorded beside them does not.
 
     Captures of WildCap 0.1.0 recorded a time in place of the hash: of those, size and name must do.
     """
     def told(stamp: list) -> list:
-        return [[name if len(stamp) > 1 or not hashed else "", size, digest if hashed else ""]
-                for name, size, digest in stamp if not name.startswith(".")]
+        files = [file for file in stamp if _is_photograph(file[0])] or stamp
+        return [[name if len(files) > 1 or not hashed else "", size, digest if hashed else ""]
+                for name, size, digest in files]
 
     hashed = all(isinstance(digest, str) for _, _, digest in (*recorded, *present))
     return told(recorded) == told(present)

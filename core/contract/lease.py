@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from .messages import Problem
+from .messages import CancelledError, Problem
 from .processes import identify_process, is_at_work, is_gone
 from .regular_files import require_regular
 
@@ -45,8 +45,11 @@ class Lease:
     token: str
 
     def holds(self) -> bool:
-        """Whether nobody has taken it over."""
-        return (_read(self.path) or {}).get("token") == self.token
+        """Whether nobody has taken it over. Raises OSError where the disk does not tell just now."""
+        try:
+            return _parse(self.path).get("token") == self.token
+        except FileNotFoundError:
+            return False
 
 
 def check_lease(root: Path) -> None:
@@ -85,15 +88,17 @@ def _refuse_stranger(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def hold(root: Path, tell: Callable[[str], None] = lambda text: None, what: str = "capture") -> Iterator[Lease]:
+def hold(root: Path, tell: Callable[[str], None] = lambda text: None, what: str = "capture",
+         cancelled: Callable[[], bool] = lambda: False) -> Iterator[Lease]:
     """Holds the lease of a capture's folder, or a batch's, which must be there. Raises Problem naming who works there.
 
     A process of this machine that is at work is refused at once, and one that has ended is replaced at once. For one
-    that was stopped, or that lives on another machine, a term is waited for a refresh; `tell` hears of that.
+    that was stopped, or that lives on another machine, a term is waited for a refresh; `tell` hears of that. Raises
+    CancelledError where `cancelled` says so meanwhile.
     """
     lease = Lease(root / "lock", secrets.token_hex(8))
     while not _make(lease):
-        expired = _wait_out(lease.path, tell, what)
+        expired = _wait_out(lease.path, tell, what, cancelled)
         if expired is not None:
             _take_over(lease, *expired)
     _held[_key(root)] = lease
@@ -107,8 +112,9 @@ def hold(root: Path, tell: Callable[[str], None] = lambda text: None, what: str 
         ended.set()
         keeper.join()
         del _held[_key(root)]
-        if lease.holds():
-            lease.path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # a server that has gone: the lease runs out
+            if lease.holds():
+                lease.path.unlink(missing_ok=True)
 
 
 def _make(lease: Lease) -> bool:
@@ -124,9 +130,10 @@ def _make(lease: Lease) -> bool:
     return True
 
 
-def _wait_out(path: Path, tell: Callable[[str], None], what: str) -> tuple[dict, tuple | None] | None:
+def _wait_out(path: Path, tell: Callable[[str], None], what: str,
+              cancelled: Callable[[], bool]) -> tuple[dict, tuple | None] | None:
     """What the lease says that can be taken over, and its stamp: its holder has ended, or a term went by without a
-    refresh. None where it was given back. Raises Problem when it is held."""
+    refresh. None where it was given back. Raises Problem when it is held, and CancelledError."""
     _refuse_stranger(path)
     first, began, told = _stamp(path), time.monotonic(), False
     while True:
@@ -141,6 +148,8 @@ def _wait_out(path: Path, tell: Callable[[str], None], what: str) -> tuple[dict,
         if waited > 1 and not told:
             tell(f"Looking whether the worker that holds this {what} is still at work ...")
             told = True
+        if cancelled():
+            raise CancelledError(str(path))
         time.sleep(LOOK_S)
 
 
@@ -193,16 +202,24 @@ def _refresh(lease: Lease, ended: threading.Event) -> None:
 
 
 def _read(path: Path) -> dict | None:
-    """What the file says; {} where it is empty or half written, None where it is not there."""
+    """What the file says; {} where it is empty, half written or cannot be read, None where it is not there."""
     try:
-        content = json.loads(require_regular(path).read_bytes())
-        if isinstance(content, dict) and "start" in content:  # by WildCap 0.1.0
-            content["since"] = content.pop("start")
-        return content if isinstance(content, dict) and {"host", "pid", "since"} <= content.keys() else {}
+        return _parse(path)
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, RecursionError):
+    except OSError:
         return {}
+
+
+def _parse(path: Path) -> dict:
+    """What the file says; {} where it is empty or half written. Raises OSError where it cannot be read."""
+    try:
+        content = json.loads(require_regular(path).read_bytes())
+    except (ValueError, RecursionError):
+        return {}
+    if isinstance(content, dict) and "start" in content:  # by WildCap 0.1.0
+        content["since"] = content.pop("start")
+    return content if isinstance(content, dict) and {"host", "pid", "since"} <= content.keys() else {}
 
 
 def _stamp(path: Path) -> tuple | None:

@@ -7,6 +7,8 @@ Ground floor: standard library only; the add-on and `core mask import` write mas
 
 from __future__ import annotations
 
+import calendar
+import re
 import shutil
 import time
 from pathlib import Path
@@ -20,19 +22,20 @@ KEPT = 10
 
 def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | None:
     """Copies `mask` (shadow_mask.png or protect_mask.png), or another `content` of that file, to
-    mask_history/NAME_DATE_TIME.png and drops all but the last ten of that name.
+    mask_history/NAME_DATE_TIME.png (UTC) and drops all but the last ten of that name.
 
     Returns the copy, or None when there is no mask yet. Raises Problem when the folder cannot be written.
     """
     if content is None and not mask.is_file():
         return None
-    now = time.time_ns() // 1_000_000
-    # a fast disk takes several within a millisecond, and none may be lost
-    while (copy := _place(capture, mask, now)).exists():
-        now += 1
+    copies = sorted(capture.mask_history.glob(f"{mask.stem}_*{mask.suffix}"))
+    # Names tell the order in which copies are dropped: a fast disk takes several within a millisecond, and clocks are
+    # set back.
+    latest = max((_time_of(path) for path in copies), default=0)
+    copy = _place(capture, mask, max(time.time_ns() // 1_000_000, latest + 1))
     with replacing(copy) as temporary:
         shutil.copyfile(mask, temporary) if content is None else temporary.write_bytes(content)
-    for old in sorted(capture.mask_history.glob(f"{mask.stem}_*{mask.suffix}"))[:-KEPT]:
+    for old in [*copies, copy][:-KEPT]:
         if ownership.is_ours(capture.root, old):
             old.unlink(missing_ok=True)
     return copy
@@ -42,5 +45,14 @@ def _place(capture: Capture, mask: Path, milliseconds: int) -> Path:
     seconds, rest = divmod(milliseconds, 1000)
     return (
         capture.mask_history
-        / f"{mask.stem}_{time.strftime('%Y%m%d_%H%M%S', time.localtime(seconds))}_{rest:03d}{mask.suffix}"
+        / f"{mask.stem}_{time.strftime('%Y%m%d_%H%M%S', time.gmtime(seconds))}_{rest:03d}{mask.suffix}"
     )
+
+
+def _time_of(copy: Path) -> int:
+    """The milliseconds that the name of a copy tells; 0 for a name that tells none."""
+    told = re.search(r"_(\d{8}_\d{6})_(\d{3})$", copy.stem)
+    try:
+        return 1000 * calendar.timegm(time.strptime(told[1], "%Y%m%d_%H%M%S")) + int(told[2]) if told else 0
+    except ValueError:
+        return 0

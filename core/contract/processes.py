@@ -84,7 +84,9 @@ def _ask_beginning(pid: int) -> str:
         # Linux: clock ticks since the machine was started
         return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2].split()[19].decode()
     with contextlib.suppress(OSError, subprocess.SubprocessError):
-        completed = subprocess.run(["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, timeout=5)
+        # in the same words for every program that asks, whatever its language and time zone
+        completed = subprocess.run(["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, timeout=5,
+                                   env={**os.environ, "LC_ALL": "C", "TZ": "UTC"})
         return completed.stdout.strip()
     return ""
 

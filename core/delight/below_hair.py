@@ -35,16 +35,17 @@ def fill_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
     return complete_shading(shading, _covered(share)).astype(np.float32)
 
 
-def fill_hair(look: ShadingEstimate, fitted: np.ndarray, share: np.ndarray) -> ShadingEstimate:
-    """The look moved by FITTED_SHARE towards the fitted log-shading [h, h, 3] below hair, whose `share` of the head is
-    [h, h], at the level at which it meets the skin around; and the shadow that is seen there."""
+def fill_hair(look: ShadingEstimate, own: ShadingEstimate, fitted: np.ndarray, share: np.ndarray) -> ShadingEstimate:
+    """The look with the mean of the network's `own` answer and the fitted log-shading [h, h, 3] below hair, whose
+    `share` of the head is [h, h], the fitted one at the level at which it meets the skin around; and the shadow that is
+    seen there."""
     here = look.face >= 0
     hairy, bare = _covered(share) & here, here & ~_covered(share)
     if not hairy.any() or not bare.any():
         return look
     known = np.concatenate([look.shading - fitted, look.shadow[..., None]], -1)
     around = complete_shading(np.where(bare[..., None], known, 0), ~bare)
-    moved = look.shading + FITTED_SHARE * (fitted + around[..., :3] - look.shading)
+    moved = own.shading + FITTED_SHARE * (fitted + around[..., :3] - own.shading)
     return replace(look, shading=np.where(hairy[..., None], moved, look.shading).astype(np.float32),
                    shadow=np.where(hairy, around[..., 3], look.shadow).astype(np.float32))
 

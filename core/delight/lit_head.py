@@ -25,15 +25,15 @@ FIT_POINTS = 6000
 @dataclass(frozen=True)
 class LitHead:
     """The head; its smoothed unit normals [V, 3]; transfer [V, 9] of the sky; skin [V]: 1 on bare facial skin; hair
-    [V]: the share of the views that show hair, eyes or cloth there; brows [V]; the light; and best_lit [3]: the linear
-    colour of the best lit skin, taken for that of the skin itself."""
+    [V]: the share of the views that show hair, eyes or cloth there; features [V]: 1 on brows and lips; the light; and
+    best_lit [3]: the linear colour of the best lit skin, taken for that of the skin itself."""
 
     head: Head
     normals: np.ndarray
     transfer: np.ndarray
     skin: np.ndarray
     hair: np.ndarray
-    brows: np.ndarray
+    features: np.ndarray
     light: Light
     best_lit: np.ndarray
 
@@ -67,10 +67,10 @@ def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     colours, count, hair, seen_brows = vertex_colours(head, normals, views, report)
     transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done,
                                  of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
-    skin, brows = skin_weights(head.mesh)
-    skin, brows = skin * (1 - hair) * (1 - seen_brows), np.maximum(brows, seen_brows)
+    skin, features = skin_weights(head.mesh)
+    skin, features = skin * (1 - hair) * (1 - seen_brows), np.maximum(features, seen_brows)
     light, reached = _fit(head, normals, transfer, colours, skin * (count >= min(2, len(views))), report)
-    return LitHead(head, normals, transfer, skin, hair, brows, light,
+    return LitHead(head, normals, transfer, skin, hair, features, light,
                    _best_lit(light, normals, transfer, reached, count))
 
 

@@ -86,9 +86,9 @@ def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
 
 def put_together(answers: Answers) -> list[ShadingEstimate]:
     """One shading for each frame out of both answers."""
-    looks = even_out(answers.head, answers.views, answers.looks)
-    looks = weigh_in(looks, answers.fitted, answers.skins)
-    looks = [fill_hair(*told) for told in zip(looks, answers.fitted, answers.hair, strict=True)]
+    own = even_out(answers.head, answers.views, answers.looks)
+    looks = weigh_in(own, answers.fitted, answers.skins)
+    looks = [fill_hair(*told) for told in zip(looks, own, answers.fitted, answers.hair, strict=True)]
     return remove_casts(looks, answers.skins)
 
 
@@ -115,11 +115,12 @@ def load_network(device: str) -> DelightNet:
 
 
 def square_around(points: np.ndarray) -> tuple[float, float, float]:
-    """Left, top and side of the square around a face's landmarks [N, 2] in pixels."""
+    """Left, top and side of the square around a face's landmarks [N, 2] in whole pixels: what is told there of the
+    picture is brought back without being resampled, which would blur it."""
     low, high = points.min(0), points.max(0)
-    side = FACE_MARGIN * float((high - low).max())
-    left, top = (low + high) / 2 - side / 2
-    return float(left), float(top), side
+    side = round(FACE_MARGIN * float((high - low).max()))
+    left, top = np.round((low + high) / 2 - side / 2)
+    return float(left), float(top), float(side)
 
 
 def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.ndarray:
@@ -139,17 +140,24 @@ def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEs
     """What the network says of a frame, and the log-shading of the fitted light at the same size."""
     pixels, _ = view.project(_landmarks(head))
     box = square_around(pixels[np.isfinite(pixels).all(1)])
-    y, x = np.mgrid[0:SIDE_PX, 0:SIDE_PX]
-    rays = view.rays((np.stack([x.ravel(), y.ravel()], -1) + 0.5) * box[2] / SIDE_PX + box[:2])
-    face, bary, _ = head.caster.first_hits(np.repeat(view.centre[None], len(rays), 0), rays)
-    face, bary = face.reshape(SIDE_PX, SIDE_PX), bary.reshape(SIDE_PX, SIDE_PX, 3)
+    face, bary = _hits(view, head, box, SIDE_PX)
     ambient, direct, free, normal = head.at(face, bary)
     geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, (face >= 0).astype(np.float32))
     picture = crop(images.read_srgb(view.path), box, SIDE_PX)
     look = _look(net, box, picture, geometry)
     light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary,
                           round(max(view.width, view.height) * SIDE_PX / box[2]))
-    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), average_cells(light, SIDE_PX // 2)
+    cell_face, cell_bary = _hits(view, head, box, SIDE_PX // 2)
+    return replace(look, face=cell_face, bary=cell_bary), average_cells(light, SIDE_PX // 2)
+
+
+def _hits(view: View, head: LitHead, box: tuple[float, float, float], side: int) -> tuple[np.ndarray, np.ndarray]:
+    """The head's face [side, side] (-1: none) and the place on it [side, side, 3] at the centres of the cells of a
+    square of a frame."""
+    y, x = np.mgrid[0:side, 0:side]
+    rays = view.rays((np.stack([x.ravel(), y.ravel()], -1) + 0.5) * box[2] / side + box[:2])
+    face, bary, _ = head.caster.first_hits(np.repeat(view.centre[None], len(rays), 0), rays)
+    return face.reshape(side, side), bary.reshape(side, side, 3)
 
 
 @torch.inference_mode()

@@ -27,8 +27,8 @@ def estimate_sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarr
     part of.
 
     linear, ambient, direct [H, W, 3]: the frame, the skin's colour under the sky, and what the sun would add; free [H,
-    W]: 1 where the head itself leaves the sun visible; skin [H, W]: 0 on brows and hair, whose darkness is their own;
-    head bool [H, W].
+    W]: 1 where the head itself leaves the sun visible; skin [H, W]: 0 on brows, lips and hair, whose darkness is their
+    own; head bool [H, W].
     """
     log = np.log(np.maximum(linear, 1e-3)).astype(np.float32)
     shaded = np.log(np.maximum(ambient, 1e-4)).astype(np.float32)

@@ -65,7 +65,7 @@ def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.nda
     ambient, direct, free, _ = head.at(face, bary)
     share = np.ones(here.shape, np.float32)
     if head.light.has_sun:
-        own = interpolate(np.maximum(head.hair, head.brows)[:, None], head.mesh.faces, face, bary)[..., 0]
+        own = interpolate(np.maximum(head.hair, head.features)[:, None], head.mesh.faces, face, bary)[..., 0]
         share = estimate_sun_share(linear, ambient, direct, free, 1 - own, here, side)
     lit = np.maximum(bleed((ambient + share[..., None] * direct).astype(np.float32), here), 1e-4)
     if head.light.has_sun:

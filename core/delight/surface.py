@@ -96,12 +96,13 @@ def _without_doubts(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def skin_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """([V], [V]): 1 on plain facial skin, 0 on lips, brows, eyes and off the face; and 1 on the brows, 0 elsewhere.
-    On a mesh of another topology all is skin."""
+    """([V], [V]): 1 on plain facial skin, 0 on lips, brows, eyes and off the face; and 1 on brows and lips, 0
+    elsewhere. On a mesh of another topology all is skin."""
     if mesh.uvs is None or mesh.faces.shape != template.load().faces.shape:
         return np.ones(len(mesh.vertices)), np.zeros(len(mesh.vertices))
     skin = template.mask("skin", 512)
     for name in NOT_SKIN:
         skin = skin * (1 - template.mask(name, 512))
     uvs = vertex_uvs(mesh)
-    return sample_uv(skin, uvs), sample_uv(template.mask("brows", 512), uvs)
+    features = np.maximum(template.mask("brows", 512), template.mask("lips", 512))
+    return sample_uv(skin, uvs), sample_uv(features, uvs)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from ..contract import delivery_plan, provenance, stages
+from ..contract import delivery_plan, freshness, provenance, stages
 from ..contract.capture import Capture
 from ..contract.delivery_plan import PACKING, TEXTURES, DeliveryPlan
 from ..contract.delivery_presets import HAIR, SCAN_MAPS, MapPicture
@@ -103,7 +103,8 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
                                 (("albedo", "diffuse_albedo"), ("normal", "normal"), ("specular", "specular_albedo"))}
                  for number in numbers or [0]}
     else:
-        folder = _newest(capture)
+        enlarged = capture.verdict(stages.by_name("upscale"), settings).state in freshness.FINISHED
+        folder = capture.maps_4k if enlarged else capture.maps
         files = {HEAD_TILE: {"albedo": folder / "diffuse_albedo.png", "normal": folder / "normal.png",
                              "specular": folder / "specular_albedo.png", "displacement": delivery / "displacement.exr",
                              **{name: folder / f"{name}.png" for name in ("brows", "lashes", "beard")},
@@ -115,19 +116,6 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
         raise Problem("This capture has no albedo without hair.",
                       "Run the stage 4K Maps again, or deliver the albedo as it is.")
     return files
-
-
-def _newest(capture: Capture) -> Path:
-    """The 4K maps where they are complete and not older than the solved ones, else those."""
-    solved, enlarged = ([folder / name for name in stages.MAPS if name.endswith(".png")]
-                        for folder in (capture.maps, capture.maps_4k))
-
-    def time_of(path: Path) -> float:
-        return path.stat().st_mtime
-
-    complete = all(path.is_file() for path in enlarged)
-    fresh = complete and min(map(time_of, enlarged)) >= max(map(time_of, solved))
-    return capture.maps_4k if fresh else capture.maps
 
 
 def _mean_specular(capture: Capture, built_in: bool) -> float:

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from ..contract.hashes import PHOTOGRAPHS
 from ..contract.messages import Problem, Reporter
 from ..imaging import images
 from .colour import P3, SDR, to_srgb
 from .source import Picture, evenly, fit
 
-SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif", ".avif")
 RAW = (".dng",)
 FEATURES_PX = 2000
 """Longer side of the pictures that cameras are found by: photographs lie far apart, and what still matches between them
@@ -24,7 +24,7 @@ AS_JPEG = "Export them as JPEG or PNG."
 def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
     """At most `most` photographs, evenly spread; one that cannot be read is passed over with a line in the log."""
     files = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
-    pictures = [p for p in files if p.suffix.lower() in SUFFIXES]
+    pictures = [p for p in files if p.suffix.lower() in PHOTOGRAPHS]
     if not pictures:
         if any(p.suffix.lower() in RAW for p in files):
             raise Problem(f"The photographs in {folder.name} are raw files, which cannot be read.", AS_JPEG)

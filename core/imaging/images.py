@@ -131,8 +131,9 @@ def read_focal_35mm(path: Path) -> float | None:
     spec = image.spec()
     told = {tag: spec.getattribute(f"Exif:{name}") for tag, name in EXIF.items()}
     image.close()
-    return heif.focal_35mm({tag: float(value) for tag, value in told.items() if isinstance(value, int | float)},
-                           spec.width, spec.height)
+    # a manual lens tells 0/0
+    return heif.focal_35mm({tag: float(value) for tag, value in told.items()
+                            if isinstance(value, int | float) and np.isfinite(value)}, spec.width, spec.height)
 
 
 def read_profile(path: Path) -> str:

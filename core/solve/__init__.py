@@ -41,7 +41,7 @@ from .tone import resolve_skin_tone
 from .window import average_down
 from .witnesses import confirm_marks
 
-FAINT_WEIGHT = 2.0
+FAINT_WEIGHT = 1.4
 """After any delighter little of a shadow is left, and what M takes along of dark skin and beards is not to be explained
 by local light (Recipe.faint)."""
 

@@ -115,7 +115,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
                  else np.zeros_like(mask))
     alpha = soften_mask(mask) * (1 - protected)
     skin = template.mask("skin", size) * template.mask("face", size)
-    skin = skin * (1 - template.mask("eyes", size)) * (1 - hidden)
+    skin = skin * (1 - template.mask("eyes", size)) * (1 - bearded)
     weight = np.where(covered, np.clip(seen / FULL_CONFIDENCE, 0, 1), 0)
     tensors = [np.ascontiguousarray(a, np.float32)
                for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]

@@ -47,7 +47,8 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     """L_pho + L_neg + 0.1 L_TV of theta, and what our recipe adds. L_TV makes M's border seamless."""
     shading = o.shader.total(lights)
     loss = photometric_loss(denoised, shading, o, o.weight if recipe.trusting else o.weight * o.trust, recipe.blur)
-    brightness = (o.weight * albedo(denoised) ** 2).mean()  # L_pho is larger on light skin
+    # the mean squared albedo of what was seen: L_pho is larger on light skin
+    brightness = (o.weight * albedo(denoised) ** 2).mean() / o.weight.mean().clamp_min(1e-6)
     if o.shader.empty:
         return loss
     local = o.shader.local(lights)

@@ -67,7 +67,7 @@ class Recipe:
     neg: float = 1.0
     # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a
     # shadow is
-    smooth: float = 1.4
+    smooth: float = 1.0
     # pull of s^V towards what M's border says is missing, per texel and mean squared albedo; not where the artist added
     # to the proposal for M
     faint: float = 0.0

@@ -31,10 +31,10 @@ GOBOS = ("none", "none", "none", "leaves", "leaves", "blinds", "edge")
 class Portrait:
     """float32 pictures of side S. srgb [S, S, 3]: the file; albedo [S, S, 3]: linear, 0 off the head; shading [S, S,
     3]: what the albedo was multiplied by, highlights and clipping included; even [S, S, 3]: the same for skin of one
-    tone, so that nothing of the pigment is in it, through what the camera's curve does to pigment either; shadow [S, S]
-    in [0, 1]: the share of the main light that is blocked or turned away, 0 where no light is main; strong: that
-    light's irradiance facing it over all other light's, as a share in [0, 1]; head, face and skin [S, S] in [0, 1];
-    fitted [P]."""
+    tone and lips of one, so that nothing of the pigment is in it, through what the camera's curve does to pigment
+    either; shadow [S, S] in [0, 1]: the share of the main light that is blocked or turned away, 0 where no light is
+    main; strong: that light's irradiance facing it over all other light's, as a share in [0, 1]; head, face and skin
+    [S, S] in [0, 1]; fitted [P]."""
 
     srgb: np.ndarray
     albedo: np.ndarray
@@ -75,7 +75,8 @@ def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: 
     face = sight.picture(sight.masks[:, MASKS.index("face")])
     linear, gains = expose(radiance, face > 0.5 if (face > 0.5).any() else head > 0, rng)
     haired, tone = rng.random() < 0.35, _tone(sight, albedo)
-    even = np.clip(sight.picture(tone * diffuse + specular) * gains, 0, 1).astype(np.float32)
+    plain = with_lips(tone, albedo, sight.masks[:, MASKS.index("lips")])
+    even = np.clip(sight.picture(plain * diffuse + specular) * gains, 0, 1).astype(np.float32)
     picture, even = np.split(curve(np.concatenate([linear, even]), rng), 2)
     picture, hair = _haired(picture, sight, rng) if haired else (picture, np.zeros_like(head))
     truth = sight.picture(albedo)
@@ -83,7 +84,8 @@ def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: 
     shadow, strong = _shadow(sight, lamps, colours, blocked, ambient)
     bare = 1 - hair
     return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None],
-                    (images.srgb_to_linear(even) / tone).astype(np.float32),
+                    (images.srgb_to_linear(even) / np.where(head[..., None] > 0, sight.picture(plain), 1)
+                     ).astype(np.float32),
                     sight.picture(shadow), strong, head * bare, face * bare,
                     sight.picture(sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")]))
                     * bare, _fitted(sight, carried, environment, lamps, colours, _tone(sight, albedo) * gains, rng))
@@ -123,6 +125,14 @@ def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> 
         reach.append(sight.reach[k]
                      * (1 - gobo(sight.position, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng)))
     return lamps, colours, reach
+
+
+def with_lips(tone: np.ndarray, albedo: np.ndarray, lips: np.ndarray) -> np.ndarray:
+    """The tone [3] of skin, and on lips, of which a pixel has the share `lips` [...], their mean albedo; both linear,
+    [..., 3], as the albedo is."""
+    mostly = lips > 0.5
+    own = albedo[mostly].mean(0) if mostly.any() else tone
+    return (tone + lips[..., None] * (own - tone)).astype(np.float32)
 
 
 def gobo(position: np.ndarray, lamp: np.ndarray, radius: float, kind: str,

@@ -102,10 +102,13 @@ def observe_all(capture: Capture, head: Head, size: int,
     report.progress(0, len(views) + 6, "unfolding the head")
     surface = head.unfold(size)
     best = max(frames[view.name].sharpness for view, _ in views) or 1.0
+    middle = surface.points.mean(0)
+    pixel_m = float(np.median([np.linalg.norm(view.centre - middle) / view.camera.mean_focal_length()
+                               for view, _ in views]))
     observations = []
     for i, (view, path) in enumerate(views):
         report.progress(i, len(views) + 6, f"projecting {view.name}")
-        observations.append(observe(view, _delit(path, view), surface, frames[view.name].sharpness / best))
+        observations.append(observe(view, _delit(path, view), surface, frames[view.name].sharpness / best, pixel_m))
     report.figure("blinks", len(leave_out_blinks(capture, observations, surface, report)))
     shown = tell_parts(observations, surface, report)
     hair = leave_out_hair(observations, shown, surface)

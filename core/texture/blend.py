@@ -55,12 +55,12 @@ def robust_weights(observations: list[UnwrappedView], tolerance: float = 0.10) -
     if len(observations) < 3:
         return
     scale = len(observations[0].weight) / 1024
-    step = max(1, round(4 * scale))
+    cells = (max(1, len(observations[0].weight) // max(1, round(4 * scale))),) * 2
     tones, weights = [], []
     for o in observations:
         tone = blurred(o.log_colour.mean(-1), (o.weight > 0).astype(np.float32), 4 * scale)
-        tones.append(tone[::step, ::step])
-        weights.append(o.weight[::step, ::step])
+        tones.append(cv2.resize(tone, cells, interpolation=cv2.INTER_AREA))
+        weights.append(cv2.resize(o.weight, cells, interpolation=cv2.INTER_AREA))
     median = _weighted_median(np.stack(tones), np.stack(weights))
     for o, tone in zip(observations, tones, strict=True):
         factor = (1 / (1 + ((tone - median) / tolerance) ** 2)).astype(np.float32)

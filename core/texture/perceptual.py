@@ -114,6 +114,7 @@ def _target(observation: UnwrappedView, surface: Unfolded, wanted: np.ndarray) -
     mesh, caster = surface.mesh, surface.caster
     directions = view.rays(at * [view.width / width, view.height / height])
     face, bary, _ = caster.first_hits(np.repeat(view.centre[None], len(directions), 0), directions)
+    face = np.where(face < len(mesh.faces), face, -1)  # what lies behind open lids has no texels
     uv = raster.interpolate(mesh.uvs, mesh.face_uvs, face, bary)
     texel = np.stack([uv[:, 0], 1 - uv[:, 1]], -1) * size
     # pixels(x) shows what lay at x + warp(x) before: the texel that now shows there is one warp back

@@ -62,9 +62,11 @@ class UnwrappedView:
                        weight=larger(self.weight), warp=warp)
 
 
-def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float) -> UnwrappedView:
+def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float,
+            reference_m: float | None = None) -> UnwrappedView:
     """Projects every texel into a linear picture [H, W, 3] of any size of that view. sharpness in [0, 1] scales its
-    weight."""
+    weight; so does how many pixels show a texel, beside those of a view whose pixels are `reference_m` metres wide on
+    the head (None: this view's own)."""
     count, scale = len(surface.points), [picture.shape[1] / view.width, picture.shape[0] / view.height]
     pixels, quality, distance = np.empty((count, 2), np.float32), np.empty(count), np.empty(count)
     seen, silhouette = np.empty(count, bool), _silhouette_distance(surface.caster, view)
@@ -73,8 +75,10 @@ def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float
         xy, quality[chunk], distance[chunk], seen[chunk] = _look(view, surface, chunk, silhouette)
         pixels[chunk] = np.nan_to_num(xy, nan=-1) * scale
     pixels = surface.spread(pixels)
-    reference = np.median(distance[seen]) if seen.any() else 1.0
-    weight = quality ** 2 * sharpness * (reference / distance) ** 2
+    pixel_m = distance / view.camera.mean_focal_length()
+    if reference_m is None:
+        reference_m = float(np.median(pixel_m[seen])) if seen.any() else 1.0
+    weight = quality ** 2 * sharpness * (reference_m / pixel_m) ** 2
     return UnwrappedView(view, picture, pixels, log_colours(picture, pixels), surface.spread(quality),
                          surface.spread(weight))
 

@@ -78,8 +78,9 @@ class HeadSurface:
         """
         means, known = self._on_vertices(values, weight * self.texel**2)
         if tolerance is not None:
+            trusted = known
             for _ in range(3):
-                off = np.abs(means - self._solved(means, known, 4 * reach)).mean(1)
+                off = np.abs(means - self._solved(means, trusted, 4 * reach)).mean(1)
                 trusted = known / (1 + (off / tolerance) ** 2)
             known = trusted
         return self.spread(self._solved(means, known, reach))

@@ -76,7 +76,11 @@ def last_settings(capture: Capture) -> Settings:
 def _check_names(root: Path, source: str | Path) -> None:
     """Raises Problem for a name that is no text, in the path of the capture or of its source, or of a photograph: no
     record could hold it."""
-    inside = os.listdir(source) if str(source) and os.path.isdir(source) else []
+    try:
+        inside = os.listdir(source) if str(source) and os.path.isdir(source) else []
+    except OSError as error:
+        raise Problem(f"{source} cannot be read ({error.strerror}).",
+                      "Change its permissions, or copy it to a folder that may be read.") from error
     for name in (os.path.abspath(root), str(source), *inside):
         try:
             name.encode()

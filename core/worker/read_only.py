@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,7 +22,7 @@ def stand_in(capture: Capture, folder: str) -> Iterator[Capture]:
     """The capture itself where it can be written to; else one of the same name in a temporary folder within `folder`,
     with links to its files (copies where the system has no links), which is gone afterwards. Raises Problem where no
     folder is named, or that cannot be written to either."""
-    if os.access(capture.root, os.W_OK):
+    if _is_writable(capture.root):
         yield capture
         return
     if not folder:
@@ -46,3 +47,12 @@ def _link(source: str, target: str) -> None:
             os.symlink(os.path.abspath(source), target)
             return
     shutil.copyfile(source, target)
+
+
+def _is_writable(folder: Path) -> bool:
+    """Whether a file can be made in a folder: on Windows its permissions alone do not tell."""
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return os.access(folder, os.W_OK)
+    except OSError:
+        return False

@@ -49,7 +49,7 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None,
     stage = ""
     try:
         job = read_job(path)
-        with job.capture.locked(lambda text: emit(Log(text))):
+        with job.capture.locked(lambda text: emit(Log(text)), cancelled):
             if job.tool is None:
                 _take_source(job, emit)
             _check_device(job.settings.device)
@@ -213,12 +213,18 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
                           "Check its name and whether the disk it is on is connected.")
         emit(Log(f"{source} is not there any more; what was taken from it is used."))
         return
-    if not job.force and not capture.made_from(source):
-        raise Problem(f"This capture was made from {known.name if known else 'another source'}, not from this "
-                      f"{source.name}.",
-                      f"Choose another capture folder for another video, or run the stage {first.label} again (in a "
-                      f"terminal: --from {first.name}) to replace everything but the painted masks.")
-    capture.set_source(source)
+    try:
+        if job.force or capture.made_from(source):
+            capture.set_source(source)
+            return
+    except PermissionError as error:
+        raise Problem(f"{error.filename or source} cannot be read.",
+                      "Change its permissions (on a Mac: System Settings, Privacy & Security, Files and Folders), or "
+                      "copy it to a folder that Blender may read.") from error
+    raise Problem(f"This capture was made from {known.name if known else 'another source'}, not from this "
+                  f"{source.name}.",
+                  f"Choose another capture folder for another video, or run the stage {first.label} again (in a "
+                  f"terminal: --from {first.name}) to replace everything but the painted masks.")
 
 
 def _check_device(device: str) -> None:

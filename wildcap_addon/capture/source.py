@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
+from ...core.contract import hashes
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from .. import captures, preferences, problems
@@ -16,7 +17,7 @@ from ..base_operator import FileOperator
 from ..base_panel import WildcapPanel
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm")
-PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif", ".avif", ".dng")
+PHOTOGRAPHS = (*hashes.PHOTOGRAPHS, ".dng")
 """What the stage frames reads, and what it explains how to convert."""
 WIDTH = 240
 """Of the file browser's sidebar, pixels."""

@@ -26,7 +26,7 @@ from ...light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..environments import Environment, made_environment, panorama_environment
 from ..fitted_light import FittedLight, LampOnHead, fitted_light
 from ..olat import BASIS, LIGHTS
-from ..portrait import GOBOS, Portrait, gobo
+from ..portrait import GOBOS, Portrait, gobo, with_lips
 from ..response import curve, develop, expose
 from .clutter import backdrop, cover, with_open_mouth
 from .figure import Figure
@@ -41,6 +41,7 @@ RAYS = 160
 STRONGEST = 25.0
 """Of a lamp's irradiance over pi, where the sky's radiance is one in the mean: the sun is some nine times its sky, a
 lamp in a dark room more."""
+LIPS = PARTS.index("lips")
 BARE = ("skin", "lips", "clothes")
 """Parts whose own shading is what a delighter is to find."""
 
@@ -157,16 +158,17 @@ def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator,
     tone = (albedo[face] if face.sum() > 50 else albedo[seen] if seen.any() else albedo.reshape(-1, 3)).mean(0)
     grown = 1 - shares[..., [PARTS.index(name) for name in (*BARE, "background")]].sum(-1)
     grown = (np.clip(grown, 0, 1) * stage.here)[..., None]
-    # What the camera would make of skin of one tone under this light: its curve bends pigment, too, and that is to stay
-    # in the albedo.
-    even = tone * ((1 - grown) * diffuse + grown * own) + (1 - grown) * shine + grown * own_shine
+    # What the camera would make of skin of one tone, and lips of theirs, under this light: its curve bends pigment,
+    # too, and that is to stay in the albedo. Gloss counts for more of what is darker.
+    plain = with_lips(tone, albedo, shares[..., LIPS])
+    even = plain * ((1 - grown) * diffuse + grown * own) + (1 - grown) * shine + grown * own_shine
     picture, below = np.split(curve(np.concatenate([linear, np.clip(even * gains, 0, 1).astype(np.float32)]), rng), 2)
-    even = (images.srgb_to_linear(below) / np.maximum(tone, 0.004)).astype(np.float32)
+    even = (images.srgb_to_linear(below) / np.maximum(plain, 0.004)).astype(np.float32)
     head = (1 - shares[..., -1]).astype(np.float32)
     shading = images.srgb_to_linear(picture) / np.maximum(albedo, 0.004) * head[..., None]
     # what nobody can tell is not asked for
     skin = np.clip(head - shares[..., PARTS.index("hair")] - shares[..., PARTS.index("clothes")], 0, 1)
-    shadow, strong = _shadow(stage, lamps, tints, before, grown, diffuse)
+    shadow, strong = _shadow(stage, lamps, tints, before, grown, sky)
     return Portrait(develop(picture, rng), albedo * head[..., None], shading.astype(np.float32), even, shadow, strong,
                     skin, skin, skin, _fitted(stage, environment, lamps, tints, tone * gains, rng))
 
@@ -255,8 +257,9 @@ def _softened(direct: np.ndarray, there: np.ndarray, radius: float) -> np.ndarra
 
 
 def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list, grown: np.ndarray,
-            diffuse: np.ndarray) -> tuple[np.ndarray, float]:
-    """The lost share [S, S] of the lamps' light, weighted by their strength, and how much of all light they are."""
+            sky: np.ndarray) -> tuple[np.ndarray, float]:
+    """The lost share [S, S] of the lamps' light, weighted by their strength, and how much of all light they are, facing
+    them, beside the sky's [9, 3]."""
     side = len(stage.here)
     if not lamps:
         return np.zeros((side, side), np.float32), 0.0
@@ -269,10 +272,9 @@ def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list,
         reach = [r[..., k].astype(np.float32) / 255 for r in (stage.unlit.reach, stage.reach)]
         arrives = [f * r * through for f, r in zip(facing, reach, strict=True)]
         lost += share * (1 - (1 - grown[..., 0]) * arrives[0] - grown[..., 0] * arrives[1])
-    seen = diffuse[stage.here].mean() if stage.here.any() else 1.0
     main = strength.sum()
-    share = main / (main + 2 * max(seen - 0.5 * main, 0.05))
-    return lost / np.float32(main), float(np.clip(share, 0, 1))
+    ambient = np.maximum(stage.transfer[stage.here].astype(np.float32) @ sky, 0.02).mean() if stage.here.any() else 1.0
+    return lost / np.float32(main), float(main / (main + ambient))
 
 
 def _fitted(stage: RelightableView, environment: Environment, lamps: list[int], tints: list, tone: np.ndarray,
