@@ -78,6 +78,30 @@ def test_cameras_and_scan_come_in_again_in_place_and_go_with_the_head(addon, rec
     assert addon("captures").active(bpy.context).path == str(reconstructed)
 
 
+def test_a_copy_of_a_camera_is_the_artists_and_stays_and_the_scene_keeps_its_frame(reconstructed):
+    bpy.ops.wildcap.bring_in_cameras()
+    last = list(cameras().values())[-1]
+    scene, name = bpy.context.scene, last.name
+    copies = [last.copy(), last.copy()]
+    copies[1].data = last.data.copy()
+    for copy in copies:
+        scene.collection.objects.link(copy)
+    scene.camera = last
+    mine = [copy.name for copy in copies]
+    bpy.ops.wildcap.bring_in_cameras()
+    assert len(cameras()) == 4 and all(bpy.data.objects[each].data is not None for each in mine)
+    assert scene.camera.name not in mine and scene.camera.name.startswith(name)
+
+
+def test_the_scan_comes_in_again_while_the_old_one_is_active(reconstructed):
+    bpy.ops.wildcap.bring_in_scan()
+    scan = next(o for o in bpy.context.scene.objects if o.name.endswith("Scan"))
+    bpy.context.view_layer.objects.active = scan
+    scan.select_set(True)
+    bpy.ops.wildcap.bring_in_scan()
+    assert bpy.context.view_layer.objects.active.name.endswith("Scan")
+
+
 def test_what_is_missing_or_damaged_is_told_and_nothing_comes_in_while_painting(addon, reconstructed):
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()

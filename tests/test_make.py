@@ -141,5 +141,11 @@ def test_the_terminal_runs_the_chain_with_the_solver_that_is_set_up(addon, captu
     # the chain's own exit code, and its words
     assert execute(["run", str(capture / "no_film.mp4"), str(capture), "--quality", "draft"]) == 2
     assert "no_film.mp4" in capfd.readouterr().err
+    monkeypatch.chdir(capture.parent)  # paths are told from the folder that Blender was called in
+    assert execute(["run", "a film.mp4", "new.wildcap", "--settings", "mine.json"]) == 2
+    assert str(capture.parent / "mine.json") in capfd.readouterr().err
+    assert execute(["run", "a film.mp4", "new.wildcap"]) == 2
+    assert str(capture.parent / "a film.mp4") in capfd.readouterr().err
+    assert (capture.parent / "new.wildcap").is_dir() and not (addon("jobs").ROOT / "new.wildcap").exists()
     with pytest.raises(SystemExit):
         execute(["run"])

@@ -22,21 +22,25 @@ def forget(key: tuple) -> None:
     _answers.pop(key, None)
 
 
-def ask(key: tuple, work: Callable[[BackgroundTask], object], operator: str) -> None:
-    """Runs `work(task)` as a job that the tab shows, and then the operator as if it were clicked again."""
+def ask(key: tuple, work: Callable[[BackgroundTask], object], operator: str,
+        meant: Callable[[], bool] = lambda: True) -> None:
+    """Runs `work(task)` as a job that the tab shows, and then, where it is `meant` as before, the operator as if it
+    were clicked again."""
     task = BackgroundTask("setup", work)
 
     def then() -> None:
         _answers[key] = task.result
-        _click(operator)
+        _click(operator, meant)
 
     jobs.begin("", "ask", task, then)
 
 
-def _click(operator: str) -> None:
-    """Opens the operator's dialog; not under an artist who is in the middle of something: then the next click shows it
-    at once."""
+def _click(operator: str, meant: Callable[[], bool]) -> None:
+    """Opens the operator's dialog where it is allowed and meant; not under an artist who is in the middle of something:
+    then the next click shows it at once."""
     windows = [] if bpy.app.background else bpy.context.window_manager.windows
     if windows and not any(window.modal_operators for window in windows):
         with bpy.context.temp_override(window=windows[0]):
-            getattr(bpy.ops.wildcap, operator)('INVOKE_DEFAULT')
+            dialog = getattr(bpy.ops.wildcap, operator)
+            if meant() and dialog.poll():
+                dialog('INVOKE_DEFAULT')

@@ -54,12 +54,14 @@ def missing(image: bpy.types.Image) -> str:
 
 def missing_view(scene: bpy.types.Scene) -> str:
     """What the artist is to know about how a render will look; '' where it looks as it is."""
-    settings, now = scene.view_settings, scene.view_settings.view_transform
+    settings = scene.view_settings
+    now, look = settings.view_transform, settings.look  # Blender drops a look that another view does not have
     try:
         return ("" if _choose(settings, "view_transform", VIEWS)
                 else f"This OCIO configuration has no view without a look: the render is shown by {now}.")
     finally:
         settings.view_transform = now
+        settings.look = look
 
 
 def _choose(settings, name: str, values: tuple[str, ...]) -> str | None:

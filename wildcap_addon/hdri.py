@@ -6,12 +6,13 @@ lights, or a file."""
 from dataclasses import dataclass
 from math import tau
 from pathlib import Path
+from zlib import crc32
 
 import bpy
 
 from ..core.contract.messages import Problem
 
-_items: list[tuple[str, str, str]] = []  # Blender keeps no reference to the strings of a dynamic enum
+_items: list[tuple[str, str, str, int, int]] = []  # Blender keeps no reference to the strings of a dynamic enum
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,10 @@ class Hdri:
 
 def items(self, context):
     """The worlds that Blender knows, its own eight (CC0) and the artist's, for an EnumProperty."""
-    choices = [(light.name, Path(light.name).stem.replace("_", " ").title(), "") for light in _worlds()]
-    _items[:] = choices or [('NONE', "None", "This Blender came without any")]
+    # a file keeps the number: by the place in the list it would mean another world in another Blender
+    choices = [(light.name, Path(light.name).stem.replace("_", " ").title(), "", 0,
+                crc32(light.name.encode()) & 0x7FFFFFFF) for light in _worlds()]
+    _items[:] = choices or [('NONE', "None", "This Blender came without any", 0, 0)]
     return _items
 
 
@@ -47,7 +50,7 @@ def named(name: str) -> Hdri:
 def chosen_hdri(props) -> Hdri:
     """What the scene's settings ask for. Raises Problem where there is no such picture."""
     path = (Path(bpy.path.abspath(props.hdri_file)) if props.hdri_file
-            else next((Path(light.path) for light in _worlds() if light.name == props.hdri), None))
+            else next((Path(light.path) for light in _worlds() if props.hdri in (light.name, "")), None))
     if path is None:
         raise Problem("This Blender came without pictures of surroundings.", "Choose an HDRI file of your own.")
     if not path.is_file():

@@ -6,6 +6,7 @@ changed."""
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ..core.contract.capture import Capture
 from ..core.contract.messages import Problem
@@ -19,6 +20,10 @@ OUTER = "wildcap_outer_polygons"
 HAIR_UVS = "WildCap Hair"
 """UV map of such a mesh in which those of the skin are alone, as hair that is rooted by them needs it: sockets continue
 the lids' maps."""
+
+TEXTURE_KEY = "wildcap_texture"
+"""Custom property of a material that shows the texture until the skin is assembled: its fingerprint as it was made; by
+older versions true."""
 
 FOLLOWERS = []
 """Functions (head object, new mesh) of rooms that made more of a head's mesh: whether it now has the new mesh's shape,
@@ -61,11 +66,27 @@ def bring_in(context, item) -> bpy.types.Object:
 
 def _in_place(head, mesh) -> bpy.types.Mesh:
     """The new mesh on an existing head, with its materials; or the mesh it has, where that has followed."""
-    if any(follow(head, mesh) for follow in FOLLOWERS):
+    if any(follow(head, mesh) for follow in FOLLOWERS) or _take_shape(head.data, mesh):
         bpy.data.meshes.remove(mesh)
         return head.data
     data_blocks.replace_data(head, mesh, bpy.data.meshes)
     return mesh
+
+
+def _take_shape(old: bpy.types.Mesh, new: bpy.types.Mesh) -> bool:
+    """Whether a mesh has the topology of a new one and took its coordinates: weights, UV maps, attributes and shape
+    keys that the artist made on it stay."""
+    corners = [data_blocks.read_field(mesh.loops, "vertex_index", kind=np.int32) for mesh in (old, new)]
+    if len(old.vertices) != len(new.vertices) or not np.array_equal(*corners) or old.has_custom_normals:
+        return False
+    places = data_blocks.read_field(new.vertices, "co", 3)
+    keys = old.shape_keys.key_blocks if old.shape_keys else ()
+    moved = places - data_blocks.read_field(keys[0].data if keys else old.vertices, "co", 3)
+    for key in keys:
+        key.data.foreach_set("co", (data_blocks.read_field(key.data, "co", 3) + moved).ravel())
+    old.vertices.foreach_set("co", places.ravel())
+    old.update()
+    return True
 
 
 def look_at(context, head: bpy.types.Object) -> None:
@@ -112,8 +133,16 @@ def read_mesh_file(context, path: Path) -> bpy.types.Mesh:
 
 
 def load_image(path, data: bool = False) -> bpy.types.Image:
-    """The image of a file, read anew if Blender has it already: a picture in sRGB, or data."""
-    image = bpy.data.images.load(str(path), check_existing=True)
+    """The image of a file, read anew if Blender has it already: a picture in sRGB, or data. One of that file that was
+    painted on, or is packed in the .blend, stays as it is, and stays in the .blend."""
+    known = [image for image in bpy.data.images if image.source == 'FILE' and image.filepath
+             and Path(bpy.path.abspath(image.filepath, library=image.library)) == Path(path)]
+    touched = [image for image in known if image.is_dirty or image.packed_file is not None]
+    for image in touched:
+        image.use_fake_user = True
+    image = next((image for image in known if image not in touched and image.library is None), None)
+    if image is None:
+        image = bpy.data.images.load(str(path))
     image.reload()
     (colours.as_data if data else colours.as_srgb)(image)
     return image
@@ -137,7 +166,7 @@ def _show_texture(head, capture: Capture) -> None:
     links.new(node.outputs["Color"], shader.inputs["Base Color"])
     shader.inputs["Roughness"].default_value = 0.6
     nodes.active = node
-    material["wildcap_texture"] = True
+    material[TEXTURE_KEY] = node_trees.fingerprint(material, PREVIEW)
     if head.data.materials:
         head.data.materials[0] = material  # its slot was there, and empty
     else:

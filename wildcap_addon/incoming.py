@@ -30,9 +30,14 @@ def waits() -> bool:
     return any(results.wanted(root) for results in on_results)
 
 
-def bring_in(ended: bool) -> None:
-    """What is new comes in at once if the artist is in Object Mode and not in the middle of a move: a new head when a
-    job has ended, and what rooms do with results. Otherwise it waits."""
+HEAD_GOALS = ("reconstruct", "make", "solve")
+"""Goals of jobs after which a head that is not in the scene comes in."""
+
+
+def bring_in(ended: dict[str, str]) -> None:
+    """What is new comes in at once if the artist is in Object Mode and not in the middle of a move: what rooms do with
+    results, and a head whose job has ended, of the active capture. Otherwise it waits. ended: capture folder -> goal of
+    the jobs that have."""
     window = next(iter(bpy.context.window_manager.windows), None)
     if window is None or window.modal_operators:
         return
@@ -44,6 +49,7 @@ def bring_in(ended: bool) -> None:
             return
         for results in on_results:
             results.take(bpy.context, item)
-        if ended and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
+        made = ended.get(captures.root(item)) in HEAD_GOALS
+        if made and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
             with contextlib.suppress(RuntimeError):  # the tab shows the problem of the click
                 bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)

@@ -241,10 +241,10 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
 
 
 def _tick() -> float | None:
-    before, shown = set(_jobs), _shown()
+    before, shown = dict(_jobs), _shown()
     try:
         poll()
-        ended = bool(before - set(_jobs))
+        ended = {root: job.goal for root, job in before.items() if root not in _jobs}
         if ended or incoming.waits():
             incoming.bring_in(ended)
     except Exception as error:  # nobody is above a timer: without this, Blender would drop it and the tab stand still

@@ -3,6 +3,9 @@
 """The shader nodes of materials and worlds: from Blender 5.0 on each has them from the start, and switching them on is
 deprecated."""
 
+import hashlib
+import json
+
 import bpy
 
 
@@ -11,3 +14,25 @@ def of(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
     if bpy.app.version < (5, 0, 0):
         block.use_nodes = True
     return block.node_tree
+
+
+def fingerprint(material: bpy.types.Material, without: str) -> str:
+    """Stands for a material's nodes, their values and links; the pictures that they show, what stands where, and the
+    node `without` count for nothing."""
+    if material.node_tree is None:
+        return ""
+    told = []
+    for node in sorted(material.node_tree.nodes, key=lambda node: node.name):
+        if node.name != without:
+            defaults = [_plain(socket.default_value) for socket in node.inputs if hasattr(socket, "default_value")]
+            links = [[link.from_node.name, link.from_socket.identifier] for socket in node.inputs
+                     for link in socket.links]
+            told.append([node.name, node.bl_idname, node.mute, defaults, links])
+    return hashlib.blake2b(json.dumps(told).encode(), digest_size=16).hexdigest()
+
+
+def _plain(value):
+    if isinstance(value, float):
+        return round(value, 5)
+    return (str(value) if isinstance(value, (str, int)) or not hasattr(value, "__len__")
+            else [round(float(component), 5) for component in value])

@@ -118,10 +118,11 @@ def _shape(obj, rest: np.ndarray, units: dict, normals: np.ndarray) -> None:
 
 
 def rest(obj) -> None:
-    """All values zero, and the lids as they were filmed."""
-    keys = obj.data.shape_keys
+    """All face units' values zero, and the lids as they were filmed; the artist's own keys stay."""
+    keys, units = obj.data.shape_keys, load().units
     for key in keys.key_blocks:
-        key.value = 0
+        if key.name in units:
+            key.value = 0
     keys[OPEN] = float(keys.id_properties_ui(OPEN).as_dict()["default"])
     keys.update_tag()
 

@@ -7,6 +7,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract import deletion
 from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
 from ...core.worker.background import BackgroundTask
 from .. import asking, batches, captures, jobs
 from ..base_operator import Dialog
@@ -41,13 +42,24 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
         removal = asking.answer(key)
         asking.forget(key)  # whoever closes the dialog and comes back is told what is there then
         if removal is None:
-            asking.ask(key, lambda task: look_at(task, capture), "delete_face")
+            asking.ask(key, lambda task: look_at(task, capture), "delete_face",
+                       lambda: captures.root(captures.active(bpy.context)) == str(capture.root))
             return None
-        return (*deletion.lines(removal, iface_),
+        return (capture.root.name, *deletion.lines(removal, iface_),
                 "A head in the scene stays as a mesh and loses its maps: deliver it first to keep them.")
+
+    root: bpy.props.StringProperty(name="Capture", options={'HIDDEN', 'SKIP_SAVE'},
+                                   description="Folder of the face that was asked for; empty: the active one")
+
+    def invoke(self, context, event):
+        self.root = captures.root(captures.active(context))
+        return super().invoke(context, event)
 
     def work(self, context):
         capture = captures.folder(captures.require(context))
+        if self.root not in ("", str(capture.root)):
+            raise Problem("Another face is chosen now than the one that was to be deleted.",
+                          "Choose that one, and click Delete Face again.")
         jobs.begin("", "ask", BackgroundTask("setup", lambda task: delete(task, capture)),
                    lambda: forget(str(capture.root)))
 

@@ -5,6 +5,7 @@ own words come through."""
 
 import argparse
 import subprocess
+from pathlib import Path
 
 from ...core.contract.messages import Problem
 from .. import jobs, preferences
@@ -12,20 +13,22 @@ from ..terminal import Command
 
 
 def _run(asked) -> int:
-    return _core("run", asked.source, asked.capture, *asked.options)
+    source = asked.source if asked.source == "-" else Path(asked.source).absolute()
+    return _core("run", source, Path(asked.capture).absolute(), *asked.options)
 
 
 def _solve(asked) -> int:
-    return _core("run", "-", asked.capture, "--from", "solve", *asked.options)
+    return _core("run", "-", Path(asked.capture).absolute(), "--from", "solve", *asked.options)
 
 
-def _core(*words: str) -> int:
-    """The solver's own command line; returns its exit code. Raises Problem where no solver is set up."""
+def _core(*words: str | Path) -> int:
+    """The solver's own command line, in the folder that Blender was called in, from which paths are told; returns its
+    exit code. Raises Problem where no solver is set up."""
     python = preferences.python()
     if python is None:
         raise Problem("The solver is not set up on this machine.",
                       "Click Install Solver in the Setup panel of Blender's window, once.")
-    return subprocess.run([str(python), "-m", "core", *words], cwd=jobs.ROOT).returncode
+    return subprocess.run([str(python), str(jobs.ROOT), *map(str, words)]).returncode
 
 
 def _of_run(kind) -> None:

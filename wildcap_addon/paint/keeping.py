@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ...core.contract.capture import Capture
+from ...core.contract.files import storage_problem
 from ...core.contract.messages import Problem
 from . import mask_image
 
@@ -23,7 +24,10 @@ def store(mask: np.ndarray, capture: Capture, which: str, written: tuple) -> tup
     """Writes a mask [H, W], rows from the top, if it differs from the capture's. `written` is the stamp of what this
     session wrote last; returns the new one. Raises Problem when it cannot be written."""
     path = mask_image.file_of(capture, which)
-    return _stamp(path) if mask_image.store(mask, capture, which, keep=_stamp(path) != tuple(written)) else written
+    try:
+        return _stamp(path) if mask_image.store(mask, capture, which, keep=_stamp(path) != tuple(written)) else written
+    except OSError as error:  # a file server that is away for a moment: the next look tries again
+        raise storage_problem(error, path) from error
 
 
 _pixels: np.ndarray | None = None  # of the last look; a session has one Saving at a time
@@ -39,18 +43,18 @@ class Saving(threading.Thread):
         _pixels = mask_image.pixels(image, _pixels)
         self._arguments = _pixels, capture, which, written
         self._stamp: tuple = written
-        self._problem: Exception | None = None
+        self._problem: Problem | None = None
         self.start()
 
     def run(self) -> None:
         pixels, *rest = self._arguments
         try:
             self._stamp = store(mask_image.from_top(pixels), *rest)
-        except (Problem, OSError) as error:
+        except Problem as error:
             self._problem = error
 
     def result(self) -> tuple:
-        """Waits, and gives the stamp. Raises what `store` raised."""
+        """Waits, and gives the stamp. Raises Problem as `store` does."""
         self.join()
         if self._problem is not None:
             raise self._problem

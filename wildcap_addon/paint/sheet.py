@@ -10,7 +10,7 @@ import json
 
 import bpy
 
-from .. import node_trees
+from .. import captures, node_trees
 
 SIDE_M = 0.4
 NAME = "WildCap Mask Sheet"
@@ -39,6 +39,7 @@ def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.O
     nodes.active = node
     mesh.materials.append(material)
     sheet = bpy.data.objects.new(NAME, mesh)
+    sheet[captures.HEAD_KEY] = head[captures.HEAD_KEY]  # the panel means this capture, whichever is chosen in the list
     context.scene.collection.objects.link(sheet)
     context.view_layer.update()  # or whoever looks through its objects next finds one that is gone, and Blender ends
     others = [thing for thing in context.view_layer.objects if thing != sheet and not thing.hide_get()]

@@ -19,6 +19,10 @@ from . import colmap_cameras
 
 KIND_KEY = "wildcap_kind"
 """Custom property of what was brought in: 'camera' or 'scan'."""
+MADE_KEY = "wildcap_made_as"
+"""Custom property of it: the name under which it was made. A copy has another one, and is the artist's own."""
+FRAME_KEY = "wildcap_frame"
+"""Custom property of a camera: the name of its frame."""
 CAMERA_SIZE_M = 0.03
 SENSOR_MM = 36.0
 
@@ -31,13 +35,15 @@ def bring_in_cameras(context, item, every: bool = False) -> int:
     if not every:
         chosen = _chosen(capture)
         cameras = [camera for camera in cameras if camera.name in chosen] or cameras
+    frame = context.scene.camera.get(FRAME_KEY) if context.scene.camera is not None else None
     _remove(item, 'camera')
     collection = bpy.data.collections.new(f"{item.name} Cameras")
     context.scene.collection.children.link(collection)
     for camera in cameras:
         collection.objects.link(_camera(context, item, capture, camera))
     if context.scene.camera is None:
-        context.scene.camera = collection.objects[0]
+        context.scene.camera = next((thing for thing in collection.objects if thing[FRAME_KEY] == frame),
+                                    collection.objects[0])
     local_view.join(context, collection.objects)
     return len(cameras)
 
@@ -47,11 +53,9 @@ def bring_in_scan(context, item) -> bpy.types.Object:
     capture = captures.folder(item)
     if not capture.scan.is_file():
         raise Problem("This capture has no scan yet.", "Click Reconstruct: it is made from the frames.")
-    active, selected, before = (
-        context.view_layer.objects.active,
-        list(context.selected_objects),
-        set(context.scene.objects),
-    )
+    objects, before = context.view_layer.objects, set(context.scene.objects)
+    active = objects.active.name if objects.active is not None else ""
+    selected = [thing.name for thing in context.selected_objects]  # by name: an older scan among them goes
     with contextlib.suppress(RuntimeError):  # of a file that is no PLY: nothing came in
         bpy.ops.wm.ply_import(filepath=str(capture.scan), forward_axis='Y', up_axis='Z')
     new = [thing for thing in context.scene.objects if thing not in before]
@@ -63,9 +67,10 @@ def bring_in_scan(context, item) -> bpy.types.Object:
     scan = new[0]
     scan.name = scan.data.name = f"{item.name} Scan"
     _belongs(scan, context, item, 'scan')
-    for thing in context.view_layer.objects:
-        thing.select_set(thing in selected)
-    context.view_layer.objects.active = active or scan
+    context.view_layer.update()  # which knows of what was removed only now
+    for thing in objects:
+        thing.select_set(thing.name in selected)
+    objects.active = objects.get(active) or scan
     local_view.join(context, [scan])
     return scan
 
@@ -90,21 +95,24 @@ def _camera(context, item, capture: Capture, camera: colmap_cameras.FrameCamera)
     thing = bpy.data.objects.new(lens.name, lens)
     thing.lock_location = thing.lock_rotation = thing.lock_scale = (True, True, True)
     _belongs(thing, context, item, 'camera')
-    thing.matrix_basis = camera.matrix
+    thing.matrix_basis, thing[FRAME_KEY] = camera.matrix, camera.name
     return thing
 
 
 def _belongs(thing: bpy.types.Object, context, item, kind: str) -> None:
     thing.parent = captures.head(context, item)
-    thing[KIND_KEY], thing[captures.HEAD_KEY] = kind, item.path
+    thing[KIND_KEY], thing[captures.HEAD_KEY], thing[MADE_KEY] = kind, item.path, thing.name
 
 
 def _remove(item, kind: str) -> None:
-    """Takes away what was brought in before, with its data and an empty collection."""
-    for thing in [t for t in bpy.data.objects if t.get(KIND_KEY) == kind and t.get(captures.HEAD_KEY) == item.path]:
+    """Takes away what was brought in before, with its data, where no copy of the artist's has that, and an empty
+    collection."""
+    for thing in [t for t in bpy.data.objects if t.get(KIND_KEY) == kind and t.get(captures.HEAD_KEY) == item.path
+                  and t.get(MADE_KEY, t.name) == t.name]:
         data, homes = thing.data, list(thing.users_collection)
         bpy.data.objects.remove(thing)
-        (bpy.data.cameras if kind == 'camera' else bpy.data.meshes).remove(data)
+        if data.users == 0:
+            (bpy.data.cameras if kind == 'camera' else bpy.data.meshes).remove(data)
         for home in homes:
             if kind == 'camera' and not home.all_objects and home in bpy.data.collections.values():
                 bpy.data.collections.remove(home)

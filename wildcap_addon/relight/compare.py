@@ -53,8 +53,8 @@ def skin(context) -> bpy.types.Material | None:
     """The assembled material of the active capture's head."""
     item = captures.active(context)
     obj = captures.head(context, item) if item is not None else None
-    active = obj.active_material if obj is not None else None
-    return active if active is not None and material.KEY in active and ALBEDO in active.node_tree.nodes else None
+    first = obj.data.materials[0] if obj is not None and obj.data.materials else None  # others are eyes and mouth
+    return first if first is not None and material.KEY in first and ALBEDO in first.node_tree.nodes else None
 
 
 def shown_picture(context) -> str:

@@ -7,8 +7,6 @@ keeping values.
               Displacement (Non-Color, where the scan gave one) and the regions' attribute -> WildCap Skin
 """
 
-import hashlib
-import json
 from math import isclose
 
 import bpy
@@ -51,38 +49,22 @@ def assemble(context, item) -> bpy.types.Material:
          before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
     head.complete(obj, capture)
-    material[MADE] = _fingerprint(material)
+    material[MADE] = node_trees.fingerprint(material, head.PREVIEW)
     return material
 
 
 def is_edited(obj) -> bool:
     """Whether the head's material is somebody's own, or not as Assemble Material left it."""
     current = obj.data.materials[0] if obj.data.materials else None
-    if current is None or KEY not in current and current.get("wildcap_texture"):
+    if current is None or _is_preview(current):
         return False
-    return current.get(MADE) != _fingerprint(current)
+    return current.get(MADE) != node_trees.fingerprint(current, head.PREVIEW)
 
 
-def _fingerprint(material) -> str:
-    """Stands for the nodes, their values and links; the pictures that they show, and what stands where, count for
-    nothing."""
-    if material.node_tree is None:
-        return ""
-    told = []
-    for node in sorted(material.node_tree.nodes, key=lambda node: node.name):
-        if node.name != head.PREVIEW:  # comes and goes with a running solve
-            defaults = [_plain(socket.default_value) for socket in node.inputs if hasattr(socket, "default_value")]
-            links = [[link.from_node.name, link.from_socket.identifier] for socket in node.inputs
-                     for link in socket.links]
-            told.append([node.name, node.bl_idname, node.mute, defaults, links])
-    return hashlib.blake2b(json.dumps(told).encode(), digest_size=16).hexdigest()
-
-
-def _plain(value):
-    if isinstance(value, float):
-        return round(value, 5)
-    return (str(value) if isinstance(value, (str, int)) or not hasattr(value, "__len__")
-            else [round(float(component), 5) for component in value])
+def _is_preview(material) -> bool:
+    """Whether it is what Bring In Head made to show the texture, as it made it."""
+    made = material.get(head.TEXTURE_KEY)
+    return KEY not in material and bool(made) and made in (1, node_trees.fingerprint(material, head.PREVIEW))
 
 
 def _material(obj) -> bpy.types.Material:
@@ -90,8 +72,10 @@ def _material(obj) -> bpy.types.Material:
     changed."""
     slots = obj.data.materials
     current = slots[0] if slots else None
-    if current is not None and (KEY in current or current.get("wildcap_texture")):
-        return current
+    if current is not None:
+        if KEY in current or _is_preview(current):
+            return current
+        current.use_fake_user = True  # it may have no other head
     material = bpy.data.materials.new(f"{obj.name} Skin")
     node_trees.of(material)  # for _build, which leaves a material that the artist switched to plain colours as it is
     if slots:

@@ -48,7 +48,8 @@ def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, sam
     frame, radius = frame_of(obj)
     lights.build(scene, light, frame, radius, turn)
     _camera(scene, frame, radius)
-    scene.frame_set(1)
+    now = bpy.context.scene  # a head that is animated looks as it does there
+    scene.frame_set(now.frame_current, subframe=now.frame_subframe)
     render = scene.render
     render.engine = 'CYCLES'
     render.resolution_x = render.resolution_y = resolution

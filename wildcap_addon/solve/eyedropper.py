@@ -96,8 +96,8 @@ def uv_on(head, origin: Vector, direction: Vector) -> tuple[float, float] | None
 
 
 def shown_image(head) -> bpy.types.Image:
-    """The image of the material's active node, which Solid shading shows."""
-    material = head.active_material
+    """The image of the skin material's active node, which Solid shading shows."""
+    material = head.data.materials[0] if head.data.materials else None  # others are eyes and mouth
     node = material.node_tree.nodes.active if material is not None and material.node_tree is not None else None
     image = getattr(node, "image", None)
     if image is None or not image.size[0]:

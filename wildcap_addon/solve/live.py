@@ -19,7 +19,7 @@ def prepare(context, item) -> None:
     """Puts the node into the head's material, for `update` to show once there is a picture. Without a head or a
     material there is nothing to show it on."""
     obj = captures.head(context, item)
-    material = obj.active_material if obj is not None else None
+    material = obj.data.materials[0] if obj is not None and obj.data.materials else None  # others are eyes and mouth
     if material is None or material.node_tree is None:
         return
     nodes = material.node_tree.nodes
