@@ -67,7 +67,7 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
 
     bpy.ops.wildcap.install_solver()
     install_s = follow(jobs)
-    log = solver.with_name(f"{solver.name}.log").read_text(encoding="utf-8")
+    log = solver.with_name(f"{solver.name}.wildcap-install.log").read_text(encoding="utf-8")
     assert problems.of("") is None, (problems.of(""), log[-2000:])
     assert (solver / "pyvenv.cfg").stat().st_mtime_ns == begun, "the second installation continues the first"
     python = addon("preferences").python()

@@ -48,8 +48,8 @@ def _install(options: argparse.Namespace) -> int:
     folder = options.folder.absolute()
     source = installation.PackageSource(options.compute, "folder" if options.wheels else options.packages,
                                         options.wheels)
-    task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), Path(sys.executable),
-                                     source)
+    log = folder.with_name(f"{folder.name}.wildcap-install.log")
+    task = installation.installation(folder, REQUIREMENTS, log, Path(sys.executable), source)
     _follow(task)
     print(f"The solver is ready: {python_of(folder)}")
     return 0

@@ -42,7 +42,8 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is not None:
             index.check_space(plan, folder)
-        task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), None,
+        log = folder.with_name(f"{folder.name}.wildcap-install.log")
+        task = installation.installation(folder, REQUIREMENTS, log, None,
                                          installation.PackageSource(compute, source, wheels),
                                          len(plan.packages) if plan is not None else 0)
         asking.forget(("size", str(folder)))
