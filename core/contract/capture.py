@@ -285,13 +285,6 @@ class Capture:
         if holder is not None:
             raise lease.refuse(holder, self.lock)
 
-    def outwait(self, tell: Callable[[str], None], cancelled: Callable[[], bool] = lambda: False) -> None:
-        """Sees to it that nobody holds the capture: a lease that a machine which has gone left behind is taken over
-        when its term is out. Raises Problem where somebody works here, and CancelledError; `tell` hears of the wait."""
-        if self.json.is_file() and self.lock.exists():
-            with self.locked(tell, cancelled):
-                pass
-
     @contextlib.contextmanager
     def locked(self, tell: Callable[[str], None] = lambda text: None, cancelled: Callable[[], bool] = lambda: False):
         """Keeps every other worker out, and clears away what killed ones left. Raises Problem naming who works here,

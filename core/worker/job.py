@@ -8,6 +8,7 @@ Ground floor: standard library only.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,6 +55,15 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
     capture.check_free()
     write_json(capture.job, job)
     return capture.job
+
+
+def outwait(capture: Capture, tell: Callable[[str], None], cancelled: Callable[[], bool] = lambda: False) -> None:
+    """Sees to it that nobody holds the capture before a job is written there: a lease that a machine which has gone
+    left behind is taken over when its term is out. Raises Problem where somebody works there, and CancelledError;
+    `tell` hears of the wait."""
+    if capture.json.is_file() and capture.lock.exists():
+        with capture.locked(tell, cancelled):
+            pass
 
 
 def read_job(path: Path) -> JobRequest:
