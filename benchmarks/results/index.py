@@ -33,8 +33,8 @@ def sections(*records: Figures) -> Sections:
     return [("", prose("""
         Every page has the command, the commit and the day that made its figures, all on 2 cores of a shared machine
         (AMD EPYC, 25 GB), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only. Only the
-        sample, the state of the albedo and *Skin or light* are by the solver as it is, and only the sample and *the
-        delighter's answers* by the delighter as it is; pages of older code name their commit.
+        sample and the state of the albedo are by delighter and solver as they are, and *the delighter's answers* by the
+        delighter; pages of older code name their commit.
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),

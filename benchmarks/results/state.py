@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from .. import state
 from ..figures import Figures
-from ..pages import Sections, prose
+from ..pages import Sections
 
 TITLE = "The state of the albedo"
 SAYS = "people like people, by the measures that tell light from skin, beside answers that do nothing or know the light"
@@ -14,8 +14,4 @@ RECORDS = ("state",)
 
 
 def sections(found: Figures) -> Sections:
-    return [*state.sections(found.people, found.captures), ("Since then", prose("""
-        The delighter of that commit weighed the fitted light, and the whole head's network, place by place. Today one
-        weight holds for a capture, and the network is not asked ([the answers](answers.md)). The captures were not
-        taken through the chain again.
-        """))]
+    return state.sections(found.people, found.captures)
