@@ -145,7 +145,7 @@ def test_a_result_comes_in_when_the_batch_lets_go_of_the_face(addon, batches, mo
     (capture.root / "mood.json").write_text("{}")
     bpy.ops.wildcap.cancel_batch()
     batch_faces.wait(addon, lambda: not batches.works_on(str(capture.root)))
-    assert came == [True]
+    assert came == [{str(capture.root): "reconstruct"}]
 
 
 def test_why_a_batch_cannot_be_started(addon, batches, monkeypatch, tmp_path):

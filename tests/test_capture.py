@@ -2,13 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The capture folder: what it records, who may work in it, and that no file is ever half written."""
 
+import errno
+import os
 
 import pytest
 
-from core.contract import mask_history
+from core.contract import files, mask_history
 from core.contract.capture import FORMAT, Capture
 from core.contract.files import replacing, replacing_folder, write_json
-from core.contract.messages import Problem
+from core.contract.messages import Failed, Problem
+from core.worker.job import write_job
+from core.worker.runner import run_job
 
 from .recorded import make, states
 
@@ -109,3 +113,41 @@ def test_copies_of_masks_are_kept_in_the_order_in_which_they_were_made_wherever_
     assert kept == contents[-mask_history.KEPT:]
     (capture.mask_history / "shadow_mask_99999999_999999_999.png").write_bytes(b"named by somebody")
     assert mask_history.keep(capture, capture.shadow_mask, b"one more").exists()
+
+
+def test_on_windows_a_file_that_is_open_elsewhere_is_tried_again_and_then_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "ON_WINDOWS", True)
+    replace, tries = os.replace, []
+
+    def scanned(path, into):
+        tries.append(into)
+        if len(tries) < most:
+            raise PermissionError(errno.EACCES, "in use")
+        replace(path, into)
+
+    monkeypatch.setattr(files.os, "replace", scanned)
+    most = 3
+    write_json(tmp_path / "a.json", 1)
+    assert len(tries) == 3 and (tmp_path / "a.json").read_text() == "1"
+    most = 1000
+    monkeypatch.setattr(files, "OPEN_ELSEWHERE_S", 0.1)
+    with pytest.raises(Problem, match="or another program has the file open"):
+        write_json(tmp_path / "a.json", 2)
+    assert (tmp_path / "a.json").read_text() == "1"
+
+
+def test_a_source_that_may_not_be_read_is_told_as_one(tmp_path, monkeypatch):
+    film, capture = tmp_path / "film.mp4", Capture(tmp_path / "a.wildcap")
+    film.write_bytes(b"film")
+
+    def refused(*_):
+        raise PermissionError(errno.EPERM, "Operation not permitted", str(film))
+
+    job = write_job(capture, source=film, last="frames")
+    monkeypatch.setattr(Capture, "made_from", refused)
+    ended = run_job(job, lambda message: None)
+    assert isinstance(ended, Failed) and ended.problem == f"{film} cannot be read."
+    assert "Files and Folders" in ended.remedy
+    monkeypatch.setattr(os, "listdir", refused)
+    with pytest.raises(Problem, match="cannot be read .*Operation not permitted"):
+        write_job(capture, source=tmp_path)

@@ -218,12 +218,12 @@ def test_below_hair_the_mean_of_both_answers_counts_at_the_level_of_the_skin_aro
     hair = (np.hypot(x - 24, y - 30) < 12).astype(np.float32)
     face = np.where(np.hypot(x - 24, y - 24) < 23, 0, -1)
     look = ShadingEstimate((0, 0, 48), true - 1.1 * hair[..., None], hair, true, face)
-    told = fill_hair(look, true + 0.4, hair)
+    told = fill_hair(look, look, true + 0.4, hair)
     expected = true - (1 - FITTED_SHARE) * 1.1 * hair[..., None]
     assert np.abs(told.shading - expected)[face >= 0].max() < 0.01 and told.shadow[face >= 0].max() < 1e-6
     assert np.array_equal(told.shading[face < 0], look.shading[face < 0])
-    assert fill_hair(look, true, 0 * hair) is look
-    assert fill_hair(look, true, 1 + 0 * hair) is look, "nothing is bare that would tell the level"
+    assert fill_hair(look, look, true, 0 * hair) is look
+    assert fill_hair(look, look, true, 1 + 0 * hair) is look, "nothing is bare that would tell the level"
 
 
 def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):

@@ -31,6 +31,7 @@ _UMASK = os.umask(0o022)
 os.umask(_UMASK)
 MODE = 0o666 & ~_UMASK
 """Of every file of a capture: as the user's other files."""
+ON_WINDOWS = os.name == "nt"
 OPEN_ELSEWHERE_S = 1.0
 """How long another program may have a file open that is to be replaced."""
 
@@ -123,7 +124,7 @@ def place_folder(temporary: Path, path: Path) -> None:
 def _rename(path: Path, into: Path) -> None:
     """os.replace. Windows refuses while another program, such as a virus scanner, has the file open, which may be for a
     moment only."""
-    ends = time.monotonic() + (OPEN_ELSEWHERE_S if os.name == "nt" else 0)
+    ends = time.monotonic() + (OPEN_ELSEWHERE_S if ON_WINDOWS else 0)
     while True:
         try:
             os.replace(path, into)
@@ -155,7 +156,7 @@ def storage_problem(error: OSError, path: Path) -> Problem:
         return Problem(f"The disk is full: {path} could not be written.",
                        "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
-        if os.name == "nt":  # which says the same of a file that is in use
+        if ON_WINDOWS:  # which says the same of a file that is in use
             return Problem(f"{path} cannot be written: the folder is read-only, or another program has the file open.",
                            "Close it there, or choose a folder you may write to.")
         return Problem(f"{path} cannot be written: the folder is read-only.",

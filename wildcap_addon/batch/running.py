@@ -133,7 +133,7 @@ def _tick() -> float:
         root = captures.root(captures.active(bpy.context))
         before, _worked = _worked, root if batches.works_on(root) else ""
         if before and before == root != _worked:
-            incoming.bring_in(True)
+            incoming.bring_in({root: "reconstruct"})
     except Exception as error:  # nobody is above a timer: without this, Blender would drop it and the tab stand still
         problems.show("", unforeseen.explain(error, "listening to the batch"))
         changed = True
