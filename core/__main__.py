@@ -32,7 +32,7 @@ from .contract.capture import Capture
 from .contract.messages import Problem
 from .worker import capture_commands, command_settings, read_only, self_test, setup_commands, terminal
 from .worker.commands import add_command
-from .worker.job import last_settings, outwait, write_job
+from .worker.job import last_settings, wait_until_free, write_job
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -135,7 +135,7 @@ def _run(options: argparse.Namespace) -> int:
     # sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     capture = Capture(options.capture)
-    outwait(capture, lambda text: print(text, flush=True))
+    wait_until_free(capture, lambda text: print(text, flush=True))
     job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first,
                     last=options.last, settings=run_settings, quality=options.quality)
     return terminal.follow(ROOT, capture, job, consent.by_flag(capture) if options.send_frames else {})

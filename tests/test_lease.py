@@ -18,7 +18,7 @@ from core.contract import lease, processes
 from core.contract.capture import Capture
 from core.contract.files import replacing, write_json
 from core.contract.messages import CancelledError, Problem
-from core.worker.job import outwait
+from core.worker.job import wait_until_free
 
 from . import kept_capture
 
@@ -116,9 +116,9 @@ def test_a_wait_for_another_machine_is_cancelled_and_ends_by_itself_before_a_com
     with pytest.raises(CancelledError), capture.locked(cancelled=lambda: True):
         pass
     assert time.monotonic() - began < 0.4 and capture.lock.exists()
-    outwait(capture, lambda text: None)
+    wait_until_free(capture, lambda text: None)
     assert not capture.lock.exists()
-    outwait(capture, lambda text: None)  # nobody is here
+    wait_until_free(capture, lambda text: None)  # nobody is here
 
 
 def test_a_disk_that_does_not_answer_for_a_moment_costs_nobody_the_lease(capture, monkeypatch):

@@ -21,7 +21,7 @@ from ..contract import switchlight_api
 from ..contract.capture import Capture
 from ..contract.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem
 from ..worker.client import THREAD_VARIABLES, Worker
-from ..worker.job import outwait, read_job, write_job
+from ..worker.job import read_job, wait_until_free, write_job
 from .groups import DELIVER, GROUPS, StageGroup
 from .record import Batch, BatchFace
 from .state import deliver_settings, has_sheet, is_delivered, waits
@@ -42,7 +42,7 @@ def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[M
             raise Problem(f"The shadow mask of {face.name} waits to be looked at.",
                           f"Open the batch in Blender, or accept it as it is: `python -m core batch accept "
                           f"{batch.root} {face.name}`.")
-        outwait(capture, lambda text: hear(Log(text)), cancelled)
+        wait_until_free(capture, lambda text: hear(Log(text)), cancelled)
         job = write_job(capture, source=face.source if group is GROUPS[0] else "", last=group.last,
                         settings=face.settings, quality=face.quality)
         final = _follow(capture, job, hear, cancelled, environment)
@@ -65,7 +65,7 @@ def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancel
         if again or not worker.died:
             return final
         hear(Log(f"{final.problem} It is begun once more."))
-        outwait(capture, lambda text: hear(Log(text)), cancelled)
+        wait_until_free(capture, lambda text: hear(Log(text)), cancelled)
     raise AssertionError
 
 

@@ -57,7 +57,8 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
     return capture.job
 
 
-def outwait(capture: Capture, tell: Callable[[str], None], cancelled: Callable[[], bool] = lambda: False) -> None:
+def wait_until_free(capture: Capture, tell: Callable[[str], None],
+                    cancelled: Callable[[], bool] = lambda: False) -> None:
     """Sees to it that nobody holds the capture before a job is written there: a lease that a machine which has gone
     left behind is taken over when its term is out. Raises Problem where somebody works there, and CancelledError;
     `tell` hears of the wait."""
