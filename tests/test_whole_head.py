@@ -124,6 +124,28 @@ def test_seen_hair_is_carried_on_over_the_scalp(cut):
     assert np.median(done.diffuse[back]) < 0.08 and np.median(done.diffuse[neck]) > 0.15
 
 
+def test_a_patch_of_scalp_among_unseen_is_no_stain_and_a_scalp_seen_all_around_keeps_its_bytes(cut):
+    """Two patches of scalp, of 8 and of 45 mm, seen like the face and half as bright as what is around them."""
+    position, scalp = surface().position, template.mask("scalp", SIZE) > 0.9
+    crown = position[scalp][position[scalp][:, 2].argmax()]
+    distance = np.linalg.norm(position - crown, axis=2)
+
+    def seen_within(radius_mm: float) -> tuple[HeadMaps, HeadMaps]:
+        patch = (distance < radius_mm) & scalp
+        told = replace(cut, confidence=np.where(patch, np.float32(0.7), cut.confidence),
+                       diffuse=np.where(patch[..., None], 0.5 * cut.diffuse, cut.diffuse))
+        return told, complete(told, surface(), Reporter("upscale"))
+
+    def contrast(maps: HeadMaps) -> float:
+        light = np.log(maps.diffuse).mean(2)
+        return float(light[(distance < 4) & scalp].mean() - light[(distance > 15) & (distance < 25) & scalp].mean())
+
+    told, done = seen_within(8)
+    assert contrast(told) < -0.5 and abs(contrast(done)) < 0.1
+    told, done = seen_within(45)
+    assert np.array_equal(done.diffuse[(distance < 8) & scalp], told.diffuse[(distance < 8) & scalp])
+
+
 def test_a_stray_patch_that_was_seen_at_a_glance_goes_and_a_mark_that_was_seen_well_stays(truth, cut):
     """Two patches of the neck seen with half of the usual confidence, one of them three times as bright as its skin;
     and a mark on the cheek as dark."""

@@ -31,6 +31,12 @@ SPECK = 1.5
 SKIRT, FEATHER = 2.5, 5.0
 """mm inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the
 mean face; then comes the fade."""
+ISLAND = 10.0
+"""mm around a place on the scalp that count as its surroundings. A patch seen between hair, shadow and the border of
+the pictures is of another tone and another stubble than what is made up around it, and looks like a stain."""
+GLANCED, WATCHED = 0.5, 0.8
+"""Shares of usual skin's confidence: a scalp whose surroundings were seen with the first is made up, with the second
+kept."""
 REACH = 2.5
 """mm below which detail is no tone."""
 ODD = 0.20
@@ -46,7 +52,7 @@ DARKEST = 0.004
 
 def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int = 0) -> HeadMaps:
     """The maps with what was not seen replaced; shading and confidence as they were. Texels whose `seen_well` is 1 keep
-    their bytes, but for stray ones beyond the face."""
+    their bytes, but for stray ones beyond the face and a scalp that was seen badly."""
     report.check()
     seen = seen_well(maps.confidence, surface)
     size = surface.size
@@ -56,6 +62,7 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     channels, slopes = apart(maps)
     tone = _tone(channels, seen * maps.confidence**2, surface, seed)
     report.check()
+    seen = seen * _scalp_share(maps.confidence, seen, surface)
     seen = _without_strays(seen, maps.confidence, np.abs(_low(channels, seen, surface) - tone)[..., :3].mean(2))
     holes = (seen < 1) & surface.covered
     area = surface.covered * surface.texel**2
@@ -88,6 +95,14 @@ def seen_well(confidence: np.ndarray, surface: HeadSurface) -> np.ndarray:
                                    cv2.DIST_L2, 5)[1:-1, 1:-1]
     return (seen * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT) / FEATHER)
             * surface.covered).astype(np.float32)
+
+
+def _scalp_share(confidence: np.ndarray, seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
+    """[S, S] in [0, 1]: 1 off the scalp, and on it where its surroundings were seen about as well as usual skin."""
+    usual = float(np.median(confidence[seen == 1])) if (seen == 1).any() else 1.0
+    around = surface.smooth(confidence[..., None], np.ones_like(confidence), ISLAND)[..., 0]
+    kept = _smoothstep((around / max(usual, 1e-6) - GLANCED) / (WATCHED - GLANCED))
+    return 1 - template.mask("scalp", surface.size) * (1 - kept)
 
 
 def _without_strays(seen: np.ndarray, confidence: np.ndarray, off: np.ndarray) -> np.ndarray:
