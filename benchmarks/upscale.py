@@ -138,7 +138,7 @@ def cost(method: str, size: int = 1024) -> dict[str, float]:
     """Seconds and peak memory in GiB of enlarging maps of that size, in the process it is called in."""
     rng, blank = np.random.default_rng(0), np.ones((size, size, 3), np.float32)
     maps = HeadMaps(rng.random((size, size, 3), np.float32), blank / np.sqrt(3), rng.random((size, size), np.float32),
-                    blank[..., 0], blank)
+                    blank[..., 0], blank, blank[..., 0])
     began = time.perf_counter()
     enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
     return {"seconds": round(time.perf_counter() - began, 1),
@@ -149,7 +149,7 @@ def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
     """Maps [7, H, W] in the network's channels, four times as large: [4H, 4W, 7]."""
     diffuse, normal = images.srgb_to_linear(np.moveaxis(small[:3], 0, -1)), np.moveaxis(small[3:6], 0, -1)
     blank = np.ones_like(diffuse)
-    maps = HeadMaps(diffuse, normal, small[6], blank[..., 0], blank)
+    maps = HeadMaps(diffuse, normal, small[6], blank[..., 0], blank, blank[..., 0])
     return enlarged(maps, FACTOR * len(diffuse), method, "cpu", lambda done: None)
 
 

@@ -81,7 +81,8 @@ def whole(seed: int, surface: HeadSurface) -> dict:
     shown = np.clip(2 * face, 0, 1)[..., None]
     diffuse = truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)
     specular = truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2 * (1 - shown[..., 0])
-    cut = replace(truth, confidence=(0.7 * face).astype(np.float32), diffuse=diffuse.astype(np.float32),
+    cut = replace(truth, confidence=(0.7 * face).astype(np.float32), seen=face.astype(np.float32),
+                  diffuse=diffuse.astype(np.float32),
                   specular=specular.astype(np.float32))
     done, hidden = complete(cut, surface, Reporter("upscale"), seed), face < 0.02
     row: dict = {}
@@ -111,11 +112,11 @@ def hairs(seed: int, surface: HeadSurface) -> dict:
 
 def of_capture(capture: Capture, subject: int | None = None) -> dict:
     """How far the border and the map's cut show, before and after, and how much hair there is."""
-    maps = read_maps(capture.maps)
+    maps = read_maps(capture.maps, capture.texture_confidence)
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse))
     report = Reporter("upscale")
     done = complete(maps, surface, report)
-    seen = cv2.morphologyEx((maps.confidence >= UNSEEN).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
+    seen = cv2.morphologyEx((maps.seen >= UNSEEN).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
     seen = seen.astype(bool) | (template.mask("face", surface.size) > 0.5)
     inside = (_distance(seen) - _distance(~seen)) * surface.texel
     rings = [(inside > low) & (inside < high) for low, high in RINGS]
@@ -142,7 +143,7 @@ def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
     skin = make_skin(replace(sample_parameters(seed), **changes), surface.size)
     one = np.ones((surface.size,) * 2, np.float32)
     return HeadMaps(skin.diffuse.astype(np.float32), skin.normal.astype(np.float32), skin.specular, 0.7 * one,
-                    np.repeat(one[..., None], 3, 2))
+                    np.repeat(one[..., None], 3, 2), one)
 
 
 def _step(maps: HeadMaps, here: np.ndarray, there: np.ndarray, surface: HeadSurface) -> float:

@@ -60,7 +60,7 @@ STAGES = (
                           "delit/", *OPEN_EYES)),
     Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)),
           tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale", shared=("seed", "device"), on_device=True,
-          optional_reads=("texture_detail.exr", PARTS)),
+          optional_reads=("texture_confidence.exr", "texture_detail.exr", PARTS)),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
           optional_reads=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/",
                           "cameras/")),

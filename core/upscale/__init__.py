@@ -42,7 +42,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Writes capture.maps_4k, whole or not at all."""
     size, method = settings.upscale.size, settings.upscale.method
     guided = settings.upscale.frames_detail and capture.texture_detail.is_file()
-    maps = read_maps(capture.maps)
+    maps = read_maps(capture.maps, capture.texture_confidence)
     report.figure("method", method)
     report.figure("size_from_px", len(maps.diffuse))
     report.figure("size_px", size)

@@ -44,13 +44,13 @@ class Growth:
     told: bool
 
 
-def find(light: np.ndarray, confidence: np.ndarray, zones: dict[str, np.ndarray], surface: HeadSurface,
+def find(light: np.ndarray, seen: np.ndarray, zones: dict[str, np.ndarray], surface: HeadSurface,
          parts: np.ndarray | None) -> Growth:
     """From the log albedo's mean [S, S], how well each texel was seen, where hair may grow, and what the parser saw [S,
     S, len(GROWTHS)], or None."""
     size, texel = surface.size, float(np.median(surface.texel))
     bare = ((template.mask("skin", size) > 0.99) & (zones["beard"] < 0.05) & (zones["brows"] < 0.01)
-            & (seen_well(confidence, surface) >= 1))
+            & (seen_well(seen, surface) >= 1))
     head = np.zeros((size, size), np.float32) if parts is None else _faded(parts[..., GROWTHS.index("hair")])
     bare &= head == 0
     fine = beard.fine(light, texel)

@@ -24,10 +24,12 @@ from . import grain
 from .maps import HeadMaps
 from .surface import HeadSurface
 
-UNSEEN, SEEN = 0.05, 0.30
-"""Confidence at which a texel counts as not seen, and from which on as seen well."""
+UNSEEN, SEEN = 0.015, 0.09
+"""The texture's confidence at which a texel counts as not seen, and from which on as seen well."""
+BELIEVED = 0.3
+"""The solver's confidence from which on skin is plain enough to learn its grain from: a beard is not."""
 SPECK = 1.5
-"""mm: darker lines and dots of the confidence are hairs and marks, not holes in what was seen."""
+"""mm: darker lines and dots of it are strands before the face, not holes in what was seen."""
 SKIRT, FEATHER = 2.5, 5.0
 """mm inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the
 mean face; then comes the fade."""
@@ -54,7 +56,7 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     """The maps with what was not seen replaced; shading and confidence as they were. Texels whose `seen_well` is 1 keep
     their bytes, but for stray ones beyond the face and a scalp that was seen badly."""
     report.check()
-    seen = seen_well(maps.confidence, surface)
+    seen = seen_well(maps.seen, surface)
     size = surface.size
     if not ((seen < 1) & surface.covered).any() or seen.max() < 1:
         report.figure("completed_share_percent", 0.0)
@@ -63,13 +65,13 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     tone = _tone(channels, seen * maps.confidence**2, surface, seed)
     report.check()
     seen = seen * _scalp_share(maps.confidence, seen, surface)
-    seen = _without_strays(seen, maps.confidence, np.abs(_low(channels, seen, surface) - tone)[..., :3].mean(2))
+    seen = _without_strays(seen, maps.seen, np.abs(_low(channels, seen, surface) - tone)[..., :3].mean(2))
     holes = (seen < 1) & surface.covered
     area = surface.covered * surface.texel**2
     completed = ((1 - seen) * area).sum() / area.sum()
     report.figure("completed_share_percent", round(100 * float(completed), 1))
-    skin = template.mask("skin", size) * seen
-    learnt = grain.measure(channels, slopes, (skin >= 0.99).astype(np.float32), surface, seed)
+    plain = (template.mask("skin", size) * seen >= 0.99) & (maps.confidence >= BELIEVED)
+    learnt = grain.measure(channels, slopes, plain.astype(np.float32), surface, seed)
     report.check()
     painted, tilt = grain.paint(learnt, surface, holes, seed)
     share, own = seen[holes][:, None], channels - _low(channels, seen, surface)
@@ -80,20 +82,20 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     return joined(maps, holes, filled, tilted)
 
 
-def seen_well(confidence: np.ndarray, surface: HeadSurface) -> np.ndarray:
-    """[S, S] in [0, 1]: 1 where the cameras saw enough, 0 where the solver had nothing but the mean face, and a soft
-    border on the seen side.
+def seen_well(seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
+    """HeadMaps' seen -> [S, S] in [0, 1]: 1 where the cameras saw enough, 0 where the solver had nothing but the mean
+    face, and a soft border on the seen side.
 
     Holes in the face's features count as seen: their shape comes with the mean face, and no smooth field knows it.
     """
     texel = float(np.median(surface.texel))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(1, round(SPECK / texel)) + 1,) * 2)
-    closed = cv2.morphologyEx(confidence, cv2.MORPH_CLOSE, disc)
+    closed = cv2.morphologyEx(seen, cv2.MORPH_CLOSE, disc)
     closed = np.maximum(closed, _features(surface.size))
-    seen = _smoothstep((closed - UNSEEN) / (SEEN - UNSEEN))
+    enough = _smoothstep((closed - UNSEEN) / (SEEN - UNSEEN))
     inside = cv2.distanceTransform(np.pad((closed >= UNSEEN) | ~surface.covered, 1, mode="edge").astype(np.uint8),
                                    cv2.DIST_L2, 5)[1:-1, 1:-1]
-    return (seen * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT) / FEATHER)
+    return (enough * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT) / FEATHER)
             * surface.covered).astype(np.float32)
 
 
@@ -105,16 +107,16 @@ def _scalp_share(confidence: np.ndarray, seen: np.ndarray, surface: HeadSurface)
     return 1 - template.mask("scalp", surface.size) * (1 - kept)
 
 
-def _without_strays(seen: np.ndarray, confidence: np.ndarray, off: np.ndarray) -> np.ndarray:
-    """`seen` [S, S] without what was seen at a glance only and lies `off` the head's tone (log albedo [S, S]): light
-    that was divided out wrongly, cloth, hair.
+def _without_strays(enough: np.ndarray, seen: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """`enough` [S, S] without what was `seen` [S, S] at a glance only and lies `off` the head's tone (log albedo [S,
+    S]): light that was divided out wrongly, cloth, hair.
 
-    What one believes of a texel is a matter of both: off by ODD it needs as much confidence as is missing to that of
-    usual skin. Nothing goes from the face, which every capture sees well and where marks are.
+    What one believes of a texel is a matter of both: off by ODD it has to be seen as much better as is missing to usual
+    skin. Nothing goes from the face, which every capture sees well and where marks are.
     """
-    sure = np.clip(confidence / max(float(np.median(confidence[seen == 1])), 1e-6), 0, 1)
+    sure = np.clip(seen / max(float(np.median(seen[enough == 1])), 1e-6), 0, 1)
     missing = (1 - sure) * (1 - template.mask("face", len(seen))) * off / ODD
-    return np.where(missing > 0, seen * sure**2 / np.maximum(sure**2 + missing**2, 1e-12), seen).astype(np.float32)
+    return np.where(missing > 0, enough * sure**2 / np.maximum(sure**2 + missing**2, 1e-12), enough).astype(np.float32)
 
 
 def apart(maps: HeadMaps) -> tuple[np.ndarray, np.ndarray]:
