@@ -14,8 +14,8 @@ SAYS = ""
 RECORDS = ("state", "demo", "relit", "relit_people", "scan_albedo", "whole_chain", "costs", "comparison", "photographs",
            "whole_head", "skin_tone", "confidence")
 GROUPS = {
-    "The albedo": ("sample", "relit", "state", "split", "scan", "gallery", "comparison", "rerender", "controlled",
-                   "ablation", "prior", "confidence"),
+    "The albedo": ("sample", "relit", "state", "state_0_1_0", "split", "scan", "gallery", "comparison", "rerender",
+                   "controlled", "ablation", "prior", "confidence"),
     "Before the solve": ("geometry", "eyes", "delighters", "answers", "photographs", "shadows", "skin_tone"),
     "After the solve": ("upscale", "whole_head", "hair", "even_light", "engines", "delivery",
                         "reimported"),

@@ -123,7 +123,7 @@ def _sampled(capture: Capture, settings: Settings, start: initial.Start, denoise
 
     sampler = Sampler(denoiser, start.recipe, seed_noise(settings.seed, denoiser.device))
     state = sample_within_memory(sampler, seen, state.to(denoiser.device), on_step, report.log)
-    state.denoised = restore_maps(denoiser, state.denoised, seen[1].coords, start.recipe, settings.seed)
+    state.denoised = restore_maps(denoiser, state.denoised, seen[1].coords, settings.seed)
     return state.to("cpu")
 
 
