@@ -23,7 +23,8 @@ from core.imaging import images
 from core.synthetic.painted_head import camera, photograph
 from core.synthetic.sample import write_video
 
-from . import figures, stage_cost
+from . import figures
+from .costs.stage import measure_stage
 
 FRAMES, SCALE = 300, 1.28
 WIDEST_DEG = 40.0
@@ -43,8 +44,8 @@ def main() -> int:
     film, capture = arguments.folder / f"{name}.mp4", Capture(arguments.folder.resolve() / f"{name}.wildcap")
     if not film.is_file():
         write_video(film, pictures(0.0 if arguments.silent else JAW))
-    stage_cost.measure(capture.root, "frames", film.resolve(), "draft")
-    cost = stage_cost.measure(capture.root, "cameras", film.resolve(), "draft")
+    measure_stage(capture.root, "frames", film.resolve(), "draft")
+    cost = measure_stage(capture.root, "cameras", film.resolve(), "draft")
     command = [sys.executable, "-m", "core", "run", str(film), str(capture.root), "--quality", "draft", "--until",
                arguments.until]
     said = subprocess.run(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)

@@ -16,9 +16,7 @@ it. cost: 1024 to 4096 in a process of its own, seconds and peak memory.
 from __future__ import annotations
 
 import argparse
-import resource
 import tempfile
-import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -46,6 +44,7 @@ from core.upscale import detail, enlarged
 from core.upscale.maps import HeadMaps
 
 from .ablation_measures import feature_distance
+from .costs.meter import GIB, peak, spending
 from .detail import moles
 from .figures import write
 from .shadow_captures import picture, write_views
@@ -139,10 +138,9 @@ def cost(method: str, size: int = 1024) -> dict[str, float]:
     rng, blank = np.random.default_rng(0), np.ones((size, size, 3), np.float32)
     maps = HeadMaps(rng.random((size, size, 3), np.float32), blank / np.sqrt(3), rng.random((size, size), np.float32),
                     blank[..., 0], blank)
-    began = time.perf_counter()
-    enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
-    return {"seconds": round(time.perf_counter() - began, 1),
-            "peak GiB": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, 2)}
+    with spending() as spent:
+        enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
+    return {"seconds": round(spent.seconds, 1), "peak GiB": round(peak() / GIB, 2)}
 
 
 def _enlarged(small: np.ndarray, method: str) -> np.ndarray:

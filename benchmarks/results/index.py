@@ -19,7 +19,7 @@ GROUPS = {
     "Before the solve": ("geometry", "eyes", "delighters", "answers", "photographs", "shadows", "skin_tone"),
     "After the solve": ("upscale", "whole_head", "hair", "even_light", "engines", "delivery",
                         "reimported"),
-    "Time and memory": ("costs", "solver_speed", "png_levels", "blender"),
+    "Time and memory": ("costs", "png_levels", "blender"),
 }
 ELSEWHERE = """
     - [promises](../promises.md): hostile files and kills at random moments; [farm](../farm.md) and

@@ -62,8 +62,9 @@ def told() -> dict[str, list[str]]:
         "docs/delighters.md": [
             f"{cost.tera_multiplications:.2f} x 10^12 multiplications, three quarters of them in the decoder, and "
             f"{cost.peak_gb:.1f} GB of memory",
-            f"a frame took {cost.seconds} s on two threads, while 10^12 multiplications of one large matrix product "
-            f"took {cost.seconds_of_a_product} s there; a cancel was heard within {cost.seconds_to_cancel:.1f} s"],
+            f"a frame took {cost.seconds:.0f} s on two threads, while 10^12 multiplications of one large matrix "
+            f"product took {cost.seconds_of_a_product:.0f} s there; a cancel was heard within "
+            f"{cost.seconds_to_cancel:.1f} s"],
     }
 
 
