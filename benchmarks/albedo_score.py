@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solved albedo against true albedo, in image space, on facial skin (the paper's protocol for Digital Emily).
 
-    python -m benchmarks.albedo_score CAPTURE TRUTH [--json OUT.json]
+    python -m benchmarks.albedo_score CAPTURE TRUTH [--texture PICTURE] [--pictures FOLDER] [--json OUT.json]
 
 TRUTH holds capture.mp4, albedo/NNNN.png (sRGB with alpha), face/NNNN.png and, under hard light, shadow/NNNN.png,
 numbered by video frame. Figures per capture, each the mean over the frames with truth that were registered:
-  psnr, ssim, flip   as they are, and after one gain per channel in linear light, which removes what a skin tone would
-  supply detail             correlation of log green between 1 and 3 px with the truth's: 1 keeps each pore, 0 is
-  another skin shadow_step        log(predicted / true) 4 to 12 px on the lit side of the true shadow's edge, minus the
-  dark side; 0 is clean face_coverage      share of the face masks that the solved head covers
+  psnr, ssim, flip   as they are, and after one gain per channel in linear light, which removes what a tone would supply
+  detail             correlation of log green between 1 and 3 px with the truth's: 1 keeps each pore, 0 is another skin
+  shadow_step        log(predicted / true) 4 to 12 px on the lit side of the true shadow's edge, minus the dark side
+  face_coverage      share of the face masks that the solved head covers
 """
 
 from __future__ import annotations

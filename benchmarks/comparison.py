@@ -7,10 +7,12 @@ and on raw frames.
     OUT.json]
 
 FOLDER was made and solved by benchmarks/people.py; CAPTURE is a solved one of another subject, TRUTH its folder. Rows
-  of INPUT: METHOD over one texture: wildcap                  the texel grid of local light in the shadow mask, with two
-  seeds, whose spread says what a tie is regions 5, regions 10    soft regions with a light each (light_models.py)
-  environment    one environment cubemap environment, no prior    the same, and texels that follow the frames alone,
-  smoothly over its blur            the texture divided by its own blur, what one does by hand in Blender
+of INPUT: METHOD over one texture:
+  wildcap                  the texel grid of local light in the shadow mask, by two seeds, whose spread is a tie
+  regions 5, regions 10    soft regions with a light each (light_models.py)
+  environment              one environment cubemap
+  environment, no prior    the same, and texels that follow the frames alone, smoothly
+  over its blur            the texture divided by its own blur, what one does by hand in Blender
   texture                  taken for albedo as it is
 All but the last three sample the same prior with the same guidance; all are told the true skin tone. Raw rows get the
 mask that the chain proposes for raw frames. Maps are kept in FOLDER/comparison (benchmarks/rerender.py reads them), so

@@ -6,11 +6,15 @@ people, their true albedo known.
     python -m benchmarks.controlled FOLDER [--only NAME ...] [--json OUT.json] [--pictures FOLDER]
 
 FOLDER was made by benchmarks/people.py (--places wild flash studio) and its wild captures are solved. Rows, each an
-  albedo map in the same UVs: wild             the chain's own                             wild_texture    its texture
-  taken for the albedo flash            dark room, lamp at the camera: the known light divided out (flash_light.py),
-  solved over the same prior with that light held flash_texture    the same, before the solve                  limit
-        the true albedo frames as a texture: what geometry and texture leave studio           sixteen cameras in even
-        light, no delighter, empty mask, solved by the stage      studio_texture    its texture taken for the albedo
+albedo map in the same UVs:
+  wild              the chain's own
+  wild_texture      its texture taken for the albedo
+  flash             dark room, lamp at the camera: the known light divided out (flash_light.py), solved over the same
+                    prior with that light held
+  flash_texture     the same, before the solve
+  limit             the true albedo frames as a texture: what geometry and texture leave
+  studio            sixteen cameras in even light, no delighter, empty mask, solved by the stage
+  studio_texture    its texture taken for the albedo
 All are scored in the wild capture's frames that have a truth; all share head, prior, quality and true skin tone.
 FOLDER/controlled keeps maps and figures, so that a second run goes on where the first stopped. A set that has not been
 made is left out; what OUT.json has and FOLDER has not stays in it.

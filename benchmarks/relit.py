@@ -8,11 +8,13 @@
 CAPTURE was solved from core/synthetic/sample, FOLDER was made by benchmarks/people.py. Rendered by Cycles with the
 add-on's own material and lights, of which none lit a capture, as linear EXR; both heads are the registered one. A
 picture is exposed so that the true subject's face has the mean luminance MIDDLE (one gain per light, the same for all
-  rows), encoded by the sRGB curve and clipped: no AgX. Figures are of the face, each the mean over the lights: raw
-        the filmed texture for albedo       delit          the delit texture for albedo solved         all three maps as
-        delivered         plain          the solved albedo, with no relief and an even gloss
-  true_albedo, true_normal, true_specular            solved, with one map swapped for the true one: what that map costs
-  floor          the truth with other random numbers: what the rendering's noise costs
+rows), encoded by the sRGB curve and clipped: no AgX. Figures are of the face, each the mean over the lights:
+  raw       the filmed texture for albedo
+  delit     the delit texture for albedo
+  solved    all three maps as delivered
+  plain     the solved albedo, with no relief and an even gloss
+  true_albedo, true_normal, true_specular    solved, with one map swapped for the true one: what that map costs
+  floor     the truth with other random numbers: what the rendering's noise costs
 The true maps are worn where the registered surface lies on the true head (benchmarks/relit_maps.py).
 All albedos share the true skin tone as mean, and all rows but plain the solved relief and gloss.
 WORK keeps the renders; those that are newer than the maps and textures are taken as they are.

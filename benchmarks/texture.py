@@ -7,8 +7,10 @@
 
 CAPTURE is registered (cameras, head.obj); TRUTH is laid out as benchmarks/albedo_score.py says. Its albedo frames go
 through the `folder` delighter, V = those. Prints one JSON with, per row, the score of albedo_score and the marks of
-  benchmarks/detail.py: average      the weighted mean of all views: the minimum of a squared loss
-  blend        in bands, not aligned                        aligned      what the stage does by default
+benchmarks/detail.py:
+  average      the weighted mean of all views: the minimum of a squared loss
+  blend        in bands, not aligned
+  aligned      what the stage does by default
   perceptual   the aligned blend after --steps of the paper's texture loss
   delit        as aligned, from the capture's own delit frames: what its delighter's errors add
 and "leave_one_out": the aligned texture scored in N frames, each time built without that frame.

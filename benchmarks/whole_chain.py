@@ -3,10 +3,11 @@
 """Which stage costs what: a solved capture's score beside the scores with one stage replaced by the truth or switched
 off.
 
-    python -m benchmarks.whole_chain CAPTURE TRUTH [--rows NAME ...] [--delighters NAME ...]
+    python -m benchmarks.whole_chain CAPTURE TRUTH [--rows NAME ...] [--delighters NAME ...] [--json OUT.json]
 
 CAPTURE has been run from TRUTH/capture.mp4 with the true skin tone; TRUTH is laid out as benchmarks/albedo_score.py
-  says. Prints one JSON: chain         the capture's own maps
+says. Prints one JSON:
+  chain         the capture's own maps
   solve_off     its texture, scaled to the tone, taken for the albedo
   raw_texture   the same without any delighting: what geometry and light leave
   true_frames   the true albedo frames through the folder delighter: what geometry, texture and solver cost
