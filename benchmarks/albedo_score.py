@@ -17,11 +17,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import av
 import numpy as np
 
 from core.contract.capture import Capture
@@ -33,6 +31,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 
 from .figures import markdown, write
+from .films import read_film
 from .measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
 
 LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true tone": "the true tone everywhere"}
@@ -123,18 +122,12 @@ def score_floors(truth: Path) -> dict:
     """What has to be beaten: the raw video taken for albedo, and the true mean skin colour everywhere."""
     frames = {true.frame: true for true in read_truth(truth)}
     raw, flat = [], []
-    for number, image in enumerate(_video(truth / "capture.mp4")):
+    for number, image in enumerate(read_film(truth / "capture.mp4")):
         if (true := frames.get(number)) is not None:
-            raw.append(compare(image, true, true.face))
+            raw.append(compare(image.astype(np.float32) / 255, true, true.face))
             tone = images.linear_to_srgb(images.srgb_to_linear(true.albedo[true.face]).mean(0))
             flat.append(compare(np.broadcast_to(tone, true.albedo.shape), true, true.face))
     return {"raw video": mean_scores(raw), "flat true tone": mean_scores(flat)}
-
-
-def _video(path: Path) -> Iterator[np.ndarray]:
-    with av.open(str(path)) as video:
-        for frame in video.decode(video=0):
-            yield frame.to_ndarray(format="rgb24").astype(np.float32) / 255
 
 
 def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:

@@ -30,7 +30,6 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from functools import cache, partial
-from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -40,7 +39,6 @@ import torch
 
 from core.contract.capture import Capture
 from core.contract.files import replacing_folder, write_json
-from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json, preset
 from core.face.head import read_head
 from core.imaging import images
@@ -54,6 +52,7 @@ from core.solve.witnesses import confirm_marks
 from . import figures, light_models
 from .ablation import texels_alone
 from .albedo_score import looks, score_map
+from .continued import run_stages
 from .people import PEOPLE, skin_tone
 
 INPUTS = ("delit", "raw")
@@ -183,8 +182,7 @@ def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
         later = shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "delivery", "delit", "lock",
                                        "shadow_mask*", "mask_history", "texture*")
         shutil.copytree(source.root, folder, ignore=later)
-        for stage in ("delight", "texture", "shadow_mask"):
-            import_module(f"core.{stage}").run(copy, settings, Reporter(stage))
+        run_stages(copy, settings, "delight", "texture", "shadow_mask")
     return copy
 
 

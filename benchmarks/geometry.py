@@ -33,10 +33,9 @@ from core.contract.settings import Settings
 from core.imaging import images
 
 from .costs.stage import measure_stage
-from .figures import read, write
+from .figures import ROOT, read, write
 from .geometry_table import published, table
 
-ROOT = Path(__file__).resolve().parent.parent
 LAST = "texture"
 """Stages up to this one are run."""
 

@@ -30,7 +30,6 @@ FRAMES, SCALE = 300, 1.28
 WIDEST_DEG = 40.0
 JAW, SYLLABLE, SENTENCE = 0.35, 7, 90
 """How far the jaw opens, and frames of a syllable, and of a sentence with the pause after it."""
-ROOT = Path(__file__).resolve().parent.parent
 
 
 def main() -> int:
@@ -48,7 +47,7 @@ def main() -> int:
     cost = measure_stage(capture.root, "cameras", film.resolve(), "draft")
     command = [sys.executable, "-m", "core", "run", str(film), str(capture.root), "--quality", "draft", "--until",
                arguments.until]
-    said = subprocess.run(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    said = subprocess.run(command, cwd=figures.ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     record = capture.read()
     stages = {stage: round(done["seconds"], 1) for stage, done in record["stages"].items()}
     findings = [finding["problem"] for done in record["stages"].values() for finding in done.get("findings", [])]

@@ -35,6 +35,7 @@ from core.contract.messages import Problem
 from core.solve.prior import fast_dtype
 
 from .. import figures
+from ..films import read_film
 from .rows import GROWTH, ROWS, WHOLES, StageRun, cell, disturbed, growth, table, together
 from .stage import measure_stage
 
@@ -133,7 +134,7 @@ def prepare(row: StageRun, capture: Path, options: argparse.Namespace) -> Path:
     if not video.exists():
         from core.synthetic.sample import write_video
 
-        write_video(video, to_and_fro(decoded(VIDEO), row.frames))
+        write_video(video, to_and_fro(list(read_film(VIDEO)), row.frames))
     return video
 
 
@@ -152,12 +153,6 @@ def select(capture: Capture, count: int) -> None:
 def length(video: Path) -> int:
     with av.open(str(video)) as container:
         return container.streams.video[0].frames
-
-
-def decoded(video: Path) -> list[np.ndarray]:
-    """All frames, uint8 [H, W, 3]."""
-    with av.open(str(video)) as container:
-        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
 def to_and_fro(frames: list[np.ndarray], count: int) -> Iterator[np.ndarray]:
