@@ -20,10 +20,26 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
+import shutil
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import torch
+
+from core import shadow_mask, solve
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
+from core.face.head import read_head
+from core.solve import initial, network, network_blocks
+from core.solve import prior as priors
+from core.solve.evidence import read_evidence
+from core.solve.memory import sample_within_memory, spare_memory
+from core.solve.recipes import OURS
+from core.solve.sampler import Sampler, seed_noise
+from core.solve.skin_tone import parse_skin_tone
 
 from ..figures import write
 from .meter import GIB, peak, run_alone, spending
@@ -117,11 +133,7 @@ def line(name: str, row: dict, plain: dict | None) -> str:
 
 def make(folder: str, source: str) -> None:
     """A capture that is ready to be solved: a copy of `source`, or where that is "" a synthetic subject's texture."""
-    import shutil
-
-    from core.contract.capture import Capture
-
-    from ..uv_problems import plain_problem
+    from ..uv_problems import plain_problem  # its libraries are not the solver's
 
     capture = Capture(Path(folder) / "a.wildcap")
     if source:
@@ -133,12 +145,7 @@ def make(folder: str, source: str) -> None:
 
 def measured(row: SolverVariant, folder: Path, options: argparse.Namespace) -> dict:
     """A row's figures, in this process."""
-    import torch
-
-    from core import solve  # noqa: F401 - all that the stage imports counts as loaded
-    from core.contract.capture import Capture
-
-    before = peak()
+    before = peak()  # all that the stage imports counts as loaded
     capture = Capture(folder / "a.wildcap")
     found = whole_stage(row, capture, options) if row.stage else single_steps(row, capture, options)
     found |= {"peak_gib": round(peak() / GIB, 3), "added_gib": round((peak() - before) / GIB, 3),
@@ -148,22 +155,9 @@ def measured(row: SolverVariant, folder: Path, options: argparse.Namespace) -> d
     return found
 
 
-def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> dict:
+def single_steps(row: SolverVariant, capture: Capture, options: argparse.Namespace) -> dict:
     """`options.steps` steps that lie along the walk as all of them do, each with as many light updates as one of
     theirs."""
-    from dataclasses import replace
-
-    import torch
-
-    from core.contract.messages import Reporter
-    from core.face.head import read_head
-    from core.solve import initial
-    from core.solve.evidence import read_evidence
-    from core.solve.memory import sample_within_memory
-    from core.solve.recipes import OURS
-    from core.solve.sampler import Sampler, seed_noise
-    from core.solve.skin_tone import parse_skin_tone
-
     prior = prior_of(row, options)
     coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
@@ -186,17 +180,10 @@ def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> di
             "processor_s_per_step": round(spent.processor_s / short.steps, 4), "steps": short.steps, "dtype": dtype}
 
 
-def whole_stage(row: SolverVariant, capture, options: argparse.Namespace) -> dict:
-    """The stage solve, the mask's proposal before it where the capture has frames; imports and loading count."""
-    import torch
-
-    from core import shadow_mask, solve
-    from core.contract.messages import Reporter
-    from core.contract.settings import from_json
-    from core.solve import prior
-
-    dtype = torch.float32 if row.float32 else prior.fast_dtype(options.device)
-    prior.fast_dtype = lambda device: dtype
+def whole_stage(row: SolverVariant, capture: Capture, options: argparse.Namespace) -> dict:
+    """The stage solve, the mask's proposal before it where the capture has frames; loading the prior counts."""
+    dtype = torch.float32 if row.float32 else priors.fast_dtype(options.device)
+    priors.fast_dtype = lambda device: dtype
     settings = from_json({"device": options.device, "solve": row.stage})
     report = Reporter("solve", emit=lambda message: None)
     with spending() as spent:
@@ -207,27 +194,20 @@ def whole_stage(row: SolverVariant, capture, options: argparse.Namespace) -> dic
             "dtype": str(dtype).removeprefix("torch.")}
 
 
-def prior_of(row: SolverVariant, options: argparse.Namespace):
+def prior_of(row: SolverVariant, options: argparse.Namespace) -> priors.Prior:
     """The shipped prior, or one of the authors' size, as the row has it."""
-    import torch
-
-    from core.solve import network as networks
-    from core.solve import network_blocks
-    from core.solve.memory import spare_memory
-    from core.solve.prior import ReleasedPrior, build_network, fast_dtype, load
-
-    dtype = torch.float32 if row.float32 else fast_dtype(options.device)
+    dtype = torch.float32 if row.float32 else priors.fast_dtype(options.device)
     if row.channels_first:
-        networks.MEMORY_FORMAT = network_blocks.MEMORY_FORMAT = torch.contiguous_format
+        network.MEMORY_FORMAT = network_blocks.MEMORY_FORMAT = torch.contiguous_format
     if options.network == "ours":
-        prior = load(device=options.device, dtype=dtype)
+        prior = priors.load(device=options.device, dtype=dtype)
     else:
         torch.manual_seed(0)
-        network = build_network(AUTHORS)
-        for parameter in network.parameters():  # those that begin at zero as well: their products are to be worked out
+        made = priors.build_network(AUTHORS)
+        for parameter in made.parameters():  # those that begin at zero as well: their products are to be worked out
             torch.nn.init.normal_(parameter, std=0.02)
-        prior = ReleasedPrior(network, "coord", 0, (0.01, 80.0), None)
-        network.to(options.device).lower(dtype)
+        prior = priors.ReleasedPrior(made, "coord", 0, (0.01, 80.0), None)
+        made.to(options.device).lower(dtype)
     if row.low_memory:
         spare_memory(prior)
     return prior
