@@ -46,7 +46,7 @@ from core.upscale.maps import HeadMaps
 from .ablation_measures import feature_distance
 from .costs.meter import GIB, peak, spending
 from .detail import moles
-from .figures import write
+from .figures import markdown, write
 from .shadow_captures import picture, write_views
 
 SEEDS, FILMED = (900001, 900003, 900004, 900005, 900007, 900008), (900003,)
@@ -79,7 +79,10 @@ def main() -> None:
         # each in a fresh process, whose peak is its own
         with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
             found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
-    print("\n\n".join(_table(name, rows) for name, rows in found.items()))
+    for name, rows in found.items():
+        columns = next(iter(rows.values()))
+        print(markdown([name, *columns], [[row, *(f"{values[column]:.4g}" for column in columns)]
+                                          for row, values in rows.items()]), end="\n\n")
     if arguments.json:
         def keys(values: dict[str, float]) -> dict[str, float]:
             return {figure.lower().replace(" ", "_"): value for figure, value in values.items()}
@@ -221,14 +224,6 @@ def _fine_figures(albedo: np.ndarray, true: np.ndarray, seen: np.ndarray) -> dic
     return {"PSNR": float(-10 * np.log10(((albedo - true)[inner] ** 2).mean())), "SSIM": float(ssim[inner].mean()),
             "pores": float(np.corrcoef(fine[inner], true_fine[inner])[0, 1]),
             "moles": float((spots * true_spots)[near].sum() / (true_spots[near] ** 2).sum())}
-
-
-def _table(name: str, rows: dict[str, dict[str, float]]) -> str:
-    figures = list(next(iter(rows.values())))
-    lines = [f"| {name} | " + " | ".join(figures) + " |", "|" + " --- |" * (len(figures) + 1)]
-    return "\n".join(lines
-                     + [f"| {row} | " + " | ".join(f"{values[f]:.4g}" for f in figures) + " |"
-                        for row, values in rows.items()])
 
 
 if __name__ == "__main__":
