@@ -10,17 +10,14 @@ was set on are the default seeds).
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from core.cameras.landmarks import PUPILS_PER_LIDS, fit_rays, pupils  # noqa: E402
-from core.cameras.world import intersect_rays  # noqa: E402
-from core.face import faces  # noqa: E402
-from core.synthetic import painted_head  # noqa: E402
-from core.synthetic.identities import identity_coefficients  # noqa: E402
+from core.cameras.landmarks import PUPILS_PER_LIDS, fit_rays, pupils
+from core.cameras.world import intersect_rays
+from core.face import faces
+from core.synthetic import painted_head
+from core.synthetic.identities import identity_coefficients
 
 SEEDS = (5, 11, 23, 31, 42, 57)
 AZIMUTHS = (-40, -28, -18, -9, 0, 9, 18, 28, 40)

@@ -49,7 +49,6 @@ from .people import PEOPLE, write_maps
 from .relit_maps import Worn, face_mask, read_rows, read_worn, worn_by, write_row
 from .relit_renders import MARGIN
 
-ROOT = Path(__file__).resolve().parent.parent
 LIGHTS = ("three_point", "window", "sun", "coloured", "city.exr", "interior.exr")
 ROWS = ("raw", "delit", "solved", "plain", "no_relief", "even_gloss", "true_albedo", "true_normal", "true_specular",
         "floor")
@@ -156,8 +155,8 @@ def render(subject: RelitSubject, work: Path, lights: list[str], wanted: list[st
     write_json(work / "job.json",
                {"rows": rows, "lights": list(lights), "out": str(renders), "mask": str(mask), "resolution": RESOLUTION,
                 "samples": SAMPLES})
-    subprocess.run([sys.executable, "-m", "benchmarks.relit_renders", str(work / "job.json")], cwd=ROOT, check=True,
-                   stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, "-m", "benchmarks.relit_renders", str(work / "job.json")], cwd=figures.ROOT,
+                   check=True, stdout=subprocess.DEVNULL)
 
 
 def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..demo import table
+from ..albedo_score import table
 from ..figures import Figures
 from ..pages import Sections, prose
 
