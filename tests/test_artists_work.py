@@ -103,7 +103,7 @@ def test_a_world_is_kept_by_a_number_of_its_own_and_not_by_its_place_in_the_list
 
 
 def test_who_asked_for_one_face_does_not_delete_another(addon, capture, item):
-    with pytest.raises(RuntimeError, match="Another face is chosen now"):
+    with pytest.raises(RuntimeError, match="Another face is selected now"):
         bpy.ops.wildcap.delete_face(root=str(capture.parent / "another.wildcap"))
     assert (capture / "head.obj").is_file()
     clicked = []

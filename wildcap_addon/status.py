@@ -199,7 +199,7 @@ def _look_aside(root: str, stamp: tuple, capture: Capture, settings) -> None:
     except Exception as error:  # of a folder that changes under the look: the next stamp is another one
         _found.put((root, stamp,
                     Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error}).",
-                                           "It is looked at again in a second."))))
+                                           "WildCap looks again in a second."))))
 
 
 def redraw() -> None:

@@ -32,7 +32,8 @@ def sections(*records: Figures) -> Sections:
     of = Figures(zip(RECORDS, records, strict=True))
     return [("", prose("""
         Every page has the command, the commit and the day that made its figures, all on 2 cores of a shared machine
-        (AMD EPYC, 25 GB), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only. Only the
+        (25 GB; each page names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic
+        subjects only, and may be older than the figures beside them. Only the
         sample and the state of the albedo are by delighter and solver as they are, and *the delighter's answers* by the
         delighter; pages of older code name their commit.
         """)),

@@ -17,6 +17,10 @@ def sections(demo: Figures) -> Sections:
     return [("", prose(f"""
         ![frame, mask, albedo, specular, normal, three lights](../pictures/teaser.jpg)
 
+        *The picture is of 2026-11-22, by the delighter and the solver of then. Above: a frame, the shadow mask, the
+        solved albedo, which keeps a faint outline of the leaves, and the specular albedo. Below: the normals, nearly
+        flat, and the head under the sun, three lamps and a window, with a bright patch on the unseen scalp.*
+
         The solved albedo against the truth, in the picture, on facial skin; the true skin tone is given (mean of
         {demo.views} frames). *After one gain*: per channel, in linear light. *Detail*: the correlation with the truth's
         log green between 1 and 3 px. *Shadow step*: log(answer / truth), lit less dark, at the shadow's edge.

@@ -56,7 +56,9 @@ def told() -> dict[str, list[str]]:
         "README.md": in_readme(of),
         "docs/cameras.md": in_cameras(of.geometry.lps_sun.cameras.against_truth, of.head_scale),
         "docs/scan_and_head.md": in_scan_and_head(of.geometry.lps_sun, of.sample_surfaces),
-        "docs/guide/install.md": [f"{installed.told_gb:.1f} GB are told, {installed.freed_gb:.1f} GB come off again"],
+        "docs/guide/install.md": [
+            f"it announces {installed.told_gb:.1f} GB, and **Remove Solver**, which says first what it frees, gives "
+            f"back {installed.freed_gb:.1f} GB"],
         "docs/guide/relight.md": [
             f"takes {memory.shown_gb:.1f} GB of memory ({memory.empty_gb:.1f} GB empty; {memory.loading_gb:.1f} GB "
             f"while they load, {memory.mask_opened_gb:.1f} GB when a mask"],

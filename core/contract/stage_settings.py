@@ -27,7 +27,7 @@ class FramesSettings:
     """The pictures are mirrored, as a front camera may save them: flip them back. A head alone cannot show which way
     round it was"""
     no_glasses: bool = setting(False, per_face=True)
-    """The person wears no glasses, whatever the frames look like: a capture with glasses is refused"""
+    """The person wears no glasses, whatever the frames look like. Off: a capture that shows glasses is refused"""
 
 
 @dataclass(frozen=True)

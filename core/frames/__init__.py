@@ -167,8 +167,8 @@ def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photo
     if len(records) < FEWEST and not photographs:
         raise Problem(f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be "
                       "built from.",
-                      "Film the face for 5 to 30 seconds while you walk half around it; a damaged file may be whole "
-                      "once copied again.")
+                      "Film the face for 5 to 30 seconds while you walk half around it; if the file may be damaged, "
+                      "copy it again.")
     if not any(r.face_box for r in records):
         raise Problem("No face was found in any frame.",
                       "Film one face, upright, filling a third of the picture or more, and lit well enough to see the "

@@ -46,8 +46,8 @@ def read_video(path: Path, most: int, long_side: int, report: Reporter) -> Itera
                 report.log("The video is HDR; its highlights are compressed into sRGB.")
             turns, mirrored = orientation(frame)
             if not given and mirrored:
-                report.finding("The video is marked to be shown as in a mirror, as selfie cameras do; it was turned "
-                               "back, so that left is left.",
+                report.finding("The video is marked to be shown as in a mirror, as selfie cameras do; it was "
+                               "flipped back, so that left is left again.",
                                "If moles end up on the wrong side, switch off the mirroring of the front camera, or "
                                "film with the back camera.")
             size = fitted(frame.width * (stream.sample_aspect_ratio or 1), frame.height, long_side)

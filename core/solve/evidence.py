@@ -94,7 +94,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     if texture.shape[:2] != confidence.shape or texture.shape[0] != texture.shape[1]:
         raise Problem(f"{capture.texture} is {texture.shape[1]} x {texture.shape[0]} pixels and "
                       f"{capture.texture_confidence.name} {confidence.shape[1]} x "
-                      f"{confidence.shape[0]}: they have to be alike and square.", advise_again("texture"))
+                      f"{confidence.shape[0]}: both have to be square and of one size.", advise_again("texture"))
     confidence, texture = np.clip(confidence, 0, 1), np.clip(texture, 0, None)
     if confidence.max() < 1e-3:
         raise Problem("No texel of the texture was seen by any frame.",

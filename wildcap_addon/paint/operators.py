@@ -82,7 +82,7 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         if self.kind == 'SNAPPED' and session.offered() != 'SNAPPED':
             raise Problem("There is no snapped mask.", "Click Snap to Edges first, and wait until it is done.")
         if self.kind == 'PROPOSAL' and session.painted_kind() == 'PROTECT':
-            raise Problem("What is to be protected is never proposed.", "Paint it by hand, or click Clear.")
+            raise Problem("There is no proposal for the protect mask.", "Paint it by hand, or click Clear.")
         image = session.mask()
         mask = mask_image.mask_values(image)
         files = {"PROPOSAL": capture.shadow_mask_auto, "SNAPPED": capture.shadow_mask_edges}
