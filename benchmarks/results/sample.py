@@ -15,11 +15,11 @@ RECORDS = ("demo",)
 
 def sections(demo: Figures) -> Sections:
     return [("", prose(f"""
-        ![frame, mask, albedo, specular, normal, three lights](../pictures/teaser.jpg)
+        ![A frame, the mask over the delit texture, the solved albedo; the head under three lights](../pictures/teaser.jpg)
 
-        *The picture is of 2026-11-22, by the delighter and the solver of then. Above: a frame, the shadow mask, the
-        solved albedo, which keeps a faint outline of the leaves, and the specular albedo. Below: the normals, nearly
-        flat, and the head under the sun, three lamps and a window, with a bright patch on the unseen scalp.*
+        *Above: a frame, the shadow mask over the delit texture, and the solved albedo, which keeps a faint outline of
+        the leaves and a dark spot where one ends at the brow. Below: the head under the sun, three lamps and a window
+        (`python -m benchmarks.teaser`). What no camera saw well of the scalp is made up, without stubble.*
 
         The solved albedo against the truth, in the picture, on facial skin; the true skin tone is given (mean of
         {demo.views} frames). *After one gain*: per channel, in linear light. *Detail*: the correlation with the truth's
