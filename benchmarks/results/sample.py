@@ -15,7 +15,7 @@ RECORDS = ("demo",)
 
 def sections(demo: Figures) -> Sections:
     return [("", prose(f"""
-        ![A frame, the mask over the delit texture, the solved albedo; the head under three lights](../pictures/teaser.jpg)
+        ![Frame, mask over the delit texture, solved albedo; the head under three lights](../pictures/teaser.jpg)
 
         *Above: a frame, the shadow mask over the delit texture, and the solved albedo, which keeps a faint outline of
         the leaves and a dark spot where one ends at the brow. Below: the head under the sun, three lamps and a window
