@@ -32,6 +32,27 @@ def planes(signal: np.ndarray, matrix: int, bits: int, full: bool) -> list[np.nd
             for p in (low + scale * y, 128 * step + chroma * cb[::2, ::2], 128 * step + chroma * cr[::2, ::2])]
 
 
+def signal_of(y: np.ndarray, cb: np.ndarray, cr: np.ndarray, matrix: int, bits: int, full: bool) -> np.ndarray:
+    """R'G'B' [..., 3] in [0, 1] of Y, Cb, Cr, by the standards' formulas."""
+    red, blue = WEIGHTS[matrix]
+    step, top = 2 ** (bits - 8), 2**bits - 1
+    scale, low, chroma = (top, 0, top) if full else (219 * step, 16 * step, 224 * step)
+    luma = (y - float(low)) / scale
+    r = luma + (2 - 2 * red) * (cr - 128.0 * step) / chroma
+    b = luma + (2 - 2 * blue) * (cb - 128.0 * step) / chroma
+    return np.stack([r, (luma - red * r - blue * b) / (1 - red - blue), b], -1)
+
+
+def frame_of(signal: np.ndarray, matrix: int, bits: int, full: bool) -> av.VideoFrame:
+    frame = av.VideoFrame(signal.shape[1], signal.shape[0], f"yuv420p{bits}le" if bits > 8 else "yuv420p")
+    for plane, values in zip(frame.planes, planes(signal, matrix, bits, full), strict=True):
+        rows = np.zeros((plane.height, plane.line_size // values.itemsize), values.dtype)
+        rows[:, :values.shape[1]] = values
+        plane.update(rows.tobytes())
+    frame.colorspace, frame.color_range = matrix, 2 if full else 1
+    return frame
+
+
 def write(path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec="libx265", times=None, base=1000,
           **options):
     """A video of full-range R'G'B' signals; `times` in units of 1/base second."""
@@ -45,13 +66,8 @@ def write(path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec
         context.color_trc, context.color_primaries, context.colorspace = trc, primaries, matrix
         context.color_range = 2 if full else 1
         for i, signal in enumerate(signals):
-            frame = av.VideoFrame(stream.width, stream.height, stream.pix_fmt)
-            for plane, values in zip(frame.planes, planes(signal, matrix, bits, full), strict=True):
-                rows = np.zeros((plane.height, plane.line_size // values.itemsize), values.dtype)
-                rows[:, :values.shape[1]] = values
-                plane.update(rows.tobytes())
+            frame = frame_of(signal, matrix, bits, full)
             frame.pts, frame.time_base = times[i] if times is not None else round(i * base / 24), Fraction(1, base)
-            frame.colorspace, frame.color_range = matrix, 2 if full else 1
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return path
@@ -130,6 +146,26 @@ def test_full_and_narrow_range_are_told_apart(tmp_path, full):
     colours = [[0.2] * 3, [0.8] * 3, [0.7, 0.5, 0.4], [0.1, 0.3, 0.2]]
     assert np.abs(shown(write(tmp_path / "a.mp4", [patches(colours)] * 3, full=full, codec="libx264"))
                   - colours).max() < 0.012
+
+
+@pytest.mark.parametrize("size", [(320, 180), (160, 90)], ids=["as it is", "shrunk"])
+@pytest.mark.parametrize("full", [False, True], ids=["narrow", "full"])
+@pytest.mark.parametrize("bits", [8, 10])
+def test_skin_is_as_bright_as_it_was_filmed(bits, full, size):
+    """Flat patches, dark skin in a shadow among them, against the standards' formulas of the very values in the
+    frame; whole codes of 255 are half a code off, and the full range's a little more."""
+    most = (1.0 if full else 0.75) / 255
+    for colour in [(200, 140, 115), (90, 60, 50), (40, 30, 25), (250, 250, 250)]:
+        flat = np.full((180, 320, 3), np.array(colour) / 255)
+        stored = [plane[0, 0] for plane in planes(flat[:2, :2], 1, bits, full)]
+        true = np.clip(signal_of(*stored, 1, bits, full), 0, 1)
+        frame = frame_of(flat, 1, bits, full)
+        plain = video._srgb(frame, size, 1, REC709)
+        assert plain.shape == (size[1], size[0], 3) and np.abs(plain - true).max() < most
+        if full and bits == 8:
+            continue  # that no phone records in HDR or in a wide gamut
+        wide = video._srgb(frame, size, 1, P3)
+        assert np.abs(wide - to_srgb(true.astype(np.float32), 1, P3)).max() < most
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
