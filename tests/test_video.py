@@ -17,7 +17,8 @@ from core.frames.colour import HLG, P3, PQ, REC709, REC2020, to_srgb
 from core.frames.source import evenly_in_time
 from core.imaging import images
 
-WEIGHTS = {1: (0.2126, 0.0722), 9: (0.2627, 0.0593)}  # Kr and Kb of the matrices Rec. 709 and Rec. 2020
+WEIGHTS = {1: (0.2126, 0.0722), 5: (0.299, 0.114), 9: (0.2627, 0.0593)}
+"""Kr and Kb of the matrices Rec. 709, Rec. 601 and Rec. 2020."""
 
 
 def planes(signal: np.ndarray, matrix: int, bits: int, full: bool) -> list[np.ndarray]:
@@ -116,6 +117,17 @@ def test_hdr_of_ten_bits_shows_known_patches_in_known_colours(tmp_path, codec):
         path = write(tmp_path / f"{transfer}.mov", [patches([signal for signal, _ in known])] * 4, transfer, REC2020, 9,
                      10, codec=codec)
         assert np.abs(shown(path) - [srgb for _, srgb in known]).max() < 0.015
+
+
+@pytest.mark.parametrize(("size", "transfer", "matrix"), [((1280, 720), 2, 1), ((720, 1280), 2, 1), ((640, 480), 2, 5),
+                                                           ((640, 480), PQ, 9)])
+def test_a_video_without_tags_is_read_as_players_read_it(size, transfer, matrix):
+    skin = np.array([130, 105, 95]) / 255
+    frame = frame_of(np.full((size[1], size[0], 3), skin), matrix, 10, False)
+    frame.colorspace = video.UNSPECIFIED
+    srgb = video._srgb(frame, size, transfer, video.UNSPECIFIED)
+    true = to_srgb(skin.astype(np.float32), transfer, video.UNSPECIFIED)
+    assert np.abs(srgb - true).max() < 1 / 255
 
 
 def test_saturated_colours_keep_luminance_and_hue_and_nothing_leaves_the_gamut():

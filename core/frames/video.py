@@ -19,10 +19,12 @@ import numpy as np
 from av.video.reformatter import Interpolation
 
 from ..contract.messages import Problem, Reporter
-from .colour import HLG, PQ, REC709, to_srgb
+from .colour import HLG, PQ, REC709, REC2020, to_srgb
 from .source import Picture, evenly_in_time, fitted
 
 UNSPECIFIED, FULL_RANGE = 2, 2
+REC709_MATRIX, REC601_MATRIX, REC2020_MATRIX = 1, 5, 9
+"""Matrices from R'G'B' to Y'CbCr as ITU-T H.273 numbers them."""
 EXACT_16 = Interpolation.AREA | Interpolation.ACCURATE_RND
 EXACT = EXACT_16 | Interpolation.FULL_CHR_H_INT
 """How swscale shrinks and converts: without these it truncates, and a frame comes up to 3 codes of 255 too dark, a
@@ -189,9 +191,7 @@ def _srgb(frame: av.VideoFrame, size: tuple[int, int], transfer: int, primaries:
     # Unless told, swscale takes Rec. 601 for every matrix, and a phone's Rec. 709 skin turns greenish; and full-range
     # values for the narrow range
     how = {"width": size[0], "height": size[1], "interpolation": EXACT if plain else EXACT_16,
-           "dst_colorspace": "DEFAULT"}
-    if frame.colorspace != UNSPECIFIED:
-        how["src_colorspace"] = frame.colorspace
+           "src_colorspace": _matrix(frame, transfer, primaries), "dst_colorspace": "DEFAULT"}
     if full:
         how |= {"src_color_range": FULL_RANGE, "dst_color_range": FULL_RANGE}
     if plain:
@@ -199,3 +199,12 @@ def _srgb(frame: av.VideoFrame, size: tuple[int, int], transfer: int, primaries:
     white = 65535 if full or frame.format.is_rgb else WHITE_16
     signal = frame.reformat(format="rgb48le", **how).to_ndarray().astype(np.float32) / white
     return to_srgb(np.minimum(signal, 1), transfer, primaries)
+
+
+def _matrix(frame: av.VideoFrame, transfer: int, primaries: int) -> int:
+    """H.273's number of the frame's matrix; where no tag tells it, what players take: by the size, of HDR Rec. 2020."""
+    if frame.colorspace != UNSPECIFIED:
+        return frame.colorspace
+    if transfer in (HLG, PQ) or primaries == REC2020:
+        return REC2020_MATRIX
+    return REC709_MATRIX if frame.width >= 1280 or frame.height > 576 else REC601_MATRIX
