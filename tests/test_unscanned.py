@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from core import registration
 from core.contract.capture import Capture
+from core.contract.eyes_record import read_eyes
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
 from core.geometry import meshes
@@ -92,6 +93,17 @@ def test_two_sides_make_a_draft_that_says_so(tmp_path):
         report.findings[0]["problem"].startswith("This head is a draft")
         and "from each side" in report.findings[0]["remedy"]
     )
+
+
+def test_open_eyes_from_one_side_make_a_draft_with_eyeballs(tmp_path, monkeypatch):
+    """Nothing can be lifted from views a degree apart: the straightest alone tells where the eyes are."""
+    monkeypatch.setattr(registration.eyes, "opening", lambda seen: 0.35)
+    capture, report = shot(tmp_path / "selfies.wildcap", (-1, 0, 1), points=0), Reporter("registration")
+    registration.run(capture, from_json({}), report)
+    left, right = read_eyes(capture)
+    assert capture.head_open.is_file() and capture.picture("registration", "eyes").is_file()
+    assert left.centre[0] > 0.02 and right.centre[0] < -0.02
+    assert report.findings[0]["problem"].startswith("This head is a draft")
 
 
 def test_landmarks_that_the_artist_puts_win(fitted, tmp_path):

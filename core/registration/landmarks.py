@@ -29,8 +29,8 @@ BEHIND_FACE_M = 0.06
 class Landmarks:
     """points [468, 3] in metres (nan: not lifted), trust [468] in [0, 1], error_px the median reprojection error;
     images maps a frame's name to what was found in it: pixels [468, 2], and used bool [468]; opening of the eyes,
-    height over width; put bool [468]: which points the artist has given; eyes: by a frame's name the yaw of the head in
-    degrees and the right and the left eye, in its pixels."""
+    height over width; put bool [468]: which points the artist has given; eyes: by the name of a frame whose landmarks
+    were used the yaw of the head in degrees and the right and the left eye, in its pixels."""
 
     points: np.ndarray
     trust: np.ndarray
@@ -62,9 +62,11 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
     lifted = triangulate([view for view, _ in detections], np.stack([pixels for _, pixels in detections]))
     if not np.isfinite(lifted.points).any():  # a single view, or several from one side
         lifted = lift_alone(*min(detections, key=lambda pair: abs(seen[pair[0].name][0])))
+    # another person's eyes say nothing, nor does what the net guesses of a profile
+    kept = {name: seen[name] for name, (_, used) in lifted.images.items() if used.any()}
     return replace(lifted,
-                   opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in seen.values()]),
-                   eyes=seen)
+                   opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in kept.values()]),
+                   eyes=kept)
 
 
 def spread(views: list[View], count: int) -> list[View]:
