@@ -95,6 +95,12 @@ def test_matches_refine_the_cameras_and_bring_in_a_profile(scene):
     assert centres.max() < 0.005 and turns.max() < 0.3
 
 
+def test_a_told_focal_length_that_was_rounded_is_put_right(scene):
+    rng, views, found = scene
+    result = resect(group(views, 0.975 * FOCAL), found, matched(views, rng), Reporter("cameras"))
+    assert result.model.cameras[1].params[0] == pytest.approx(FOCAL, rel=0.01)
+
+
 def test_wrong_matches_do_not_count_as_refinement(scene):
     rng, views, found = scene
     keypoints = {name: rng.uniform(0, WIDTH, (300, 2)) for name in views}

@@ -20,7 +20,7 @@ import pycolmap
 from ..contract.messages import Reporter
 from ..face import faces
 from ..geometry.models import pose_of
-from .bundle import Bundle, Observations, adjust
+from .bundle import TOLD_SIGMA_LOG, Bundle, Observations, adjust
 from .landmarks import template_landmarks
 from .matches import Matches
 from .resection import LEAST_MATCHES, agreeing, place_by_matches
@@ -32,9 +32,8 @@ WIDE_WIDTH_SHARES = (0.06, 0.025)
 """What goes before for cameras that may be some pixels off."""
 FEATURE_SIGMA_SHARE = 1 / 3000
 """Deviation of a match, as a share of a picture's longer side: features are looked for at 2,000 pixels."""
-FREE_SIGMA_LOG, TOLD_SIGMA_LOG = 3.0, 0.03
-"""Spreads of the logarithm of a focal length: of an unknown one, which what matches tells, and of one that a file told,
-which focusing changes."""
+FREE_SIGMA_LOG = 3.0
+"""Spread of the logarithm of a focal length that no file told: what matches tells it."""
 FEWEST_TRACKS = 60
 
 
@@ -85,12 +84,12 @@ def as_bundle(model: pycolmap.Reconstruction, registered: list, unknown_focal: b
     used = [model.cameras[image.camera_id] for image in registered]
     return Bundle(np.array([pose.rotation.matrix() for pose in poses]), np.array([pose.translation for pose in poses]),
                   focal, focal.copy(),
-                  np.zeros(len(numbers), bool), np.array([numbers.index(image.camera_id) for image in registered]),
+                  np.full(len(numbers), FREE_SIGMA_LOG if unknown_focal else TOLD_SIGMA_LOG),
+                  np.array([numbers.index(image.camera_id) for image in registered]),
                   np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]),
                   np.zeros(len(template_landmarks().basis)),
                   template_landmarks().mean.copy(),
-                  FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used),
-                  FREE_SIGMA_LOG if unknown_focal else TOLD_SIGMA_LOG)
+                  FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used))
 
 
 def _landmarks(model: pycolmap.Reconstruction, registered: list, found: dict[str, faces.Face]) -> Observations:

@@ -5,12 +5,14 @@ sRGB."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
 from ..contract.hashes import PHOTOGRAPHS
 from ..contract.messages import Problem, Reporter
 from ..imaging import images
+from ..imaging.heif import DIAGONAL_35MM
 from .colour import P3, SDR, to_srgb
 from .source import Picture, evenly, fit
 
@@ -47,6 +49,6 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
         if "Display P3" in images.read_profile(path):  # an iPhone's JPEG
             full = to_srgb(full, SDR, P3)
         srgb = fit(full, long_side)
-        focal_px = None if focal is None else round(focal / 36 * max(srgb.shape[:2]), 2)  # a full frame is 36 mm wide
+        focal_px = None if focal is None else round(focal / DIAGONAL_35MM * math.hypot(*srgb.shape[:2]), 2)
         yield Picture(srgb, int(index), None, path.name, focal_px, done, len(chosen),
                       full if full.shape != srgb.shape else None)

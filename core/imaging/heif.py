@@ -8,6 +8,7 @@ The package brings Pillow along; nothing here uses it.
 
 from __future__ import annotations
 
+import math
 import struct
 from pathlib import Path
 
@@ -27,6 +28,9 @@ EXIF_FOLDER, FOCAL_LENGTH, FOCAL_35MM, PLANE_RESOLUTION, PLANE_UNIT, WIDTH, HEIG
     0xA003,
 )
 """EXIF 2.3's numbers of its tags."""
+DIAGONAL_35MM = 43.267
+"""Diagonal in millimetres of a frame of 35 mm film, 36 x 24 mm: a picture of another shape is compared by its own
+(CIPA DCG-001)."""
 
 
 def is_heif(path: Path) -> bool:
@@ -94,15 +98,16 @@ def parse_exif(block: bytes) -> dict[int, float]:
 
 
 def focal_35mm(tags: dict[int, float], width: int, height: int) -> float | None:
-    """Millimetres of 35 mm film: as told, or from the lens and the sensor's resolution; None where neither is. width,
-    height: the picture's."""
+    """Millimetres of 35 mm film, by the diagonal: as told, or from the lens and the sensor's resolution; None where
+    neither is. width, height: the picture's."""
     if tags.get(FOCAL_35MM, 0) > 0:
         return tags[FOCAL_35MM]
     unit = {2: 25.4, 3: 10.0, 4: 1.0}.get(int(tags.get(PLANE_UNIT, 2)))
     if not unit or min(tags.get(FOCAL_LENGTH, 0), tags.get(PLANE_RESOLUTION, 0)) <= 0:
         return None
     sensor_mm = max(tags.get(WIDTH, width), tags.get(HEIGHT, height)) / tags[PLANE_RESOLUTION] * unit
-    return 36 * tags[FOCAL_LENGTH] / sensor_mm if 1 < sensor_mm < 100 else None
+    diagonal_mm = sensor_mm * math.hypot(width, height) / max(width, height)
+    return DIAGONAL_35MM * tags[FOCAL_LENGTH] / diagonal_mm if 1 < sensor_mm < 100 else None
 
 
 def _opened(path: Path):
