@@ -104,7 +104,8 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
     if 1 <= off < IMPORT_NEAR_RATIO and len(frames.records) <= ALL_PAIRS_FRAMES:
         report.log("The imported cameras are a little off; they are refined by what matches in these pictures.")
         matches = solve_structure(frames, capture, False, settings.cameras.matching, settings.seed, report)[1]
-        model = refine(model, faces, matches, False, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
+        told = {image.name: model.cameras[image.camera_id].mean_focal_length() for image in model.images.values()}
+        model = refine(model, faces, matches, told, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
         head, off = checked(model)
     if not off < 1:
         raise Problem(f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by "

@@ -65,7 +65,7 @@ def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, re
     registered = [image for image in everything if by is None or image.name in by]
     names, width = [image.name for image in registered], _face_width(room, registered)
     own = on_head(room, everything, matches)
-    straight, bundle = straightened(room, everything, own), as_bundle(room, registered, False)
+    straight, bundle = straightened(room, everything, own), as_bundle(room, registered, {})
     reach = REACH_WIDTH_SHARES[0] * width
     _, tracks, still = agreeing(bundle, names, straight, reach)
     if len(tracks) < LEAST_TRACKS:

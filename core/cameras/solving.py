@@ -157,8 +157,8 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
         return solved
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
     missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
-    unknown = any(record.focal_px is None for record in frames.records)
-    model = refine(solved.model, solved.found, solved.matches, unknown, report, camera_groups(missing, capture.frames))
+    told = {record.name: record.focal_px for record in frames.records if record.focal_px}
+    model = refine(solved.model, solved.found, solved.matches, told, report, camera_groups(missing, capture.frames))
     return replace(solved, model=model, head=find_head(model, solved.found, apart),
                    every_frame_held=holds_every_frame(model))
 
