@@ -145,6 +145,13 @@ def test_each_shortcoming_has_its_sentence_and_a_good_capture_none(records, word
         assert len(report.findings) == 1, "nothing else is wrong"
 
 
+def test_a_face_in_blurred_frames_alone_is_told():
+    records = [record(face_box=None, yaw_deg=None)] * 39 + [record(blur=0.8)]
+    kept = [each for each, out in zip(records, blurred(records), strict=True) if not out]
+    with pytest.raises(Problem, match="only in frames that are blurred"):
+        diagnose(kept, ["00039.jpg"], False, Reporter("frames"))
+
+
 def test_the_measures_say_what_was_done_to_the_picture():
     rng = np.random.default_rng(0)
     box = faces.detect(FACE).box

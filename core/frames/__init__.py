@@ -23,7 +23,7 @@ from ..contract.settings import Settings
 from ..face import faces
 from ..face.glasses import sureness
 from ..imaging import images
-from .doctor import FEW, blurred, diagnose, examine
+from .doctor import FEW, FIND_FACE, blurred, diagnose, examine
 from .drift import content_of, gains_of
 from .eyes import blinks
 from .glasses import judge
@@ -170,9 +170,7 @@ def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photo
                       "Film the face for 5 to 30 seconds while you walk half around it; a damaged file may be whole "
                       "once copied again.")
     if not any(r.face_box for r in records):
-        raise Problem("No face was found in any frame.",
-                      "Film one face, upright, filling a third of the picture or more, and lit well enough to see the "
-                      "eyes.")
+        raise Problem("No face was found in any frame.", FIND_FACE)
     if len(records) > 1 and np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL:
         raise Problem("All frames show the same picture: the camera did not move.",
                       "Let the person sit still and move the camera from one ear around the face to the other.")

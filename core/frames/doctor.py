@@ -36,6 +36,8 @@ EQUAL, OFTEN = 0.75, 0.5
 """Prominence of a second face over the first above which nobody can say whom the video shows; and the share of frames
 in which it is so."""
 
+FIND_FACE = "Film one face, upright, filling a third of the picture or more, and lit well enough to see the eyes."
+
 
 def examine(srgb: np.ndarray, box: tuple | None) -> dict:
     """blur (Crete et al., "The Blur Effect", 2007: 0 sharp, 1 blurred), and of the inside of the face's box (the middle
@@ -66,8 +68,10 @@ def blurred(records: list[FrameRecord], around: int = 10) -> np.ndarray:
 
 def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, report: Reporter) -> None:
     """Reports a finding for each shortcoming of the kept frames; `dropped` names those left out as blurred. Raises
-    Problem where it is not clear whose face is meant."""
+    Problem where they show no face, or it is not clear whose face is meant."""
     with_face = [r for r in records if r.face_box]
+    if not with_face:
+        raise Problem("A face was found only in frames that are blurred and were left out.", FIND_FACE)
     count, shots = len(records), "photographs" if photographs else "frames"
     _other_faces(with_face, report)
     if count < FEW:

@@ -39,12 +39,10 @@ def sharpness(srgb: np.ndarray, box: tuple | None) -> float:
 
 def turns(records: list[FrameRecord]) -> np.ndarray:
     """From where each frame sees the head [N]: its yaw in degrees, carried on along the sequence where no face is
-    found; nan too far from any face."""
+    found; nan too far from any face. One at least shows a face."""
     order = np.arange(len(records))
     known = np.array([r.yaw_deg is not None for r in records])
     yaw = np.array([r.yaw_deg or 0.0 for r in records])
-    if not known.any():
-        return order.astype(float)
     turn = np.interp(order, order[known], yaw[known])
     for end, inner in ((order[known][0], slice(None, 5)), (order[known][-1], slice(-5, None))):
         beyond = order < end if end == order[known][0] else order > end
