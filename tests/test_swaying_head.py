@@ -10,8 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from core.cameras.matches import Matches
 from core.cameras.settled import MOST_LEFT_SHARE, on_head, settle
+from core.cameras.solving import Solved, _refined
 from core.cameras.world import HeadFrame
+from core.contract.capture import Capture
+from core.contract.frame_records import VIDEO, FrameRecord, Frames
 from core.contract.messages import Reporter
+from core.contract.settings import from_json
 from core.face import template
 from core.geometry.models import pose_of
 from core.synthetic.painted_head import camera
@@ -127,6 +131,22 @@ def test_a_film_in_which_hardly_anything_of_the_head_matches_is_left_as_it_is():
     model, matches, _, _ = filmed(0.003, 1.0, count=150)
     settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
     assert settled is model and left is None
+
+
+@pytest.mark.parametrize("by", [[], ["00.jpg", "08.jpg"]])
+def test_where_hardly_a_frame_shows_the_head_large_enough_the_cameras_stay(by):
+    model, matches, _, _ = filmed(0.0, 0.0, count=50)
+    assert settle(model, IN_HEAD, matches, Reporter("cameras"), by) == (model, None)
+
+
+def test_a_film_of_a_tiny_head_is_not_looked_at_in_parts(tmp_path):
+    """In pictures of 100 by 133 pixels the head is 40 wide."""
+    model, matches, _, _ = filmed(0.0, 0.0, count=50)
+    model.cameras[1].rescale(100, 133)
+    records = tuple(FrameRecord(name=f"{i:02d}.jpg", sharpness=1.0, selected=False) for i in range(len(AZIMUTHS)))
+    solved = Solved(model, "plain", IN_HEAD, {}, matches=matches)
+    kept = _refined(solved, Frames(records, VIDEO), Capture(tmp_path / "a.wildcap"), from_json({}), Reporter("cameras"))
+    assert kept is solved
 
 
 def test_only_what_matches_on_the_head_counts():

@@ -34,8 +34,8 @@ MOST_LEFT_SHARE = 0.9
 """Share of the head's error that is left by cameras of its own, in tracks that had no say in these, below which the
 head moved before the room. Poses that fit one half of the tracks predict the other half no better where it kept still;
 a tenth is left to the scatter of the two medians."""
-LEAST_TRACKS = 200
-"""Points on the head that several frames show, for poses of its own."""
+LEAST_TRACKS, LEAST_FRAMES = 200, 3
+"""Points on the head that several frames show, and frames, for poses of its own."""
 CHEST_M = -0.12
 """Height below the eyes where what moves with the head ends."""
 AIR_SHARE = 0.05
@@ -63,6 +63,8 @@ def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, re
     room.transform(head.world_from_model)
     everything = sorted((image for image in room.images.values() if image.has_pose), key=lambda image: image.name)
     registered = [image for image in everything if by is None or image.name in by]
+    if len(registered) < LEAST_FRAMES:
+        return model, None
     names, width = [image.name for image in registered], _face_width(room, registered)
     own = on_head(room, everything, matches)
     straight, bundle = straightened(room, everything, own), as_bundle(room, registered, {})

@@ -145,8 +145,10 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
         model, left = settle(solved.model, solved.head, solved.matches, report,
                              skeleton.choose(film, skeleton.size(film)))
         if left is None or model is not solved.model:  # a room's features are too coarse for a head
-            fine, chosen = match_crops(head_boxes(solved.model, solved.head), frames, capture, settings.seed, report)
-            model, left = settle(solved.model, solved.head, fine, report, chosen)
+            boxes = head_boxes(solved.model, solved.head)
+            if boxes:
+                fine, chosen = match_crops(boxes, frames, capture, settings.seed, report)
+                model, left = settle(solved.model, solved.head, fine, report, chosen)
         if model is solved.model:
             return solved
         report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % "
