@@ -255,6 +255,8 @@ def test_bad_sources_end_in_a_sentence(capture, tmp_path):
     assert "no photographs" in refused(capture, folder).problem
     (folder / "a.dng").write_bytes(b"raw")
     assert "raw files" in refused(capture, folder).problem
+    (folder / "b.avif").write_bytes(b"avif")
+    assert "are raw and AVIF files" in refused(capture, folder).problem
     for i in range(2):
         (folder / f"{i}.png").write_bytes(b"cut off while it was copied")
     assert "None of the photographs" in refused(capture, folder).problem

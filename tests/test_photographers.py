@@ -52,3 +52,18 @@ def test_a_telephones_heic_is_read_upright_with_its_focal_length_and_colours(cap
     for i in range(3):
         (folder / f"{i}.heic").write_bytes(b"heic")
     assert "None of the photographs" in refused(Capture(tmp_path / "b.wildcap"), folder).problem
+
+
+def test_what_cannot_be_read_is_named_with_what_to_do(capture, tmp_path):  # noqa: F811
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for i in range(3):
+        images.write_srgb(folder / f"{i}.jpg", moving_face(5 * i).astype(np.float32) / 255)
+    (folder / "cut.heic").write_bytes(b"heic")
+    (folder / "from the web.avif").write_bytes(b"avif")
+    record, report = take(capture, folder)
+    other, finding = report.findings[:2]
+    assert len(record["frames"]) == 3
+    assert finding["problem"] == "1 of 4 photographs could not be read: cut.heic."
+    assert finding["remedy"].startswith("Export it as JPEG or PNG")
+    assert other["problem"].startswith("1 AVIF files were left out beside 4") and "JPEG" in other["remedy"]

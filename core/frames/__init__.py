@@ -162,8 +162,6 @@ def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
 
 
 def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photographs: bool) -> None:
-    if not records:
-        raise Problem(f"None of the photographs in {path.name} could be read.", "Save them again as JPEG, PNG or TIFF.")
     if len(records) < FEWEST and not photographs:
         raise Problem(f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be "
                       "built from.",

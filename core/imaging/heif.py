@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""HEIC, HEIF and AVIF, as telephones write them, by libheif (package pillow-heif), which OpenImageIO's wheel lacks.
-libheif turns pictures upright itself, so their EXIF orientation is told already.
+"""HEIC and HEIF, as telephones write them, by libheif (package pillow-heif), which OpenImageIO's wheel lacks. libheif
+turns pictures upright itself, so their EXIF orientation is told already.
 
 The package brings Pillow along; nothing here uses it.
 """
@@ -16,7 +16,7 @@ import numpy as np
 
 from ..contract.messages import Problem
 
-SUFFIXES = (".heic", ".heif", ".avif")
+SUFFIXES = (".heic", ".heif")
 EXPORT = "Export it as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible)."
 EXIF_FOLDER, FOCAL_LENGTH, FOCAL_35MM, PLANE_RESOLUTION, PLANE_UNIT, WIDTH, HEIGHT = (
     0x8769,
