@@ -3,6 +3,7 @@
 """A head without a scan: a synthetic person from a few photographs that lie far apart, under known cameras."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pycolmap
@@ -104,6 +105,19 @@ def test_open_eyes_from_one_side_make_a_draft_with_eyeballs(tmp_path, monkeypatc
     assert capture.head_open.is_file() and capture.picture("registration", "eyes").is_file()
     assert left.centre[0] > 0.02 and right.centre[0] < -0.02
     assert report.findings[0]["problem"].startswith("This head is a draft")
+
+
+def test_of_many_views_32_spread_over_all_are_asked(monkeypatch):
+    views, asked = [painted_head.camera(azimuth) for azimuth in np.linspace(-70, 70, 61)], []
+
+    def note(capture, chosen, subject, report):
+        asked.extend(chosen)
+        raise InterruptedError
+
+    monkeypatch.setattr(registration, "_shown", note)
+    with pytest.raises(InterruptedError):
+        registration._by_views(None, None, views, SimpleNamespace(model=None, found=None), Reporter("registration"))
+    assert len(asked) == 32 and asked[0] is views[0] and asked[-1] is views[-1]
 
 
 def test_landmarks_that_the_artist_puts_win(fitted, tmp_path):

@@ -18,7 +18,7 @@ from ..imaging import images
 from . import eyes
 
 MOST_VIEWS = 32
-"""In which the face is looked for, spread over all."""
+"""In which the face is looked for, spread over all; and, where there is no scan, its outlines."""
 FEW_VIEWS = 6
 """Of so few views two with a face will do: the others may be profiles."""
 BEHIND_FACE_M = 0.06
