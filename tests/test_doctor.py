@@ -152,6 +152,16 @@ def test_a_face_in_blurred_frames_alone_is_told():
         diagnose(kept, ["00039.jpg"], False, Reporter("frames"))
 
 
+def test_of_a_few_photographs_the_blurred_one_is_named():
+    report = Reporter("frames")
+    records = [record(name=f"{i:05d}.jpg", source=f"IMG_{i}.jpg", time_s=None, yaw_deg=12.0 * i - 54,
+                      blur=0.86 if i == 4 else 0.45) for i in range(10)]
+    diagnose(records, [], True, report)
+    told = [finding for finding in report.findings if "blurred" in finding["problem"]]
+    assert [finding["problem"] for finding in told] == ["1 of 10 photographs are blurred: IMG_4.jpg."]
+    assert told[0]["frames"] == ["00004.jpg"]
+
+
 def test_the_measures_say_what_was_done_to_the_picture():
     rng = np.random.default_rng(0)
     box = faces.detect(FACE).box

@@ -13,7 +13,7 @@ import numpy as np
 from skimage.measure import blur_effect
 
 from ..contract.frame_records import FrameRecord
-from ..contract.messages import Problem, Reporter
+from ..contract.messages import Problem, Reporter, name_some
 from .select import inside_box, turns
 
 UNMEASURED = {"blur": 1.0, "brightness": 0.0, "clipped": 0.0, "noise": 0.0}
@@ -168,6 +168,10 @@ def _sharpness(found: list[FrameRecord], dropped: list[str], count: int, shots: 
     elif len(dropped) > 0.1 * (count + len(dropped)):
         report.finding(f"{len(dropped)} of {count + len(dropped)} {shots} are blurred and were left out.",
                        "Move more slowly, and film in more light.", dropped)
+    soft = [r for r in found if r.blur > BLURRED]
+    if soft and shots == "photographs" and len(soft) < len(found) / 2:
+        report.finding(f"{len(soft)} of {count} photographs are blurred: {name_some([r.shown for r in soft])}.",
+                       "Take them again with the focus on the face.", _names(soft))
 
 
 def _names(records: list[FrameRecord]) -> list[str]:
