@@ -162,6 +162,16 @@ def test_of_a_few_photographs_the_blurred_one_is_named():
     assert told[0]["frames"] == ["00004.jpg"]
 
 
+@pytest.mark.parametrize(("photographs", "told"), [(True, True), (False, False)])
+def test_sides_that_no_face_tells_are_believed_of_a_film_alone(photographs, told):
+    """The camera of a film moves on into the profile; the last of twenty photographs may show anything."""
+    records = around(low=-28, high=28, step=4) + [record(yaw_deg=None, face_box=None)] * 2
+    records = [record(yaw_deg=None, face_box=None)] * 2 + records
+    report = Reporter("frames")
+    diagnose(records, [], photographs, report)
+    assert ("from in front only" in problems(report)) == told
+
+
 def test_the_measures_say_what_was_done_to_the_picture():
     rng = np.random.default_rng(0)
     box = faces.detect(FACE).box

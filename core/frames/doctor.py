@@ -100,7 +100,8 @@ def _other_faces(found: list[FrameRecord], report: Reporter) -> None:
 
 
 def _angles(records: list[FrameRecord], photographs: bool, report: Reporter) -> None:
-    turn = turns(records)
+    # the neighbours of a photograph in the alphabet say nothing about it
+    turn = (np.array([r.yaw_deg for r in records if r.yaw_deg is not None]) if photographs else turns(records))
     turn = np.sort(turn[np.isfinite(turn)])
     again = "Start at one ear and walk around the face to the other, at arm's length, while the person sits still."
     left, right = -turn[0], turn[-1]
