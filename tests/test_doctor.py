@@ -19,6 +19,8 @@ from core.contract.settings import from_json
 from core.face import faces
 from core.frames.doctor import blurred, diagnose, examine
 from core.frames.eyes import blinks
+from core.frames.select import sharpness
+from core.frames.source import Picture
 from core.imaging import images
 
 FACE = astronaut().astype(np.float32)[:300, 60:400] / 255
@@ -170,6 +172,21 @@ def test_sides_that_no_face_tells_are_believed_of_a_film_alone(photographs, told
     report = Reporter("frames")
     diagnose(records, [], photographs, report)
     assert ("from in front only" in problems(report)) == told
+
+
+def test_where_no_face_is_found_a_film_is_measured_at_the_last_one_and_a_photograph_at_the_person(monkeypatch):
+    """A sharp back of the head to the right of a blurred wall, before which the last picture showed a face."""
+    picture = np.full((300, 400, 3), 0.5, np.float32)
+    picture[100:220, 260:380] = FACE[60:180, 100:220]
+    person = np.zeros((300, 400), np.float32)
+    person[100:220, 260:380] = 1
+    monkeypatch.setattr(faces, "segment_person", lambda srgb: person)
+    last = faces.Face((20, 40, 160, 200), np.zeros((468, 3)), 0.9)
+    for time_s, box in ((None, (260, 100, 380, 220)), (1.0, last.box)):
+        made = frames._record(Picture(picture, 0, time_s, "", None, 1, 1), "0.jpg", None, last, 0.0)
+        assert made.sharpness == pytest.approx(sharpness(picture, box), abs=1e-5)
+        assert made.blur == examine(picture, box)["blur"]
+    assert examine(picture, last.box)["blur"] > 0.9 > 0.6 > examine(picture, (260, 100, 380, 220))["blur"]
 
 
 def test_the_measures_say_what_was_done_to_the_picture():

@@ -16,15 +16,15 @@ detectors fail."""
 
 
 def inside_box(srgb: np.ndarray, box: tuple | None) -> np.ndarray:
-    """The part of a picture in a face's box; its middle where there is none."""
+    """The part of a picture in a box; its middle where there is none."""
     height, width = srgb.shape[:2]
     x0, y0, x1, y1 = box or (width / 4, height / 4, 3 * width / 4, 3 * height / 4)
     return srgb[max(0, int(y0)):max(1, int(y1)), max(0, int(x0)):max(1, int(x1))]
 
 
 def sharpness(srgb: np.ndarray, box: tuple | None) -> float:
-    """Tenengrad of the face (of the middle of the picture where there is none), relative to its brightness; higher is
-    sharper.
+    """Tenengrad of what lies in a box (of the middle of the picture where there is none), relative to its brightness;
+    higher is sharper.
 
     Mean squared Sobel gradient of luma over squared mean luma: exposure cancels, motion blur and defocus do not.
     """
