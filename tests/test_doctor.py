@@ -160,7 +160,7 @@ def test_of_a_few_photographs_the_blurred_one_is_named():
                       blur=0.86 if i == 4 else 0.45) for i in range(10)]
     diagnose(records, [], True, report)
     told = [finding for finding in report.findings if "blurred" in finding["problem"]]
-    assert [finding["problem"] for finding in told] == ["1 of 10 photographs are blurred: IMG_4.jpg."]
+    assert [finding["problem"] for finding in told] == ["1 of 10 photographs is blurred: IMG_4.jpg."]
     assert told[0]["frames"] == ["00004.jpg"]
 
 
@@ -187,6 +187,26 @@ def test_where_no_face_is_found_a_film_is_measured_at_the_last_one_and_a_photogr
         assert made.sharpness == pytest.approx(sharpness(picture, box), abs=1e-5)
         assert made.blur == examine(picture, box)["blur"]
     assert examine(picture, last.box)["blur"] > 0.9 > 0.6 > examine(picture, (260, 100, 380, 220))["blur"]
+
+
+def test_the_ten_photographs_of_the_guide_are_no_gaps_and_no_holes():
+    yaws = (0, -38, 41, None, None, 2, -1, 36, -40, 1)
+    records = [record(yaw_deg=yaw, face_box=None if yaw is None else (200, 300, 520, 720), time_s=None) for yaw in yaws]
+    report = Reporter("frames")
+    diagnose(records, [], True, report)
+    assert problems(report).startswith("There are only 10 photographs: expect a head that follows features and")
+    assert len(report.findings) == 1
+    diagnose([replace(each, yaw_deg=1.0) for each in records[:1]] * 3, [], True, report)
+    assert "profiles" in report.findings[-1]["remedy"] and "front only" in report.findings[-1]["problem"]
+
+
+def test_photographers_are_not_told_of_frames_and_videos():
+    second = [record(time_s=None, other_face=0.5)] * 5 + [record(time_s=None)] * 10
+    report = Reporter("frames")
+    diagnose(second, [], True, report)
+    assert "second face is in 5 of 15 photographs" in problems(report)
+    with pytest.raises(Problem, match="crop the photographs"):
+        diagnose([record(time_s=None, other_face=0.9)] * 5, [], True, report)
 
 
 def test_the_measures_say_what_was_done_to_the_picture():

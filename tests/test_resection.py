@@ -11,6 +11,7 @@ import pycolmap
 import pytest
 
 from benchmarks.cameras_against_truth import similarity
+from core.cameras import _left_out, solving
 from core.cameras.bundle import TOLD_SIGMA_LOG, Observations, adjust
 from core.cameras.joint import FREE_SIGMA_LOG, as_bundle, refine
 from core.cameras.landmarks import fit_rays, pupils, template_landmarks
@@ -18,6 +19,7 @@ from core.cameras.matches import Matches, tracks
 from core.cameras.resection import resect
 from core.cameras.solving import Solved, worth
 from core.cameras.world import agreeing_faces, find_head
+from core.contract.frame_records import FrameRecord
 from core.contract.messages import Reporter
 from core.face.faces import Face
 from core.synthetic.painted_head import FOCAL, HEIGHT, WIDTH, camera
@@ -208,6 +210,33 @@ def test_of_two_ways_the_one_that_places_more_frames_wins_unless_nothing_but_the
     worths = [worth(solved("face", 5)), worth(solved("skin", 3)), worth(solved("face", 3)),
               worth(solved("face", 5, refined=False))]
     assert all(better > worse for better, worse in zip(worths, worths[1:], strict=False))
+
+
+@pytest.mark.parametrize(("time_s", "blurred", "problem", "remedy"), [
+    (None, False, "1 of 4 photographs did not fit", "Take more between"),
+    (None, True, "1 of them are blurred", "Take those again"),
+    (0.5, False, "1 of 4 frames did not fit", "Move the camera slower past"),
+    (0.5, True, "1 of them are blurred", "or add light"),
+])
+def test_what_did_not_fit_is_told_in_the_words_of_its_source(scene, time_s, blurred, problem, remedy):
+    _, views, _ = scene
+    model = model_of(dict(list(views.items())[:3]), FOCAL, np.random.default_rng(0), 0.0)
+    records = [FrameRecord(name=f"{i}.jpg", source=f"IMG {i}.jpg", time_s=time_s, selected=True,
+                           sharpness=0.1 if blurred and i == 3 else 1.0) for i in range(4)]
+    report = Reporter("cameras")
+    _left_out(Solved(model, "plain", None, {}), records, {each.name: each.shown for each in records}, report)
+    told = report.findings[0]
+    assert problem in told["problem"] and remedy in told["remedy"]
+    assert told["frames"] == ["IMG 3.jpg"]
+
+
+def test_a_mirrored_photograph_is_told_by_its_own_name(scene, monkeypatch):
+    monkeypatch.setattr(solving, "find_mirrored", lambda names, *others: ["0.jpg"])
+    monkeypatch.setattr(solving, "camera_groups", lambda records, folder: [])
+    monkeypatch.setattr(solving, "resect", lambda *given: None)
+    records = [FrameRecord(name=f"{i}.jpg", source=f"IMG {i}.jpg", sharpness=1.0, selected=True) for i in range(4)]
+    _, fault = solving._by_face(records, SimpleNamespace(frames=None), scene[2], Matches(), None, Reporter("cameras"))
+    assert "and IMG 0.jpg is mirrored" in fault
 
 
 def test_tracks_hang_together_and_ambiguous_ones_go():

@@ -202,13 +202,14 @@ def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | Non
 
 def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matches: Matches, settings: Settings,
              report: Reporter) -> tuple[Solved | None, str | None]:
+    shown = {record.name: record.shown for record in records}
     mirrored = (find_mirrored(sorted(found), [], capture.frames, report, found) if len(records) <= FEW_PHOTOGRAPHS
                 else [])
     result = resect(camera_groups(records, capture.frames),
                     {name: face for name, face in found.items() if name not in mirrored}, matches, report)
     registered = result.model.num_reg_images() if result else 0
     if registered < min(LEAST_VIEWS, len(records)):
-        but = f", and {', '.join(mirrored)} is mirrored" if mirrored else ""
+        but = f", and {', '.join(shown[name] for name in mirrored)} is mirrored" if mirrored else ""
         without = f"A face is found in only {len(found)} of {len(records)} frames{but}"
         return None, f"{without}; the landmarks of three could have placed the cameras."
     if result.landmark_miss > MOST_LANDMARK_MISS_SHARE:
