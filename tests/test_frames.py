@@ -169,29 +169,6 @@ def test_photographs_upright_with_focal_length(capture, tmp_path):
     assert "few" in report.figures["expected_quality"]
 
 
-def test_display_p3_photographs_are_brought_to_srgb(capture, tmp_path):
-    """As iPhones write them: the profile is in the JPEG's second application segment."""
-    text = b"Display P3\0"
-    tag = b"desc" + bytes(4) + struct.pack(">I", len(text)) + text + bytes(78 + -(90 + len(text)) % 4)
-    head = struct.pack(">I4xI4s4s4s12x4s28x3I48x", 144 + len(tag), 0x02100000, b"mntr", b"RGB ", b"XYZ ", b"acsp",
-                       0xF6D6, 0x10000, 0xD32D)
-    profile = b"ICC_PROFILE\0\1\1" + head + struct.pack(">I4s2I", 1, b"desc", 144, len(tag)) + tag
-    (tmp_path / "photos").mkdir()
-    for i in range(3):
-        path = tmp_path / "photos" / f"{i}.jpg"
-        images.write_srgb(path, moving_face(5 * i).astype(np.float32) / 255, quality=98)
-        data = path.read_bytes()
-        if i:
-            path.write_bytes(data[:2] + b"\xff\xe2" + struct.pack(">H", len(profile) + 2) + profile + data[2:])
-    (tmp_path / "photos" / "3.dng").write_bytes(b"raw")
-    record, report = take(capture, tmp_path / "photos")
-    assert "1 raw files were left out beside 3" in report.findings[0]["problem"]
-    plain, wide = (images.read_srgb(capture.frames / record["frames"][i]["name"]) for i in (0, 1))
-    assert np.abs(plain - moving_face(0) / 255).mean() < 0.01
-    skin = moving_face(5) / 255
-    assert np.abs(wide - skin).mean() > 0.005 and np.abs(wide - to_srgb(skin.astype(np.float32), 1, 12)).mean() < 0.01
-
-
 def test_mirrored_pictures_are_flipped_back(capture, tmp_path):
     source = write_video(tmp_path / "clip.mp4", [moving_face(i) for i in range(4)])
     take(capture, source)

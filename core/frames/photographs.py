@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of photographs, in the order of their names, upright by their EXIF orientation, Display P3 brought to
-sRGB."""
+"""Folders of photographs, in the order of their names, upright by their EXIF orientation, Display P3 and
+Adobe RGB brought to sRGB."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..contract.hashes import PHOTOGRAPHS
 from ..contract.messages import Problem, Reporter, name_some
 from ..imaging import images
 from ..imaging.heif import DIAGONAL_35MM
-from .colour import P3, SDR, to_srgb
+from .colour import from_profile
 from .source import Picture, evenly, fit
 
 UNREAD = {".dng": "raw", ".avif": "AVIF"}
@@ -39,7 +39,7 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
     if unread:
         report.finding(f"{len(unread)} {kinds} files were left out beside {len(pictures)} photographs that can be "
                        "read.", AS_JPEG)
-    chosen, left_out = evenly(len(pictures), most), {}
+    chosen, left_out, unknown = evenly(len(pictures), most), {}, {}
     for done, index in enumerate(chosen, 1):
         path = pictures[index]
         try:
@@ -50,14 +50,20 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
             continue
         focal = images.read_focal_35mm(path)
         full = fit(srgb, max(FEATURES_PX, long_side))
-        if "Display P3" in images.read_profile(path):  # an iPhone's JPEG
-            full = to_srgb(full, SDR, P3)
+        profile = images.read_profile(path)
+        srgb = from_profile(full, profile)
+        if srgb is None:
+            unknown.setdefault(profile, []).append(path.name)
+        full = full if srgb is None else srgb
         srgb = fit(full, long_side)
         focal_px = None if focal is None else round(focal / DIAGONAL_35MM * math.hypot(*srgb.shape[:2]), 2)
         yield Picture(srgb, int(index), None, path.name, focal_px, done, len(chosen),
                       full if full.shape != srgb.shape else None)
     if len(left_out) == len(chosen):
         raise Problem(f"None of the photographs in {folder.name} could be read.", next(iter(left_out.values())))
+    for profile, names in unknown.items():
+        report.finding(f"The colours of {name_some(names)} are taken for sRGB, and their profile is {profile}.",
+                       "Export them in sRGB, Display P3 or Adobe RGB.")
     if left_out:
         report.finding(f"{len(left_out)} of {len(chosen)} photographs could not be read: {name_some(list(left_out))}.",
                        next(iter(left_out.values())))

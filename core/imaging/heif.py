@@ -32,6 +32,9 @@ DIAGONAL_35MM = 43.267
 """Diagonal in millimetres of a frame of 35 mm film, 36 x 24 mm: a picture of another shape is compared by its own
 (CIPA DCG-001)."""
 
+PROFILES = ("Display P3", "Adobe RGB", "ProPhoto RGB")
+"""Colour profiles that are looked for by name."""
+
 
 def is_heif(path: Path) -> bool:
     return Path(path).suffix.lower() in SUFFIXES
@@ -59,13 +62,14 @@ def size(path: Path) -> tuple[int, int]:
 
 
 def read_profile(path: Path) -> str:
-    """ "Display P3" where the picture's colours are in it, else ""."""
+    """Name of the picture's colours where they are none of sRGB: one of PROFILES, or PQ or HLG; else ""."""
     info = _opened(path).info
     icc, nclx = info.get("icc_profile") or b"", info.get("nclx_profile") or {}
-    wide = (
-        b"Display P3" in icc or "Display P3".encode("utf-16-be") in icc or not icc and nclx.get("color_primaries") == 12
-    )
-    return "Display P3" if wide else ""
+    named = [name for name in PROFILES if name.encode() in icc or name.encode("utf-16-be") in icc]
+    if named or icc:
+        return named[0] if named else ""
+    hdr = {16: "PQ", 18: "HLG"}.get(nclx.get("transfer_characteristics"), "")
+    return hdr or ("Display P3" if nclx.get("color_primaries") == 12 else "")
 
 
 def read_exif(path: Path) -> dict[int, float]:
