@@ -179,6 +179,16 @@ def test_the_eyes_of_another_face_are_not_read(person, monkeypatch):
         assert [each.view.name for each in looks] == ["0.jpg", "1.jpg", "3.jpg", "4.jpg"]
 
 
+@pytest.mark.parametrize("degrees", [0, 30])
+def test_what_a_single_view_shows_is_lifted_as_deep_as_it_is_large(person, degrees):
+    """The same picture in a world of 50 mm between the pupils and in one of 63."""
+    pixels = view_from(degrees).project(template.landmark_points(person[0]))[0]
+    usual, small = (landmarks.lift_alone(view_from(degrees, distance), pixels).points
+                    for distance in (0.5, 0.5 * 50 / 63))
+    assert np.abs(63 / 50 * small - usual).max() < 0.0005
+    assert np.linalg.norm(usual - template.landmark_points(person[0]), axis=1).mean() < 0.005
+
+
 def test_lids_meet_the_edges_that_were_seen_and_balls_lie_behind_them(person, fitted):
     _, opened = person
     start, found = fitted

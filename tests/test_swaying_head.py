@@ -3,15 +3,17 @@
 """Cameras of a film whose subject swayed before the room: known poses of a head found again by what matches on it, and
 a head at rest left alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pycolmap
 import pytest
 from scipy.spatial.transform import Rotation
 
 from core.cameras.matches import Matches
-from core.cameras.settled import MOST_LEFT_SHARE, on_head, settle
+from core.cameras.settled import MOST_LEFT_SHARE, head_boxes, on_head, settle
 from core.cameras.solving import Solved, _refined
-from core.cameras.world import HeadFrame
+from core.cameras.world import PUPILS_M, HeadFrame
 from core.contract.capture import Capture
 from core.contract.frame_records import VIDEO, FrameRecord, Frames
 from core.contract.messages import Reporter
@@ -22,7 +24,7 @@ from core.synthetic.painted_head import camera
 
 AZIMUTHS = np.linspace(-40, 40, 17)
 NEIGHBOURS, WRONG, NOISE_PX, RAGGED_PX = 5, 0.2, 0.3, 2.0
-IN_HEAD = HeadFrame(pycolmap.Sim3d(), 1.0, 0.01, 0.062, 0.001)
+IN_HEAD = HeadFrame(pycolmap.Sim3d(), 1.0, 0.01, PUPILS_M, 0.001)
 
 
 def filmed(sway_m: float, sway_deg: float, count: int = 700, ragged: float = 0.0):
@@ -147,6 +149,13 @@ def test_a_film_of_a_tiny_head_is_not_looked_at_in_parts(tmp_path):
     solved = Solved(model, "plain", IN_HEAD, {}, matches=matches)
     kept = _refined(solved, Frames(records, VIDEO), Capture(tmp_path / "a.wildcap"), from_json({}), Reporter("cameras"))
     assert kept is solved
+
+
+def test_parts_that_show_the_head_are_as_large_for_a_child():
+    """The pupils' distance that is set makes the world smaller, and the head in it."""
+    model, _, _, _ = filmed(0.0, 0.0, count=50)
+    small = replace(IN_HEAD, world_from_model=pycolmap.Sim3d(50 / 63, pycolmap.Rotation3d(np.eye(3)), np.zeros(3)))
+    assert head_boxes(model, small) == head_boxes(model, IN_HEAD)
 
 
 def test_only_what_matches_on_the_head_counts():

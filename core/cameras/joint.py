@@ -24,7 +24,7 @@ from .bundle import TOLD_SIGMA_LOG, Bundle, Observations, adjust
 from .landmarks import template_landmarks
 from .matches import Matches
 from .resection import LEAST_MATCHES, agreeing, place_by_matches
-from .world import agreeing_faces, find_head
+from .world import PUPILS_M, agreeing_faces, find_head
 
 AGREE_WIDTH_SHARES = (0.0125, 0.006, 0.004)
 """Shares of the face's width by which matches may miss, round by round."""
@@ -45,7 +45,7 @@ def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches
     missing: [{names, width, height, focal_px}] like camera groups, of frames that have no camera yet and may get one by
     their matches; they share the lens of the frames of their size, unless another one was told of those. agree: as
     AGREE_WIDTH_SHARES, wider first where the cameras may be off. Raises Problem where no face is found."""
-    head = find_head(model, found, 0.063)
+    head = find_head(model, found, PUPILS_M)
     model = pycolmap.Reconstruction(model)
     model.transform(head.world_from_model)
     seen_faces = agreeing_faces(model, found)

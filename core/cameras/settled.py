@@ -55,12 +55,12 @@ class HeadCameras:
 
 def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter,
            by: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
-    """The model with its cameras placed with respect to the head, in the head's world (metres), and the share of the
+    """The model with its cameras placed with respect to the head, in the template's world, and the share of the
     error that is left of the head's matches (see MOST_LEFT_SHARE); `model` itself where the head kept still, or where
     too little matches on it to tell (None). `by`: the frames that tell, all if not given; each of the others is placed
     by the points of those."""
     room = pycolmap.Reconstruction(model)
-    room.transform(head.world_from_model)
+    room.transform(head.template_from_model)
     everything = sorted((image for image in room.images.values() if image.has_pose), key=lambda image: image.name)
     registered = [image for image in everything if by is None or image.name in by]
     if len(registered) < LEAST_FRAMES:
@@ -137,7 +137,7 @@ def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tup
     """Name -> left, top, right and bottom, in pixels, of a part that shows the head, with some air around it, in each
     frame of `model` where the head is more than a dot. The parts are of one size, as pictures of one camera are."""
     room, outlines = pycolmap.Reconstruction(model), {}
-    room.transform(head.world_from_model)
+    room.transform(head.template_from_model)
     for image in room.images.values():
         outline = _outline(room, image) if image.has_pose else None
         if outline is not None:

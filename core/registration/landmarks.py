@@ -117,10 +117,13 @@ def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Land
 def lift_alone(view: View, pixels: np.ndarray) -> Landmarks:
     """Lifts the pixels [468, 2] of a single view to where their rays pass nearest to the mean head's landmarks: across
     the view they are the person's, along it the mean's. The mean head stands as the world has it, its pupils about the
-    origin."""
-    mean = template.landmark_points(template.load())
-    rays = view.rays(pixels)
-    points = view.centre + rays * ((mean - view.centre) * rays).sum(1, keepdims=True)
+    origin, and is made as large as the person's looks."""
+    mean, rays = template.landmark_points(template.load()), view.rays(pixels)
+    across, size = np.eye(3) - np.outer(view.axis, view.axis), 1.0
+    for _ in range(3):  # what lies nearer or farther looks larger or smaller
+        points = view.centre + rays * ((size * mean - view.centre) * rays).sum(1, keepdims=True)
+        size = float(np.linalg.norm((points - points.mean(0)) @ across)
+                     / np.linalg.norm((mean - mean.mean(0)) @ across))
     used = _facing(points, np.repeat(view.centre[None, None], len(points), 0))[:, 0] > 0
     return Landmarks(points, np.where(used, 0.25, 0.0), 0.0, {view.name: (pixels, used)})
 
