@@ -133,7 +133,7 @@ def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
     scan.run(capture, Settings(), Reporter("scan"))
     report = Reporter("registration")
     registration.run(capture, Settings(), report)
-    assert "This head is a draft: the photographs show the face from one side only" in problems(report)
+    assert "This head is a draft: its pictures show the face from one side only" in problems(report)
     head, truth = read_head(capture).mesh, painted_head.person()[0].mesh
     width, true_width = np.ptp(head.vertices[:, 0]), np.ptp(truth.vertices[:, 0])
     assert width == pytest.approx(true_width, rel=0.08), "metres, by the distance of the pupils"
