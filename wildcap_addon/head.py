@@ -66,7 +66,12 @@ def bring_in(context, item) -> bpy.types.Object:
 
 def _in_place(head, mesh) -> bpy.types.Mesh:
     """The new mesh on an existing head, with its materials; or the mesh it has, where that has followed."""
-    if any(follow(head, mesh) for follow in FOLLOWERS) or _take_shape(head.data, mesh):
+    try:
+        followed = any(follow(head, mesh) for follow in FOLLOWERS)
+    except Problem:
+        bpy.data.meshes.remove(mesh)
+        raise
+    if followed or _take_shape(head.data, mesh):
         bpy.data.meshes.remove(mesh)
         return head.data
     data_blocks.replace_data(head, mesh, bpy.data.meshes)

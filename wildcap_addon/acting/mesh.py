@@ -32,6 +32,12 @@ def has(obj) -> bool:
     return MARK in obj.data and obj.data.shape_keys is not None
 
 
+def is_whole(obj) -> bool:
+    """Whether a head that has face units has all of its vertices still, by whose numbers the units find them."""
+    asset = load()
+    return len(obj.data.vertices) == len(asset.template) + len(asset.copies) + len(asset.parts)
+
+
 def open_filmed_eyes(obj, capture: Capture) -> None:
     """A head that was filmed with open eyes gets its face units, and its lids as they were; one that has them, or shape
     keys of its own, stays as it is. `head.complete` asks."""
@@ -128,9 +134,14 @@ def rest(obj) -> None:
 
 
 def renewed(obj, mesh) -> bool:
-    """Whether the head has units and now follows the new mesh, which is then not needed; `head.bring_in` asks."""
+    """Whether the head has units and now follows the new mesh, which is then not needed; `head.bring_in` asks. Raises
+    Problem where vertices were deleted or added since: what the artist made of it is then neither moved nor
+    replaced."""
     if not has(obj) or len(mesh.vertices) != len(load().template):
         return False
+    if not is_whole(obj):
+        raise Problem("This head's mesh was changed since it got its face units, and cannot follow a new shape.",
+                      "Keep it as it is, or delete it and click Bring In Head.")
     follow(obj, _vertices(mesh), _corner_normals(mesh))
     return True
 
