@@ -38,6 +38,12 @@ def is_whole(obj) -> bool:
     return len(obj.data.vertices) == len(asset.template) + len(asset.copies) + len(asset.parts)
 
 
+def is_complete(obj) -> bool:
+    """Whether it has its face units, every one of them, and all of its vertices: what gaze and close-up are made
+    from."""
+    return has(obj) and is_whole(obj) and load().units.keys() <= set(obj.data.shape_keys.key_blocks.keys())
+
+
 def open_filmed_eyes(obj, capture: Capture) -> None:
     """A head that was filmed with open eyes gets its face units, and its lids as they were; one that has them, or shape
     keys of its own, stays as it is. `head.complete` asks."""
@@ -129,7 +135,8 @@ def rest(obj) -> None:
     for key in keys.key_blocks:
         if key.name in units:
             key.value = 0
-    keys[OPEN] = float(keys.id_properties_ui(OPEN).as_dict()["default"])
+    if OPEN in keys:
+        keys[OPEN] = float(keys.id_properties_ui(OPEN).as_dict()["default"])
     keys.update_tag()
 
 

@@ -48,8 +48,10 @@ def assemble(context, item) -> bpy.types.Material:
          {"Specular Amount": _specular_amount(capture), "Subsurface Scale": node_group.SCATTERING_M * _scale(obj)},
          before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
-    head.complete(obj, capture)
-    material[MADE] = node_trees.fingerprint(material, head.PREVIEW)
+    try:
+        head.complete(obj, capture)
+    finally:  # the maps are in, whatever is wrong with the rest of the head
+        material[MADE] = node_trees.fingerprint(material, head.PREVIEW)
     return material
 
 

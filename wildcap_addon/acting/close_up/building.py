@@ -63,11 +63,11 @@ def remove(obj) -> None:
 
 
 def keep_up(obj, _capture) -> None:
-    """The close-up of a head that was reconstructed anew is made for its new shape; one of a head that has its units no
-    more goes. `head.complete` asks."""
-    if of(obj) and mesh.has(obj):
+    """The close-up of a head that was reconstructed anew is made for its new shape; one of a head that was cut since, or
+    lost a unit, stays as it is; one of a head that has its units no more goes. `head.complete` asks."""
+    if of(obj) and mesh.is_complete(obj):
         add(bpy.context, obj)
-    elif of(obj):
+    elif of(obj) and not mesh.has(obj):
         remove(obj)
 
 
