@@ -15,6 +15,8 @@ IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0
           "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
 """Linear colours."""
 DEFAULT = "brown"
+SLOTS = ("Eyes", "Mouth", "Teeth")
+"""Of a head that is cut open, after the skin's; the artist's own follow."""
 KEY = "wildcap_inside"
 IRIS, IRIS_NODE = "iris", "WildCap Iris"
 """Kind of the material of an iris that is an object of its own (close_up), and its node that has the colour."""

@@ -18,14 +18,12 @@ from ...core.contract.messages import Problem
 from .. import captures
 from ..data_blocks import read_field
 from ..head import OUTER
-from . import carrying, filmed, materials
+from . import carrying, filmed, going_over, materials
 from .asset import GAZE, SIDES, FaceUnits, load
 
 MARK = "wildcap_face_units"
 OPEN = "eyesOpen"
 """Custom property of the shape keys: how far the lids are open, 0 to 1."""
-LAYOUT = {'FLOAT': ("value", 1), 'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4)}
-"""Kinds of attributes that are carried over: field, and how many numbers it has."""
 
 
 def has(obj) -> bool:
@@ -63,11 +61,13 @@ def add(obj, iris: str = "") -> None:
     head, normals = _vertices(old), _corner_normals(old)
     seen = filmed_eyes(obj, asset)
     carried = carrying.carried(asset, head, seen)
-    new = _built(old, asset, carried[0])
-    slots = list(old.materials) or [None]
-    for material in slots[:1] + materials.inside(obj.name, iris or measured_iris(seen) or materials.DEFAULT):
+    new, weights = _built(old, asset, carried[0]), going_over.read_weights(obj)
+    skin, *others = list(old.materials) or [None]
+    for material in (skin, *materials.inside(obj.name, iris or measured_iris(seen) or materials.DEFAULT), *others):
         new.materials.append(material)
+    _attributes(old, new, asset)
     obj.data = new
+    going_over.write_weights(obj, weights, _origin(asset))
     name = old.name
     if old.users == 0:
         bpy.data.meshes.remove(old)
@@ -169,12 +169,14 @@ def is_built_in(obj, asset: FaceUnits) -> bool:
 
 
 def _built(old, asset: FaceUnits, rest: np.ndarray):
-    """The mesh at rest, its UVs those of the head; inner parts but the skin's have theirs in tiles to the right, where
-    no map of the skin lies."""
+    """The mesh at rest, with the UVs and the settings of the head's; inner parts but the skin's have their UVs in tiles
+    to the right, where no map of the skin lies."""
     triangles = asset.triangles.copy()
     triangles[asset.corners[:, 0], asset.corners[:, 1]] = asset.corners[:, 2]
     inner = [[i for i in face if i >= 0] for face in asset.faces.tolist()]
-    mesh = bpy.data.meshes.new(old.name)
+    mesh = old.copy()
+    mesh.clear_geometry()
+    mesh.materials.clear()  # before any polygon says in which slot it is
     mesh.from_pydata(rest, [], triangles.tolist() + inner)
     uv = read_field(old.uv_layers[0].data, "uv", 2)
     first = len(rest) - len(asset.parts)
@@ -186,29 +188,33 @@ def _built(old, asset: FaceUnits, rest: np.ndarray):
     extra = known[corners] + np.stack([tile, 0 * tile], 1)
     layer = mesh.uv_layers.new(name=old.uv_layers[0].name)
     layer.data.foreach_set("uv", np.concatenate([uv, extra.astype(np.float32)]).ravel())
-    mesh.polygons.foreach_set("material_index",
-                              np.concatenate([np.zeros(len(triangles), np.int32), asset.slots.astype(np.int32)]))
+    slots = read_field(old.polygons, "material_index", kind=np.int32)
+    slots[slots > 0] += len(materials.SLOTS)  # the artist's own come after those of the inner parts
+    mesh.polygons.foreach_set("material_index", np.concatenate([slots, asset.slots.astype(np.int32)]))
     mesh.shade_smooth()
-    _attributes(old, mesh, asset)
     mesh.update()
     return mesh
 
 
 def _attributes(old, new, asset: FaceUnits) -> None:
-    """What is kept for each vertex of the head (its roughness, an artist's mask), on the copies as on what they double;
-    zero inside."""
-    for attribute in old.attributes:
-        if (
-            attribute.domain == 'POINT'
-            and attribute.data_type in LAYOUT
-            and not attribute.is_internal
-            and not attribute.is_required
-        ):
-            field, width = LAYOUT[attribute.data_type]
-            values = read_field(attribute.data, field, width)
-            inner = np.zeros((len(asset.parts), *values.shape[1:]), np.float32)
-            every = np.concatenate([values, values[asset.copies], inner])
-            new.attributes.new(attribute.name, attribute.data_type, 'POINT').data.foreach_set(field, every.ravel())
+    """What the artist and we know of each vertex, edge, face and corner of the head (its roughness, a mask, other UV
+    maps), on the copies as on what they double; zero inside."""
+    origin = _origin(asset)
+    known, ends = (read_field(mesh.edges, "vertices", 2, np.int32) for mesh in (old, new))
+    edges = {tuple(sorted(pair)): at for at, pair in enumerate(known.tolist())}
+    going_over.copy_attributes(old, new, {
+        'POINT': origin, 'EDGE': np.array([edges.get(tuple(sorted(pair)), -1) for pair in origin[ends].tolist()]),
+        'FACE': _first(len(old.polygons), len(new.polygons)), 'CORNER': _first(len(old.loops), len(new.loops))})
+
+
+def _origin(asset: FaceUnits) -> np.ndarray:
+    """Of each vertex of the head cut open the one that it was or doubles, -1 inside, [V + C + P]."""
+    return np.concatenate([np.arange(len(asset.template)), asset.copies, np.full(len(asset.parts), -1)])
+
+
+def _first(known: int, count: int) -> np.ndarray:
+    """Where the first of `count` come from: each from its own place; -1 for the others."""
+    return np.where(np.arange(count) < known, np.arange(count), -1)
 
 
 def _vertices(mesh) -> np.ndarray:
