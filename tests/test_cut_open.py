@@ -82,7 +82,7 @@ def test_weights_uv_maps_attributes_slots_and_seams_stay_on_a_head_that_is_cut_o
     assert not values(mesh.uv_layers["Mine"].data, "uv", 2)[3 * TRIANGLES:].any()
     group = values(mesh.attributes["group"].data, "value", 1, np.int32)[:, 0]
     assert np.array_equal(group[:TRIANGLES], np.arange(TRIANGLES)) and not group[TRIANGLES:].any()
-    assert seams(mesh) == before["seams"]
+    assert not seams(mesh) ^ before["seams"] and len(before["seams"]) > 1000
     assert [material.name for material in mesh.materials] == [
         skin.name, *(f"{obj.name} {inside}" for inside in ("Eyes", "Mouth", "Teeth")), "Beanie"]
     slots = values(mesh.polygons, "material_index", 1, np.int32)[:, 0]

@@ -31,12 +31,12 @@ which is then not needed."""
 
 COMPLETERS = []
 """Functions (head object, capture) of rooms that add to a head whose skin is assembled: the eyes that it was filmed
-with."""
+with. What one returns is to be told to the artist."""
 
 
-def complete(obj, capture: Capture) -> None:
-    for add in COMPLETERS:
-        add(obj, capture)
+def complete(obj, capture: Capture) -> str:
+    """Returns what is to be told of it, '' for nothing."""
+    return " ".join(filter(None, [add(obj, capture) for add in COMPLETERS]))
 
 
 def bring_in(context, item) -> bpy.types.Object:

@@ -11,6 +11,8 @@ LAYOUT = {'FLOAT': ("value", 1, np.float32), 'INT': ("value", 1, np.int32), 'INT
           'BOOLEAN': ("value", 1, bool), 'FLOAT2': ("vector", 2, np.float32), 'FLOAT_VECTOR': ("vector", 3, np.float32),
           'FLOAT_COLOR': ("color", 4, np.float32), 'BYTE_COLOR': ("color", 4, np.float32)}
 """Kinds of attributes that are carried over: field, how many numbers it has, and of which kind."""
+SEAM = ".uv_seam"
+"""Seams in Blender 4.2, which counts the attribute as its own."""
 ACTIVE = ("active_color_name", "default_color_name")
 
 
@@ -18,7 +20,8 @@ def copy_attributes(old, new, origins: dict[str, np.ndarray]) -> None:
     """All that the new mesh has not got, UV maps among them. origins: domain -> of each of the new mesh's elements the
     old one that it comes from, -1 for none: it gets zeros."""
     for attribute in old.attributes:
-        if attribute.data_type in LAYOUT and not attribute.is_internal and attribute.name not in new.attributes:
+        theirs = attribute.name == SEAM or not attribute.is_internal
+        if theirs and attribute.data_type in LAYOUT and attribute.name not in new.attributes:
             field, width, kind = LAYOUT[attribute.data_type]
             values, origin = read_field(attribute.data, field, width, kind), origins[attribute.domain]
             every = values[origin]

@@ -30,9 +30,9 @@ SET = "wildcap_set"
 """Where the material keeps what was set by itself: a value that is another one now is the artist's"""
 
 
-def assemble(context, item) -> bpy.types.Material:
+def assemble(context, item) -> tuple[bpy.types.Material, str]:
     """The skin material on the capture's head, from the 4K maps where they are newest, else from the solved ones; and
-    what else belongs to a finished head."""
+    what else belongs to a finished head, with what is to be told of that."""
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
     maps = status.delivered(capture)
@@ -49,10 +49,10 @@ def assemble(context, item) -> bpy.types.Material:
          before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
     try:
-        head.complete(obj, capture)
+        told = head.complete(obj, capture)
     finally:  # the maps are in, whatever is wrong with the rest of the head
         material[MADE] = node_trees.fingerprint(material, head.PREVIEW)
-    return material
+    return material, told
 
 
 def is_edited(obj) -> bool:
