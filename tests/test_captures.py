@@ -105,6 +105,28 @@ def test_the_active_head_says_which_of_several_captures_is_meant(addon, project)
     assert captures.active(bpy.context).name == "berta"
 
 
+def test_what_a_head_wears_means_its_face_as_the_head_does(addon, project):
+    active, heads = addon("captures").active, [item.head for item in items()]
+    hair = bpy.data.objects.new("Hair", bpy.data.hair_curves.new("Hair"))
+    tie = bpy.data.objects.new("Tie", None)
+    for thing, parent in ((hair, heads[0]), (tie, hair)):
+        bpy.context.scene.collection.objects.link(thing)
+        thing.parent = parent
+    for thing in (hair, tie):
+        bpy.context.scene.wildcap.active_index = 1
+        bpy.context.view_layer.objects.active = thing
+        assert active(bpy.context) == items()[0]
+        bpy.context.scene.wildcap.active_index = 1  # a click in the list
+        assert active(bpy.context) == items()[1] and bpy.context.view_layer.objects.active == heads[1]
+    bpy.data.objects.remove(heads[1])
+    bpy.context.view_layer.objects.active = hair
+    bpy.context.scene.wildcap.active_index = 1
+    assert active(bpy.context) == items()[1], "also where its head is not in the scene"
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.wildcap.open_capture(directory=items()[1].path)
+    assert active(bpy.context) == items()[1]
+
+
 def test_save_as_elsewhere_keeps_the_link(addon, project, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "elsewhere" / "other.blend"))
