@@ -71,10 +71,12 @@ def _is_preview(material) -> bool:
 
 def _material(obj) -> bpy.types.Material:
     """The head's skin material; somebody else's material in the first slot is replaced on this head only, never
-    changed."""
+    changed. Of a skin that another face has, too, the head gets a copy, with all that was set in it."""
     slots = obj.data.materials
     current = slots[0] if slots else None
     if current is not None:
+        if KEY in current and _is_another_face_s(current, obj):
+            current = slots[0] = current.copy()
         if KEY in current or _is_preview(current):
             return current
         current.use_fake_user = True  # it may have no other head
@@ -85,6 +87,11 @@ def _material(obj) -> bpy.types.Material:
     else:
         slots.append(material)
     return material
+
+
+def _is_another_face_s(material, obj) -> bool:
+    return any(other.data.materials[:1] == [material] and other.get(captures.HEAD_KEY) != obj.get(captures.HEAD_KEY)
+               for other in bpy.data.objects if other.type == 'MESH' and captures.HEAD_KEY in other)
 
 
 def _build(material, paths: dict, obj) -> None:
