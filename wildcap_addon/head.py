@@ -139,18 +139,27 @@ def read_mesh_file(context, path: Path) -> bpy.types.Mesh:
 
 def load_image(path, data: bool = False) -> bpy.types.Image:
     """The image of a file, read anew if Blender has it already: a picture in sRGB, or data. One of that file that was
-    painted on, or is packed in the .blend, stays as it is, and stays in the .blend."""
+    painted on, or is packed in the .blend as another one than the file is now, stays as it is, and stays in the
+    .blend."""
     known = [image for image in bpy.data.images if image.source == 'FILE' and image.filepath
              and Path(bpy.path.abspath(image.filepath, library=image.library)) == Path(path)]
-    touched = [image for image in known if image.is_dirty or image.packed_file is not None]
+    touched = [image for image in known
+               if image.is_dirty or image.packed_file is not None and not _is_packed(image, path)]
     for image in touched:
         image.use_fake_user = True
     image = next((image for image in known if image not in touched and image.library is None), None)
     if image is None:
         image = bpy.data.images.load(str(path))
-    image.reload()
+    if image.packed_file is None:
+        image.reload()
     (colours.as_data if data else colours.as_srgb)(image)
     return image
+
+
+def _is_packed(image: bpy.types.Image, path) -> bool:
+    """Whether the .blend holds the very file, as it does where Blender packs resources by itself."""
+    packed, path = image.packed_file, Path(path)
+    return packed.size == path.stat().st_size and bytes(packed.data) == path.read_bytes()
 
 
 def _show_texture(head, capture: Capture) -> None:
