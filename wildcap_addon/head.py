@@ -45,8 +45,10 @@ def bring_in(context, item) -> bpy.types.Object:
     capture = captures.folder(item)
     if not capture.head.is_file():
         raise Problem("This capture has no head yet.", "Click Reconstruct first.")
-    mesh = read_mesh(context, capture)
     head = captures.head(context, item)
+    if head is not None:
+        captures.require_shown(context, head)
+    mesh = read_mesh(context, capture)
     if head is None:
         head = bpy.data.objects.new(item.name, mesh)
         context.collection.objects.link(head)

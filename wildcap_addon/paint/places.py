@@ -6,6 +6,7 @@ Which of them it is, the scene says, for an undo may take the sheet away or brin
 import bpy
 
 from ...core.contract.messages import Problem
+from .. import captures
 from . import sheet, view
 
 
@@ -23,6 +24,7 @@ def enter(context, session, use_sheet: bool) -> None:
     target = bpy.data.objects.get(session.head)
     if target is None or target.name not in context.scene.objects:
         raise Problem("The head is not in this scene any more.", "Undo, or bring the head in again.")
+    captures.require_shown(context, target)
     if use_sheet:
         target = sheet.make(context, context.scene.tool_settings.image_paint.canvas, target)
     face(session, use_sheet)

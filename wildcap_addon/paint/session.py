@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field
 
 import bpy
 
+from ...core.contract import unforeseen
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from .. import captures, head, problems
@@ -137,7 +138,7 @@ def end(context) -> None:
         return
     save()  # a Problem here leaves the session open, and nothing is lost
     # only in this mode does Blender let go of a brush
-    if context.mode != 'PAINT_TEXTURE' and session.head in context.scene.objects:
+    if context.mode != 'PAINT_TEXTURE' and session.head in context.view_layer.objects:
         places.enter(context, session, sheet.is_there())
     brush.restore(context, session.brush)
     _keep_tint(context)
@@ -233,8 +234,8 @@ def _watch() -> float | None:
             root = _session.root
             try:
                 end(bpy.context)
-            except Problem as problem:
-                problems.show(root, problem)
+            except Exception as error:  # nobody is above a timer: without this, Blender would drop it
+                problems.show(root, error if isinstance(error, Problem) else unforeseen.explain(error, "painting"))
                 return WATCH_S * 4
         else:
             keep_up(any(operator.bl_idname == 'PAINT_OT_image_paint' for operator in window.modal_operators))
