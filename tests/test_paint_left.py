@@ -64,3 +64,19 @@ def test_the_watch_goes_on_whatever_ending_raises(excluded, addon, capture, monk
     assert "not in the view layer" in problems.of(str(capture)).problem
     session._watch()
     assert not session.active()
+
+
+def test_a_head_that_was_renamed_while_it_was_painted_is_let_go_as_it_was(addon, capture):
+    bpy.ops.wildcap.bring_in_head()
+    head = bpy.context.view_layer.objects.active
+    head.shape_key_add(name="Basis")
+    head.shape_key_add(name="Smile")
+    head.active_shape_key_index = 1
+    head.data.use_mirror_x = True
+    bpy.ops.wildcap.paint_mask()
+    assert head.show_only_shape_key
+    head.name = "Hero"
+    assert bpy.ops.wildcap.paint_mask(on='SHEET') == bpy.ops.wildcap.finish_mask() == {'FINISHED'}
+    assert not head.show_only_shape_key and head.active_shape_key_index == 1 and head.data.use_mirror_x
+    assert bpy.context.view_layer.objects.active == head and bpy.context.selected_objects == [head]
+    assert bpy.context.mode == 'OBJECT'

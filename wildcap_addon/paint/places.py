@@ -10,6 +10,18 @@ from .. import captures
 from . import sheet, view
 
 
+def follow_name(session) -> None:
+    """A head that was renamed since is known by its capture; the session then goes on by its new name."""
+    scene = bpy.data.scenes.get(session.scene)
+    heads = [item.head for item in scene.wildcap.captures if captures.root(item) == session.root] if scene else []
+    old, new = session.head, heads[0].name if heads and heads[0] is not None else session.head
+    if new != old:
+        told = session.before
+        told["selected"] = [new if name == old else name for name in told["selected"]]
+        told.update({key: new for key in ("active", "head") if told.get(key) == old})
+        session.head = new
+
+
 def turn(context, session, use_sheet: bool) -> None:
     """From the head to the sheet or back."""
     if use_sheet != sheet.is_there():

@@ -99,6 +99,7 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
     """Enters Texture Paint on the head or on the sheet, the mask as its tinted stencil and the mask brush in hand."""
     global _session
     if _session is not None and _session.which == which:
+        places.follow_name(_session)
         places.turn(context, _session, use_sheet)
         return
     end(context)
@@ -137,6 +138,7 @@ def end(context) -> None:
     if session is None:
         return
     save()  # a Problem here leaves the session open, and nothing is lost
+    places.follow_name(session)
     # only in this mode does Blender let go of a brush
     if context.mode != 'PAINT_TEXTURE' and session.head in context.view_layer.objects:
         places.enter(context, session, sheet.is_there())
@@ -157,6 +159,8 @@ def after_undo(context) -> None:
     """Undo and redo bring objects and modes back, but not what the views look at, and nothing of a painting that has
     ended: the mask stays as it was left."""
     active = context.view_layer.objects.active
+    if _ended is not None:
+        places.follow_name(_ended)
     # undone past its start: the watch ends it, and what was saved before goes to the history
     if _session is not None and context.mode == 'OBJECT':
         _session.written = ()
