@@ -133,3 +133,31 @@ def test_what_was_slimmed_away_is_made_again_for_whoever_looks_at_it(addon, reco
     ask()
     assert started == ["bring_back"] and not cameras()
     assert addon("status").look(folder, Settings()).problem is None
+
+
+def test_landmarks_that_were_moved_on_one_head_stay_when_another_ones_are_shown(addon, reconstructed, tmp_path):
+    shown = addon("reconstruct.landmarks").shown_landmarks
+    roots = [reconstructed, standin.make(tmp_path / "other.wildcap")]
+    for root in roots:
+        (root / "landmarks.json").write_text('{"points": {"1": [0, -0.1, 0], "152": [0, -0.1, -0.1]}}', encoding="ascii")
+    heads = []
+    for root in roots:
+        bpy.ops.wildcap.open_capture(directory=str(root))
+        bpy.ops.wildcap.bring_in_head()
+        heads.append(bpy.context.view_layer.objects.active)
+    first, second = bpy.context.scene.wildcap.captures
+    bpy.context.view_layer.objects.active = heads[0]
+    bpy.ops.wildcap.show_landmarks()
+    bpy.data.collections["WildCap Landmarks"].name = "Mine"
+    shown(first)[0].location.x += 0.01
+    bpy.context.view_layer.objects.active = heads[1]
+    assert not bpy.ops.wildcap.hide_landmarks.poll() and not shown(second)
+    for _ in range(2):
+        bpy.ops.wildcap.show_landmarks()
+        assert len(shown(first)) == len(shown(second)) == 2
+    assert shown(first)[0].location.x == pytest.approx(0.01)
+    bpy.ops.wildcap.hide_landmarks()
+    assert len(shown(first)) == 2 and not shown(second)
+    bpy.context.view_layer.objects.active = heads[0]
+    bpy.ops.wildcap.hide_landmarks()
+    assert not shown(first)
