@@ -93,6 +93,27 @@ def test_a_copy_of_a_camera_is_the_artists_and_stays_and_the_scene_keeps_its_fra
     assert scene.camera.name not in mine and scene.camera.name.startswith(name)
 
 
+def test_what_is_tied_to_a_camera_stays_so_when_the_cameras_come_in_again(reconstructed):
+    bpy.ops.wildcap.bring_in_cameras(every=True)
+    scene, (kept, other, _) = bpy.context.scene, cameras().values()
+    marker = scene.timeline_markers.new("cut", frame=5)
+    marker.camera = scene.camera = kept
+    follower = bpy.data.objects.new("Follower", None)
+    scene.collection.objects.link(follower)
+    constraint = follower.constraints.new('COPY_TRANSFORMS')
+    constraint.target = kept
+    lens, matrix = kept.data.lens, kept.matrix_basis.copy()
+    kept.data.lens, kept.matrix_basis = 200, Matrix.Translation((1, 2, 3))
+    images = len(bpy.data.images)
+    bpy.ops.wildcap.bring_in_cameras()
+    assert marker.camera == scene.camera == constraint.target == kept
+    assert kept.data.lens == pytest.approx(lens) and kept.matrix_basis == matrix
+    assert sorted(cameras()) == ["head 00000.jpg", "head 00002.jpg"] and len(bpy.data.cameras) == 2, "the others went"
+    assert len(kept.data.background_images) == 1 and len(bpy.data.images) == images
+    bpy.ops.wildcap.bring_in_cameras(every=True)
+    assert len(cameras()) == 3 and [c.name for c in bpy.data.collections] == ["head Cameras"]
+
+
 def test_the_scan_comes_in_again_while_the_old_one_is_active(reconstructed):
     bpy.ops.wildcap.bring_in_scan()
     scan = next(o for o in bpy.context.scene.objects if o.name.endswith("Scan"))
