@@ -95,7 +95,7 @@ def test_a_copy_of_a_camera_is_the_artists_and_stays_and_the_scene_keeps_its_fra
 
 def test_what_is_tied_to_a_camera_stays_so_when_the_cameras_come_in_again(reconstructed):
     bpy.ops.wildcap.bring_in_cameras(every=True)
-    scene, (kept, other, _) = bpy.context.scene, cameras().values()
+    scene, (kept, *_) = bpy.context.scene, cameras().values()
     marker = scene.timeline_markers.new("cut", frame=5)
     marker.camera = scene.camera = kept
     follower = bpy.data.objects.new("Follower", None)
@@ -160,7 +160,7 @@ def test_landmarks_that_were_moved_on_one_head_stay_when_another_ones_are_shown(
     shown = addon("reconstruct.landmarks").shown_landmarks
     roots = [reconstructed, standin.make(tmp_path / "other.wildcap")]
     for root in roots:
-        (root / "landmarks.json").write_text('{"points": {"1": [0, -0.1, 0], "152": [0, -0.1, -0.1]}}', encoding="ascii")
+        (root / "landmarks.json").write_text('{"points": {"1": [0, -0.1, 0], "152": [0, -0.1, -0.1]}}', "ascii")
     heads = []
     for root in roots:
         bpy.ops.wildcap.open_capture(directory=str(root))

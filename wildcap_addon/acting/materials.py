@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from .. import node_trees
+from ..data_blocks import find
 
 SIZE = 512
 IRIS_ANGLE = 0.42  # radians from the pupil's middle to the iris' rim, seen from the eye's centre
@@ -62,7 +63,7 @@ def colour_of(obj) -> tuple[float, float, float]:
 
 
 def _material(name: str, kind: str, colour: tuple, roughness: float, coat: float) -> bpy.types.Material:
-    existing = bpy.data.materials.get(name)
+    existing = find(bpy.data.materials, name)
     if existing is not None and existing.get(KEY) == kind:
         return existing
     material = bpy.data.materials.new(name)

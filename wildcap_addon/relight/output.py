@@ -17,6 +17,7 @@ from pathlib import Path
 import bpy
 
 from ...core.contract.files import place_file, place_folder, storage_problem
+from ..data_blocks import find
 from . import lights
 
 SCENE = "WildCap Relight"
@@ -167,7 +168,7 @@ def _finish() -> None:
 
 
 def _free() -> None:
-    scene = bpy.data.scenes.get(SCENE)
+    scene = find(bpy.data.scenes, SCENE)
     if scene is not None:
         if scene.render.use_persistent_data:
             scene.render.use_persistent_data = False  # which frees what was kept
@@ -184,7 +185,7 @@ def let_go(scene: bpy.types.Scene) -> None:
 
 def _picture(path: Path) -> None:
     """The PNG of an EXR, as the relight scene shows it; its metadata say by which view transform."""
-    scene = bpy.data.scenes[SCENE]
+    scene = find(bpy.data.scenes, SCENE)
     image = bpy.data.images.load(str(path.with_suffix(".exr")))
     try:
         as_picture(scene)

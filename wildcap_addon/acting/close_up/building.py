@@ -65,11 +65,9 @@ def remove(obj) -> None:
         bpy.data.objects.remove(thing)
     _drop(bpy.data.meshes, data)
     _drop(bpy.data.materials, made)
-    _drop(bpy.data.images,
-          [image for image in map(bpy.data.images.get, (pictures.IRIS, pictures.WHITE)) if image is not None])
-    _drop(bpy.data.node_groups,
-          [tree for tree in map(bpy.data.node_groups.get, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE))
-           if tree is not None])
+    for blocks, names in ((bpy.data.images, (pictures.IRIS, pictures.WHITE)),
+                          (bpy.data.node_groups, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE))):
+        _drop(blocks, filter(None, [data_blocks.find(blocks, name) for name in names]))
 
 
 def keep_up(obj, _capture) -> str:
