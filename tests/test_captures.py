@@ -180,6 +180,40 @@ def test_a_moved_capture_is_missed_and_one_click_finds_it_and_what_moved_along(a
     assert {Path(found.path).parent for found in items()} == {project}
 
 
+@pytest.mark.parametrize("noted", [False, True])
+def test_a_project_that_comes_from_windows_finds_its_captures_and_pictures(addon, project, noted):
+    bpy.ops.wildcap.assemble_material()
+    links, item = addon("links"), addon("captures").active(bpy.context)
+    root, there = project / "berta.wildcap", "C:\\Faces\\berta.wildcap"
+    ours = [image for image in bpy.data.images if str(root) in image.filepath]
+    assert len(ours) == 3
+    for image in ours:
+        image.filepath = image.filepath.replace(str(root), there.upper()).replace("/", "\\")
+    item.registration.template = f"{there}\\template\\mine.obj"
+    item.head["wildcap_capture"] = item.path = there
+    item.from_blend = "berta.wildcap" if noted else ""
+    assert links.find(item) == root and links.name(item) == "berta.wildcap"
+    links.follow_on_opening()
+    assert item.path == item.head["wildcap_capture"] == str(root)
+    assert item.registration.template == str(root / "template" / "mine.obj")
+    assert all(Path(image.filepath).is_relative_to(root) and Path(image.filepath).is_file() for image in ours)
+
+
+def test_what_a_setting_names_in_a_capture_moves_with_it_and_what_it_names_elsewhere_does_not(addon, project, tmp_path):
+    item = addon("captures").active(bpy.context)
+    for at in (item.path, str(project)):
+        item.registration.template, item.deliver.folder = f"{at}/template/mine.obj", f"{at}/out"
+        if at == item.path:
+            shutil.copytree(item.path, tmp_path / "berta.wildcap")
+            before = item.path
+            addon("links").move(item, tmp_path / "berta.wildcap")
+            assert item.registration.template == str(tmp_path / "berta.wildcap" / "template" / "mine.obj")
+            assert item.deliver.folder == str(tmp_path / "berta.wildcap" / "out")
+            addon("links").move(item, Path(before))
+    addon("links").move(item, tmp_path / "berta.wildcap")
+    assert (item.registration.template, item.deliver.folder) == (f"{project}/template/mine.obj", f"{project}/out")
+
+
 def test_captures_of_an_unsaved_file_go_where_the_preferences_say_and_stay_linked(addon, tmp_path):
     addon("preferences").get().captures = str(tmp_path / "all faces")
     (tmp_path / "face.mp4").write_bytes(b"0")
