@@ -72,8 +72,11 @@ class _Toggle(HeadOperator):
         obj = _acting(context)
         if self.switched.of(obj):
             self.switched.remove(obj)
-        else:
+        elif mesh.is_complete(obj):
             self.switched.add(context, obj)
+        else:
+            raise Problem("This head lost vertices or face units since it got them.",
+                          "Undo that, or delete the head, click Bring In Head and Add Face Units, then this.")
 
 
 class WILDCAP_OT_gaze(_Toggle, bpy.types.Operator):

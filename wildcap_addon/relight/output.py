@@ -17,6 +17,8 @@ from pathlib import Path
 import bpy
 
 from ...core.contract.files import place_file, place_folder, storage_problem
+from ..data_blocks import find
+from . import lights
 
 SCENE = "WildCap Relight"
 
@@ -166,14 +168,24 @@ def _finish() -> None:
 
 
 def _free() -> None:
-    scene = bpy.data.scenes.get(SCENE)
-    if scene is not None and scene.render.use_persistent_data:
-        scene.render.use_persistent_data = False  # which frees what was kept
+    scene = find(bpy.data.scenes, SCENE)
+    if scene is not None:
+        if scene.render.use_persistent_data:
+            scene.render.use_persistent_data = False  # which frees what was kept
+        let_go(scene)
+
+
+def let_go(scene: bpy.types.Scene) -> None:
+    """Takes the head and what it wears out of the relight scene, which nobody looks at: a head that the artist deletes
+    is to be gone from the file. Camera and lights stay."""
+    for thing in [o for o in scene.collection.objects if o.type not in ('CAMERA', 'LIGHT')
+                  and not (o.type == 'EMPTY' and o.name.startswith(lights.RIG))]:
+        scene.collection.objects.unlink(thing)
 
 
 def _picture(path: Path) -> None:
     """The PNG of an EXR, as the relight scene shows it; its metadata say by which view transform."""
-    scene = bpy.data.scenes[SCENE]
+    scene = find(bpy.data.scenes, SCENE)
     image = bpy.data.images.load(str(path.with_suffix(".exr")))
     try:
         as_picture(scene)
