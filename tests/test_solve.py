@@ -20,6 +20,7 @@ from core.solve import initial, tone
 from core.solve.evidence import read_evidence, soften_mask
 from core.solve.prior import WEIGHTS, load
 from core.solve.problem import albedo
+from core.solve.recipes import RECIPES
 from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic.identities import reserved_seeds
 
@@ -130,6 +131,20 @@ def test_a_shadow_that_the_artist_added_to_the_proposal_is_taken_away(capture):
         step = [np.log(a[inside].mean() / a[around].mean()) for a in (albedo, truth)]
         kept.append((step[0] - step[1]) / np.log(0.5))
     assert kept[1] < 0.2 < kept[0], kept
+
+
+def test_the_border_of_a_shadow_on_the_neck_tells_what_is_missing_there(capture):
+    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
+    distance = np.hypot(x - 0.88, y - 0.9)
+    shadow = 1 / (1 + np.exp((distance - 0.06) / 0.003))
+    albedo = initial.make_uniform_skin(torch.from_numpy(TONE), SIZE)[0, :3].permute(1, 2, 0).numpy() / 2 + 0.5
+    images.write_linear(capture.texture, albedo * (1 - 0.3 * shadow[..., None]))
+    images.write_data(capture.shadow_mask_auto, (distance < 0.06).astype(np.float32))
+    evidence, prior = read_evidence(capture, read_head(capture), SIZE), load()
+    recipe = replace(RECIPES["wildcap"], faint=1.0, reference="uniform", protect_marks=False)
+    start = initial.start_solve(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
+    neck = (shadow > 0.9) & (template.mask("neck", SIZE) > 0.9) & evidence.covered.numpy()
+    assert neck.sum() > 50 and start.observations[1].missing.numpy()[neck].mean() > 0.12
 
 
 def test_unusable_inputs_are_problems(capture):

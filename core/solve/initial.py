@@ -97,8 +97,8 @@ def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float,
         evidence = snap_to_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))
     evidence = replace(evidence, alpha=mask(evidence.alpha))
     if recipe.faint:
-        bare = evidence.weight * evidence.trust * evidence.skin
-        evidence = replace(evidence, missing=measure_missing_light(light, evidence.alpha, bare, evidence.texel))
+        told = evidence.weight * evidence.trust * evidence.bare
+        evidence = replace(evidence, missing=measure_missing_light(light, evidence.alpha, told, evidence.texel))
     marks: list[Mark] = []
     if recipe.protect_marks:
         evidence, marks = protect_marks(evidence, witness)
