@@ -150,7 +150,7 @@ def _leave_figures(capture: Capture, report: Reporter, source: str, evidence: Sh
     report.figure("seen_in_frames_percent", percent(found.frames))
     report.figure("left_in_texture_percent", percent(found.texture))
     report.figure("occlusion_percent", percent(found.occlusion > 0.1))
-    report.figure("laid_on_edges_percent", round(100 * float(found.edges.sum() / max(_border(found.mask).sum(), 1)), 1))
+    report.figure("laid_on_edges_percent", round(100 * share_on_edges(found.mask, found.edges), 1))
     filmed = images.linear_to_srgb(evidence.filmed)
     # red, green, blue
     shown = np.stack([found.frames, found.texture, found.occlusion / max(float(found.occlusion.max()), 0.25)],
@@ -160,6 +160,8 @@ def _leave_figures(capture: Capture, report: Reporter, source: str, evidence: Sh
                       np.hstack([filmed, tinted, np.repeat(found.mask[..., None], 3, -1)]))
 
 
-def _border(mask: np.ndarray) -> np.ndarray:
+def share_on_edges(mask: np.ndarray, edges: np.ndarray) -> float:
+    """The share in [0, 1] of the border of a mask [S, S] that lies on edges [S, S] in [0, 1]; 0 without a border."""
     inside = mask > 0.5
-    return (inside ^ np.roll(inside, 1, 0)) | (inside ^ np.roll(inside, 1, 1))
+    border = (inside ^ np.roll(inside, 1, 0)) | (inside ^ np.roll(inside, 1, 1))
+    return float(edges[border].sum() / max(border.sum(), 1))
