@@ -12,6 +12,7 @@ import torch
 
 from core import solve
 from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import from_json
 from core.contract.stages import MAPS
 from core.face import template
 from core.face.head import read_head
@@ -96,6 +97,30 @@ def test_cancel_then_run_again_gives_the_same_bytes(capture, brief_light):  # no
     solve.run(capture, options, Reporter("solve", emit=lambda message: logged.append(getattr(message, "text", ""))))
     assert "Going on after step 2 of 5." in logged
     assert maps_of(capture) == unbroken
+
+
+def other_delighter(capture):
+    return from_json({"delight": {"delighter": "none"}}, settings(steps=5))
+
+
+def other_proposal(capture):
+    """Under the mask that was painted."""
+    images.write_data(capture.shadow_mask_auto, np.zeros((SIZE, SIZE), np.float32))
+    return settings(steps=5)
+
+
+@pytest.mark.parametrize("change", [None, other_delighter, other_proposal])
+def test_a_checkpoint_of_another_run_is_not_gone_on_from(capture, brief_light, change):  # noqa: F811
+    images.write_data(capture.shadow_mask, images.read_mask(capture.shadow_mask_auto))
+    logged = []
+    for options in (settings(steps=5), None):
+        said = []
+        report = Reporter("solve", emit=lambda message, said=said: said.append(getattr(message, "text", "")),
+                          cancelled=lambda said=said: any("step 3 of" in text for text in said))
+        with pytest.raises(CancelledError):
+            solve.run(capture, options or (change(capture) if change else settings(steps=5)), report)
+        logged.append("Going on after step 2 of 5." in said)
+    assert logged == [False, change is None]
 
 
 def test_the_artists_masks_win(capture):

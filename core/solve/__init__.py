@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from ..contract import mask_edit
 from ..contract.capture import Capture
@@ -167,10 +168,12 @@ def _check_often(prior: Prior, report: Reporter) -> None:
 
 def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
     """Stands for everything a run's bytes depend on."""
-    digest = hashlib.blake2b(digest_size=16)
-    for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, start.tone.tensor,
-                   start.state.lights.glob, start.local):
-        digest.update(tensor.numpy().tobytes())
+    digest, o = hashlib.blake2b(digest_size=16), start.observations[1]
+    for values in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, start.tone.tensor,
+                   start.state.lights.glob, start.local, start.reference, start.alpha, o.texture, o.trust, o.held,
+                   o.missing):
+        digest.update(torch.as_tensor(values).numpy().tobytes())
+    digest.update(repr(start.recipe).encode())
     digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.compute_device]).encode())
     digest.update(code_key(__package__).encode())  # with the prior's weights
     own_prior = hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior else ""
