@@ -172,6 +172,23 @@ def test_the_border_of_a_shadow_on_the_neck_tells_what_is_missing_there(capture)
     assert neck.sum() > 50 and start.observations[1].missing.numpy()[neck].mean() > 0.12
 
 
+def test_a_cancel_is_heard_and_something_is_said_before_the_first_step(capture):
+    """While the light's scales are searched, and at each of the 72 penumbras that are tried."""
+    for enough in (np.inf, 1, 75):
+        said, looks = [], []
+
+        def cancelled(said=said, looks=looks, enough=enough) -> bool:
+            looks.extend(text for text in said[-1:] if text.startswith("telling skin from light"))
+            return len(looks) >= enough or "sampling" in said[-1:]
+
+        def emit(message, said=said) -> None:
+            said.append("sampling" if "sampling" in message.text else message.text)
+
+        with pytest.raises(CancelledError):
+            solve.run(capture, settings(), Reporter("solve", emit, cancelled))
+        assert len(looks) > 80 if enough == np.inf else said[-1].startswith("telling skin from light")
+
+
 def test_unusable_inputs_are_problems(capture):
     with pytest.raises(Problem, match="not a colour"):
         solve.run(capture, settings(skin_tone="pink"), Reporter("solve"))
