@@ -123,7 +123,8 @@ def round_trip(there: layout.Layout, albedo: np.ndarray, normal: np.ndarray) -> 
     ones = torch.ones(size, size)
     up = torch.zeros(3, size, size)
     up[2] = 1
-    e = layout.Evidence(torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, 0 * ones, 0 * ones)
+    e = layout.Evidence(torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, ones, 0 * ones,
+                        0 * ones)
     return there.returned(solved, e, Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)), 1.0,
                           SkinTone.from_linear(TONE, GIVEN))
 
