@@ -10,6 +10,7 @@ import pycolmap
 import pytest
 from scipy.spatial.transform import Rotation
 
+from core.cameras import landmarks
 from core.cameras.matches import Matches
 from core.cameras.settled import MOST_LEFT_SHARE, head_boxes, on_head, settle
 from core.cameras.solving import Solved, _refined
@@ -19,6 +20,7 @@ from core.contract.frame_records import VIDEO, FrameRecord, Frames
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
 from core.face import template
+from core.face.faces import Face
 from core.geometry.models import pose_of
 from core.synthetic.painted_head import camera
 
@@ -156,6 +158,22 @@ def test_parts_that_show_the_head_are_as_large_for_a_child():
     model, _, _, _ = filmed(0.0, 0.0, count=50)
     small = replace(IN_HEAD, world_from_model=pycolmap.Sim3d(50 / 63, pycolmap.Rotation3d(np.eye(3)), np.zeros(3)))
     assert head_boxes(model, small) == head_boxes(model, IN_HEAD)
+
+
+@pytest.mark.parametrize(("time_s", "looks"), [(1.0, [True, True]), (None, [True, True, False])])
+def test_a_frame_without_a_face_is_looked_at_once_in_a_film(monkeypatch, tmp_path, time_s, looks):
+    """Following the last face comes first there; in a photograph, after looking anew."""
+    face, asked = Face((0, 0, 9, 9), np.zeros((468, 3)), 1.0), []
+
+    def detect(srgb, last=None):
+        asked.append(last is None or time_s is not None)
+        return face if len(asked) == 1 else None
+
+    monkeypatch.setattr(landmarks.faces, "detect", detect)
+    monkeypatch.setattr(landmarks.images, "read_srgb", lambda path: None)
+    records = [FrameRecord(name=f"{i}.jpg", sharpness=1.0, selected=False, time_s=time_s) for i in range(2)]
+    assert list(landmarks.find_landmarks(records, tmp_path, Reporter("cameras"))) == ["0.jpg"]
+    assert asked == looks
 
 
 def test_only_what_matches_on_the_head_counts():

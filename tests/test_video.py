@@ -232,6 +232,18 @@ def test_what_lies_between_wanted_frames_is_jumped_over(tmp_path, monkeypatch):
     assert len(decoded) < 12 * 25
 
 
+@pytest.mark.parametrize("suffix", ["mts", "m2ts", "mp4", "mkv"])
+def test_a_jump_that_lands_behind_a_frame_is_made_again(tmp_path, suffix):
+    """As camcorders record; their transport streams are jumped in by what comes first in the file."""
+    signals = [np.full((64, 64, 3), (i % 200) / 220) for i in range(600)]
+    path = write(tmp_path / f"long.{suffix}", signals, codec="libx264", g="24", crf="15", bf="2")
+    report = Reporter("frames")
+    pictures = read(path, 8, report=report)
+    assert [p.index for p in pictures] == np.round(np.linspace(0, 599, 8)).astype(int).tolist()
+    assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index % 200 / 220 for p in pictures], abs=0.015)
+    assert not report.findings
+
+
 def test_8k_is_shrunk_before_it_becomes_an_array(tmp_path):
     path = tmp_path / "8k.mp4"
     with av.open(str(path), "w") as container:

@@ -32,6 +32,8 @@ tenth of the light of dark skin. To 16 bits FULL_CHR_H_INT is left out: where th
 chroma with it."""
 WHITE_16 = 255 << 8
 """What swscale makes of the narrow range's white in 16 bits."""
+STARTS = 3
+"""Key frames that are tried to come before a wanted frame."""
 LARGE = 2560 * 1440
 """Pixels above which the decoder works on few frames at a time: each of its threads keeps one, of 100 MB in 8K."""
 
@@ -140,13 +142,9 @@ def _index(path: Path, report: Reporter) -> _Index:
 def _frames(container, stream, index: _Index, wanted: np.ndarray,
             report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
     """The frames of these numbers, or where one is lost the next that can be decoded, with their numbers."""
-    for first, numbers in _stretches(index, wanted):
-        if first is not None:
-            container.seek(int(first), stream=stream)
+    for starts, numbers in _stretches(index, wanted):
         targets = list(numbers)
-        for count, frame in enumerate(_decode(container, stream, report)):
-            number = (int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None
-                      else count)
+        for number, frame in _from(container, stream, index, starts, targets[0], report):
             if number < targets[0]:
                 report.check()
                 continue
@@ -157,16 +155,39 @@ def _frames(container, stream, index: _Index, wanted: np.ndarray,
                 break
 
 
-def _stretches(index: _Index, wanted: np.ndarray) -> list[tuple[int | None, list[int]]]:
-    """Wanted numbers in stretches that are decoded in one go, each with the time stamp to jump to (None: read on from
-    the start)."""
+def _from(container, stream, index: _Index, starts: list[int], first: int,
+          report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
+    """All frames with their numbers from one of `starts` on, the first of them from which frame `first` is not missed:
+    in a transport stream a jump lands behind where it was to. From where the container is, if there are no starts."""
+    for left, start in zip(range(len(starts))[::-1], starts, strict=True):
+        container.seek(start, stream=stream)
+        frames = _numbered(container, stream, index, report)
+        landed = next(frames, None)
+        if landed is not None and (landed[0] <= first or not left):
+            yield landed
+            yield from frames
+            return
+    if not starts:
+        yield from _numbered(container, stream, index, report)
+
+
+def _numbered(container, stream, index: _Index, report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
+    for count, frame in enumerate(_decode(container, stream, report)):
+        yield (int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None
+               else count), frame
+
+
+def _stretches(index: _Index, wanted: np.ndarray) -> list[tuple[list[int], list[int]]]:
+    """Wanted numbers in stretches that are decoded in one go, each with the time stamps to jump to, the nearest first
+    (none: read on from the start)."""
     begin = np.searchsorted(index.keys, index.times[wanted], side="right") - 1  # the key frame each needs
-    stretches: list[tuple[int | None, list[int]]] = []
+    stretches: list[tuple[list[int], list[int]]] = []
     for i, number in enumerate(wanted.tolist()):
         if i and begin[i] <= begin[i - 1] + 1:
             stretches[-1][1].append(number)
         else:
-            stretches.append((index.keys[begin[i]] if begin[i] > 0 else None, [number]))
+            starts = index.keys[max(begin[i] - STARTS + 1, 0):begin[i] + 1][::-1] if begin[i] > 0 else []
+            stretches.append(([int(start) for start in starts], [number]))
     return stretches
 
 
