@@ -53,6 +53,25 @@ def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the
         bpy.ops.wildcap.open_delivery()
 
 
+def test_views_selection_and_the_active_object_are_afterwards_as_they_were(capture):  # noqa: F811
+    delivered.in_tiles(capture)
+    scene, head = bpy.context.scene, bpy.context.view_layer.objects.active
+    camera, cube = (bpy.data.objects.new(name, data) for name, data in (
+        ("Camera", bpy.data.cameras.new("Camera")), ("Cube", bpy.data.meshes.new("Cube"))))
+    for thing in (camera, cube):
+        scene.collection.objects.link(thing)
+    scene.camera = camera
+    space = next(area.spaces.active for area in bpy.context.screen.areas if area.type == 'VIEW_3D')
+    space.region_3d.view_perspective = 'CAMERA'
+    cube.select_set(True)
+    head.select_set(False)
+    for what in ("own_mesh", "head"):
+        scene.wildcap.captures[0].deliver.what = what
+        assert bpy.ops.wildcap.deliver() == {'FINISHED'}
+        assert space.region_3d.view_perspective == 'CAMERA' and scene.camera == camera
+        assert bpy.context.view_layer.objects.active == head and bpy.context.selected_objects == [cube]
+
+
 def test_a_blender_without_an_exporter_says_so(addon, capture, monkeypatch, tmp_path):  # noqa: F811
     files = addon("deliver.files")
     problem = import_module(f"{files.__name__.split('.wildcap_addon')[0]}.core.contract.messages").Problem
