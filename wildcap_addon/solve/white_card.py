@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract.messages import Problem
 from ...core.contract.settings import CARDS
-from .. import bring_back, captures, jobs
+from .. import bring_back, captures, jobs, undo
 from ..base_operator import CaptureOperator, JobOperator
 from .eyedropper import colour_at
 
@@ -26,8 +26,12 @@ class WILDCAP_OT_find_color_checker(JobOperator, bpy.types.Operator):
 
     def work(self, context):
         root = captures.root(captures.require(context))
-        job = jobs.start_tool(captures.require(context), "white_point",
-                              then=lambda: set_white(root, job.figures["white_point"]))
+
+        def then() -> None:
+            set_white(root, job.figures["white_point"])
+            undo.push("Find ColorChecker")
+
+        job = jobs.start_tool(captures.require(context), "white_point", then=then)
 
 
 class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
