@@ -49,7 +49,7 @@ def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the
     with pytest.raises(RuntimeError, match="is not there any more"):
         bpy.ops.wildcap.open_delivery()
     waiting.forget()
-    with pytest.raises(RuntimeError, match="Nothing was delivered"):
+    with pytest.raises(RuntimeError, match="Nothing has been delivered"):
         bpy.ops.wildcap.open_delivery()
 
 

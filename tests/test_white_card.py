@@ -42,7 +42,7 @@ def test_a_click_on_a_card_gives_the_white_point_and_the_cross_takes_it_away(add
 
 @pytest.mark.parametrize(("frame", "uv", "said"),
                          [("00000.jpg", (0.5, 0.2), "burnt out or black"),
-                          ("00000.jpg", (1.2, 0.2), "beside the frame"),
+                          ("00000.jpg", (1.2, 0.2), "outside the frame"),
                           ("00009.jpg", (0.5, 0.7), "no such frame")])
 def test_a_click_that_measures_nothing_says_why(item, frame, uv, said):
     with pytest.raises(RuntimeError, match=said):

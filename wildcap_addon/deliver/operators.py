@@ -78,7 +78,7 @@ class WILDCAP_OT_open_delivery(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         known = cls.with_capture(context) and waiting.last(captures.root(captures.active(context))) is not None
-        return cls.allowed(known, "Nothing was delivered since Blender was started")
+        return cls.allowed(known, "Nothing has been delivered since Blender was started")
 
     def work(self, context):
         folder = waiting.last(captures.root(captures.require(context)))

@@ -84,7 +84,7 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
             raise Problem("There is no such frame in this capture.",
                           "Click Reconstruct first: the frames come with it.")
         if not all(0 <= c < 1 for c in self.uv):
-            raise Problem("That was beside the frame: nothing was measured.", "Click on the card.")
+            raise Problem("That click was outside the frame: nothing was measured.", "Click on the card.")
         image = bpy.data.images.load(str(path))
         try:
             colour = np.array(colour_at(image, self.uv))
@@ -117,7 +117,7 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_clear_white_point(CaptureOperator, bpy.types.Operator):
-    """Forget the measured white point: the scene tells it again"""
+    """Forget the measured white point: it is estimated from the scene again"""
 
     bl_idname = "wildcap.clear_white_point"
     bl_label = "Clear White Point"
