@@ -130,7 +130,7 @@ def test_a_turntable_that_cannot_be_is_refused_before_it_is_rendered(addon, capt
 @pytest.mark.parametrize("error, said", [
     (PermissionError(errno.EACCES, "in use", "/renders/sun.png"), "sun.png cannot be written"),
     (ValueError("no picture"), "An error inside WildCap stopped Render")])
-def test_a_render_that_cannot_be_put_in_its_place_is_told_and_frees_its_memory(addon, capture, monkeypatch, error, said):
+def test_a_render_that_cannot_be_put_in_place_is_told_and_frees_its_memory(addon, capture, monkeypatch, error, said):
     output, problems = addon("relight.output"), addon("problems")
     bpy.ops.wildcap.bring_in_head()
     head = bpy.context.view_layer.objects.active

@@ -33,7 +33,9 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         where = iface_("{} with its maps, for {}, goes to {}").format(plan.mesh, plan.preset.title, plan.target)
         replaced = ((iface_("The delivery that is there is replaced once the new one is complete; files that you added "
                             "stay."),) if plan.target.exists() else ())
-        return (where, *replaced, *plan.format.drops, plan.preset.hint)
+        obj = captures.head(bpy.context, captures.require(bpy.context))
+        left = stand.left_behind(obj, plan.what, plan.format.suffix)
+        return (where, *replaced, *plan.format.drops, *left, plan.preset.hint)
 
     def work(self, context):
         item = captures.require(context)

@@ -73,12 +73,22 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
         _look_again(context, *seen)
 
 
+def left_behind(obj: bpy.types.Object | None, what: str, suffix: str) -> tuple[str, ...]:
+    """What the head wears that a delivery leaves out, a sentence each."""
+    if obj is None or what != "head":
+        return ()
+    hair = ("The hair stays here: of these formats only USD holds it.",)
+    eyes = ("The close-up eyes and mouth stay here: the delivered head has its plain ones.",)
+    return ((hair if captures.hair(obj) and suffix != HAIR_IN else ()) + (eyes if captures.close_up(obj) else ()))
+
+
 def _looks(context) -> tuple[list, str, list[str]]:
     """What another scene in the window and an import change: of each 3D view the space, from where it looks and through
     which camera; the names of the active object and of those that are selected."""
     spaces = [area.spaces.active for area in context.window.screen.areas if area.type == 'VIEW_3D']
+    views = [(space, space.region_3d.view_perspective, space.camera) for space in spaces]
     active = context.view_layer.objects.active
-    return ([(space, space.region_3d.view_perspective, space.camera) for space in spaces], active.name if active else "",
+    return (views, active.name if active else "",
             [thing.name for thing in context.view_layer.objects if thing.select_get()])
 
 
