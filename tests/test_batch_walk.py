@@ -109,7 +109,7 @@ def test_what_is_no_batch_is_refused_and_one_that_is_damaged_meanwhile_says_so(a
     assert batches.current() is None
     for click in ("close_batch", "next_mask", "accept_mask"):
         refuses("No batch is open: click Open Batch", getattr(bpy.ops.wildcap, click))
-    refuses("two or more captures", bpy.ops.wildcap.solve_all)
+    refuses("fewer than two captures", bpy.ops.wildcap.solve_all)
     folder = batch_faces.planned(tmp_path / "good", batch_faces.filmed(tmp_path / "good", "anna"))
     bpy.ops.wildcap.open_batch(directory=str(folder))
     batch_faces.wait(addon, lambda: batch_faces.seen(batches))

@@ -100,7 +100,7 @@ def _refuse_own(keys: bpy.types.Key) -> None:
     drivers = [] if KEY in keys or keys.animation_data is None else keys.animation_data.drivers
     taken = [name for name in _units() if any(f'"{name}"' in curve.data_path for curve in drivers)]
     if taken:
-        raise Problem(f"{taken[0]} already has a driver of yours.", "Remove that driver, or go on without Gaze.")
+        raise Problem(f"{taken[0]} already has a driver of its own.", "Remove that driver, or go on without Gaze.")
 
 
 def _units() -> list[str]:

@@ -53,7 +53,7 @@ class WILDCAP_OT_iris(HeadOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_rest_face(HeadOperator, bpy.types.Operator):
-    """Bring all face units back to zero and the lids to where they were filmed"""
+    """Set all face units back to zero and the lids to where they were filmed"""
 
     bl_idname = "wildcap.rest_face"
     bl_label = "Rest"

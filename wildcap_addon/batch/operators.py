@@ -23,7 +23,7 @@ class AllFaces(BaseOperator):
     @classmethod
     def poll(cls, context):
         many = batches.current() is not None or len(context.scene.wildcap.captures) > 1
-        return (cls.allowed(many, "This is for two or more captures in the list")
+        return (cls.allowed(many, "The list has fewer than two captures: use that capture's own buttons")
                 and cls.allowed(not running.running(), "A batch is running: wait for it, or cancel it")
                 and cls.allowed(not jobs.elsewhere(""), "A job is running: wait for it, or click Cancel"))
 

@@ -101,7 +101,7 @@ def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np
             or colour.shape != (shape[0], 3)
             or not finite
         ):
-            raise Problem(f"{path} is damaged (it does not hold hairs).", AGAIN)
+            raise Problem(f"{path} is damaged (it holds no hair strands).", AGAIN)
     if not hairs:
         raise Problem("No brows and no beard were found on this face.",
                       "Hair that is as light as the skin cannot be told from it: add curves of your own.")

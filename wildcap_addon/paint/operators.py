@@ -65,7 +65,7 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         ('MIRROR', "Mirror", "What is masked on one side is masked on the other, too"),
         ('INVERT', "Invert", "Shadow where there was none"),
         ('CLEAR', "Clear", "No shadow anywhere"),
-        ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found by itself"),
+        ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found automatically"),
         ('SNAPPED', "Take Snapped Mask", "The mask that was painted, laid on the shadow's edges")])
 
     @classmethod

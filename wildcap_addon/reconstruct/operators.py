@@ -141,6 +141,7 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.fit_landmarks"
     bl_label = "Fit Head Again"
+    bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):

@@ -16,7 +16,10 @@ from pathlib import Path
 
 import bpy
 
+from ...core.contract import unforeseen
 from ...core.contract.files import place_file, place_folder, storage_problem
+from ...core.contract.messages import Problem
+from .. import problems, status
 from ..data_blocks import find
 from . import lights
 
@@ -126,7 +129,7 @@ def _hidden(path: Path) -> Path:
 def completed(scene, *_):
     """The whole render is there. Without a window, who asked for it waits for it."""
     if scene.name == SCENE and not bpy.app.background:
-        bpy.app.timers.register(_finish, first_interval=0.0)
+        bpy.app.timers.register(_finish_or_show, first_interval=0.0)
 
 
 @bpy.app.handlers.persistent
@@ -150,19 +153,34 @@ def drop() -> None:
     _free()
 
 
+def _finish_or_show() -> float | None:
+    """As `_finish`, in a timer, where nobody catches what it raises: it is shown in the tab."""
+    if busy():  # its last moments
+        return 0.1
+    try:
+        _finish()
+    except Problem as problem:
+        problems.show("", problem)
+    except OSError as error:
+        problems.show("", storage_problem(error, Path(error.filename or "the render")))
+    except Exception as error:
+        problems.show("", unforeseen.explain(error, "Render"))
+    status.redraw()
+    return None
+
+
 def _finish() -> None:
     """Gives what is complete its name."""
     global _running
-    if busy():  # its last moments
-        bpy.app.timers.register(_finish, first_interval=0.1)
-        return
     running, _running = _running, Running()
-    for source, path in running.stills.items():
-        place_file(source, path.with_suffix(".exr"))
-        _picture(path)
-    if running.folder is not None:
-        place_folder(_hidden(running.folder), running.folder)
-    _free()
+    try:
+        for source, path in running.stills.items():
+            place_file(source, path.with_suffix(".exr"))
+            _picture(path)
+        if running.folder is not None:
+            place_folder(_hidden(running.folder), running.folder)
+    finally:
+        _free()
     if running.then is not None:
         running.then()
 

@@ -54,6 +54,8 @@ def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, sam
     render.resolution_x = render.resolution_y = resolution
     render.resolution_percentage = 100
     render.use_lock_interface = True  # the views wait, so that no thread draws what another changes
+    scene.cycles.device = now.cycles.device  # the artist's choice; a file without one renders on the CPU
+    render.threads_mode, render.threads = now.render.threads_mode, now.render.threads
     scene.cycles.samples = samples
     scene.cycles.use_denoising = has_denoiser()
     colours.show_by(scene, view)
