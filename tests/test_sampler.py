@@ -11,7 +11,7 @@ import torch
 
 from core.contract.messages import Problem
 from core.solve import checkpoint
-from core.solve.light_fit import light_loss
+from core.solve.light_fit import light_loss, update_lights
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.prior import coordinates
 from core.solve.problem import Observation, State
@@ -141,6 +141,21 @@ def test_the_paper_and_its_code_remove_a_known_shadow_too(name):
     assert error[:, shadow].mean() < 0.7 * before[:, shadow].mean()
     # lights fitted one after the other leave more outside than lights fitted together
     assert error[:, support == 0].mean() < 0.05
+
+
+def test_the_lights_move_as_far_on_a_finer_map_as_on_a_coarse_one():
+    """On maps that are even there is no difference between the sizes but the number of texels, which Adam ignores."""
+    found = []
+    for coarse in ((), ((2, 1.0),)):
+        seen = {factor: observation(torch.full((3, SIZE // factor, SIZE // factor), 0.2)) for factor in (1, 2)}
+        seen = {factor: replace(o, shader=Shader(torch.tensor([0.0, 0, 1])[:, None, None].expand(3, *o.weight.shape),
+                                                 0 * o.weight, (4, 4))) for factor, o in seen.items()}
+        recipe = Recipe(steps=20, coarse=coarse, phases=(("main", 0.0, 1.0),), updates=60)
+        sampler = Sampler(lambda x, sigma, coords: torch.zeros_like(x), replace(recipe, guidance="proximal"),
+                          seed_noise(0), fit=lambda state, denoised, *rest: update_lights(state, 0 * denoised, *rest))
+        found.append(sampler.sample(seen, start()).lights.glob)
+    assert (found[0] - start().lights.glob).abs().max() > 0.1
+    assert torch.allclose(found[0], found[1], atol=1e-4), (found[0] - found[1]).abs().max()
 
 
 def test_the_paper_s_total_variation_is_of_all_gamma_and_counts_the_mask_s_border():
