@@ -14,7 +14,6 @@ import bpy
 from ...core.contract.capture import Capture
 from .. import captures, head, jobs
 
-
 _ended: set[str] = set()  # captures whose solve has ended while somebody painted
 
 
