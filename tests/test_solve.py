@@ -189,6 +189,19 @@ def test_a_cancel_is_heard_and_something_is_said_before_the_first_step(capture):
         assert len(looks) > 80 if enough == np.inf else said[-1].startswith("telling skin from light")
 
 
+def test_under_the_light_that_the_split_tells_the_skin_has_its_tone(capture):
+    """Even light, and a face redder on one side: no part of its mean is light's level."""
+    evidence, prior, told = read_evidence(capture, read_head(capture), SIZE), load(), SkinTone.from_linear(TONE, GIVEN)
+    side, redder = torch.sigmoid((torch.linspace(0, 1, SIZE) - 0.6) / 0.02), torch.tensor([0.1, 0.4, 0.5])
+    face = initial.make_reference(prior, told, evidence, "mean")
+    evidence = replace(evidence, texture=albedo(face) * (1 - redder[:, None, None] * side), alpha=0 * evidence.alpha)
+    start = initial.start_solve(prior, evidence, told, 8.0, RECIPES["wildcap"])
+    assert "grid" in {phase for phase, _, _ in start.recipe.phases}, "the split's light is taken"
+    o, skin = start.observations[1], evidence.skin
+    found = initial.mean_tone(o.texture / o.shader.main(start.state.lights), skin)
+    assert torch.allclose(found / initial.mean_tone(albedo(face), skin), torch.ones(3), atol=0.003), found
+
+
 def test_unusable_inputs_are_problems(capture):
     with pytest.raises(Problem, match="not a colour"):
         solve.run(capture, settings(skin_tone="pink"), Reporter("solve"))

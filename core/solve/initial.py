@@ -66,10 +66,13 @@ def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, r
         light = told.light(evidence.normal)
         if weighted_deviation(light.log(), lit) < recipe.linear:
             recipe = settle_recipe(recipe)
-            lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal),
-                                              evidence.skin * evidence.weight, 1e-3)
             if others:  # one capture alone cannot tell a light of this form from a trait
                 local = torch.from_numpy(told.local)
+            # to the split the light's level and the traits' mean look alike; but the tone is the mean of the skin
+            beneath = evidence.texture * exposure / (light * enlarge_field(local, evidence.size).exp())
+            light = light * (mean_tone(beneath, lit) / mean_tone(albedo_of(x_ref), lit))[:, None, None]
+            lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal),
+                                              evidence.skin * evidence.weight, 1e-3)
         else:
             recipe = free_recipe(recipe)
     begun = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
