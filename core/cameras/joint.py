@@ -35,20 +35,39 @@ FEATURE_SIGMA_SHARE = 1 / 3000
 FREE_SIGMA_LOG, TOLD_SIGMA_LOG = 3.0, 0.03
 """Spreads of the logarithm of a focal length: of an unknown one, which what matches tells, and of one that a file told,
 which focusing changes."""
-FEWEST_TRACKS = 60
+FEWEST_TRACKS = 60  # below, what matches on the head says too little to refine by
 
 
-def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches: Matches, unknown_focal: bool,
+def refine(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], matches: Matches, unknown_focal: bool,
            report: Reporter,
            missing: Sequence[dict] = (), agree: Sequence[float] = AGREE_WIDTH_SHARES) -> pycolmap.Reconstruction:
-    """The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one
-    explains less. found: name -> face. missing: [{names, width, height}] like camera groups, of frames that have no
-    camera yet and may get one by their matches; they share the lens of the frames of their size. agree: as
-    AGREE_WIDTH_SHARES, wider first where the cameras may be off. Raises Problem where no face is found."""
-    head = find_head(model, found, 0.063)
+    """The cameras refined by what matches on the head.
+
+    Parameters
+    ----------
+    model : cameras, of any world
+    face_by_name : the face in each frame that shows one
+    matches : between the frames
+    unknown_focal : whether nothing told the focal length: it is free then
+    report : hears of progress
+    missing : [{names, width, height}] like camera groups, of frames that have no camera yet and may get one by their
+        matches; they share the lens of the frames of their size
+    agree : as AGREE_WIDTH_SHARES, wider first where the cameras may be off
+
+    Returns
+    -------
+    The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one
+    explains less.
+
+    Raises
+    ------
+    Problem
+        Where no face is found.
+    """
+    head = find_head(model, face_by_name, 0.063)
     model = pycolmap.Reconstruction(model)
     model.transform(head.world_from_model)
-    seen_faces = agreeing_faces(model, found)
+    seen_faces = agreeing_faces(model, face_by_name)
     registered = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
     names = [image.name for image in registered]
     straight = straightened(model, registered, matches)
@@ -93,13 +112,13 @@ def as_bundle(model: pycolmap.Reconstruction, registered: list, unknown_focal: b
                   FREE_SIGMA_LOG if unknown_focal else TOLD_SIGMA_LOG)
 
 
-def _landmarks(model: pycolmap.Reconstruction, registered: list, found: dict[str, faces.Face]) -> Observations:
+def _landmarks(model: pycolmap.Reconstruction, registered: list, face_by_name: dict[str, faces.Face]) -> Observations:
     count, camera, pixel = len(template_landmarks().mean), [], []
     for i, image in enumerate(registered):
-        if image.name in found:
+        if image.name in face_by_name:
             camera.append(np.full(count, i))
             pixel.append(_straight(model.cameras[image.camera_id],
-                                   found[image.name].landmarks[:, :2].astype(np.float64)))
+                                   face_by_name[image.name].landmarks[:, :2].astype(np.float64)))
     return Observations(np.concatenate(camera), np.tile(np.arange(count), len(camera)), np.concatenate(pixel))
 
 
@@ -127,8 +146,18 @@ def _late(bundle: Bundle, model: pycolmap.Reconstruction, groups: list[dict], na
 
 def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tracks: list, matches: Matches,
             late: Mapping[str, tuple] = MappingProxyType({}), groups: Sequence[dict] = ()) -> pycolmap.Reconstruction:
-    """A model with the bundle's cameras and, as its points, the tracks; late: poses by name of frames of `groups` that
-    were placed afterwards."""
+    """A model with a bundle's cameras and, as its points, the tracks.
+
+    Parameters
+    ----------
+    model : whose lenses are kept but for their focal lengths
+    bundle : poses, focal lengths and points
+    registered : the model's images, in the bundle's order
+    tracks : of the bundle's points
+    matches : whose keypoints they join
+    late : rotation and translation by the name of frames that were placed afterwards
+    groups : camera groups, of these
+    """
     rebuilt, numbers = pycolmap.Reconstruction(), sorted(model.cameras)
     for number in numbers:
         camera = pycolmap.Camera(model.cameras[number].todict())

@@ -25,18 +25,18 @@ class EyeLook:
     shares: EyeShares
 
 
-def usable(seen: list[tuple[float, Eye]], side: int) -> list[int]:
+def usable(sights: list[tuple[float, Eye]], side: int) -> list[int]:
     """Which sights (yaw of the head in degrees, eye) of the left (0) or right (1) eye hold: it is not beyond the nose,
     and as open as it usually is."""
-    there = [i for i, (yaw, _) in enumerate(seen) if shows_eye(yaw, side)]
-    usual = float(np.median([seen[i][1].opening for i in there])) if there else 0.0
-    return [i for i in there if seen[i][1].is_open_as(usual)]
+    there = [i for i, (yaw, _) in enumerate(sights) if shows_eye(yaw, side)]
+    usual = float(np.median([sights[i][1].opening for i in there])) if there else 0.0
+    return [i for i in there if sights[i][1].is_open_as(usual)]
 
 
-def look(views: list[View], found: Landmarks, report: Reporter) -> tuple[list[EyeLook], list[EyeLook]]:
+def look(views: list[View], landmarks: Landmarks, report: Reporter) -> tuple[list[EyeLook], list[EyeLook]]:
     """The left and the right eye as the reader sees them in the views that show them well."""
-    seen = [view for view in views if view.name in found.eyes]
-    use = [usable([(found.eyes[view.name][0], found.eyes[view.name][2 - side]) for view in seen], side)
+    seen = [view for view in views if view.name in landmarks.eyes]
+    use = [usable([(landmarks.eyes[view.name][0], landmarks.eyes[view.name][2 - side]) for view in seen], side)
            for side in (0, 1)]  # the right eye stands first there
     looks: tuple[list[EyeLook], list[EyeLook]] = [], []
     for number, view in enumerate(seen):
@@ -45,7 +45,7 @@ def look(views: list[View], found: Landmarks, report: Reporter) -> tuple[list[Ey
         report.check()
         srgb = images.read_srgb(view.path)
         shrink = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
-        pixels = found.images[view.name][0]
+        pixels = landmarks.images[view.name][0]
         for side, corners in enumerate((LEFT_EYE[::-1], RIGHT_EYE)):
             if number in use[side]:
                 eye = read_eye(srgb, pixels[list(corners)] * shrink, side == 0)

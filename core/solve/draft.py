@@ -15,12 +15,25 @@ WHOLE_MAP = slice(None), slice(None)
 
 
 def restore_maps(prior: ConditionedPrior, denoised: torch.Tensor, coords: torch.Tensor, recipe: Recipe, seed: int,
-                 part: tuple[slice, slice] = WHOLE_MAP) -> torch.Tensor:
-    """The map [1, 7, S, S], or those rows and columns of it, with the normals and specular that are expected of its
-    albedo where the recipe's guidance was the closed form; as it is where not. coords [1, 2, S, S] are the whole map's;
-    a part gets the noise that it would get in the whole map."""
+                 region: tuple[slice, slice] = WHOLE_MAP) -> torch.Tensor:
+    """The map with the normals and specular that are expected of its albedo, where the recipe's guidance was the closed
+    form; as it is where not.
+
+    Parameters
+    ----------
+    prior : of the skin tone
+    denoised : [1, 7, S, S] in the network's range, or only the rows and columns `region` of it
+    coords : [1, 2, S, S] in [-1, 1], of the whole map
+    recipe : of the solve
+    seed : of the noise
+    region : rows and columns; they get the noise that they would get in the whole map
+
+    Returns
+    -------
+    As `denoised`.
+    """
     if recipe.guidance != "proximal":
         return denoised
     noise = torch.randn(1, denoised.shape[1], *coords.shape[-2:],
                         generator=torch.Generator().manual_seed(seed)).to(denoised.device)
-    return prior.respond(denoised, coords[(..., *part)], noise[(..., *part)])
+    return prior.respond(denoised, coords[(..., *region)], noise[(..., *region)])

@@ -38,5 +38,5 @@ class Dice:
         """Normal, of deviation 1."""
         return torch.randn(shape, generator=self._generator, device=self.device)
 
-    def _there(self, values: np.ndarray) -> torch.Tensor:
-        return torch.as_tensor(np.asarray(values, np.float32), device=self.device)
+    def _there(self, array: np.ndarray) -> torch.Tensor:
+        return torch.as_tensor(np.asarray(array, np.float32), device=self.device)
