@@ -79,11 +79,11 @@ def markdown(head: list[str], rows: list[list]) -> str:
                      for row in (head, ["---"] * len(head), *rows))
 
 
-def merged(old: dict, new: dict) -> dict:
-    """Nested figures: `new` over `old`."""
-    return {**old,
-            **{key: merged(old[key], value) if isinstance(value, dict) and isinstance(old.get(key), dict) else value
-               for key, value in new.items()}}
+def merged(base: dict, update: dict) -> dict:
+    """Nested figures: `update` over `base`."""
+    return {**base,
+            **{key: merged(base[key], value) if isinstance(value, dict) and isinstance(base.get(key), dict) else value
+               for key, value in update.items()}}
 
 
 def plain(figures, name: str = "figures"):

@@ -91,9 +91,9 @@ def _costs(results: dict) -> str:
     return markdown(["stage: seconds, peak memory", *results], rows)
 
 
-def _number(value, digits: int, unit: str = "") -> str:
-    return "-" if value is None else f"{value:.{digits}f}{unit}"
+def _number(figure, digits: int, unit: str = "") -> str:
+    return "-" if figure is None else f"{figure:.{digits}f}{unit}"
 
 
-def _percent(value, digits: int) -> str:
-    return _number(value, digits, " %")
+def _percent(figure, digits: int) -> str:
+    return _number(figure, digits, " %")
