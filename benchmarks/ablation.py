@@ -3,8 +3,9 @@
 """What each part of the solver is worth, on UV-space problems with known truth (benchmarks/uv_problems.py): subjects
 that no training saw.
 
-    python -m benchmarks.ablation OUT.json [--rows NAME ...] [--skins FOLDER] [--kind raw|delit] [--size 256] [--steps
-    20] [--jobs 2] python -m benchmarks.ablation OUT.json --table [--json docs/figures/ablation.json]
+    python -m benchmarks.ablation OUT.json [--rows NAME ...] [--subjects NAME ...] [--skins FOLDER] [--kind raw|delit]
+                                  [--size 256] [--steps 20] [--jobs 2]
+    python -m benchmarks.ablation OUT.json --table [--json docs/figures/ablation.json]
     python -m benchmarks.ablation OUT.json --pictures FOLDER
 
 Six subjects x three shadows for the rows that carry the method (KEY), the full method with two seeds, whose spread says

@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solved albedo against true albedo, in image space, on facial skin (the paper's protocol for Digital Emily).
 
-    python -m benchmarks.albedo_score CAPTURE TRUTH [--json OUT.json]
+    python -m benchmarks.albedo_score CAPTURE TRUTH [--texture PICTURE] [--pictures FOLDER] [--json OUT.json]
 
 TRUTH holds capture.mp4, albedo/NNNN.png (sRGB with alpha), face/NNNN.png and, under hard light, shadow/NNNN.png,
 numbered by video frame. Figures per capture, each the mean over the frames with truth that were registered:
-  psnr, ssim, flip   as they are, and after one gain per channel in linear light, which removes what a skin tone would
-  supply detail             correlation of log green between 1 and 3 px with the truth's: 1 keeps each pore, 0 is
-  another skin shadow_step        log(predicted / true) 4 to 12 px on the lit side of the true shadow's edge, minus the
-  dark side; 0 is clean face_coverage      share of the face masks that the solved head covers
+  psnr, ssim, flip   as they are, and after one gain per channel in linear light, which removes what a tone would supply
+  detail             correlation of log green between 1 and 3 px with the truth's: 1 keeps each pore, 0 is another skin
+  shadow_step        log(predicted / true) 4 to 12 px on the lit side of the true shadow's edge, minus the dark side
+  face_coverage      share of the face masks that the solved head covers
 """
 
 from __future__ import annotations
@@ -17,11 +17,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import av
 import numpy as np
 
 from core.contract.capture import Capture
@@ -33,6 +31,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 
 from .figures import markdown, write
+from .films import read_film
 from .measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
 
 LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true tone": "the true tone everywhere"}
@@ -123,18 +122,12 @@ def score_floors(truth: Path) -> dict:
     """What has to be beaten: the raw video taken for albedo, and the true mean skin colour everywhere."""
     frames = {true.frame: true for true in read_truth(truth)}
     raw, flat = [], []
-    for number, image in enumerate(_video(truth / "capture.mp4")):
+    for number, image in enumerate(read_film(truth / "capture.mp4")):
         if (true := frames.get(number)) is not None:
-            raw.append(compare(image, true, true.face))
+            raw.append(compare(image.astype(np.float32) / 255, true, true.face))
             tone = images.linear_to_srgb(images.srgb_to_linear(true.albedo[true.face]).mean(0))
             flat.append(compare(np.broadcast_to(tone, true.albedo.shape), true, true.face))
     return {"raw video": mean_scores(raw), "flat true tone": mean_scores(flat)}
-
-
-def _video(path: Path) -> Iterator[np.ndarray]:
-    with av.open(str(path)) as video:
-        for frame in video.decode(video=0):
-            yield frame.to_ndarray(format="rgb24").astype(np.float32) / 255
 
 
 def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solved cameras against known ones: `python benchmarks/cameras_against_truth.py CAPTURE TRUTH`.
+"""Solved cameras against known ones: `python -m benchmarks.cameras_against_truth CAPTURE TRUTH`.
 
 TRUTH holds cameras.json: {"focal_px", "width", "cameras": [{"frame", "matrix_world"}]}, Blender's camera-to-world.
 Centres are compared after a similarity fit, as shares of the mean distance from the cameras to what they look at. A
@@ -18,11 +18,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from core.contract.capture import Capture  # noqa: E402
-from core.contract.frame_records import read_frames  # noqa: E402
-from core.geometry.views import View, read_views  # noqa: E402
+from core.contract.capture import Capture
+from core.contract.frame_records import read_frames
+from core.geometry.views import View, read_views
 
 BLENDER_TO_COLMAP = np.diag([1.0, -1.0, -1.0])
 FACE = np.array([[0, 0, 0], [0, -0.03, -0.04], [0.06, 0.03, -0.03], [-0.06, 0.03, -0.03], [0.03, 0, 0.03],

@@ -7,10 +7,12 @@ and on raw frames.
     OUT.json]
 
 FOLDER was made and solved by benchmarks/people.py; CAPTURE is a solved one of another subject, TRUTH its folder. Rows
-  of INPUT: METHOD over one texture: wildcap                  the texel grid of local light in the shadow mask, with two
-  seeds, whose spread says what a tie is regions 5, regions 10    soft regions with a light each (light_models.py)
-  environment    one environment cubemap environment, no prior    the same, and texels that follow the frames alone,
-  smoothly over its blur            the texture divided by its own blur, what one does by hand in Blender
+of INPUT: METHOD over one texture:
+  wildcap                  the texel grid of local light in the shadow mask, by two seeds, whose spread is a tie
+  regions 5, regions 10    soft regions with a light each (light_models.py)
+  environment              one environment cubemap
+  environment, no prior    the same, and texels that follow the frames alone, smoothly
+  over its blur            the texture divided by its own blur, what one does by hand in Blender
   texture                  taken for albedo as it is
 All but the last three sample the same prior with the same guidance; all are told the true skin tone. Raw rows get the
 mask that the chain proposes for raw frames. Maps are kept in FOLDER/comparison (benchmarks/rerender.py reads them), so
@@ -28,7 +30,6 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from functools import cache, partial
-from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -38,7 +39,6 @@ import torch
 
 from core.contract.capture import Capture
 from core.contract.files import replacing_folder, write_json
-from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json, preset
 from core.face.head import read_head
 from core.imaging import images
@@ -52,6 +52,7 @@ from core.solve.witnesses import confirm_marks
 from . import figures, light_models
 from .ablation import texels_alone
 from .albedo_score import looks, score_map
+from .continued import run_stages
 from .people import PEOPLE, skin_tone
 
 INPUTS = ("delit", "raw")
@@ -181,8 +182,7 @@ def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
         later = shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "delivery", "delit", "lock",
                                        "shadow_mask*", "mask_history", "texture*")
         shutil.copytree(source.root, folder, ignore=later)
-        for stage in ("delight", "texture", "shadow_mask"):
-            import_module(f"core.{stage}").run(copy, settings, Reporter(stage))
+        run_stages(copy, settings, "delight", "texture", "shadow_mask")
     return copy
 
 

@@ -6,11 +6,15 @@ people, their true albedo known.
     python -m benchmarks.controlled FOLDER [--only NAME ...] [--json OUT.json] [--pictures FOLDER]
 
 FOLDER was made by benchmarks/people.py (--places wild flash studio) and its wild captures are solved. Rows, each an
-  albedo map in the same UVs: wild             the chain's own                             wild_texture    its texture
-  taken for the albedo flash            dark room, lamp at the camera: the known light divided out (flash_light.py),
-  solved over the same prior with that light held flash_texture    the same, before the solve                  limit
-        the true albedo frames as a texture: what geometry and texture leave studio           sixteen cameras in even
-        light, no delighter, empty mask, solved by the stage      studio_texture    its texture taken for the albedo
+albedo map in the same UVs:
+  wild              the chain's own
+  wild_texture      its texture taken for the albedo
+  flash             dark room, lamp at the camera: the known light divided out (flash_light.py), solved over the same
+                    prior with that light held
+  flash_texture     the same, before the solve
+  limit             the true albedo frames as a texture: what geometry and texture leave
+  studio            sixteen cameras in even light, no delighter, empty mask, solved by the stage
+  studio_texture    its texture taken for the albedo
 All are scored in the wild capture's frames that have a truth; all share head, prior, quality and true skin tone.
 FOLDER/controlled keeps maps and figures, so that a second run goes on where the first stopped. A set that has not been
 made is left out; what OUT.json has and FOLDER has not stays in it.
@@ -111,7 +115,7 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
             images.write_srgb(kept / f"{row}.png", albedo, bits=16)
             write_json(kept / f"{row}.json", {**_rounded(score(albedo, _looks(wild.root, truth))), **more})
             print(f"{name}: {row}", file=sys.stderr, flush=True)
-        rows[row] = json.loads((kept / f"{row}.json").read_text(encoding="utf-8"))
+        rows[row] = json.loads((kept / f"{row}.json").readfigures.number(encoding="utf-8"))
     return rows
 
 
@@ -148,22 +152,23 @@ def table(record: dict) -> str:
     parts = []
     for rows in (GAP, STUDIO):
         head = [f"mean of {len(whole(record['people'], rows))} people", *(label for label, _ in COLUMNS.values())]
-        parts.append((head, [[label, *(_text(mean[row].get(figure), digits) for figure, (_, digits) in COLUMNS.items())]
+        parts.append((head, [[label, *(figures.number(mean[row].get(figure), digits)
+                                       for figure, (_, digits) in COLUMNS.items())]
                              for row, label in rows.items() if row in mean]))
     three = ("wild", "flash", "limit")
     head = ["dB after one gain", "in the wild", "flash", "true frames", "gap to flash", "moles, in the wild",
             "moles, flash", "moles, true frames"]
-    parts.append((head, [[name.replace("_", " "), *(_text(rows[row]["psnr_after_gain"], 2) for row in three),
+    parts.append((head, [[name.replace("_", " "), *(figures.number(rows[row]["psnr_after_gain"], 2) for row in three),
                           f"{rows['flash']['psnr_after_gain'] - rows['wild']['psnr_after_gain']:+.2f}",
-                          *(_text(rows[row].get("mole_contrast"), 2) for row in three)]
+                          *(figures.number(rows[row].get("mole_contrast"), 2) for row in three)]
                          for name, rows in everyone.items() if {*three} <= {*rows}]))
     head = ["dB after one gain", "texture", "solved", "the solve adds", "detail, texture", "detail, solved",
             "proposed mask, % of the face", "seconds"]
-    parts.append((head, [[name.replace("_", " "), *(_text(rows[row]["psnr_after_gain"], 2) for row in STUDIO),
+    parts.append((head, [[name.replace("_", " "), *(figures.number(rows[row]["psnr_after_gain"], 2) for row in STUDIO),
                           f"{rows['studio']['psnr_after_gain'] - rows['studio_texture']['psnr_after_gain']:+.2f}",
-                          *(_text(rows[row]["detail"], 2) for row in STUDIO),
-                          _text(rows["studio"]["proposed_mask_percent"], 2),
-                          _text(rows["studio"]["seconds"], 0)] for name, rows in everyone.items()
+                          *(figures.number(rows[row]["detail"], 2) for row in STUDIO),
+                          figures.number(rows["studio"]["proposed_mask_percent"], 2),
+                          figures.number(rows["studio"]["seconds"], 0)] for name, rows in everyone.items()
                          if {*STUDIO} <= {*rows}]))
     return "\n\n".join(figures.markdown(head, lines) for head, lines in parts if lines)
 
@@ -185,10 +190,6 @@ def _looks(capture: Path, truth: Path) -> list:
 
 def _rounded(scores: dict) -> dict:
     return {name: round(value, 4) if isinstance(value, float) else value for name, value in scores.items()}
-
-
-def _text(figure: float | None, digits: int) -> str | None:
-    return None if figure is None else f"{figure:.{digits}f}"
 
 
 if __name__ == "__main__":

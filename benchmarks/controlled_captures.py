@@ -9,8 +9,6 @@ leaves an albedo map in the same UVs.
 
 from __future__ import annotations
 
-import importlib
-import shutil
 import time
 from dataclasses import replace
 from functools import cache
@@ -19,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 from core.contract.capture import Capture
-from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json
 from core.face import template
 from core.face.head import read_head
@@ -30,6 +27,7 @@ from core.solve.prior import load
 from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import parse_skin_tone
 
+from .continued import begin_at_delight, run_stages
 from .flash_light import write_delit
 from .relit_maps import toned
 
@@ -39,10 +37,10 @@ EMPTY = np.zeros((64, 64), np.float32)
 def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
     """The dark room's capture up to its texture, with an empty mask; made once."""
     if not work.texture_confidence.is_file():
-        _copy(source, work)
+        begin_at_delight(source, work.root)
         write_delit(work, work.root / "without_lamp")
-        _run(work, from_json({"delight": {"delighter": "folder", "folder": str(work.root / "without_lamp")}}, settings),
-             "delight", "texture")
+        dark = from_json({"delight": {"delighter": "folder", "folder": str(work.root / "without_lamp")}}, settings)
+        run_stages(work, dark, "delight", "texture")
     images.write_data(work.shadow_mask_auto, EMPTY)
     return work
 
@@ -64,8 +62,8 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
 def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
     """The studio's capture up to the proposed mask; the mask that counts is empty. Made once."""
     if not work.shadow_mask.is_file():
-        _copy(source, work)
-        _run(work, from_json({"delight": {"delighter": "none"}}, settings), "delight", "texture", "shadow_mask")
+        begin_at_delight(source, work.root)
+        run_stages(work, from_json({"delight": {"delighter": "none"}}, settings), "delight", "texture", "shadow_mask")
         images.write_data(work.shadow_mask, EMPTY)
     return work
 
@@ -74,7 +72,7 @@ def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict
     """The solve stage's albedo, sRGB [S, S, 3]; its seconds, and the share of the seen face that the proposed mask
     would have covered, in percent."""
     began = time.monotonic()
-    _run(capture, from_json({"delight": {"delighter": "none"}}, settings), "solve")
+    run_stages(capture, from_json({"delight": {"delighter": "none"}}, settings), "solve")
     seconds, proposed = time.monotonic() - began, images.read_mask(capture.shadow_mask_auto)
     face = template.mask("face", len(proposed)) * images.read_data(capture.texture_confidence)[..., 0]
     share = {"proposed_mask_percent": round(100 * float((proposed * face).sum() / face.sum()), 2)}
@@ -84,9 +82,9 @@ def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict
 def true_frames(source: Capture, truth: Path, work: Capture, settings: Settings) -> Capture:
     """The wild capture with its true albedo frames for delit ones, up to the texture; made once."""
     if not work.texture_confidence.is_file():
-        _copy(source, work)
-        _run(work, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings),
-             "delight", "texture")
+        begin_at_delight(source, work.root)
+        true = from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings)
+        run_stages(work, true, "delight", "texture")
     return work
 
 
@@ -96,19 +94,6 @@ def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
     tone = np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
     return images.linear_to_srgb(toned(texture, tone, skin))
-
-
-def _copy(source: Capture, work: Capture) -> None:
-    """What a chain that begins at delight needs of a capture."""
-    shutil.rmtree(work.root, ignore_errors=True)
-    for part in (source.frames, source.cameras):
-        shutil.copytree(part, work.root / part.name)
-    shutil.copyfile(source.head, work.head)
-
-
-def _run(capture: Capture, settings: Settings, *stages: str) -> None:
-    for stage in stages:
-        importlib.import_module(f"core.{stage}").run(capture, settings, Reporter(stage))
 
 
 @cache

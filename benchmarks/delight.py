@@ -4,7 +4,7 @@
 the flat true tone.
 
     python -m benchmarks.delight [--data DIR] [--sets NAME ...] [--capture NAME=FOLDER ...] [--opendelight PATH]
-    [--quick] [--parts] [--json OUT] [--pictures FOLDER]
+    [--quick] [--json OUT] [--pictures FOLDER]
 
 Sets: faceolat (--data: laid out like ../shared/data/faceolat), portraits (synthetic subjects that no training sees, six
 per group of skin tone, two lights each), lps_sun, sample, or any folder laid out as benchmarks/albedo_score.py says. A
@@ -27,7 +27,6 @@ import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +35,6 @@ from core import delight
 from core.contract.capture import Capture
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import Settings
-from core.delight.whole_head import WEIGHTS, whole_head
 from core.imaging import images
 
 from . import figures
@@ -69,10 +67,6 @@ def main() -> None:
     parser.add_argument("--opendelight", default="", help="the authors' checkpoint")
     parser.add_argument("--weights", type=Path,
                         help="weights of our network, with their card beside them, instead of those that are shipped")
-    parser.add_argument("--parts", action="store_true",
-                        help="on captures also what the whole head's network says alone")
-    parser.add_argument("--texels", type=Path, metavar="FILE", default=WEIGHTS,
-                        help="of --parts: weights of the whole head's network")
     parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
     parser.add_argument("--json", type=Path, help="where the results go; what it holds of other sets and rows stays")
@@ -83,8 +77,6 @@ def main() -> None:
         settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
     if options.weights:
         importlib.import_module("core.delight.network").WEIGHTS = options.weights
-    if options.parts:
-        delight.DELIGHTERS |= {"whole head": partial(whole_head, weights=options.texels)}
     captures = dict(pair.split("=", 1) for pair in options.capture)
     results = (figures.read(options.json.stem, options.json.parent)["figures"] if options.json
                and options.json.is_file() else {})

@@ -1,8 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each of the delighter's answers is worth in captures, that of the whole head's network too, and each step that
-puts them together; and how far they are best believed beside the frames' own (core/delight/second_opinion.py), chosen
-by leaving one person out.
+"""What each of the delighter's answers is worth in captures, and each step that puts them together; and how far the
+fitted light is best believed beside the frames' own (core/delight/second_opinion.py), chosen by leaving one person out.
 
     python -m benchmarks.delight_answers FOLDER [--truths FOLDER] [--only PREFIX ...] [--sample CAPTURE]
     [--eyes FOLDER [--facekit FOLDER]] [--json PATH]
@@ -31,7 +30,6 @@ from core.contract.settings import Settings
 from core.delight.evening import ShadingEstimate, even_out
 from core.delight.network import ask, put_together
 from core.delight.second_opinion import FITTED, Weighing, weigh_in
-from core.delight.whole_head import load_texel_net, read_answers
 from core.face import template
 from core.geometry.raster import interpolate, sample
 from core.imaging import images
@@ -51,23 +49,22 @@ BARE = 0.5  # share of bare skin in a cell from which it counts, as in second_op
 DARKEST = 2e-3
 HAIRED = 0.3  # density of hair from which a map of skin is no truth of what is seen there
 ROWS = {"filmed": "doing nothing", "alone": "each frame alone", "frames": "evened out", "fitted": "the fitted light",
-        "whole": "the whole head's", "with_fitted": "evened out and fitted light", "together": "put together"}
+        "with_fitted": "evened out and fitted light", "together": "put together"}
 """What is told apart, and its heading."""
-ANSWERS = ("true", "alone", "frames", "fitted", "whole", "together")
+ANSWERS = ("true", "alone", "frames", "fitted", "together")
 
 
 @dataclass(frozen=True)
 class Judged:
     """A capture's answers on its cells of bare skin whose albedo is known, in natural log [N, 3] less their mean: the
-    true light, and that of the network for each frame, of the same evened out over the head, of the fitted light, of
-    the whole head, and of all that the delighter puts together, hues of light taken out as well."""
+    true light, and that of the network for each frame, of the same evened out over the head, of the fitted light, and
+    of all that the delighter puts together, hues of light taken out as well."""
 
     person: str
     true: np.ndarray
     alone: np.ndarray
     frames: np.ndarray
     fitted: np.ndarray
-    whole: np.ndarray
     together: np.ndarray
 
     def error(self, light: np.ndarray) -> float:
@@ -128,18 +125,17 @@ def keep(path: Path, capture: Capture, albedo: np.ndarray, known: np.ndarray) ->
     """Asks the delighter and keeps its answers where the albedo is known."""
     answers = ask(capture, Settings(device="cpu"), Reporter("delight", emit=lambda message: None))
     if not answers.head.head.built_in:
-        raise SystemExit(f"{capture.root} has an own head: the whole head's answer knows the built-in one alone.")
-    whole_head = read_answers(load_texel_net("cpu"), answers.head, answers.views, answers.looks, lambda done, of: None)
+        raise SystemExit(f"{capture.root} has an own head: the true albedo is in the built-in one's UVs.")
     albedo = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), SIZE, SIZE), DARKEST))
     maps = np.concatenate([albedo, known[..., None]], -1).astype(np.float32)
     mesh, cells = answers.head.mesh, {key: [] for key in ANSWERS}
     evened = even_out(answers.head, answers.views, answers.looks)
-    for look, even, fitted, whole, final, skin in zip(answers.looks, evened, answers.fitted, whole_head,
-                                                      put_together(answers), answers.skins, strict=True):
+    for look, even, fitted, final, skin in zip(answers.looks, evened, answers.fitted, put_together(answers),
+                                               answers.skins, strict=True):
         uv = interpolate(mesh.uvs, mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
         seen = sample(maps, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * SIZE).reshape(*look.face.shape, 4)
         where = (look.face >= 0) & (skin > BARE) & (seen[..., 3] > 0.99)
-        lights = look.log - seen[..., :3], look.shading, even.shading, fitted, whole, final.shading
+        lights = look.log - seen[..., :3], look.shading, even.shading, fitted, final.shading
         for key, light in zip(ANSWERS, lights, strict=True):
             cells[key].append(light[where])
     joined = {key: np.concatenate(parts) for key, parts in cells.items()}
@@ -157,22 +153,19 @@ def weighed(light: np.ndarray, answer: np.ndarray, weighing: Weighing) -> np.nda
 
 
 def score(judged: dict[str, Judged]) -> tuple[dict, dict]:
-    """The errors of each capture by ROWS, and what `choose` says of both answers that may be weighed in: the whole
-    head's beside the frames' with the fitted light."""
-    before = {name: each.frames for name, each in judged.items()}
-    with_fitted = {name: weighed(each.frames, each.fitted, FITTED) for name, each in judged.items()}
+    """The errors of each capture by ROWS, and what `choose` says of the answer that is weighed in."""
     rows = {name: {"person": each.person, "filmed": each.error(0 * each.true),
                    **{key: each.error(getattr(each, key)) for key in ANSWERS if key != "true"},
-                   "with_fitted": each.error(with_fitted[name])} for name, each in judged.items()}
-    return rows, {"fitted": choose(judged, before, "fitted", FITTED),
-                  "whole": choose(judged, with_fitted, "whole", Weighing(0.0, DOUBTS[0]))}
+                   "with_fitted": each.error(weighed(each.frames, each.fitted, FITTED))}
+            for name, each in judged.items()}
+    return rows, {"fitted": choose(judged)}
 
 
-def choose(judged: dict[str, Judged], before: dict[str, np.ndarray], answer: str, shipped: Weighing) -> dict:
-    """Which Weighing of GRID is best for an answer beside what there is `before`, over people, and with each person
-    left out of the choice. People count alike, by ratios: their mean is the geometric one."""
-    errors = {weighing: {name: each.error(weighed(before[name], getattr(each, answer), weighing))
-                         for name, each in judged.items()} for weighing in {*GRID, shipped}}
+def choose(judged: dict[str, Judged]) -> dict:
+    """Which Weighing of GRID is best for the fitted light beside the frames' own answers, over people, and with each
+    person left out of the choice. People count alike, by ratios: their mean is the geometric one."""
+    errors = {weighing: {name: each.error(weighed(each.frames, each.fitted, weighing))
+                         for name, each in judged.items()} for weighing in {*GRID, FITTED}}
     persons = sorted({each.person for each in judged.values()})
 
     def of_person(weighing: Weighing, person: str) -> float:
@@ -188,7 +181,7 @@ def choose(judged: dict[str, Judged], before: dict[str, np.ndarray], answer: str
     left_out = [of_person(best([other for other in persons if other != person]), person) for person in persons]
     return {"share": over_all.share, "doubt": over_all.doubt,
             **{key: mean([of_person(weighing, person) for person in persons])
-               for key, weighing in (("best", over_all), ("shipped", shipped), ("without", none))},
+               for key, weighing in (("best", over_all), ("shipped", FITTED), ("without", none))},
             "left_out": mean(left_out),
             "people_better": sum(out < of_person(none, person) for out, person in zip(left_out, persons, strict=True)),
             "people": len(persons)}

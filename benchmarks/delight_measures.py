@@ -18,6 +18,7 @@ from core.synthetic import pigment
 
 from .ablation_measures import feature_distance
 from .albedo_score import AlbedoTruth
+from .figures import markdown
 from .measures.pictures import detail, differences, edge_bands, face_box, log_green, shadow_step, with_gain
 
 FIGURES = ("psnr", "ssim", "flip", "features", "detail", "shadow_step")
@@ -80,18 +81,15 @@ def mean_of(scores: list[dict[str, float]]) -> dict[str, float | None]:
 def table(results: dict[str, dict]) -> str:
     """Markdown of set -> row -> {pictures, figures, groups}: a line per row, then a line per row for each group (person
     or skin tone) of several."""
-    lines = ["| set | delighter | pictures | PSNR | SSIM | FLIP | features | detail | shadow step |",
-             "|" + " --- |" * 9]
+    lines = []
     for name, rows in results.items():
-        lines += [_line(name, row, found["pictures"], found["figures"]) if "figures" in found
-                  else f"| {name} | {row} | - | {found['not_run']} |" + " |" * 5
-                  for row, found in rows.items()]
+        lines += [_line(name, row, found) if "figures" in found
+                  else [name, row, None, found["not_run"], *[""] * (len(FIGURES) - 1)] for row, found in rows.items()]
         groups = list(dict.fromkeys(group for found in rows.values() for group in found.get("groups", {})))
-        for group in groups if len(groups) > 1 else []:
-            lines += [_line(f"{name}: {group}", row, found["groups"][group]["pictures"],
-                            found["groups"][group]["figures"])
-                      for row, found in rows.items() if "figures" in found]
-    return "\n".join(lines)
+        lines += [_line(f"{name}: {group}", row, found["groups"][group])
+                  for group in groups if len(groups) > 1 for row, found in rows.items() if "figures" in found]
+    return markdown(["set", "delighter", "pictures", "PSNR", "SSIM", "FLIP", "features", "detail", "shadow step"],
+                    lines)
 
 
 def shortfalls(results: dict[str, dict], ours: str = "network") -> list[str]:
@@ -127,7 +125,7 @@ def sheet(photographs: list[list[np.ndarray]], side: int = 192) -> np.ndarray:
                       for row in photographs])
 
 
-def _line(name: str, row: str, pictures: int, figures: dict) -> str:
-    digits = {"psnr": 2, "detail": 2, "shadow_step": 2}
-    cells = ["-" if figures[f] is None else f"{figures[f]:.{digits.get(f, 3)}f}" for f in FIGURES]
-    return f"| {name} | {row} | {pictures} | " + " | ".join(cells) + " |"
+def _line(name: str, row: str, found: dict) -> list:
+    digits, figures = {"psnr": 2, "detail": 2, "shadow_step": 2}, found["figures"]
+    return [name, row, found["pictures"], *(None if figures[f] is None else f"{figures[f]:.{digits.get(f, 3)}f}"
+                                            for f in FIGURES)]

@@ -5,7 +5,6 @@ capture."""
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 
 from .albedo_score import AlbedoTruth, read_truth
+from .continued import begin_at_delight
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,7 @@ def frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photogr
     """
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
-    copy = Capture(work / "copy.wildcap")
-    for part in (capture.frames, capture.cameras):
-        shutil.copytree(part, copy.root / part.name)
-    shutil.copy(capture.head, copy.head)
+    copy = begin_at_delight(capture, work / "copy.wildcap")
     known = {true.frame: true for true in read_truth(truth)}
     listed = read_frames(copy)
     registered = {view.name: view for view in read_views(copy)}

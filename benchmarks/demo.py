@@ -23,10 +23,8 @@ from core.contract.settings import QUALITIES, from_json, preset
 from . import albedo_score, figures
 from .people import skin_tone
 
-ROOT = Path(__file__).resolve().parent.parent
-SAMPLE = ROOT / "core" / "synthetic" / "sample"
+SAMPLE = figures.ROOT / "core" / "synthetic" / "sample"
 LIGHTS = ("three_point", "sun", "window")
-table = albedo_score.table
 
 
 def main() -> int:
@@ -39,28 +37,25 @@ def main() -> int:
     started = time.monotonic()
     tone = skin_tone(SAMPLE)
     code = subprocess.call([sys.executable, "-m", "core", "run", str(SAMPLE / "capture.mp4"), str(capture.root),
-                            "--quality", arguments.quality, "--skin-tone", tone], cwd=ROOT)
+                            "--quality", arguments.quality, "--skin-tone", tone], cwd=figures.ROOT)
     if code:
         return code
     print("Rendering the head under three lights with Cycles ...", flush=True)
-    code = subprocess.call([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *LIGHTS], cwd=ROOT,
-                           stdout=subprocess.DEVNULL)
+    code = subprocess.call([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *LIGHTS],
+                           cwd=figures.ROOT, stdout=subprocess.DEVNULL)
     if code:  # Cycles fills standard output with its progress; what went wrong is on standard error
         return code
     rows = {"WildCap": albedo_score.score_capture(capture, SAMPLE), **albedo_score.score_floors(SAMPLE)}
     write_json(capture.root / "score.json", rows)
     # once more, with the renders
     report.write(capture, from_json({"solve": {"skin_tone": tone}}, preset(arguments.quality)))
-    print(f"\n{'':16}{'PSNR':>9}{'SSIM':>8}{'FLIP':>8}{'detail':>8}{'shadow_step':>13}")
-    for name, row in rows.items():
-        raw = row["raw"]
-        print(f"{name:16}{raw['psnr']:6.2f} "
-              f"dB{raw['ssim']:8.3f}{raw['flip']:8.3f}{row['detail']:8.2f}{row['shadow_step']:13.2f}")
+    scores = albedo_score.rows(rows)
+    print("\n" + albedo_score.table({"rows": scores}))
     print(f"\nFinished after {(time.monotonic() - started) / 60:.1f} minutes.\nThe report: {capture.report}")
     if arguments.json:
         size = sum(path.stat().st_size for path in capture.root.rglob("*") if path.is_file())
         figures.write(arguments.json, "demo", "make demo",
-                      {"views": rows["WildCap"]["views"], "rows": albedo_score.rows(rows), "capture_gb": size / 1e9})
+                      {"views": rows["WildCap"]["views"], "rows": scores, "capture_gb": size / 1e9})
     beaten = all(rows["WildCap"]["raw"]["psnr"] > rows[name]["raw"]["psnr"] for name in ("raw video", "flat true tone"))
     if not beaten:
         print("The result does not beat both floors.", file=sys.stderr)

@@ -18,8 +18,7 @@ from pathlib import Path
 
 from . import figures
 
-ROOT = Path(__file__).resolve().parent.parent
-FOUND = ROOT / "dist" / "gui" / "engines.json"
+FOUND = figures.ROOT / "dist" / "gui" / "engines.json"
 COMMAND = "python -m benchmarks.engines"
 SHOWN = {"surface": "no subsurface", "random_walk_skin": "WildCap Skin",
          "random_walk": "the same, Random Walk, as in 0.1.0"}
@@ -30,8 +29,8 @@ def main() -> None:
     parser.add_argument("--json", type=Path, metavar="OUT.json")
     arguments = parser.parse_args()
     FOUND.unlink(missing_ok=True)
-    subprocess.run(["make", "zip"], cwd=ROOT, check=True)
-    subprocess.run([str(ROOT / "tests" / "gui" / "run.sh"), "engines"], cwd=ROOT, check=True)
+    subprocess.run(["make", "zip"], cwd=figures.ROOT, check=True)
+    subprocess.run([str(figures.ROOT / "tests" / "gui" / "run.sh"), "engines"], cwd=figures.ROOT, check=True)
     found = json.loads(FOUND.read_text(encoding="utf-8"))
     if arguments.json:
         figures.write(arguments.json, "engines", COMMAND, found)

@@ -3,7 +3,7 @@
 """How much of its albedo skin gives back under even light in Cycles: a sphere as large as a head, of six tones, without
 gloss.
 
-    python -m benchmarks.even_light [--page PAGE.md --json OUT.json]
+    python -m benchmarks.even_light [--json OUT.json]
 
 Rendered in Blender's Python module with the node group WildCap Skin as it comes, and with both of Cycles's random walks
 and the albedo as the Base Color. 1 is all of it: what a capture measured as albedo is what a renderer then shows.
@@ -19,7 +19,6 @@ from pathlib import Path
 import numpy as np
 
 from . import figures
-from .pages import write_page
 from .render_capture import extension
 
 TONES = {"very light": (0.58, 0.40, 0.33), "light": (0.48, 0.31, 0.24), "intermediate": (0.38, 0.23, 0.16),
@@ -39,17 +38,13 @@ SIDE, SAMPLES = 32, 256
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--page", type=Path, metavar="PAGE.md")
     parser.add_argument("--json", type=Path, metavar="OUT.json")
     arguments = parser.parse_args()
-    command = f"python -m benchmarks.even_light --page {arguments.page} --json {arguments.json}"
     with extension():
         found = {way: {tone: dict(zip(("red", "green", "blue"), given_back(way, albedo), strict=True))
                        for tone, albedo in TONES.items()} for way in WAYS}
     if arguments.json:
-        figures.write(arguments.json, "even_light", command, found)
-    if arguments.page:
-        write_page(arguments.page, "What skin gives back of its albedo", command, [("", WORDS), ("", table(found))])
+        figures.write(arguments.json, "even_light", f"python -m benchmarks.even_light --json {arguments.json}", found)
     print(table(found))
     return 0
 

@@ -35,8 +35,8 @@ from core.contract.files import write_json
 from core.contract.messages import Problem
 
 from . import farm_batch, farm_nodes, figures
+from .costs.meter import busy_s
 from .farm_nodes import ADDRESSES, HEAD, PORT, WORKING, Node
-from .stage_cost import busy_s
 
 EVERY_TASKS = 8
 """Tasks that end for each process that is killed, in the mean."""

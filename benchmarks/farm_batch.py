@@ -22,6 +22,7 @@ from core.contract.capture import Capture
 from core.contract.files import replacing, replacing_folder
 
 from . import same_maps
+from .films import read_film
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE = ROOT / "core" / "synthetic" / "sample" / "capture.mp4"
@@ -97,8 +98,7 @@ def face_names(count: int) -> list[str]:
 
 def _cut(path: Path, kind: int) -> None:
     """Every fifth picture of the sample, beginning with another one for each kind."""
-    with av.open(str(SAMPLE)) as source:
-        pictures = [frame.to_ndarray(format="rgb24") for frame in source.decode(video=0)]
+    pictures = list(read_film(SAMPLE))
     step = len(pictures) // FRAMES
     with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(24))

@@ -6,7 +6,7 @@ that anyone can replace.
     python -m benchmarks.farm_model [--json docs/figures/farm_model.json] [--page docs/growth.md] [--capture CAPTURE]
                                     [--starts N] [--faces 10000] [--eur-core-hour 0.04] ...
 
-Seconds, processor seconds and memory of each stage are those of docs/figures/costs.json (benchmarks/costs.py).
+Seconds, processor seconds and memory of each stage are those of docs/figures/costs.json (benchmarks/costs).
 --capture weighs a finished capture of the same film: what each task writes and reads; --starts has N processes start as
 a task does. Both are kept in the record and need no measuring again. Nothing here was run on a farm: docs/farm.md says
 what was.
@@ -17,9 +17,7 @@ from __future__ import annotations
 import argparse
 import re
 import statistics
-import subprocess
 import sys
-import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path, PurePath
@@ -31,8 +29,8 @@ from core.contract.files import replacing
 from core.contract.messages import Problem
 
 from . import figures
+from .costs.meter import run_alone
 from .farm_page import COMMAND, SAID, SLIMMED, page
-from .stage_cost import own_s
 
 PAGE = figures.ROOT / "docs" / "growth.md"
 STARTS = {"command": (str(figures.ROOT), "--version"), "torch": ("-c", "import torch")}
@@ -120,23 +118,19 @@ def time_starts(count: int) -> dict[str, dict[str, float]]:
     """Median seconds and processor seconds of what a task starts."""
     found = {}
     for name, words in STARTS.items():
-        walls, used = [], []
-        for _ in range(count):
-            own, began = own_s()[1], time.monotonic()
-            subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL)
-            walls.append(time.monotonic() - began)
-            used.append(own_s()[1] - own)
-        found[name] = {"seconds": round(statistics.median(walls), 2), "processor_s": round(statistics.median(used), 2)}
+        ran = [run_alone(words).checked() for _ in range(count)]
+        found[name] = {key: round(statistics.median(getattr(each, key) for each in ran), 2)
+                       for key in ("seconds", "processor_s")}
     return found
 
 
 def model(costs: dict, disk: dict[str, float], starts: dict, assumptions: Assumptions) -> dict:
-    """All figures of the page. `costs` is what benchmarks/costs.py recorded. Raises Problem where its standard row is
+    """All figures of the page. `costs` is what benchmarks/costs recorded. Raises Problem where its standard row is
     not whole."""
     row, cores = costs.get("standard", {}), costs["machine"]["cores"]
     if any("seconds" not in row.get(stage, {}) for stage in stages.NAMES):
         raise Problem("docs/figures/costs.json has no whole row 'standard'.",
-                      "Run `python -m benchmarks.costs WORK --json docs/figures/costs.json`.")
+                      "Run `python -m benchmarks.costs chain WORK --json docs/figures/costs.json`.")
     tasks = {group.name: _task(group, row, disk, assumptions.film_mb) for group in GROUPS}
     seconds, traffic = (sum(task[key] for task in tasks.values()) for key in ("seconds", "traffic_mb"))
     solve, faces, hour = tasks[GATE]["seconds"], assumptions.faces, 3600.0

@@ -19,7 +19,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-import av
 import numpy as np
 
 from core import cameras, frames, registration, scan
@@ -30,6 +29,7 @@ from core.geometry import meshes
 from core.geometry.views import read_points
 from core.imaging import images
 
+from .films import read_film
 from .head_against_truth import compare
 
 FIVE = (0, 27, 51, 75, 95)
@@ -38,11 +38,9 @@ FIVE = (0, 27, 51, 75, 95)
 def photographs_of(video: Path, numbers: tuple[int, ...], folder: Path) -> None:
     """The frames with these numbers as pictures NNNN.png."""
     folder.mkdir(parents=True)
-    with av.open(str(video)) as container:
-        for number, frame in enumerate(container.decode(video=0)):
-            if number in numbers:
-                images.write_srgb(folder / f"{number:04d}.png",
-                                  frame.to_ndarray(format="rgb24").astype(np.float32) / 255)
+    for number, frame in enumerate(read_film(video)):
+        if number in numbers:
+            images.write_srgb(folder / f"{number:04d}.png", frame.astype(np.float32) / 255)
 
 
 def truth_of(truth: Path, numbers: tuple[int, ...], folder: Path) -> None:

@@ -79,6 +79,11 @@ def markdown(head: list[str], rows: list[list]) -> str:
                      for row in (head, ["---"] * len(head), *rows))
 
 
+def number(value: float | None, digits: int, unit: str = "") -> str | None:
+    """What a table's cell says of a figure; None, which is a dash there, of one that was not measured."""
+    return None if value is None else f"{value:.{digits}f}{unit}"
+
+
 def merged(base: dict, update: dict) -> dict:
     """Nested figures: `update` over `base`."""
     return {**base,

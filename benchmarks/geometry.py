@@ -32,11 +32,10 @@ from core.contract.messages import Problem
 from core.contract.settings import Settings
 from core.imaging import images
 
-from . import stage_cost
-from .figures import read, write
+from .costs.stage import measure_stage
+from .figures import ROOT, read, write
 from .geometry_table import published, table
 
-ROOT = Path(__file__).resolve().parent.parent
 LAST = "texture"
 """Stages up to this one are run."""
 
@@ -98,7 +97,7 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
         if stage in costs and capture.state(stages.by_name(stage), Settings()) == "done":
             continue
         print(f"{capture.root.stem}: stage {stage}", flush=True)
-        cost = stage_cost.measure(capture.root, stage, source.absolute())
+        cost = measure_stage(capture.root, stage, source.absolute())
         if "problem" in cost:
             return costs, {"stage": stage, **cost}
         costs[stage] = cost

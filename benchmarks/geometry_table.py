@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from .figures import markdown
+from .figures import markdown, number
 
 ROWS = {"average": "plain average (L2)", "blend": "blend", "aligned": "aligned blend",
         "perceptual": "with perceptual step", "delit": "aligned, own delit frames, after one gain"}
@@ -37,11 +37,11 @@ def _cameras(results: dict) -> str:
     for name, figures in results.items():
         c = figures.get("cameras", {})
         t = c.get("against_truth", {})
-        rows.append([name, c.get("frames", "-"), _percent(c.get("registered_percent"), 0),
-                     _number(c.get("reprojection_px"), 2, " px"),
-                     _percent(t.get("centre_error_median_percent"), 3),
-                     _number(t.get("rotation_error_median_deg"), 2, "°"),
-                     _number(t.get("focal_px"), 0, f" px of {t['true_focal_px']:.0f}" if "true_focal_px" in t else "")])
+        rows.append([name, c.get("frames", "-"), number(c.get("registered_percent"), 0, " %"),
+                     number(c.get("reprojection_px"), 2, " px"),
+                     number(t.get("centre_error_median_percent"), 3, " %"),
+                     number(t.get("rotation_error_median_deg"), 2, "°"),
+                     number(t.get("focal_px"), 0, f" px of {t['true_focal_px']:.0f}" if "true_focal_px" in t else "")])
     return markdown(["cameras", "frames", "registered", "reprojection", "centres (median, of the distance)",
                      "rotations (median)", "focal length"], rows)
 
@@ -53,7 +53,7 @@ def _surfaces(results: dict) -> str:
             t = figures.get(part, {}).get("against_truth")
             if t:
                 rows.append([f"{name}: {part}",
-                             *(_number(t.get(kind, {}).get(f"{share}_mm"), 2, " mm")
+                             *(number(t.get(kind, {}).get(f"{share}_mm"), 2, " mm")
                                for kind in ("by_cameras", "after_icp")
                                for share in ("median", "p90", "p95"))])
             else:
@@ -74,10 +74,10 @@ def _textures(results: dict) -> str:
                 rows.append([f"{name}: {label}", f"not run: {f['not_run']}", *["-"] * 6])
             elif f:
                 rows.append([f"{name}: {label}",
-                             _number(f.get("psnr_after_gain" if row == "delit" else "psnr"), 2, " dB"),
-                             *(_number(f.get(k), 3) for k in (
+                             number(f.get("psnr_after_gain" if row == "delit" else "psnr"), 2, " dB"),
+                             *(number(f.get(k), 3) for k in (
                     "ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")),
-                             _number(f.get("seconds"), 0, " s")])
+                             number(f.get("seconds"), 0, " s")])
     return markdown(["texture of the true albedo frames", "PSNR", "SSIM", "detail", "moles: contrast",
                      "pores: contrast", "pores: correlation", "seconds"], rows)
 
@@ -89,11 +89,3 @@ def _costs(results: dict) -> str:
                else "-"
                for figures in results.values())] for stage in names]
     return markdown(["stage: seconds, peak memory", *results], rows)
-
-
-def _number(figure, digits: int, unit: str = "") -> str:
-    return "-" if figure is None else f"{figure:.{digits}f}{unit}"
-
-
-def _percent(figure, digits: int) -> str:
-    return _number(figure, digits, " %")

@@ -18,7 +18,6 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-import av
 import cv2
 import numpy as np
 from skimage.data import astronaut
@@ -33,6 +32,7 @@ from core.synthetic.people import glasses
 from core.training import glasses as training
 
 from . import figures
+from .films import read_film
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 COMMAND = "python -m benchmarks.glasses DATA --hdri DATA/hdri --json docs/figures/glasses.json"
@@ -110,8 +110,7 @@ def read(folder: Path, pattern: str) -> Iterator[np.ndarray]:
 
 def filmed(video: Path) -> list[np.ndarray]:
     """FILMED frames of a film, evenly spread."""
-    with av.open(str(video)) as container:
-        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    frames = list(read_film(video))
     return [frames[k].astype(np.float32) / 255 for k in np.linspace(0, len(frames) - 1, FILMED).astype(int)]
 
 

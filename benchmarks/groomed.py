@@ -3,8 +3,8 @@
 """Hair that is grown from pictures of people whose every hair is known: where it covers the face, and which way it
 lies.
 
-    python -m benchmarks.groomed FOLDER [--seeds 3 ...] [--page docs/results/hair.md] [--sheet docs/pictures/hair.jpg]
-    [--json docs/figures/groomed.json]
+    python -m benchmarks.groomed FOLDER [--seeds 3 ...] [--trust] [--sheet docs/pictures/hair.jpg]
+                                 [--json docs/figures/groomed.json]
 
 The people of core/synthetic/people seen by rays from nine sides, lit by one lamp and a sky without shadows, through a
 phone's pipeline; cameras, head and the albedo's texture are the true ones, and the face parser is asked in these
@@ -39,14 +39,12 @@ from core.upscale.surface import lay_out
 from . import figures
 from .haired_people import OVER, SCALE, SIZE, VIEWS, photograph, read_maps, shrink
 from .likenesses import LIKENESSES
-from .pages import write_page
 
 NAMES = {person.seed: person.name for person in LIKENESSES}
 JUDGED = (3, 5)
 """Views in which coverage is compared: either side of the front."""
 COVERED, NEAR_MM = 0.1, 3.0
-COMMAND = ("python -m benchmarks.groomed FOLDER --page docs/results/hair.md --sheet docs/pictures/hair.jpg --json "
-           "docs/figures/groomed.json")
+COMMAND = "python -m benchmarks.groomed FOLDER --sheet docs/pictures/hair.jpg --json docs/figures/groomed.json"
 WORDS = ("Four people whose every hair is known, from nine sides through a phone's pipeline (1,440 x 1,920). No other "
          "step of the chain lies between: cameras, "
          "head and texture are the true ones, and the face parser is asked in these pictures. *IoU*: of the pixels "
@@ -79,7 +77,6 @@ def main() -> None:
                         help="the four reserved people, where none are named")
     parser.add_argument("--trust", action="store_true",
                         help="how far hair is off for how clear strokes must be (seeds 3, 5, 13)")
-    parser.add_argument("--page", type=Path, help="where the page goes")
     parser.add_argument("--sheet", type=Path, help="a picture of true and grown hair")
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/groomed.json")
     options = parser.parse_args()
@@ -94,11 +91,6 @@ def main() -> None:
         print(to_table(rows).splitlines()[-1], flush=True)
     if options.sheet:
         images.write_srgb(options.sheet, np.concatenate(pictures))
-    if options.page:
-        picture = (f"![From left to right a frame, the true hairs, the grown hairs](../pictures/{options.sheet.name})"
-                   if options.sheet else "")
-        write_page(options.page, "Hair that is grown from pictures", COMMAND,
-                   [("", WORDS), ("", to_table(rows)), ("", picture)])
     if options.json:
         figures.write(options.json, "groomed", COMMAND, {"people": rows})
 

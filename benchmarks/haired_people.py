@@ -78,8 +78,8 @@ def read_maps(figure: Figure, views: list[View], colours: list[np.ndarray]) -> t
     bare = images.resize(figure.skin.diffuse, SIZE, SIZE)
     diffuse = np.where(weights > 1e-4, np.exp(total / np.maximum(weights, 1e-9)), bare).astype(np.float32)
     one = np.ones((SIZE, SIZE), np.float32)
-    maps = HeadMaps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, np.clip(weights[..., 0], 0, 1).astype(np.float32),
-                    np.repeat(one[..., None], 3, 2))
+    seen = np.clip(weights[..., 0], 0, 1).astype(np.float32)
+    maps = HeadMaps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, seen, np.repeat(one[..., None], 3, 2), seen)
     return maps, tell_parts(looks, surface, Reporter("texture"))
 
 

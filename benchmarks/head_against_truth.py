@@ -3,31 +3,31 @@
 """Distance of a capture's head (or scan) to the true mesh, in the facial skin, after a similarity of the camera
 centres.
 
-    python benchmarks/head_against_truth.py CAPTURE TRUTH [MESH] [--surface head.obj|scan.ply]
+    python -m benchmarks.head_against_truth CAPTURE TRUTH [MESH] [--surface head.obj|scan.ply]
 
 TRUTH holds cameras.json ({"cameras": [{"frame", "matrix_world"}]}, Blender's convention) and face/NNNN.png. MESH is an
 OBJ or PLY in that world, or a glTF in it turned Y up: (x, -z, y) of it is the world of cameras.json. Without MESH the
 truth is the sample's subject.
 """
 
+from __future__ import annotations
+
 import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from core.contract.capture import Capture  # noqa: E402
-from core.contract.frame_records import read_frames  # noqa: E402
+from core.contract.capture import Capture
+from core.contract.frame_records import read_frames
 from core.geometry import meshes, raster
-from core.geometry.views import View, read_views  # noqa: E402
-from core.imaging import images  # noqa: E402
-from core.registration.alignment import Similarity, similarity  # noqa: E402
-from core.synthetic.identities import subject_mesh  # noqa: E402
-from core.synthetic.sample import RESERVED  # noqa: E402
+from core.geometry.views import View, read_views
+from core.imaging import images
+from core.registration.alignment import Similarity, similarity
+from core.synthetic.identities import subject_mesh
+from core.synthetic.sample import RESERVED
 
 
 def compare(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well the distance of the pupils is found: `python -m benchmarks.head_scale [SEED ...]`.
+"""How well the distance of the pupils is found.
+
+    python -m benchmarks.head_scale [SEED ...]
 
 Synthetic heads of known size, photographed by known cameras; printed is by how much too large each comes out and how
 far it leans, which is what PUPILS_PER_LIDS in core/cameras/landmarks.py was set by (its 1.019 divides out; the heads it
@@ -9,18 +11,15 @@ was set on are the default seeds).
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+import argparse
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from core.cameras.landmarks import PUPILS_PER_LIDS, fit_rays, pupils  # noqa: E402
-from core.cameras.world import intersect_rays  # noqa: E402
-from core.face import faces  # noqa: E402
-from core.synthetic import painted_head  # noqa: E402
-from core.synthetic.identities import identity_coefficients  # noqa: E402
+from core.cameras.landmarks import PUPILS_PER_LIDS, fit_rays, pupils
+from core.cameras.world import intersect_rays
+from core.face import faces
+from core.synthetic import painted_head
+from core.synthetic.identities import identity_coefficients
 
 SEEDS = (5, 11, 23, 31, 42, 57)
 AZIMUTHS = (-40, -28, -18, -9, 0, 9, 18, 28, 40)
@@ -46,8 +45,10 @@ def measure(seed: int) -> tuple[float, float]:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("seeds", type=int, nargs="*", default=SEEDS)
     errors = []
-    for seed in [int(argument) for argument in sys.argv[1:]] or SEEDS:
+    for seed in parser.parse_args().seeds:
         error, lean = measure(seed)
         errors.append(error)
         print(f"subject {seed:4}   pupils {error:+5.1f} %   leans back {lean:+5.1f} degrees", flush=True)

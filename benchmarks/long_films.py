@@ -17,11 +17,7 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
-import signal
-import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,11 +32,12 @@ from core.synthetic import sample, scene
 from core.synthetic.people import filmed, motion, phone
 from core.synthetic.people.shape import person_mesh
 
-from . import figures, stage_cost
+from . import figures
 from .cameras_against_truth import compare
+from .costs.meter import run_alone
+from .costs.stage import measure_stage
 from .people_lights import KINDS
 
-ROOT = Path(__file__).resolve().parent.parent
 COUNTS = (60, 120, 300, 1000)
 FRAMES, SHARED = 1000, 300
 """Of the longest film; and of the one that shorter ones are taken from, so that few frames are rendered where it is not
@@ -124,10 +121,10 @@ def row(folder: Path, count: int, plain_times: float) -> dict:
     capture, truth = Capture(folder / f"{count}.wildcap"), film(folder, count)
     settings = {"frames": {"max_frames": count}}
     if not capture.has("frames"):
-        cost = stage_cost.measure(capture.root, "frames", truth / "film.mp4", settings=settings)
+        cost = measure_stage(capture.root, "frames", truth / "film.mp4", settings=settings)
         if "problem" in cost:
             raise SystemExit(f"{cost['problem']} {cost['remedy']}")
-    ours = stage_cost.measure(capture.root, "cameras", settings=settings)
+    ours = measure_stage(capture.root, "cameras", settings=settings)
     if "problem" not in ours:
         features = capture.read()["stages"]["cameras"]["figures"]["features"]
         ours |= _against_truth(capture, truth, count) | {"found_by": features}
@@ -158,21 +155,12 @@ def plain_cost(capture: Capture, beside: Capture, truth: Path, count: int, limit
         (copy / "cameras").mkdir()
         (copy / "frames").symlink_to(capture.frames)
     names = [record.name for record in read_frames(capture).records]
-    own, began = stage_cost.own_s(), time.monotonic()
-    child = subprocess.Popen([sys.executable, "-c", f"from {__spec__.name} import plain; plain()", str(capture.frames),
-                              str(beside.root), *names], cwd=ROOT,
-                             start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        child.wait(limit_s)
-    except subprocess.TimeoutExpired:
+    code = f"from {__spec__.name} import plain; plain()"
+    ran = run_alone(["-c", code, str(capture.frames), str(beside.root), *names], limit_s, quiet=True)
+    if ran.code is None:
         return {"over_s": round(limit_s)}
-    finally:
-        if child.poll() is None:
-            os.killpg(child.pid, signal.SIGKILL)
-            child.wait()
-    seconds = time.monotonic() - began
-    cost = {"seconds": round(seconds, 1), "processor_s": round(stage_cost.own_s()[1] - own[1], 1)}
-    return ({**cost, **_against_truth(beside, truth, count)} if child.returncode == 0
+    cost = {"seconds": round(ran.seconds, 1), "processor_s": round(ran.processor_s, 1)}
+    return ({**cost, **_against_truth(beside, truth, count)} if ran.code == 0
             else {**cost, "frames": count, "registered": 0})
 
 

@@ -21,7 +21,6 @@ from pathlib import Path
 
 from . import figures
 
-ROOT = Path(__file__).resolve().parent.parent
 PRODUCT, BESIDE = ("core", "wildcap_addon", "farm"), ("core/synthetic", "core/training")
 LINES, PARAMETERS, COLUMNS = 60, 7, 120
 COMMAND = "python -m benchmarks.measure_code --json docs/figures/measure_code.json"
@@ -32,7 +31,7 @@ def main() -> None:
     parser.add_argument("--list", action="store_true", help="name what is counted")
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
-    found = look([path for top in (*PRODUCT, "benchmarks") for path in sorted((ROOT / top).rglob("*.py"))])
+    found = look([path for top in (*PRODUCT, "benchmarks") for path in sorted((figures.ROOT / top).rglob("*.py"))])
     if asked.list:
         print("\n".join(f"{kind}: {name}" for kind, names in found.items() if kind != "product lines"
                         for name in names))
@@ -42,7 +41,7 @@ def main() -> None:
         figures.write(asked.json, "measure_code", COMMAND, counts)
 
 
-def look(paths: list[Path], root: Path = ROOT) -> dict[str, list[str] | int]:
+def look(paths: list[Path], root: Path = figures.ROOT) -> dict[str, list[str] | int]:
     """What is counted, by name; of the product's lines the number."""
     long, many, wide, classes, lines = [], [], [], Counter(), 0
     for path in paths:

@@ -13,18 +13,16 @@ from __future__ import annotations
 import argparse
 import shutil
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from core import solve
+from core.contract import sample_head
 from core.contract.capture import Capture
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
-from core.face.template import ASSETS
-from core.geometry import meshes
 from core.imaging import images
 
 from .figures import write
@@ -62,23 +60,16 @@ def main() -> None:
 def solved(darkening: np.ndarray, mask: np.ndarray, added: bool, size: int) -> np.ndarray:
     """Linear albedo [size, size, 3] of the sample head whose texture is multiplied by `darkening` [1024, 1024]."""
     with tempfile.TemporaryDirectory() as folder:
-        capture = Capture(Path(folder) / "head.wildcap")
+        sample, capture = sample_head.copy_to(Path(folder)), Capture(Path(folder) / "darkened.wildcap")
         capture.root.mkdir()
-        shutil.copyfile(ASSETS / "sample_head" / "texture_confidence.exr", capture.texture_confidence)
-        meshes.write_obj(capture.head, sample_head())
-        images.write_linear(capture.texture,
-                            images.read_linear(ASSETS / "sample_head" / "texture.exr") * darkening[..., None])
+        shutil.copyfile(sample.texture_confidence, capture.texture_confidence)
+        shutil.copyfile(sample.head, capture.head)
+        images.write_linear(capture.texture, images.read_linear(sample.texture) * darkening[..., None])
         images.write_data(capture.shadow_mask_auto, 0 * mask if added else mask)
         if added:
             images.write_data(capture.shadow_mask, mask)
         solve.run(capture, from_json({"solve": {"size": size}}), Reporter("solve"))
         return images.read_linear(capture.maps / "diffuse_albedo.exr")
-
-
-def sample_head() -> meshes.Mesh:
-    """The sample's head: the built-in one's faces and UVs over the vertices that are stored of it."""
-    vertices = np.loadtxt(ASSETS / "sample_head" / "head_vertices.obj", usecols=(1, 2, 3))
-    return replace(meshes.read_obj(ASSETS / "head.obj"), vertices=vertices)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,6 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-import av
 import numpy as np
 
 from core.face import faces, parser
@@ -37,6 +36,7 @@ from core.synthetic.people.figure import make_figure
 from core.synthetic.people.truth import Scene
 
 from .figures import markdown, write
+from .films import read_film
 from .likenesses import LIKENESSES
 
 VIEWS, SIZE, TEXELS = 8, 400, 1024
@@ -92,14 +92,12 @@ def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """The frames with truth of a filmed person and their shares, each hair SPARSE times."""
     names = sorted(path.stem for path in (folder / "parts" / "hair").glob("*.png"))
-    with av.open(str(folder / "capture.mp4")) as video:
-        for number, frame in enumerate(video.decode(video=0)):
-            if f"{number:04d}" in names:
-                parts = np.stack([images.read_mask(folder / "parts" / part / f"{number:04d}.png") for part in GROWN],
-                                 -1)
-                shares = unlit.true_shares(parts)
-                shares[..., [PARTS.index(name) for name in HAIRS]] *= SPARSE
-                yield frame.to_ndarray(format="rgb24").astype(np.float32) / 255, shares / shares.sum(-1, keepdims=True)
+    for number, frame in enumerate(read_film(folder / "capture.mp4")):
+        if f"{number:04d}" in names:
+            parts = np.stack([images.read_mask(folder / "parts" / part / f"{number:04d}.png") for part in GROWN], -1)
+            shares = unlit.true_shares(parts)
+            shares[..., [PARTS.index(name) for name in HAIRS]] *= SPARSE
+            yield frame.astype(np.float32) / 255, shares / shares.sum(-1, keepdims=True)
 
 
 def _crops(pictures: Iterator[tuple[np.ndarray, np.ndarray]],

@@ -4,7 +4,7 @@
 and the two slopes.
 
     python -m benchmarks.photographs [--data DIR] [--delighter NAME] [--weights FILE] [--sets NAME ...] [--subjects N]
-        [--page PATH] [--json PATH] [--pictures FOLDER]
+                                     [--json PATH] [--pictures FOLDER]
 
 Sets: faceolat (two people under twelve lights each, with their albedo and landmarks.json), lamps (DIR/near_ps_human1: a
 man with brows and a beard under seven lamps, ambient light subtracted; the merge of what each lamp lights stands for
@@ -42,11 +42,10 @@ from .measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, fl
 from .measures.slopes import slope
 from .measures.table import Column, Scores, summarise, to_markdown, to_record
 from .measures.tone import psnr_after_gain, to_decibels
-from .pages import write_page
 from .pairs import pairs
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
-COMMAND = "python -m benchmarks.photographs --page docs/results/photographs.md --json docs/figures/photographs.json"
+COMMAND = "python -m benchmarks.photographs --json docs/figures/photographs.json"
 LIT = 0.05
 """Share of a lit picture's 98th percentile above which a pixel is lit by its lamp."""
 COLUMNS = {"psnr": Column("PSNR, dB"), "detail": Column("detail"), "kept_brows": Column("brows", 2, 0),
@@ -93,7 +92,6 @@ def main() -> int:
                         help="weights of our network, with their card beside them, instead of those that are shipped")
     parser.add_argument("--sets", nargs="+", choices=TITLES, default=list(TITLES))
     parser.add_argument("--subjects", type=int, default=2, help="of each group of skin tone")
-    parser.add_argument("--page", type=Path, help="where the page goes, docs/results/photographs.md")
     parser.add_argument("--json", type=Path, help="where the record goes, docs/figures/photographs.json")
     parser.add_argument("--pictures", type=Path,
                         help="folder for PERSON.png: three lights, and a row per answer; of real people")
@@ -112,8 +110,6 @@ def main() -> int:
         text.append((TITLES[name], to_markdown(found, COLUMNS, "answer")))
         record[name] = to_record(found, scores)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
-    if asked.page:
-        write_page(asked.page, "Single photographs: the face that is kept and the light that is left", COMMAND, text)
     if asked.json:
         figures.write(asked.json, "photographs", COMMAND, record, keep=True)
     return 0

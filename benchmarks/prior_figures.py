@@ -40,7 +40,8 @@ from core.training.skins import SCALES, carried_names, carried_skins, synthetic_
 
 from .figures import write
 
-COMMAND = "python -m benchmarks.prior_figures"
+COMMAND = ("python -m benchmarks.prior_figures samples OUT.png --work DIR --skins FOLDER; "
+           "python -m benchmarks.prior_figures response")
 PATCH = 64
 COARSE = SCALES[-1]
 NAMES = "sampled", "expected", "draft", "draft, not restored", "mean face", "another subject"

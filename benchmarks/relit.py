@@ -8,13 +8,16 @@
 CAPTURE was solved from core/synthetic/sample, FOLDER was made by benchmarks/people.py. Rendered by Cycles with the
 add-on's own material and lights, of which none lit a capture, as linear EXR; both heads are the registered one. A
 picture is exposed so that the true subject's face has the mean luminance MIDDLE (one gain per light, the same for all
-  rows), encoded by the sRGB curve and clipped: no AgX. Figures are of the face, each the mean over the lights: raw
-        the filmed texture for albedo       delit          the delit texture for albedo solved         all three maps as
-        delivered         plain          the solved albedo, with no relief and an even gloss
-  true_albedo, true_normal, true_specular            solved, with one map swapped for the true one: what that map costs
-  floor          the truth with other random numbers: what the rendering's noise costs
-The true maps are worn where the registered surface lies on the true head (benchmarks/relit_maps.py).
-All albedos share the true skin tone as mean, and all rows but plain the solved relief and gloss.
+rows), encoded by the sRGB curve and clipped: no AgX. Figures are of the face, each the mean over the lights:
+
+    raw, delit                   the filmed or the delit texture for albedo
+    solved                       all three maps as delivered
+    no_relief, even_gloss        solved without the one, with the other; plain: both
+    true_albedo, true_normal, true_specular    solved, with one map swapped for the true one: what that map costs
+    floor                        the truth with other random numbers: what the rendering's noise costs
+
+The true maps are worn where the registered surface lies on the true head (benchmarks/relit_maps.py). All albedos share
+the truth's mean over confident facial skin.
 WORK keeps the renders; those that are newer than the maps and textures are taken as they are.
 """
 
@@ -46,11 +49,12 @@ from .people import PEOPLE, write_maps
 from .relit_maps import Worn, face_mask, read_rows, read_worn, worn_by, write_row
 from .relit_renders import MARGIN
 
-ROOT = Path(__file__).resolve().parent.parent
 LIGHTS = ("three_point", "window", "sun", "coloured", "city.exr", "interior.exr")
-ROWS = ("raw", "delit", "solved", "plain", "true_albedo", "true_normal", "true_specular", "floor")
+ROWS = ("raw", "delit", "solved", "plain", "no_relief", "even_gloss", "true_albedo", "true_normal", "true_specular",
+        "floor")
 LABELS = {"raw": "filmed texture as albedo", "delit": "delit texture as albedo", "solved": "**solved**",
           "plain": "solved albedo, no relief, even gloss",
+          "no_relief": "solved, no relief", "even_gloss": "solved, even gloss",
           "true_albedo": "solved, with the true albedo", "true_normal": "solved, with the true normals",
           "true_specular": "solved, with the true specular albedo",
           "floor": "the truth, other random numbers"}
@@ -151,8 +155,8 @@ def render(subject: RelitSubject, work: Path, lights: list[str], row_names: list
     write_json(work / "job.json",
                {"rows": rows, "lights": list(lights), "out": str(renders), "mask": str(mask), "resolution": RESOLUTION,
                 "samples": SAMPLES})
-    subprocess.run([sys.executable, "-m", "benchmarks.relit_renders", str(work / "job.json")], cwd=ROOT, check=True,
-                   stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, "-m", "benchmarks.relit_renders", str(work / "job.json")], cwd=figures.ROOT,
+                   check=True, stdout=subprocess.DEVNULL)
 
 
 def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:

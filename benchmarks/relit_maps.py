@@ -5,8 +5,7 @@ add-on opens.
 
 All rows share the registered head, so that pixels can be compared. It wears the true maps where its surface lies on the
 true head, not where their UVs agree: these are a millimetre apart, by which all fine detail would count as an error.
-All albedos have the same mean over confident facial skin, the true tone that the solver was given: what the rows differ
-in is not brightness.
+All albedos have the same mean over confident facial skin, the truth's: what the rows differ in is not brightness.
 """
 
 from __future__ import annotations
@@ -49,12 +48,15 @@ def rows_of(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin: 
     even = np.full_like(solved.specular, (solved.specular * skin).sum() / skin.sum())
     flat = np.broadcast_to(np.float32([0, 0, 1]), solved.normal.shape)
     tone = (true.albedo * skin[..., None]).sum((0, 1)) / skin.sum()
+    solved = replace(solved, albedo=toned(solved.albedo, tone, skin))
     return {
         "truth": true,
         "raw": replace(solved, albedo=toned(raw, tone, skin)),
         "delit": replace(solved, albedo=toned(delit, tone, skin)),
         "solved": solved,
         "plain": replace(solved, normal=flat, specular=even),
+        "no_relief": replace(solved, normal=flat),
+        "even_gloss": replace(solved, specular=even),
         "true_albedo": replace(solved, albedo=true.albedo),
         "true_normal": replace(solved, normal=true.normal),
         "true_specular": replace(solved, specular=true.specular),

@@ -22,6 +22,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+EXTENSION = "bl_ext.user_default.wildcap"
+"""The checkout's name in Blender, the very one that users get."""
 
 
 def main() -> None:
@@ -44,7 +46,7 @@ def main() -> None:
 
 @contextlib.contextmanager
 def extension() -> Iterator[None]:
-    """The checkout, enabled in this process's Blender under the very name users get: bl_ext.user_default.wildcap."""
+    """The checkout, enabled in this process's Blender as EXTENSION."""
     with tempfile.TemporaryDirectory() as extensions:
         repository = Path(extensions) / "user_default"
         repository.mkdir()
@@ -54,12 +56,12 @@ def extension() -> Iterator[None]:
             import bpy  # noqa: F401  (makes addon_utils importable)
         import addon_utils
 
-        if addon_utils.enable("bl_ext.user_default.wildcap", default_set=True) is None:
+        if addon_utils.enable(EXTENSION, default_set=True) is None:
             raise SystemExit("Blender could not enable the extension.")
         try:
             yield
         finally:
-            addon_utils.disable("bl_ext.user_default.wildcap")  # a class left registered crashes the wheel at exit
+            addon_utils.disable(EXTENSION)  # a class left registered crashes the wheel at exit
 
 
 @contextlib.contextmanager

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Self-Test expects: python -m benchmarks.self_test [SEEDS], after the sample head, the prior or the solver has
-changed.
+"""What Self-Test expects, after the sample head, the prior or the solver has changed.
+
+    python -m benchmarks.self_test [COUNT]
 
 Another device draws other noise and rounds otherwise, so what is expected is measured over seeds, in bfloat16 and in
 float32.
@@ -9,7 +10,7 @@ float32.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import tempfile
 from pathlib import Path
 from unittest import mock
@@ -29,7 +30,10 @@ PRECISIONS = {"bfloat16": torch.bfloat16, "float32": torch.float32}
 
 
 def main() -> None:
-    scores = {name: [score(seed, dtype) for seed in range(1, 1 + int(sys.argv[1] if sys.argv[1:] else SEEDS))]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("count", type=int, nargs="?", default=SEEDS, help="of seeds")
+    count = parser.parse_args().count
+    scores = {name: [score(seed, dtype) for seed in range(1, 1 + count)]
               for name, dtype in PRECISIONS.items()}
     every = np.concatenate(list(scores.values()))
     write_json(EXPECTED_FILE,

@@ -17,18 +17,17 @@ import argparse
 import shutil
 import tempfile
 import time
-from importlib import import_module
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from core.contract.capture import Capture
-from core.contract.messages import Reporter
 from core.contract.settings import from_json
 from core.face import template
 from core.imaging import images
 
+from .continued import begin_at_delight, run_stages
 from .figures import write
 from .shadow_captures import KINDS, SIZE, lifted_truth, synthetic_capture
 
@@ -134,19 +133,14 @@ def _delighter_of(capture: Capture) -> str:
 
 def _delit(capture: Capture, delighter: str, folder: Path) -> Capture:
     """A copy of what the delighter needs, delit and textured by today's code."""
-    copy = Capture(folder)
-    shutil.rmtree(copy.root, ignore_errors=True)
-    for part in (capture.frames, capture.cameras):
-        shutil.copytree(part, copy.root / part.name)
-    shutil.copyfile(capture.head, copy.head)
+    copy = begin_at_delight(capture, folder)
     _run(copy, delighter, "delight", "texture")
     return copy
 
 
 def _run(capture: Capture, delighter: str, *stages: str) -> None:
     settings = from_json({"delight": {"delighter": delighter}, "texture": {"size": SIZE}})
-    for stage in stages:
-        import_module(f"core.{stage}").run(capture, settings, Reporter(stage))
+    run_stages(capture, settings, *stages)
 
 
 def _border(mask: np.ndarray) -> np.ndarray:

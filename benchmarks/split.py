@@ -4,8 +4,8 @@
 and what it takes for granted.
 
     python -m benchmarks.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...] [--skins FOLDER]
-    [--page PATH] [--json PATH] python -m benchmarks.split FOLDER --only NAME --picture OUT.jpg     the parts of that
-    capture, side by side
+                               [--json PATH]
+    python -m benchmarks.split FOLDER --only NAME --picture OUT.jpg     the parts of that capture, side by side
 
 FOLDER holds captures as benchmarks/state.py measures them, several lights of each person, solved. The closed form alone
 is a second of work: the texture over the global light that it finds, of each capture alone and of all captures of a
@@ -42,12 +42,11 @@ from core.training.skins import carried_names, clusters
 from . import figures, people
 from .measures.references import NOTHING, TRUE
 from .measures.table import Column, Scores, summarise, to_markdown, to_record
-from .pages import Sections, write_page
+from .pages import Sections
 from .state_captures import DELIT, SIZE, SOLVED, Filmed, add_captures, captures_asked
 from .state_scores import in_uv, mean_of, of_person, small
 
-TITLE = "Skin or light"
-COMMAND = "python -m benchmarks.split FOLDER --page docs/results/split.md --json docs/figures/split.json"
+COMMAND = "python -m benchmarks.split FOLDER --json docs/figures/split.json"
 ALONE, TOGETHER, LESS, MORE = (
     "split alone",
     "split together",
@@ -92,7 +91,6 @@ def main() -> int:
     parser.add_argument("--picture", type=Path,
                         help="draw the parts of the first capture instead of measuring; of synthetic people only in "
                              "the docs")
-    parser.add_argument("--page", type=Path)
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     captures = captures_asked(parser, asked)
@@ -104,10 +102,7 @@ def main() -> int:
     record = {**to_record(summarise(scores, COLUMNS, DELIT), scores), "captures": by_capture, "scales": scales}
     if asked.skins:
         record["skins"] = reach_of_traits(asked.skins)
-    text = sections(record)
-    print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
-    if asked.page:
-        write_page(asked.page, TITLE, COMMAND, text)
+    print("\n\n".join(f"{heading}\n\n{body}" for heading, body in sections(record)))
     if asked.json:
         figures.write(asked.json, "split", COMMAND, record)
     return 0

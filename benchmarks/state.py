@@ -175,7 +175,9 @@ def measure(captures: list[Filmed]) -> tuple[Scores, dict[str, dict[str, Figures
 def code_of(captures: list[Filmed]) -> dict[str, str]:
     """What made the figures: the keys of the stages' code in the captures' records, and the hash of the measures'."""
     stages = [filmed.capture.read()["stages"] for filmed in captures]
-    keys = {name: " ".join(sorted({each[name]["code"][:12] for each in stages if name in each}))
+    # 0.1.0 kept one key of a stage's code, settings and inputs
+    keys = {name: " ".join(sorted({each[name].get("code", each[name].get("key", ""))[:12]
+                                   for each in stages if name in each}))
             for name in freeze.STAGES}
     measures = " ".join(hash_file(path) for path in measuring())
     return {**keys, "measures": hashlib.sha256(measures.encode()).hexdigest()[:12]}

@@ -11,22 +11,20 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.cameras_against_truth import similarity  # noqa: E402
-from core.contract.capture import Capture  # noqa: E402
-from core.contract.messages import Reporter  # noqa: E402
-from core.contract.settings import from_json  # noqa: E402
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
 from core.geometry import meshes
-from core.geometry.views import read_views  # noqa: E402
-from core.imaging import images  # noqa: E402
-from core.synthetic import painted_head  # noqa: E402
+from core.geometry.views import read_views
+from core.imaging import images
+from core.synthetic import painted_head
+
+from .cameras_against_truth import similarity
 
 STAGES = ("frames", "cameras", "scan", "registration", "delight", "texture", "shadow_mask")
 

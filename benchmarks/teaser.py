@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The README's picture of a finished capture: frame, mask over the texture, albedo, specular, normal, renders.
+"""The README's picture of a finished capture: a frame, the mask over the texture, the solved albedo, and below them the
+head under three lights.
 
-    python -m benchmarks.teaser CAPTURE docs/pictures/teaser.jpg
+    python -m benchmarks.teaser .demo/sample.wildcap docs/pictures/teaser.jpg
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -16,22 +17,26 @@ from core.contract.capture import Capture
 from core.geometry.views import read_views
 from core.imaging import images
 
-SIDE = 360
+SIDE = 480
+LIGHTS = "sun", "three_point", "window"
 
 
 def main() -> None:
-    capture, target = Capture(Path(sys.argv[1])), Path(sys.argv[2])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path, help="solved and rendered, as `make demo` leaves it")
+    parser.add_argument("target", type=Path)
+    arguments = parser.parse_args()
+    capture = Capture(arguments.capture)
     views = read_views(capture, selected_only=True)
     texture = images.read_srgb(capture.texture_png)
     mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
     mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
-    row = [images.read_srgb(views[len(views) // 2].path), texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0])]
-    row += [images.read_srgb(capture.maps / f"{name}.png") for name in ("diffuse_albedo", "specular_albedo", "normal")]
-    row += [images.read_srgb(path) for path in sorted(capture.renders.glob("*.png"))]
-    row = [_square(picture) for picture in row]
-    half = (len(row) + 1) // 2
-    row += [np.ones_like(row[0])] * (2 * half - len(row))
-    images.write_srgb(target, np.vstack([np.hstack(row[:half]), np.hstack(row[half:])]), quality=88)
+    albedo = capture.maps_4k if capture.maps_4k.is_dir() else capture.maps
+    above = [images.read_srgb(views[len(views) // 2].path), texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0]),
+             images.read_srgb(albedo / "diffuse_albedo.png")]
+    below = [images.read_srgb(capture.renders / f"{light}.png") for light in LIGHTS]
+    images.write_srgb(arguments.target, np.vstack([np.hstack([_square(picture) for picture in row])
+                                                   for row in (above, below)]), quality=88)
 
 
 def _square(picture: np.ndarray) -> np.ndarray:

@@ -7,8 +7,10 @@
 
 CAPTURE is registered (cameras, head.obj); TRUTH is laid out as benchmarks/albedo_score.py says. Its albedo frames go
 through the `folder` delighter, V = those. Prints one JSON with, per row, the score of albedo_score and the marks of
-  benchmarks/detail.py: average      the weighted mean of all views: the minimum of a squared loss
-  blend        in bands, not aligned                        aligned      what the stage does by default
+benchmarks/detail.py:
+  average      the weighted mean of all views: the minimum of a squared loss
+  blend        in bands, not aligned
+  aligned      what the stage does by default
   perceptual   the aligned blend after --steps of the paper's texture loss
   delit        as aligned, from the capture's own delit frames: what its delighter's errors add
 and "leave_one_out": the aligned texture scored in N frames, each time built without that frame.
@@ -17,9 +19,7 @@ and "leave_one_out": the aligned texture scored in N frames, each time built wit
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
-import shutil
 import tempfile
 import time
 from collections.abc import Iterable
@@ -40,6 +40,7 @@ from core.imaging import images
 from core.texture.blend import weighted_mean
 
 from .albedo_score import compare, mean_scores, read_truth
+from .continued import begin_at_delight, run_stages
 from .detail import FaceRays, centre_rays, look, marks, mean_of
 
 ROWS = ("average", "blend", "aligned", "perceptual", "delit")
@@ -57,12 +58,9 @@ def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: 
         results["delit"] = _row("aligned", *texture.observe_all(capture, head, size, report)[:2], looks, steps,
                                 pictures and pictures / "delit.jpg")
     with tempfile.TemporaryDirectory() as folder:
-        copy = Capture(Path(folder) / "copy.wildcap")
-        for part in (capture.frames, capture.cameras):
-            shutil.copytree(part, copy.root / part.name)
-        shutil.copy(capture.head, copy.head)
+        copy = begin_at_delight(capture, Path(folder) / "copy.wildcap")
         delighter = from_json({"delight": {"delighter": "folder", "folder": str(truth.absolute() / "albedo")}})
-        importlib.import_module("core.delight").run(copy, delighter, Reporter("delight"))
+        run_stages(copy, delighter, "delight")
         observations, surface, _ = texture.observe_all(copy, head, size, report)
         for row in (row for row in rows if row != "delit"):
             try:

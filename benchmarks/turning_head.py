@@ -23,13 +23,13 @@ from core.imaging import images
 from core.synthetic.painted_head import camera, photograph
 from core.synthetic.sample import write_video
 
-from . import figures, stage_cost
+from . import figures
+from .costs.stage import measure_stage
 
 FRAMES, SCALE = 300, 1.28
 WIDEST_DEG = 40.0
 JAW, SYLLABLE, SENTENCE = 0.35, 7, 90
 """How far the jaw opens, and frames of a syllable, and of a sentence with the pause after it."""
-ROOT = Path(__file__).resolve().parent.parent
 
 
 def main() -> int:
@@ -43,11 +43,11 @@ def main() -> int:
     film, capture = arguments.folder / f"{name}.mp4", Capture(arguments.folder.resolve() / f"{name}.wildcap")
     if not film.is_file():
         write_video(film, pictures(0.0 if arguments.silent else JAW))
-    stage_cost.measure(capture.root, "frames", film.resolve(), "draft")
-    cost = stage_cost.measure(capture.root, "cameras", film.resolve(), "draft")
+    measure_stage(capture.root, "frames", film.resolve(), "draft")
+    cost = measure_stage(capture.root, "cameras", film.resolve(), "draft")
     command = [sys.executable, "-m", "core", "run", str(film), str(capture.root), "--quality", "draft", "--until",
                arguments.until]
-    said = subprocess.run(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    said = subprocess.run(command, cwd=figures.ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     record = capture.read()
     stages = {stage: round(done["seconds"], 1) for stage, done in record["stages"].items()}
     findings = [finding["problem"] for done in record["stages"].values() for finding in done.get("findings", [])]

@@ -16,9 +16,7 @@ it. cost: 1024 to 4096 in a process of its own, seconds and peak memory.
 from __future__ import annotations
 
 import argparse
-import resource
 import tempfile
-import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -46,8 +44,9 @@ from core.upscale import detail, enlarged
 from core.upscale.maps import HeadMaps
 
 from .ablation_measures import feature_distance
+from .costs.meter import GIB, peak, spending
 from .detail import moles
-from .figures import write
+from .figures import markdown, write
 from .shadow_captures import picture, write_views
 
 SEEDS, FILMED = (900001, 900003, 900004, 900005, 900007, 900008), (900003,)
@@ -80,7 +79,10 @@ def main() -> None:
         # each in a fresh process, whose peak is its own
         with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
             found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
-    print("\n\n".join(_table(name, rows) for name, rows in found.items()))
+    for name, rows in found.items():
+        columns = next(iter(rows.values()))
+        print(markdown([name, *columns], [[row, *(f"{values[column]:.4g}" for column in columns)]
+                                          for row, values in rows.items()]), end="\n\n")
     if arguments.json:
         def keys(figures_by_name: dict[str, float]) -> dict[str, float]:
             return {figure.lower().replace(" ", "_"): value for figure, value in figures_by_name.items()}
@@ -138,18 +140,17 @@ def cost(method: str, size: int = 1024) -> dict[str, float]:
     """Seconds and peak memory in GiB of enlarging maps of that size, in the process it is called in."""
     rng, blank = np.random.default_rng(0), np.ones((size, size, 3), np.float32)
     maps = HeadMaps(rng.random((size, size, 3), np.float32), blank / np.sqrt(3), rng.random((size, size), np.float32),
-                    blank[..., 0], blank)
-    began = time.perf_counter()
-    enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
-    return {"seconds": round(time.perf_counter() - began, 1),
-            "peak GiB": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, 2)}
+                    blank[..., 0], blank, blank[..., 0])
+    with spending() as spent:
+        enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
+    return {"seconds": round(spent.seconds, 1), "peak GiB": round(peak() / GIB, 2)}
 
 
 def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
     """Maps [7, H, W] in the network's channels, four times as large: [4H, 4W, 7]."""
     diffuse, normal = images.srgb_to_linear(np.moveaxis(small[:3], 0, -1)), np.moveaxis(small[3:6], 0, -1)
     blank = np.ones_like(diffuse)
-    maps = HeadMaps(diffuse, normal, small[6], blank[..., 0], blank)
+    maps = HeadMaps(diffuse, normal, small[6], blank[..., 0], blank, blank[..., 0])
     return enlarged(maps, FACTOR * len(diffuse), method, "cpu", lambda done: None)
 
 
@@ -223,14 +224,6 @@ def _fine_figures(albedo: np.ndarray, true: np.ndarray, observed: np.ndarray) ->
     return {"PSNR": float(-10 * np.log10(((albedo - true)[inner] ** 2).mean())), "SSIM": float(ssim[inner].mean()),
             "pores": float(np.corrcoef(fine[inner], true_fine[inner])[0, 1]),
             "moles": float((spots * true_spots)[near].sum() / (true_spots[near] ** 2).sum())}
-
-
-def _table(name: str, rows: dict[str, dict[str, float]]) -> str:
-    figures = list(next(iter(rows.values())))
-    lines = [f"| {name} | " + " | ".join(figures) + " |", "|" + " --- |" * (len(figures) + 1)]
-    return "\n".join(lines
-                     + [f"| {row} | " + " | ".join(f"{values[f]:.4g}" for f in figures) + " |"
-                        for row, values in rows.items()])
 
 
 if __name__ == "__main__":

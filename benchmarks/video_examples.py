@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a video should and should not look like, for the guide, made with the synthetic subject: python -m
-benchmarks.video_examples FOLDER
+"""What a video should and should not look like, for the guide, made with the synthetic subject.
+
+    python -m benchmarks.video_examples FOLDER
 
 film_good.jpg: five frames of one arc from ear to ear. film_bad.jpg: moved too fast, from too far, too near, a bare
 background, burnt out, too dark.
@@ -9,7 +10,7 @@ background, burnt out, too dark.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import tempfile
 from pathlib import Path
 
@@ -27,7 +28,9 @@ SWING_DEG, BLUR = 4.0, 9
 
 
 def main() -> None:
-    folder = Path(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     seed = RESERVED["sample"]
     skin = make_skin(sample_parameters(seed), MAPS)

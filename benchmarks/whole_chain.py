@@ -3,10 +3,11 @@
 """Which stage costs what: a solved capture's score beside the scores with one stage replaced by the truth or switched
 off.
 
-    python -m benchmarks.whole_chain CAPTURE TRUTH [--rows NAME ...] [--delighters NAME ...]
+    python -m benchmarks.whole_chain CAPTURE TRUTH [--rows NAME ...] [--delighters NAME ...] [--json OUT.json]
 
 CAPTURE has been run from TRUTH/capture.mp4 with the true skin tone; TRUTH is laid out as benchmarks/albedo_score.py
-  says. Prints one JSON: chain         the capture's own maps
+says. Prints one JSON:
+  chain         the capture's own maps
   solve_off     its texture, scaled to the tone, taken for the albedo
   raw_texture   the same without any delighting: what geometry and light leave
   true_frames   the true albedo frames through the folder delighter: what geometry, texture and solver cost
@@ -18,7 +19,6 @@ CAPTURE has been run from TRUTH/capture.mp4 with the true skin tone; TRUTH is la
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
 import shutil
 import tempfile
@@ -28,13 +28,13 @@ from pathlib import Path
 import numpy as np
 
 from core.contract.capture import Capture
-from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json
 from core.face import template
 from core.imaging import images
-from core.solve.skin_tone import parse_skin_tone
 
 from .albedo_score import score_capture
+from .continued import run_stages
+from .controlled_captures import as_albedo
 from .figures import write
 from .people import skin_tone
 from .shadow_captures import lifted_truth
@@ -94,14 +94,14 @@ def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:
             return _score_texture(copy, truth, settings)
         if row == "raw_texture":
             settings = from_json({"delight": {"delighter": "none"}}, settings)
-            _run(copy, settings, "delight", "texture")
+            run_stages(copy, settings, "delight", "texture")
             return _score_texture(copy, truth, settings)
         if row == "delighter":
-            _run(copy, settings, "delight", "texture", "shadow_mask", "solve")
+            run_stages(copy, settings, "delight", "texture", "shadow_mask", "solve")
             return {**score_capture(copy, truth), "solve_off": _score_texture(copy, truth, settings)}
         if row == "true_frames":
-            _run(copy, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings),
-                 "delight", "texture", "shadow_mask", "solve")
+            run_stages(copy, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings),
+                       "delight", "texture", "shadow_mask", "solve")
             return {**score_capture(copy, truth), "solve_off": _score_texture(copy, truth, settings)}
         shadow, seen = _true_shadow(copy, truth, 512)
         if row == "mask":
@@ -110,23 +110,14 @@ def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:
             return {"recall": float(both / shadow[seen].sum()), "iou": float(both / (found | shadow)[seen].sum()),
                     "true_share": float(shadow[seen].mean()), "masked_share": float(found[seen].mean())}
         images.write_data(copy.shadow_mask, images.resize(shadow.astype(np.float32), 1024, 1024).clip(0, 1))
-        _run(copy, settings, "solve")
+        run_stages(copy, settings, "solve")
         return score_capture(copy, truth)
-
-
-def _run(capture: Capture, settings: Settings, *stages: str) -> None:
-    for stage in stages:
-        importlib.import_module(f"core.{stage}").run(capture, settings, Reporter(stage))
 
 
 def _score_texture(capture: Capture, truth: Path, settings: Settings) -> dict:
     """The score of the texture whose confident facial skin has been brought to the skin tone."""
-    texture = images.read_linear(capture.texture)
-    skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
-    tone = np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
-    scaled = texture * (tone * skin.sum() / (texture * skin[..., None]).sum((0, 1)))
     path = capture.root / "texture_as_albedo.png"
-    images.write_srgb(path, images.linear_to_srgb(scaled), bits=16)
+    images.write_srgb(path, as_albedo(capture, settings), bits=16)
     return score_capture(capture, truth, texture=path)
 
 

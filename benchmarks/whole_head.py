@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The completed head and the hair's masks, in numbers.
 
-    python -m benchmarks.whole_head [--seeds 9101 9102 ...] [--size 512] [CAPTURE ...]
+    python -m benchmarks.whole_head [--seeds 9101 9102 ...] [--size 512] [--json OUT.json] [CAPTURE ...]
 
 Synthetic subjects (truth known everywhere, only the face seen), mean over the seeds, as {"fill", "completed"}; `fill`
 is what the solver gives where nobody looked, its mean face in the subject's tone:
   neck, ears, scalp   mean error of the hidden albedo's tone (over 2 mm), sRGB of 255
   grain               deviation of log albedo between 0.5 and 1 mm, hidden neck over face; 1 is alike
-  brows, beard        correlation of the mask with what the painted hair takes from the albedo; bare_chin: cm^2 of beard
-  found where there is none below_hair          error of the albedo under brows and beard against the skin painted
-  without hair, sRGB of 255: {"with hair", "clean"}
+  brows, beard        correlation of the mask with what the painted hair takes from the albedo
+  bare_chin           cm^2 of beard found where there is none
+  below_hair          error of the albedo under brows and beard against the skin painted without hair, sRGB of 255:
+                      {"with hair", "clean"}
 Captures: border, the mean step of the log tone from 8 mm inside the seen part to 6 mm outside, {"fill", "completed",
 "within"}, the last between places as far apart inside; with --subject SEED (the captures are of that synthetic person)
 tone, the errors as above where nobody looked; cut, the step over the map's own cut beside that of neighbours; hair,
@@ -81,7 +82,8 @@ def whole(seed: int, surface: HeadSurface) -> dict:
     shown = np.clip(2 * face, 0, 1)[..., None]
     diffuse = truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)
     specular = truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2 * (1 - shown[..., 0])
-    cut = replace(truth, confidence=(0.7 * face).astype(np.float32), diffuse=diffuse.astype(np.float32),
+    cut = replace(truth, confidence=(0.7 * face).astype(np.float32), seen=face.astype(np.float32),
+                  diffuse=diffuse.astype(np.float32),
                   specular=specular.astype(np.float32))
     done, hidden = complete(cut, surface, Reporter("upscale"), seed), face < 0.02
     row: dict = {}
@@ -111,12 +113,12 @@ def hairs(seed: int, surface: HeadSurface) -> dict:
 
 def of_capture(capture: Capture, subject: int | None = None) -> dict:
     """How far the border and the map's cut show, before and after, and how much hair there is."""
-    maps = read_maps(capture.maps)
+    maps = read_maps(capture.maps, capture.texture_confidence)
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse))
     report = Reporter("upscale")
     done = complete(maps, surface, report)
     seen = cv2.morphologyEx(
-        (maps.confidence >= UNSEEN_CONFIDENCE).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)
+        (maps.seen >= UNSEEN_CONFIDENCE).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)
     )
     seen = seen.astype(bool) | (template.mask("face", surface.size) > 0.5)
     inside = (_distance(seen) - _distance(~seen)) * surface.texel
@@ -144,7 +146,7 @@ def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
     skin = make_skin(replace(sample_parameters(seed), **changes), surface.size)
     one = np.ones((surface.size,) * 2, np.float32)
     return HeadMaps(skin.diffuse.astype(np.float32), skin.normal.astype(np.float32), skin.specular, 0.7 * one,
-                    np.repeat(one[..., None], 3, 2))
+                    np.repeat(one[..., None], 3, 2), one)
 
 
 def _step(maps: HeadMaps, ring: np.ndarray, next_ring: np.ndarray, surface: HeadSurface) -> float:

@@ -28,4 +28,4 @@ def painted(beard: float = 0.0, brows: float = 1.0) -> HeadMaps:
                              moles=0.0, freckles=0.0), SIZE)
     one = np.ones((SIZE, SIZE), np.float32)
     return HeadMaps(skin.diffuse.astype(np.float32), skin.normal.astype(np.float32), skin.specular, 0.7 * one,
-                    np.repeat(one[..., None], 3, 2))
+                    np.repeat(one[..., None], 3, 2), one)

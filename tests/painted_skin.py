@@ -41,13 +41,14 @@ def brief_light(monkeypatch):
     monkeypatch.setitem(RECIPES, "wildcap", replace(RECIPES["wildcap"], updates=RECIPES["wildcap"].updates // 6))
 
 
-def make(root: Path) -> Capture:
+def make(root: Path, at: tuple[float, float] = (0.66, 0.55), radius: float = 0.09) -> Capture:
+    """The capture; the shadow's middle and radius are shares of the map."""
     made = Capture(root)
     made.claim()
     skin = torch.from_numpy(template.mask("skin", SIZE).copy())
     face = initial.tint_face(load().mean_face, torch.from_numpy(TONE), skin)
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
-    shadow = 1 / (1 + np.exp((np.hypot(x - 0.66, y - 0.55) - 0.09) / 0.006))
+    shadow = 1 / (1 + np.exp((np.hypot(x - at[0], y - at[1]) - radius) / 0.006))
     light = (0.7 + 0.3 * x) * (1 - 0.5 * shadow)
     albedo = (face[0, :3].permute(1, 2, 0).numpy() + 1) / 2
     images.write_linear(made.texture, albedo * light[..., None].astype(np.float32))

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from . import standin
+
 bpy = pytest.importorskip("bpy")
 
 
@@ -42,6 +44,18 @@ def test_a_picture_that_was_painted_on_stays_beside_the_file_s(addon, capture, k
     fresh = head.load_image(path)
     assert fresh != image and image.use_fake_user and np.allclose(image.pixels[:8], 0.25, atol=0.01)
     assert head.load_image(path) == fresh, "the file's own is read into one image"
+
+
+def test_a_picture_that_blender_packed_as_it_is_serves_again(addon, capture):
+    head, path = addon("head"), capture / "maps" / "diffuse_albedo.png"
+    image = head.load_image(path)
+    image.pack()
+    images = len(bpy.data.images)
+    assert head.load_image(path) == image and not image.use_fake_user and len(bpy.data.images) == images
+    assert image.packed_file is not None
+    path.write_bytes(standin.plain((10, 20, 30)))
+    fresh = head.load_image(path)
+    assert fresh != image and image.use_fake_user and fresh.pixels[0] == pytest.approx(10 / 255, abs=1e-3)
 
 
 def test_nodes_that_were_added_to_the_texture_s_material_are_never_cleared(addon, obj):
@@ -84,6 +98,26 @@ def test_the_flat_sheet_belongs_to_the_head_that_it_was_made_for(addon, capture,
         bpy.ops.wildcap.finish_mask()
 
 
+def test_a_skin_that_was_linked_to_another_head_keeps_its_values_and_each_head_its_maps(addon, capture, obj, tmp_path):
+    albedo = addon("relight.material").IMAGES[0][0]
+    bpy.ops.wildcap.assemble_material()
+    first = obj.data.materials[0]
+    first.node_tree.nodes["WildCap Skin"].inputs["Roughness"].default_value = 0.31
+    shown = first.node_tree.nodes[albedo].image
+    shutil.copytree(capture, tmp_path / "other.wildcap")
+    bpy.ops.wildcap.open_capture(directory=str(tmp_path / "other.wildcap"))
+    bpy.ops.wildcap.bring_in_head()
+    other = bpy.context.view_layer.objects.active
+    other.data.materials[0] = first
+    bpy.ops.wildcap.assemble_material()
+    second = other.data.materials[0]
+    assert obj.data.materials[0] == first != second and first.node_tree.nodes[albedo].image == shown
+    assert Path(second.node_tree.nodes[albedo].image.filepath).is_relative_to(tmp_path / "other.wildcap")
+    assert second.node_tree.nodes["WildCap Skin"].inputs["Roughness"].default_value == pytest.approx(0.31)
+    bpy.ops.wildcap.assemble_material()
+    assert other.data.materials[0] == second
+
+
 def test_looking_for_a_view_leaves_the_artist_s_look(addon):
     settings = bpy.context.scene.view_settings
     settings.view_transform = 'AgX'
@@ -103,7 +137,7 @@ def test_a_world_is_kept_by_a_number_of_its_own_and_not_by_its_place_in_the_list
 
 
 def test_who_asked_for_one_face_does_not_delete_another(addon, capture, item):
-    with pytest.raises(RuntimeError, match="Another face is chosen now"):
+    with pytest.raises(RuntimeError, match="Another face is selected now"):
         bpy.ops.wildcap.delete_face(root=str(capture.parent / "another.wildcap"))
     assert (capture / "head.obj").is_file()
     clicked = []

@@ -172,7 +172,7 @@ def test_why_a_batch_cannot_be_started(addon, batches, monkeypatch, tmp_path):
     other = batch_faces.planned(tmp_path / "b", batch_faces.filmed(tmp_path / "b", "c"))
     refuses("before you open another one", bpy.ops.wildcap.open_batch, directory=str(other))
     batch_faces.wait(addon, lambda: not running.running())
-    assert "is no lock of WildCap's" in addon("problems").of("").problem
+    assert "is not one of WildCap's locks" in addon("problems").of("").problem
     (folder / "lock").rmdir()
     (anna.root / "mood.json").write_text(json.dumps({"cameras": "slow"}))
     bpy.ops.wildcap.reconstruct_all()

@@ -59,9 +59,9 @@ def test_a_rows_settings_lie_over_the_files_and_those_over_the_shared_ones(folde
 @pytest.mark.parametrize("row, said", [
     (",x,,,,", "names no video"), ("gone.mp4,,,,,", "no video or folder at"),
     ("anna.mp4,a/b,,,,", "cannot be the name"), ("anna.mp4,..,,,,", "cannot be the name"),
-    ("anna.mp4,CARL,,,,", "is the name of Line 2, too"), ('anna.mp4,,"0.8,0.6",,,', "is no R,G,B"),
-    ('anna.mp4,,"0.8,0.6,x",,,', "is no R,G,B"),
-    ('anna.mp4,,"0.8,nan,0.5",,,', "is no R,G,B"), ("anna.mp4,,,white,,", "is no R,G,B"),
+    ("anna.mp4,CARL,,,,", "The name CARL is taken by Line 2"), ('anna.mp4,,"0.8,0.6",,,', "is not a colour"),
+    ('anna.mp4,,"0.8,0.6,x",,,', "is not a colour"),
+    ('anna.mp4,,"0.8,nan,0.5",,,', "is not a colour"), ("anna.mp4,,,white,,", "is not a colour"),
     ("anna.mp4,,,,head.obj,", "no head mesh at"),
     ("anna.mp4,,,,,gone.json", "cannot be read"), ("anna.mp4,,,,,shots.csv", "cannot be read"),
     ("anna.mp4,,,,,,,extra", "more cells than there are columns"),
@@ -79,7 +79,7 @@ def test_a_row_that_cannot_be_used_is_told_by_its_line_and_the_rest_is_planned(f
 
 @pytest.mark.parametrize("text, said", [
     ("", "names no video"), ("video\n", "names no video"), ("film,name\na,b\n", "'film' that means nothing"),
-    ("name\nb\n", "no column video"), ("video,video\na,b\n", "a column twice"), ("video\n\0\n", "no table of text")])
+    ("name\nb\n", "no column video"), ("video,video\na,b\n", "a column twice"), ("video\n\0\n", "not a text file")])
 def test_a_table_that_is_none_is_refused(folder, text, said):
     with pytest.raises(Problem) as refused:
         plan(folder, text)
@@ -158,7 +158,7 @@ def test_what_is_no_batch_is_left_alone(folder, capsys):
     (lambda told: {**told, "faces": [{**told["faces"][0], "name": "../x"}]}, "not a batch record"),
     (lambda told: {**told, "faces": [{**told["faces"][0], "settings": {"solve": {"steps": "x"}}}]}, "steps"),
     (lambda told: {**told, "faces": [{"name": "a"}]}, "not a batch record"),
-    (lambda told: {**told, "deliver": 3}, "the stage deliver are no object"),
+    (lambda told: {**told, "deliver": 3}, "the stage deliver have to be an object"),
     (lambda told: {**told, "faces": [{**told["faces"][0], "source": 3}]}, "not a batch record")])
 def test_a_record_that_is_damaged_is_refused_and_kept(folder, change, said):
     main(["batch", "plan", str(folder), str(folder / "batch")])

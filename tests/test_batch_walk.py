@@ -87,7 +87,7 @@ def test_the_walk_from_another_mode_and_over_a_face_that_is_damaged(addon, batch
     batch_faces.wait(addon, lambda: len(batches.waiting()) == 2)
     bpy.ops.mesh.primitive_cube_add()
     bpy.ops.object.mode_set(mode='EDIT')
-    refuses("while a mask is painted", bpy.ops.wildcap.next_mask)
+    refuses("while you paint a mask", bpy.ops.wildcap.next_mask)
     bpy.ops.object.mode_set(mode='OBJECT')
     anna.head.write_text("v 0 0 0\n")
     refuses("not one mesh with UVs", bpy.ops.wildcap.next_mask)
@@ -109,7 +109,7 @@ def test_what_is_no_batch_is_refused_and_one_that_is_damaged_meanwhile_says_so(a
     assert batches.current() is None
     for click in ("close_batch", "next_mask", "accept_mask"):
         refuses("No batch is open: click Open Batch", getattr(bpy.ops.wildcap, click))
-    refuses("no two captures", bpy.ops.wildcap.solve_all)
+    refuses("fewer than two captures", bpy.ops.wildcap.solve_all)
     folder = batch_faces.planned(tmp_path / "good", batch_faces.filmed(tmp_path / "good", "anna"))
     bpy.ops.wildcap.open_batch(directory=str(folder))
     batch_faces.wait(addon, lambda: batch_faces.seen(batches))

@@ -171,9 +171,9 @@ def test_a_videos_frames_are_matched_by_number(tmp_path, shot):
     ("a.xml", "<document><chunk>", "damaged"), ("a.xml", "<html></html>", "not Metashape"),
     ("a.csv", "a,b,c\n1,2,3\n", "column name is missing"),
     ("a.csv", "#name,x,y,alt,heading,pitch,roll,f\nA.jpg,1,2,three,0,0,0,30\n", "Line 2"), ("a.json", "{", "damaged"),
-    ("a.json", "{}", "no list"),
+    ("a.json", "{}", "not a list"),
     ("a.json", '{"width": 10, "height": 10, "cameras": [{"frame": 1, "matrix_world": [[1]]}]}', "incomplete"),
-    ("a.json", '{"cameras": []}', "no solved camera"), ("a.fbx", "", "no kind of camera file"),
+    ("a.json", '{"cameras": []}', "no solved camera"), ("a.fbx", "", "not a camera file"),
     ("a.csv", "", "column name"),
     ("a.xml", metashape_xml().replace("<k1>", "<k4>0.1</k4><k1>"), "k4"),
     ("a.xml", metashape_xml().replace('class="adjusted"', 'class="x"').replace(

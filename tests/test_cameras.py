@@ -159,11 +159,11 @@ def test_frames_without_common_structure_are_refused(tmp_path):
 def test_a_camera_that_hardly_moved_is_refused(tmp_path):
     film(tmp_path / "pictures", np.linspace(-4, 4, 6))
     write_video(tmp_path / "film.mp4", (images.read_srgb(path) for path in sorted((tmp_path / "pictures").iterdir())))
-    with pytest.raises(Problem, match="degrees around the head|fit together"):
+    with pytest.raises(Problem, match="camera moved only 9 degrees around the head"):
         solve(Capture(tmp_path / "face.wildcap"), tmp_path / "film.mp4", features="plain")
 
 
-def test_a_head_that_moves_before_a_still_background_is_refused(solved, tmp_path):
+def test_a_head_that_moves_before_a_still_background_is_told_from_one_at_rest(solved, tmp_path):
     """Cameras that hold for the background, but in every second picture the face has gone aside by a third of its
     width."""
     capture, _, _ = solved

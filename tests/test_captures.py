@@ -105,6 +105,28 @@ def test_the_active_head_says_which_of_several_captures_is_meant(addon, project)
     assert captures.active(bpy.context).name == "berta"
 
 
+def test_what_a_head_wears_means_its_face_as_the_head_does(addon, project):
+    active, heads = addon("captures").active, [item.head for item in items()]
+    hair = bpy.data.objects.new("Hair", bpy.data.hair_curves.new("Hair"))
+    tie = bpy.data.objects.new("Tie", None)
+    for thing, parent in ((hair, heads[0]), (tie, hair)):
+        bpy.context.scene.collection.objects.link(thing)
+        thing.parent = parent
+    for thing in (hair, tie):
+        bpy.context.scene.wildcap.active_index = 1
+        bpy.context.view_layer.objects.active = thing
+        assert active(bpy.context) == items()[0]
+        bpy.context.scene.wildcap.active_index = 1  # a click in the list
+        assert active(bpy.context) == items()[1] and bpy.context.view_layer.objects.active == heads[1]
+    bpy.data.objects.remove(heads[1])
+    bpy.context.view_layer.objects.active = hair
+    bpy.context.scene.wildcap.active_index = 1
+    assert active(bpy.context) == items()[1], "also where its head is not in the scene"
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.wildcap.open_capture(directory=items()[1].path)
+    assert active(bpy.context) == items()[1]
+
+
 def test_save_as_elsewhere_keeps_the_link(addon, project, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "elsewhere" / "other.blend"))
@@ -156,6 +178,40 @@ def test_a_moved_capture_is_missed_and_one_click_finds_it_and_what_moved_along(a
     shutil.move(archive / "anna.wildcap", project / "anna.wildcap")
     bpy.ops.wildcap.locate_capture('INVOKE_DEFAULT')  # beside the .blend: no browser
     assert {Path(found.path).parent for found in items()} == {project}
+
+
+@pytest.mark.parametrize("noted", [False, True])
+def test_a_project_that_comes_from_windows_finds_its_captures_and_pictures(addon, project, noted):
+    bpy.ops.wildcap.assemble_material()
+    links, item = addon("links"), addon("captures").active(bpy.context)
+    root, there = project / "berta.wildcap", "C:\\Faces\\berta.wildcap"
+    ours = [image for image in bpy.data.images if str(root) in image.filepath]
+    assert len(ours) == 3
+    for image in ours:
+        image.filepath = image.filepath.replace(str(root), there.upper()).replace("/", "\\")
+    item.registration.template = f"{there}\\template\\mine.obj"
+    item.head["wildcap_capture"] = item.path = there
+    item.from_blend = "berta.wildcap" if noted else ""
+    assert links.find(item) == root and links.name(item) == "berta.wildcap"
+    links.follow_on_opening()
+    assert item.path == item.head["wildcap_capture"] == str(root)
+    assert item.registration.template == str(root / "template" / "mine.obj")
+    assert all(Path(image.filepath).is_relative_to(root) and Path(image.filepath).is_file() for image in ours)
+
+
+def test_what_a_setting_names_in_a_capture_moves_with_it_and_what_it_names_elsewhere_does_not(addon, project, tmp_path):
+    item = addon("captures").active(bpy.context)
+    for at in (item.path, str(project)):
+        item.registration.template, item.deliver.folder = f"{at}/template/mine.obj", f"{at}/out"
+        if at == item.path:
+            shutil.copytree(item.path, tmp_path / "berta.wildcap")
+            before = item.path
+            addon("links").move(item, tmp_path / "berta.wildcap")
+            assert item.registration.template == str(tmp_path / "berta.wildcap" / "template" / "mine.obj")
+            assert item.deliver.folder == str(tmp_path / "berta.wildcap" / "out")
+            addon("links").move(item, Path(before))
+    addon("links").move(item, tmp_path / "berta.wildcap")
+    assert (item.registration.template, item.deliver.folder) == (f"{project}/template/mine.obj", f"{project}/out")
 
 
 def test_captures_of_an_unsaved_file_go_where_the_preferences_say_and_stay_linked(addon, tmp_path):

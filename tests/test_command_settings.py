@@ -130,10 +130,11 @@ def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
     (["--set", "solve.steps"], "--set solve.steps gives no value. Write --set solve.steps=VALUE, as solve.steps=20."),
     (["--set", "solve.stps=5"], "no setting named 'solve.stps'. Did you mean solve.steps?"),
     (["--set", "slove.steps=5"], "Did you mean solve.steps?"),
-    (["--set", "solve.steps=many"], "solve.steps is 'many', which is no whole number. It goes from 4 to 600."),
-    (["--set", "solve.steps=5.5"], "no whole number"), (["--set", "solve.steps="], "'', which is no whole number"),
+    (["--set", "solve.steps=many"], "solve.steps is 'many', which is not a whole number. It goes from 4 to 600."),
+    (["--set", "solve.steps=5.5"], "not a whole number"),
+    (["--set", "solve.steps="], "'', which is not a whole number"),
     (["--set", "solve.steps=3"], "solve.steps is 3. It goes from 4 to 600."),
-    (["--set", "scan.voxel_mm=wide"], "which is no number. It goes from 0.3 to 5 mm."),
+    (["--set", "scan.voxel_mm=wide"], "which is not a number. It goes from 0.3 to 5 mm."),
     (["--set", "scan.voxel_mm=nan"], "It goes from 0.3 to 5 mm."),
     (["--set", "upscale.hair=perhaps"], "upscale.hair is 'perhaps'. It is on or off."),
     (["--set", "scan.method=magic"], "Choose one of auto, stereo, splats."),
@@ -165,8 +166,8 @@ def test_two_words_for_one_value_are_no_contradiction(capture):
 
 @pytest.mark.parametrize(("content", "said"), [
     (None, "mine.json cannot be read"), (b"", "cannot be read"), (b"{", "cannot be read"),
-    (b"\xff\xfe\x00", "cannot be read"), (b"[1]", "no object but [1]"),
-    (b'"solve"', "no object but 'solve'"), (b'{"solve": [5]}', "settings of the stage solve are no object"),
+    (b"\xff\xfe\x00", "cannot be read"), (b"[1]", "object, not [1]"),
+    (b'"solve"', "object, not 'solve'"), (b'{"solve": [5]}', "settings of the stage solve have to be an object"),
     (b'{"solve": {"prior": 5}}', "not a str"),
     (b'{"slove": {}}', "Did you mean solve?"), (b'{"scan": {"voxel_mm": NaN}}', "0.3 to 5 mm"),
     (b"[" * 100_000, "cannot be read")])

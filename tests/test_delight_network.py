@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighting network and what surrounds it: input, lifting along edges, evening out over views, training that goes
-on."""
+"""The delighting network and what surrounds it: input, lifting along edges, training that goes on."""
 
 import importlib
 import json
@@ -14,16 +13,12 @@ import torch
 from core.contract.messages import Problem, Reporter
 from core.delight.below_hair import FITTED_SHARE, fill_hair
 from core.delight.casts import remove_casts
-from core.delight.evening import ShadingEstimate, even_out
+from core.delight.evening import ShadingEstimate
 from core.delight.lift import lift_shading, lift_share
-from core.delight.lit_head import LitHead
 from core.delight.network import WEIGHTS, crop, load_network, square_around
 from core.delight.second_opinion import Weighing, continue_beyond, weigh_in
 from core.delight.unet import CHANNELS, DelightNet, network_input
-from core.face import template
-from core.face.head import Head
 from core.geometry.meshes import vertex_normals
-from core.geometry.raster import render_view
 from core.imaging import images
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.sight import random_camera
@@ -104,34 +99,6 @@ def test_an_untrained_network_says_nothing_and_sees_any_size():
     for side in (64, 96):
         shading, shadow = net(torch.randn(1, CHANNELS, side, side))
         assert shading.shape == (1, 3, side // 2, side // 2) and not shading.any() and not shadow.any()
-
-
-def test_views_are_brought_to_one_albedo():
-    """Three looks at one head whose shadings are off by a constant and by a slope: afterwards what they leave as albedo
-    agrees."""
-    mesh = template.load()
-    nowhere = np.zeros(len(mesh.vertices))
-    head = LitHead(Head(mesh), vertex_normals(mesh), np.zeros((len(nowhere), 9)), 1 - nowhere, nowhere, nowhere, None,
-                   np.ones(3))
-    face, bary = template.landmarks()
-    landmarks = (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
-    views, looks = [], []
-    for seed, off in ((1, 0.3), (2, -0.2), (3, 0.0)):
-        view = random_camera(landmarks, 96, np.random.default_rng(seed))
-        where, at, _ = render_view(head.caster, view)
-        slope = np.linspace(-0.2, 0.2, 96, dtype=np.float32)[None, :, None] * (seed == 2)
-        log = np.full((96, 96, 3), np.log(0.3), np.float32)
-        views.append(view)
-        looks.append(ShadingEstimate((0.0, 0.0, 96.0), log - np.log(0.4) + np.float32(off) + slope,
-                                     np.zeros((96, 96), np.float32), log, where, at))
-    even = even_out(head, views, looks)
-
-    def spread(answers):
-        return np.std([np.median((a.log - a.shading)[a.face >= 0]) for a in answers])
-
-    assert spread(looks) > 0.15 and spread(even) < 0.02
-    slanted = (even[1].log - even[1].shading)[even[1].face >= 0]
-    assert slanted.std() < 0.5 * (looks[1].log - looks[1].shading)[looks[1].face >= 0].std()
 
 
 def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():

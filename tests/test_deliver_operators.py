@@ -25,6 +25,31 @@ def test_what_comes_before_the_files_is_told_in_panel_and_dialog(addon, capture)
     assert set(presets.FORMATS["glb"].drops) <= set(told) and any("files that you added stay" in line for line in told)
 
 
+def test_hair_and_close_up_that_a_delivery_leaves_out_are_told(addon, capture):  # noqa: F811
+    captures, head = addon("captures"), bpy.context.view_layer.objects.active
+    settings, tell = bpy.context.scene.wildcap.captures[0].deliver, addon("deliver.operators").WILDCAP_OT_deliver.tell
+    hair, eyes = "The hair stays here", "The close-up eyes and mouth stay here"
+
+    def told() -> list[bool]:
+        panel = " ".join(text for text, _ in drawn(bpy.types.WILDCAP_PT_deliver))
+        dialog = " ".join(tell(None))
+        assert all((words in panel) == (words in dialog) for words in (hair, eyes))
+        return [words in panel for words in (hair, eyes)]
+
+    assert told() == [False, False]
+    for key, data in ((captures.HAIR_KEY, bpy.data.hair_curves.new("Brow")),
+                      (captures.CLOSE_UP_KEY, bpy.data.meshes.new("Eye"))):
+        thing = bpy.data.objects.new(data.name, data)
+        bpy.context.scene.collection.objects.link(thing)
+        thing.parent, thing[key] = head, "brows"
+    assert told() == [True, True]
+    settings.format = "usd"
+    assert told() == [False, True]
+    delivered.in_tiles(capture)
+    settings.what = "own_mesh"
+    assert told() == [False, False]
+
+
 def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the_old_one(addon, capture, monkeypatch):  # noqa: F811
     folder = deliver(capture)
     before = {path: path.read_bytes() for path in folder.rglob("*.*")}
@@ -49,8 +74,27 @@ def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the
     with pytest.raises(RuntimeError, match="is not there any more"):
         bpy.ops.wildcap.open_delivery()
     waiting.forget()
-    with pytest.raises(RuntimeError, match="Nothing was delivered"):
+    with pytest.raises(RuntimeError, match="Nothing has been delivered"):
         bpy.ops.wildcap.open_delivery()
+
+
+def test_views_selection_and_the_active_object_are_afterwards_as_they_were(capture):  # noqa: F811
+    delivered.in_tiles(capture)
+    scene, head = bpy.context.scene, bpy.context.view_layer.objects.active
+    camera, cube = (bpy.data.objects.new(name, data) for name, data in (
+        ("Camera", bpy.data.cameras.new("Camera")), ("Cube", bpy.data.meshes.new("Cube"))))
+    for thing in (camera, cube):
+        scene.collection.objects.link(thing)
+    scene.camera = camera
+    space = next(area.spaces.active for area in bpy.context.screen.areas if area.type == 'VIEW_3D')
+    space.region_3d.view_perspective = 'CAMERA'
+    cube.select_set(True)
+    head.select_set(False)
+    for what in ("own_mesh", "head"):
+        scene.wildcap.captures[0].deliver.what = what
+        assert bpy.ops.wildcap.deliver() == {'FINISHED'}
+        assert space.region_3d.view_perspective == 'CAMERA' and scene.camera == camera
+        assert bpy.context.view_layer.objects.active == head and bpy.context.selected_objects == [cube]
 
 
 def test_a_blender_without_an_exporter_says_so(addon, capture, monkeypatch, tmp_path):  # noqa: F811

@@ -19,6 +19,8 @@ from core.contract.settings import from_json
 from core.face import faces
 from core.frames.doctor import blurred, diagnose, examine
 from core.frames.eyes import blinks
+from core.frames.select import sharpness
+from core.frames.source import Picture
 from core.imaging import images
 
 FACE = astronaut().astype(np.float32)[:300, 60:400] / 255
@@ -143,6 +145,68 @@ def test_each_shortcoming_has_its_sentence_and_a_good_capture_none(records, word
     assert words in problems(report) and (words or not report.findings)
     if words not in ("", "No face was found in 40 of 80 frames"):
         assert len(report.findings) == 1, "nothing else is wrong"
+
+
+def test_a_face_in_blurred_frames_alone_is_told():
+    records = [record(face_box=None, yaw_deg=None)] * 39 + [record(blur=0.8)]
+    kept = [each for each, out in zip(records, blurred(records), strict=True) if not out]
+    with pytest.raises(Problem, match="only in frames that are blurred"):
+        diagnose(kept, ["00039.jpg"], False, Reporter("frames"))
+
+
+def test_of_a_few_photographs_the_blurred_one_is_named():
+    report = Reporter("frames")
+    records = [record(name=f"{i:05d}.jpg", source=f"IMG_{i}.jpg", time_s=None, yaw_deg=12.0 * i - 54,
+                      blur=0.86 if i == 4 else 0.45) for i in range(10)]
+    diagnose(records, [], True, report)
+    told = [finding for finding in report.findings if "blurred" in finding["problem"]]
+    assert [finding["problem"] for finding in told] == ["1 of 10 photographs is blurred: IMG_4.jpg."]
+    assert told[0]["frames"] == ["00004.jpg"]
+
+
+@pytest.mark.parametrize(("photographs", "told"), [(True, True), (False, False)])
+def test_sides_that_no_face_tells_are_believed_of_a_film_alone(photographs, told):
+    """The camera of a film moves on into the profile; the last of twenty photographs may show anything."""
+    records = around(low=-28, high=28, step=4) + [record(yaw_deg=None, face_box=None)] * 2
+    records = [record(yaw_deg=None, face_box=None)] * 2 + records
+    report = Reporter("frames")
+    diagnose(records, [], photographs, report)
+    assert ("from in front only" in problems(report)) == told
+
+
+def test_where_no_face_is_found_a_film_is_measured_at_the_last_one_and_a_photograph_at_the_person(monkeypatch):
+    """A sharp back of the head to the right of a blurred wall, before which the last picture showed a face."""
+    picture = np.full((300, 400, 3), 0.5, np.float32)
+    picture[100:220, 260:380] = FACE[60:180, 100:220]
+    person = np.zeros((300, 400), np.float32)
+    person[100:220, 260:380] = 1
+    monkeypatch.setattr(faces, "segment_person", lambda srgb: person)
+    last = faces.Face((20, 40, 160, 200), np.zeros((468, 3)), 0.9)
+    for time_s, box in ((None, (260, 100, 380, 220)), (1.0, last.box)):
+        made = frames._record(Picture(picture, 0, time_s, "", None, 1, 1), "0.jpg", None, last, 0.0)
+        assert made.sharpness == pytest.approx(sharpness(picture, box), abs=1e-5)
+        assert made.blur == examine(picture, box)["blur"]
+    assert examine(picture, last.box)["blur"] > 0.9 > 0.6 > examine(picture, (260, 100, 380, 220))["blur"]
+
+
+def test_the_ten_photographs_of_the_guide_are_no_gaps_and_no_holes():
+    yaws = (0, -38, 41, None, None, 2, -1, 36, -40, 1)
+    records = [record(yaw_deg=yaw, face_box=None if yaw is None else (200, 300, 520, 720), time_s=None) for yaw in yaws]
+    report = Reporter("frames")
+    diagnose(records, [], True, report)
+    assert problems(report).startswith("There are only 10 photographs: expect a head that follows features and")
+    assert len(report.findings) == 1
+    diagnose([replace(each, yaw_deg=1.0) for each in records[:1]] * 3, [], True, report)
+    assert "profiles" in report.findings[-1]["remedy"] and "front only" in report.findings[-1]["problem"]
+
+
+def test_photographers_are_not_told_of_frames_and_videos():
+    second = [record(time_s=None, other_face=0.5)] * 5 + [record(time_s=None)] * 10
+    report = Reporter("frames")
+    diagnose(second, [], True, report)
+    assert "second face is in 5 of 15 photographs" in problems(report)
+    with pytest.raises(Problem, match="crop the photographs"):
+        diagnose([record(time_s=None, other_face=0.9)] * 5, [], True, report)
 
 
 def test_the_measures_say_what_was_done_to_the_picture():

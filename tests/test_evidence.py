@@ -93,6 +93,27 @@ def test_a_copy_of_a_camera_is_the_artists_and_stays_and_the_scene_keeps_its_fra
     assert scene.camera.name not in mine and scene.camera.name.startswith(name)
 
 
+def test_what_is_tied_to_a_camera_stays_so_when_the_cameras_come_in_again(reconstructed):
+    bpy.ops.wildcap.bring_in_cameras(every=True)
+    scene, (kept, *_) = bpy.context.scene, cameras().values()
+    marker = scene.timeline_markers.new("cut", frame=5)
+    marker.camera = scene.camera = kept
+    follower = bpy.data.objects.new("Follower", None)
+    scene.collection.objects.link(follower)
+    constraint = follower.constraints.new('COPY_TRANSFORMS')
+    constraint.target = kept
+    lens, matrix = kept.data.lens, kept.matrix_basis.copy()
+    kept.data.lens, kept.matrix_basis = 200, Matrix.Translation((1, 2, 3))
+    images = len(bpy.data.images)
+    bpy.ops.wildcap.bring_in_cameras()
+    assert marker.camera == scene.camera == constraint.target == kept
+    assert kept.data.lens == pytest.approx(lens) and kept.matrix_basis == matrix
+    assert sorted(cameras()) == ["head 00000.jpg", "head 00002.jpg"] and len(bpy.data.cameras) == 2, "the others went"
+    assert len(kept.data.background_images) == 1 and len(bpy.data.images) == images
+    bpy.ops.wildcap.bring_in_cameras(every=True)
+    assert len(cameras()) == 3 and [c.name for c in bpy.data.collections] == ["head Cameras"]
+
+
 def test_the_scan_comes_in_again_while_the_old_one_is_active(reconstructed):
     bpy.ops.wildcap.bring_in_scan()
     scan = next(o for o in bpy.context.scene.objects if o.name.endswith("Scan"))
@@ -133,3 +154,31 @@ def test_what_was_slimmed_away_is_made_again_for_whoever_looks_at_it(addon, reco
     ask()
     assert started == ["bring_back"] and not cameras()
     assert addon("status").look(folder, Settings()).problem is None
+
+
+def test_landmarks_that_were_moved_on_one_head_stay_when_another_ones_are_shown(addon, reconstructed, tmp_path):
+    shown = addon("reconstruct.landmarks").shown_landmarks
+    roots = [reconstructed, standin.make(tmp_path / "other.wildcap")]
+    for root in roots:
+        (root / "landmarks.json").write_text('{"points": {"1": [0, -0.1, 0], "152": [0, -0.1, -0.1]}}', "ascii")
+    heads = []
+    for root in roots:
+        bpy.ops.wildcap.open_capture(directory=str(root))
+        bpy.ops.wildcap.bring_in_head()
+        heads.append(bpy.context.view_layer.objects.active)
+    first, second = bpy.context.scene.wildcap.captures
+    bpy.context.view_layer.objects.active = heads[0]
+    bpy.ops.wildcap.show_landmarks()
+    bpy.data.collections["WildCap Landmarks"].name = "Mine"
+    shown(first)[0].location.x += 0.01
+    bpy.context.view_layer.objects.active = heads[1]
+    assert not bpy.ops.wildcap.hide_landmarks.poll() and not shown(second)
+    for _ in range(2):
+        bpy.ops.wildcap.show_landmarks()
+        assert len(shown(first)) == len(shown(second)) == 2
+    assert shown(first)[0].location.x == pytest.approx(0.01)
+    bpy.ops.wildcap.hide_landmarks()
+    assert len(shown(first)) == 2 and not shown(second)
+    bpy.context.view_layer.objects.active = heads[0]
+    bpy.ops.wildcap.hide_landmarks()
+    assert not shown(first)

@@ -61,6 +61,15 @@ def test_mirrored_picture_turns_the_other_way(picture):
     assert abs(face.yaw_deg + mirrored.yaw_deg) < 8 and abs(face.yaw_deg) < 45
 
 
+def test_what_looks_like_a_face_at_first_does_not_hide_the_one_behind_it(picture, monkeypatch):
+    """A print on a shirt is more prominent, and its landmarks are none."""
+    found = faces.detect(picture)
+    regions = [(40.0, picture.shape[0] - 40.0, 60.0, 0.0), faces._region_of_landmarks(found.landmarks)]
+    assert faces._landmarks(picture, regions[0]) is None
+    monkeypatch.setattr(faces, "_detect_regions", lambda image, margin: regions)
+    assert np.abs(faces.detect(picture).landmarks - found.landmarks).max() < 0.05 * found.width
+
+
 def test_no_face_in_noise_or_black():
     noise = np.random.default_rng(0).random((300, 400, 3), dtype=np.float32)
     assert faces.detect(noise) is None

@@ -95,7 +95,7 @@ def test_eyes_turn_as_far_as_the_guide_says(head, addon):  # noqa: F811
 def test_a_driver_of_the_artists_is_not_taken_away(head, addon):  # noqa: F811
     key = head.data.shape_keys.key_blocks["eyeLookInRight"]
     key.driver_add("value").driver.expression = "0.3"
-    with pytest.raises(RuntimeError, match="eyeLookInRight has a driver of yours already"):
+    with pytest.raises(RuntimeError, match="eyeLookInRight already has a driver of its own"):
         bpy.ops.wildcap.gaze()
     assert (
         addon("acting.gaze").of(head) is None

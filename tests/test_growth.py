@@ -42,7 +42,7 @@ def found(skin: np.ndarray, layers: list[tuple[np.ndarray, np.ndarray]], parts: 
         albedo = albedo * (1 - share[..., None]) + share[..., None] * colour
     one = np.ones((SIZE, SIZE), np.float32)
     maps = HeadMaps(albedo.astype(np.float32), one[..., None] * [0, 0, 1], 0.35 * one, 0.7 * one,
-                    np.repeat(one[..., None], 3, 2))
+                    np.repeat(one[..., None], 3, 2), one)
     return hair.find(maps, surface(), parts)
 
 

@@ -99,6 +99,25 @@ def test_a_material_of_somebodys_own_is_left_alone(addon, capture, job):
     assert head(addon).data.materials[0] == own
 
 
+def test_a_head_that_cannot_take_the_new_shape_says_so_and_gets_no_maps_of_it(addon, capture, job, monkeypatch):
+    bpy.ops.wildcap.make_my_head()
+    job.stage("texture")
+    take(addon)
+    kept = head(addon).data.materials[0]
+
+    def refuse(obj, mesh):
+        raise addon("head").Problem("It cannot follow.", "Keep it.")
+
+    monkeypatch.setattr(addon("head"), "FOLLOWERS", [refuse])
+    job.stage("texture")
+    job.stage("solve")
+    take(addon)
+    take(addon)
+    assert head(addon).data.materials[0] == kept and "wildcap_skin" not in kept and not wanted(addon)
+    told = addon("problems").of(addon("captures").root(bpy.context.scene.wildcap.captures[0]))
+    assert told.problem == "It cannot follow."
+
+
 def test_what_was_cancelled_leads_nowhere(addon, capture, job):
     bpy.ops.wildcap.make_my_head()
     job.stage("texture")

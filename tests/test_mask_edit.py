@@ -108,12 +108,17 @@ def spoil_texture(capture: Capture) -> None:
     images.write_linear(capture.texture, images.read_linear(capture.texture) * 0.9)
 
 
+def propose_anew(capture: Capture) -> None:
+    images.write_data(capture.shadow_mask_auto, 0.5 * images.read_mask(capture.shadow_mask_auto))
+
+
 def cut_off(capture: Capture) -> None:
     capture.solved.write_bytes(capture.solved.read_bytes()[:20000])
 
 
 @pytest.mark.parametrize(("spoil", "options", "reason"), [
-    (spoil_texture, {}, "Texture.exr changed"), (lambda capture: None, {"seed": 5}, "The solver's settings changed"),
+    (spoil_texture, {}, "Texture.exr changed"), (propose_anew, {}, "Shadow_mask_auto.png changed"),
+    (lambda capture: None, {"seed": 5}, "The solver's settings changed"),
     (lambda capture: capture.solved.unlink(), {}, "No solve has left its state"), (cut_off, {}, "is damaged"),
     (lambda capture: paint(capture, (slice(0, 128), slice(0, 128))), {}, "of the map"),
 ])

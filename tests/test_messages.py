@@ -53,6 +53,23 @@ def test_the_time_left_is_what_the_pace_since_the_first_finished_unit_says():
                     Progress("scan", 6.0, 10.0, "fusing", 8.0)]
 
 
+def test_each_part_of_a_stage_has_a_pace_of_its_own():
+    """As the stage of cameras reports: 24 faces in 12 s, then a structure in 120 s, then three rounds of 1 s."""
+    now, sent = [0.0], []
+    report = Reporter("cameras", sent.append, clock=lambda: now[0])
+    for part, (count, of, seconds) in enumerate([(24, 24, 12.0), (60, 1.0, 120.0), (3, 3, 3.0)]):
+        for done in range(count):
+            report.progress(done * of / count, of, str(part))
+            now[0] += seconds / count
+    etas = [[message.eta_s for message in sent if message.text == part] for part in "012"]
+    assert etas[1][:2] == [None, None] and etas[1][2] == pytest.approx(116.0) and etas[1][-1] == pytest.approx(2.0)
+    assert etas[2] == [None, None, pytest.approx(1.0)]
+    report.progress(0, 3, "again")
+    now[0] += 5.0
+    report.progress(1, 3, "again")
+    assert [message.eta_s for message in sent[-2:]] == [None, None]
+
+
 def test_every_report_hears_of_a_cancel():
     asked = [False]
     report = Reporter("scan", cancelled=lambda: asked[0])

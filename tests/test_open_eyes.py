@@ -15,12 +15,12 @@ pytest.importorskip("OpenImageIO")
 from core.contract.capture import Capture  # noqa: E402
 from core.contract.eyes_record import Eyeball, read_eyes, write_eyes  # noqa: E402
 from core.contract.messages import Problem, Reporter  # noqa: E402
-from core.face import eye_reader, lids  # noqa: E402
+from core.face import eye_reader, faces, lids, template  # noqa: E402
 from core.face.faces import Eye  # noqa: E402
 from core.face.head import read_filmed_head, read_head  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.geometry.views import View  # noqa: E402
-from core.registration import eye_looks, eyeballs, lid_marks  # noqa: E402
+from core.registration import eye_looks, eyeballs, landmarks, lid_marks  # noqa: E402
 from core.synthetic.people import shape  # noqa: E402
 
 SEED, IRIS_M = 4, 0.0059
@@ -150,6 +150,43 @@ def test_an_eye_is_not_read_beyond_the_nose_nor_in_a_blink(person):
     # yaw is positive where the head turns to the picture's right, and hides its left eye
     assert eye_looks.usable(seen, 0) == [0, 1]
     assert eye_looks.usable(seen, 1) == [0, 2]
+
+
+def test_the_eyes_of_another_face_are_not_read(person, monkeypatch):
+    """Four views of one person, and one in which another face, larger and with wide eyes, was found."""
+    head, opened = person
+    views = [replace(view_from(degrees), name=f"{i}.jpg") for i, degrees in enumerate((-20, -8, 0, 8, 20))]
+    marks = template.landmark_points(head)
+    found = []
+    for i, view in enumerate(views):
+        pixels = view.project(marks)[0]
+        pair = [seen_eye(rims_of(opened, side), view) for side in (1, 0)]
+        if i == 2:
+            pixels = 1.5 * pixels - [400, 100]
+            pair = [replace(eye, lower=eye.upper + 1.2 * (eye.lower - eye.upper)) for eye in pair]
+        face = faces.Face((0, 0, 1000, 1000), np.concatenate([pixels, np.zeros((468, 1))], 1), 0.9)
+        found.append((face, pair))
+    detected, paired = iter(face for face, _ in found), iter(pair for _, pair in found)
+    monkeypatch.setattr(landmarks.images, "read_srgb", lambda path: np.zeros((1000, 1000, 3), np.float32))
+    monkeypatch.setattr(landmarks.faces, "detect", lambda srgb: next(detected))
+    monkeypatch.setattr(landmarks.faces, "find_eyes", lambda srgb, face: next(paired))
+    marked = landmarks.find(views, QUIET, 100.0)
+    own = [min(eye.opening for eye in pair) for i, (_, pair) in enumerate(found) if i != 2]
+    assert marked.opening == pytest.approx(np.median(own))
+    nothing = eye_reader.EyeShares(*np.zeros((2, 96, 96)), np.zeros((2, 3)))
+    monkeypatch.setattr(eye_looks, "read_eye", lambda srgb, corners, left: nothing)
+    for looks in eye_looks.look(views, marked, QUIET):
+        assert [each.view.name for each in looks] == ["0.jpg", "1.jpg", "3.jpg", "4.jpg"]
+
+
+@pytest.mark.parametrize("degrees", [0, 30])
+def test_what_a_single_view_shows_is_lifted_as_deep_as_it_is_large(person, degrees):
+    """The same picture in a world of 50 mm between the pupils and in one of 63."""
+    pixels = view_from(degrees).project(template.landmark_points(person[0]))[0]
+    usual, small = (landmarks.lift_alone(view_from(degrees, distance), pixels).points
+                    for distance in (0.5, 0.5 * 50 / 63))
+    assert np.abs(63 / 50 * small - usual).max() < 0.0005
+    assert np.linalg.norm(usual - template.landmark_points(person[0]), axis=1).mean() < 0.005
 
 
 def test_lids_meet_the_edges_that_were_seen_and_balls_lie_behind_them(person, fitted):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.opendelight_cost import base, enhancer, write_random
+from benchmarks.costs.opendelight import base, enhancer, write_random
 from core import __main__ as terminal
 from core.contract.capture import Capture
 from core.contract.messages import CancelledError, Problem, Reporter

@@ -152,7 +152,7 @@ def test_what_is_protected_is_a_mask_of_its_own(addon, capture):
     bpy.ops.wildcap.finish_mask()
     bpy.ops.wildcap.paint_mask(mask='PROTECT')
     assert np.array_equal(mask_image.mask_values(paint.stencil_image), spot)
-    with pytest.raises(RuntimeError, match="never proposed"):
+    with pytest.raises(RuntimeError, match="no proposal for the protect mask"):
         bpy.ops.wildcap.edit_mask(kind='PROPOSAL')
     bpy.ops.wildcap.finish_mask()
     assert (capture / "protect_mask.png").read_bytes() == mask_image.grey_png(spot)

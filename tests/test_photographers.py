@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Photographs as photographers and telephones make them: large, and as HEIC."""
+"""Photographs as photographers and telephones make them: large, as HEIC, and in colours other than sRGB's."""
 
 import struct
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from core.contract.capture import Capture
+from core.frames.colour import to_srgb
 from core.imaging import images
 
 from .test_frames import SIZE, capture, moving_face, refused, take  # noqa: F401
@@ -52,3 +53,71 @@ def test_a_telephones_heic_is_read_upright_with_its_focal_length_and_colours(cap
     for i in range(3):
         (folder / f"{i}.heic").write_bytes(b"heic")
     assert "None of the photographs" in refused(Capture(tmp_path / "b.wildcap"), folder).problem
+
+
+def test_what_cannot_be_read_is_named_with_what_to_do(capture, tmp_path):  # noqa: F811
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for i in range(3):
+        images.write_srgb(folder / f"{i}.jpg", moving_face(5 * i).astype(np.float32) / 255)
+    (folder / "cut.heic").write_bytes(b"heic")
+    (folder / "from the web.avif").write_bytes(b"avif")
+    record, report = take(capture, folder)
+    other, finding = report.findings[:2]
+    assert len(record["frames"]) == 3
+    assert finding["problem"] == "1 of 4 photographs could not be read: cut.heic."
+    assert finding["remedy"].startswith("Export it as JPEG or PNG")
+    assert other["problem"].startswith("1 AVIF files were left out beside 4") and "JPEG" in other["remedy"]
+
+
+def give_profile(path, name: str) -> None:
+    """As iPhones and cameras write it: the profile is in the JPEG's second application segment."""
+    text = name.encode() + b"\0"
+    tag = b"desc" + bytes(4) + struct.pack(">I", len(text)) + text + bytes(78 + -(90 + len(text)) % 4)
+    head = struct.pack(">I4xI4s4s4s12x4s28x3I48x", 144 + len(tag), 0x02100000, b"mntr", b"RGB ", b"XYZ ", b"acsp",
+                       0xF6D6, 0x10000, 0xD32D)
+    profile = b"ICC_PROFILE\0\1\1" + head + struct.pack(">I4s2I", 1, b"desc", 144, len(tag)) + tag
+    data = path.read_bytes()
+    path.write_bytes(data[:2] + b"\xff\xe2" + struct.pack(">H", len(profile) + 2) + profile + data[2:])
+
+
+def photographed(folder, profiles) -> list[np.ndarray]:
+    """A photograph for each profile (None: without); what is stored in them, sRGB."""
+    folder.mkdir()
+    stored = [moving_face(5 * i).astype(np.float32) / 255 for i in range(len(profiles))]
+    for i, (picture, profile) in enumerate(zip(stored, profiles, strict=True)):
+        images.write_srgb(folder / f"{i}.jpg", picture, quality=98)
+        if profile:
+            give_profile(folder / f"{i}.jpg", profile)
+    return stored
+
+
+def test_display_p3_photographs_are_brought_to_srgb(capture, tmp_path):  # noqa: F811
+    stored = photographed(tmp_path / "photos", (None, "Display P3", "Display P3"))
+    (tmp_path / "photos" / "3.dng").write_bytes(b"raw")
+    record, report = take(capture, tmp_path / "photos")
+    assert "1 raw files were left out beside 3" in report.findings[0]["problem"]
+    plain, wide = (images.read_srgb(capture.frames / record["frames"][i]["name"]) for i in (0, 1))
+    assert np.abs(plain - stored[0]).mean() < 0.01
+    assert np.abs(wide - stored[1]).mean() > 0.005 and np.abs(wide - to_srgb(stored[1], 1, 12)).mean() < 0.01
+
+
+def to_xyz(primaries) -> np.ndarray:
+    """Linear R, G, B of these primaries, white D65, to XYZ, from their chromaticities."""
+    x, y = np.array([*primaries, (0.3127, 0.3290)]).T
+    xyz = np.stack([x / y, np.ones(4), (1 - x - y) / y])
+    return xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
+
+
+def test_adobe_rgb_is_brought_to_srgb_and_other_profiles_are_named(capture, tmp_path):  # noqa: F811
+    stored = photographed(tmp_path / "photos", ("Adobe RGB (1998)", "ProPhoto RGB", "sRGB IEC61966-2.1"))
+    record, report = take(capture, tmp_path / "photos")
+    adobe, other, plain = (images.read_srgb(capture.frames / frame["name"]) for frame in record["frames"])
+    linear = stored[0] ** 2.2 @ np.linalg.solve(to_xyz(((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))),
+                                                to_xyz(((0.64, 0.33), (0.21, 0.71), (0.15, 0.06)))).T
+    coarse = [images.resize(each, 24, 24) for each in (adobe, images.linear_to_srgb(linear), stored[0])]
+    off, untouched = (np.abs(coarse[i] - coarse[1]) for i in (0, 2))
+    assert off.mean() < 0.003 and untouched.mean() > 0.008, "of what a JPEG keeps"
+    assert max(np.abs(other - stored[1]).mean(), np.abs(plain - stored[2]).mean()) < 0.01
+    told = [finding["problem"] for finding in report.findings if "sRGB" in finding["problem"]]
+    assert told == ["The colours of 1.jpg are taken for sRGB, and their profile is ProPhoto RGB."]

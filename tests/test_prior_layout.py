@@ -22,18 +22,16 @@ from core.contract.stages import MAPS
 from core.face import template
 from core.geometry import meshes, raster
 from core.imaging import images
-from core.solve import initial, layout
+from core.solve import layout
 from core.solve.lighting import Lights
 from core.solve.maps import Maps
 from core.solve.prior import WEIGHTS, load
-from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
+from core.solve.skin_tone import GIVEN, SkinTone
 
-from .painted_skin import brief_confidence  # noqa: F401
+from .painted_skin import SIZE, TONE, as_setting, brief_confidence, make  # noqa: F401
 from .recorded import changed, record
 from .test_released_prior import weights_of, write
 
-SIZE = 128
-TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
 MODEL = {"depths": [1, 1], "channels": [32, 32], "self_attn_depths": [False, False], "mapping_out": 16,
          "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}
 
@@ -69,18 +67,8 @@ def put_own_head(capture: Capture, own: meshes.Mesh, skin: np.ndarray | None = N
 
 @pytest.fixture
 def capture(tmp_path):
-    """The mean face of TONE in a little light from the left, a soft shadow on one cheek, and another head fitted beside
-    the built-in one."""
-    made = Capture(tmp_path / "face.wildcap")
-    reference = initial.tint_face(load().mean_face, torch.from_numpy(TONE),
-                                  torch.from_numpy(template.mask("skin", SIZE).copy()))
-    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
-    shadow = 1 / (1 + np.exp((np.hypot(x - 0.6, y - 0.5) - 0.06) / 0.006))
-    light = (0.7 + 0.3 * x) * (1 - 0.5 * shadow)
-    albedo = (reference[0, :3].permute(1, 2, 0).numpy() + 1) / 2
-    images.write_linear(made.texture, albedo * light[..., None].astype(np.float32))
-    images.write_data(made.texture_confidence, np.ones((SIZE, SIZE), np.float32))
-    images.write_data(made.shadow_mask_auto, (shadow > 0.05).astype(np.float32))
+    """Painted skin, and another head fitted beside the built-in one."""
+    made = make(tmp_path / "face.wildcap", (0.6, 0.5), 0.06)
     meshes.write_obj(made.head, front())
     put_own_head(made, other_head())
     return made
@@ -96,8 +84,7 @@ def authors(tmp_path):
 
 
 def settings(prior, **options):
-    tone = format_skin_tone(SkinTone.from_linear(TONE, GIVEN))
-    return from_json({"solve": {"size": SIZE, "steps": 10, "guidance": "proximal", "skin_tone": tone,
+    return from_json({"solve": {"size": SIZE, "steps": 10, "guidance": "proximal", "skin_tone": as_setting(TONE),
                                 "prior": str(prior), **options}})
 
 
@@ -136,7 +123,8 @@ def round_trip(there: layout.Layout, albedo: np.ndarray, normal: np.ndarray) -> 
     ones = torch.ones(size, size)
     up = torch.zeros(3, size, size)
     up[2] = 1
-    e = layout.Evidence(torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, 0 * ones, 0 * ones)
+    e = layout.Evidence(torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, ones, 0 * ones,
+                        0 * ones)
     return there.returned(solved, e, Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)), 1.0,
                           SkinTone.from_linear(TONE, GIVEN))
 

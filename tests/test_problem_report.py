@@ -87,7 +87,7 @@ def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture,
     assert told["capture"]["settings"]["registration"]["template"] == REMOVED
     assert told["capture"]["stages"]["cameras"]["figures"] == {"count": 3}
     assert "WC-" in texts["unforeseen.txt"] and "device cpu" in texts["doctor.txt"]
-    assert main(["report-problem", "--to", str(target)]) == 2 and "is there already" in capsys.readouterr().err
+    assert main(["report-problem", "--to", str(target)]) == 2 and "already exists" in capsys.readouterr().err
     assert main(["report-problem", str(tmp_path / "none"), "--to", str(tmp_path / "b.zip")]) == 2
     assert main(["status", str(tmp_path / "none")]) == 2 and "no capture at" in capsys.readouterr().err
 

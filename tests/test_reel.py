@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Turntable and contact sheet: one render of several frames, judged by where the light and the head are in each."""
 
+import errno
 import shutil
 
 import numpy as np
@@ -114,3 +115,56 @@ def test_the_buttons_render_what_the_panel_says_and_wait_for_each_other(addon, c
     for name in ("render", "turntable", "contact_sheet"):
         with pytest.raises(RuntimeError, match="Blender is rendering"):
             getattr(bpy.ops.wildcap, name)()
+
+
+@pytest.mark.parametrize("film, turns, light, resolution, said", [
+    (True, 'HEAD', "sun", 17, "resolution that is even"), (False, 'LIGHT', "overcast", 16, "same from every side")])
+def test_a_turntable_that_cannot_be_is_refused_before_it_is_rendered(addon, capture, film, turns, light, resolution,
+                                                                     said):
+    headless = addon("relight.headless")
+    with pytest.raises(headless.Problem, match=said):
+        headless.render_turntable(capture, light, turns, 2, film, resolution=resolution, samples=1)
+    assert not (capture / "renders").exists()
+
+
+@pytest.mark.parametrize("error, said", [
+    (PermissionError(errno.EACCES, "in use", "/renders/sun.png"), "sun.png cannot be written"),
+    (ValueError("no picture"), "An error inside WildCap stopped Render")])
+def test_a_render_that_cannot_be_put_in_place_is_told_and_frees_its_memory(addon, capture, monkeypatch, error, said):
+    output, problems = addon("relight.output"), addon("problems")
+    bpy.ops.wildcap.bring_in_head()
+    head = bpy.context.view_layer.objects.active
+    scene = addon("relight.picture").RenderSettings(16, 1).scene(head, "sun")
+
+    def fail(*_):
+        raise error
+
+    for stands_in in ("place_file", "place_folder"):
+        monkeypatch.setattr(output, stands_in, fail)
+    monkeypatch.setattr(output, "_render", lambda scene, wait, **what: None)
+    with monkeypatch.context() as patched:
+        patched.setattr(output, "busy", lambda: True)
+        assert output._finish_or_show() == 0.1
+    output.stills(scene, [capture / "renders" / "sun.png"], False, lambda: None)
+    assert scene.render.use_persistent_data
+    assert output._finish_or_show() is None and said in problems.of("").problem
+    assert not scene.render.use_persistent_data and head.name not in scene.objects
+    monkeypatch.setattr(output, "place_file", lambda source, path: None)
+    monkeypatch.setattr(output, "_picture", lambda path: None)
+
+    def refuse():
+        raise addon("head").Problem("The sheet cannot be joined.", "Try again.")
+
+    output.stills(scene, [capture / "renders" / "sun.png"], False, refuse)
+    output._finish_or_show()
+    assert problems.of("").problem == "The sheet cannot be joined."
+
+
+def test_pictures_are_rendered_by_the_artists_device_and_from_a_terminal_by_the_cpu(addon, capture):
+    bpy.ops.wildcap.bring_in_head()
+    now, settings = bpy.context.scene, addon("relight.picture").RenderSettings(16, 1)
+    now.cycles.device, now.render.threads_mode, now.render.threads = 'GPU', 'FIXED', 3
+    scene = settings.scene(bpy.context.view_layer.objects.active, "sun")
+    assert (scene.cycles.device, scene.render.threads_mode, scene.render.threads) == ('GPU', 'FIXED', 3)
+    head, _ = addon("relight.headless").open_head(capture)
+    assert settings.scene(head, "sun").cycles.device == 'CPU'

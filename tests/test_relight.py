@@ -73,6 +73,37 @@ def test_a_render_is_written_and_the_scene_is_untouched(addon, capture):
             {o.name for o in scene.objects}) == before
 
 
+def test_a_head_that_was_rendered_can_be_deleted_from_the_file(addon, capture, tmp_path):
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.assemble_material()
+    head, file, props = bpy.context.view_layer.objects.active, str(tmp_path / "shot.blend"), bpy.context.scene.wildcap
+    brow = bpy.data.objects.new("Brow", bpy.data.hair_curves.new("Brow"))
+    bpy.context.scene.collection.objects.link(brow)
+    brow.parent, brow[addon("captures").HAIR_KEY] = head, "brows"
+    settings = addon("relight.picture").RenderSettings(16, 1)
+    assert {head, brow} < set(settings.scene(head, "sun").collection.objects)
+    props.resolution = props.samples = 1
+    bpy.ops.wildcap.render()
+    assert head.users_scene == brow.users_scene == (bpy.context.scene,)
+    bpy.ops.object.delete()
+    bpy.data.objects.remove(brow)
+    bpy.ops.wildcap.close_capture()
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    bpy.ops.outliner.orphans_purge(do_recursive=True)
+    assert not bpy.data.meshes and not [image.name for image in bpy.data.images if image.source == 'FILE']
+
+
+def test_lights_that_are_set_up_again_leave_nothing_of_those_before(addon, capture):
+    bpy.ops.wildcap.bring_in_head()
+    head, settings = bpy.context.view_layer.objects.active, addon("relight.picture").RenderSettings(16, 1)
+    for _ in range(3):
+        settings.scene(head, "three_point")
+        addon("relight.reel").turning(head, "sun", 'LIGHT', 4, settings)
+    rigs = [thing for thing in bpy.data.objects if thing.name.startswith("WildCap Lights")]
+    assert len(rigs) == 1 and len(bpy.data.lights) == 1 and not [a.name for a in bpy.data.actions if not a.users]
+
+
 def test_headless_renders_a_picture_and_its_linear_twin(addon, capture):
     paths = addon("relight.headless").render_relit(capture, ("studio", "overcast"), resolution=32, samples=1)
     assert paths == [capture / "renders" / f"{name}.png" for name in ("studio", "overcast")]

@@ -3,6 +3,7 @@
 """Cameras from the face: known ones found again from landmarks alone and with matches; a profile without a face comes
 in through matches."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,12 +11,15 @@ import pycolmap
 import pytest
 
 from benchmarks.cameras_against_truth import similarity
-from core.cameras.joint import refine
+from core.cameras import _left_out, solving
+from core.cameras.bundle import TOLD_SIGMA_LOG, Observations, adjust
+from core.cameras.joint import FREE_SIGMA_LOG, as_bundle, refine
 from core.cameras.landmarks import fit_rays, pupils, template_landmarks
 from core.cameras.matches import Matches, tracks
 from core.cameras.resection import resect
 from core.cameras.solving import Solved, worth
 from core.cameras.world import agreeing_faces, find_head
+from core.contract.frame_records import FrameRecord
 from core.contract.messages import Reporter
 from core.face.faces import Face
 from core.synthetic.painted_head import FOCAL, HEIGHT, WIDTH, camera
@@ -95,6 +99,12 @@ def test_matches_refine_the_cameras_and_bring_in_a_profile(scene):
     assert centres.max() < 0.005 and turns.max() < 0.3
 
 
+def test_a_told_focal_length_that_was_rounded_is_put_right(scene):
+    rng, views, found = scene
+    result = resect(group(views, 0.975 * FOCAL), found, matched(views, rng), Reporter("cameras"))
+    assert result.model.cameras[1].params[0] == pytest.approx(FOCAL, rel=0.01)
+
+
 def test_wrong_matches_do_not_count_as_refinement(scene):
     rng, views, found = scene
     keypoints = {name: rng.uniform(0, WIDTH, (300, 2)) for name in views}
@@ -133,17 +143,63 @@ def test_cameras_that_are_nearly_right_are_made_right_with_the_face(scene):
     mistaken = found | {"8.jpg": profile}
     assert set(agreeing_faces(start, mistaken)) == set(found)
     missing = [{"names": ["9.jpg"], "width": WIDTH, "height": HEIGHT, "focal_px": None}]
-    refined = refine(start, mistaken, matches, True, report, missing)
+    refined = refine(start, mistaken, matches, {}, report, missing)
     centres, turns = off(SimpleNamespace(model=refined), views)
     assert refined.num_reg_images() == 7 and centres.max() < 0.01 and turns.max() < 0.5
     assert refined.cameras[1].params[0] == pytest.approx(FOCAL, rel=0.02)
     assert find_head(refined, mistaken, 0.063).unlike_m < 0.002
 
 
+def two_lenses(views: dict, starts: dict[str, float]) -> pycolmap.Reconstruction:
+    """The true poses; the first lens has taken all frames but the last two."""
+    model = pycolmap.Reconstruction()
+    for number, focal in enumerate(starts, 1):
+        model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=number, model="SIMPLE_RADIAL", width=WIDTH,
+                                                          height=HEIGHT, params=[focal, WIDTH / 2, HEIGHT / 2, 0]))
+    for number, (name, view) in enumerate(views.items(), 1):
+        pose = pycolmap.Rigid3d(np.concatenate([view.rotation, view.translation[:, None]], 1))
+        lens = 1 if number <= len(views) - 2 else 2
+        model.add_image_with_trivial_frame(pycolmap.Image(name=name, camera_id=lens, image_id=number), pose)
+    return model
+
+
+def test_a_told_focal_length_is_what_the_file_says_and_an_untold_one_beside_it_is_free(scene):
+    """What COLMAP has made of the told one, 8 % too much, is not what was told."""
+    _, views, _ = scene
+    model = two_lenses(views, (1.08 * FOCAL, 0.9 * FOCAL))
+    images = sorted(model.images.values(), key=lambda image: image.name)
+    bundle = as_bundle(model, images, {image.name: FOCAL for image in images[:-2]})
+    assert bundle.focal.tolist() == pytest.approx([1.08 * FOCAL, 0.9 * FOCAL])
+    assert bundle.focal_prior[0] == FOCAL and bundle.focal_spread[0] == TOLD_SIGMA_LOG
+    assert bundle.focal_prior[1] == pytest.approx(0.9 * FOCAL) and bundle.focal_spread[1] == FREE_SIGMA_LOG
+    alone = adjust(bundle, Observations(np.zeros(1, int), np.zeros(1, int), np.zeros((1, 2))))
+    assert alone.focal == pytest.approx([FOCAL, 0.9 * FOCAL], rel=0.01), "nothing but the priors says anything"
+
+
+def test_a_late_frame_gets_the_lens_that_was_told_of_it(scene):
+    """Two settings of a zoom take pictures of one size."""
+    rng, views, found = scene
+    late = {"8.jpg": camera(80, 0.05), "9.jpg": camera(88, 0.05)}
+    model = two_lenses(views, (FOCAL, 1.7 * FOCAL))
+    told = dict.fromkeys(list(views)[:-2], FOCAL) | dict.fromkeys(list(views)[-2:], 1.7 * FOCAL)
+    middle, zoomed = [WIDTH / 2, HEIGHT / 2], list(views)[-2:]
+    faces = {name: replace(face, landmarks=np.concatenate(
+        [middle + 1.7 * (face.landmarks[:, :2] - middle), face.landmarks[:, 2:]], 1)) if name in zoomed else face
+        for name, face in found.items()}
+    matches = matched(views | late, rng)
+    for name in zoomed:
+        matches.keypoints[name] = middle + 1.7 * (matches.keypoints[name] - middle)
+    missing = [{"names": ["8.jpg"], "width": WIDTH, "height": HEIGHT, "focal_px": FOCAL},
+               {"names": ["9.jpg"], "width": WIDTH, "height": HEIGHT, "focal_px": 2.5 * FOCAL}]
+    refined = refine(model, faces, matches, told, Reporter("cameras"), missing)
+    lens_of = {image.name: image.camera_id for image in refined.images.values()}
+    assert lens_of["8.jpg"] == 1 and "9.jpg" not in lens_of, "of that zoom nothing is known"
+
+
 def test_cameras_without_matches_stay_what_they_are(scene):
     rng, views, found = scene
     start = model_of(views, FOCAL, rng, 0.001)
-    kept = refine(start, found, Matches({name: np.zeros((0, 2)) for name in views}, {}), True, Reporter("cameras"))
+    kept = refine(start, found, Matches({name: np.zeros((0, 2)) for name in views}, {}), {}, Reporter("cameras"))
     assert kept.cameras[1].params[0] == FOCAL and kept.num_reg_images() == len(views)
 
 
@@ -154,6 +210,33 @@ def test_of_two_ways_the_one_that_places_more_frames_wins_unless_nothing_but_the
     worths = [worth(solved("face", 5)), worth(solved("skin", 3)), worth(solved("face", 3)),
               worth(solved("face", 5, refined=False))]
     assert all(better > worse for better, worse in zip(worths, worths[1:], strict=False))
+
+
+@pytest.mark.parametrize(("time_s", "blurred", "problem", "remedy"), [
+    (None, False, "1 of 4 photographs did not fit", "Take more between"),
+    (None, True, "1 of them are blurred", "Take those again"),
+    (0.5, False, "1 of 4 frames did not fit", "Move the camera slower past"),
+    (0.5, True, "1 of them are blurred", "or add light"),
+])
+def test_what_did_not_fit_is_told_in_the_words_of_its_source(scene, time_s, blurred, problem, remedy):
+    _, views, _ = scene
+    model = model_of(dict(list(views.items())[:3]), FOCAL, np.random.default_rng(0), 0.0)
+    records = [FrameRecord(name=f"{i}.jpg", source=f"IMG {i}.jpg", time_s=time_s, selected=True,
+                           sharpness=0.1 if blurred and i == 3 else 1.0) for i in range(4)]
+    report = Reporter("cameras")
+    _left_out(Solved(model, "plain", None, {}), records, {each.name: each.shown for each in records}, report)
+    told = report.findings[0]
+    assert problem in told["problem"] and remedy in told["remedy"]
+    assert told["frames"] == ["IMG 3.jpg"]
+
+
+def test_a_mirrored_photograph_is_told_by_its_own_name(scene, monkeypatch):
+    monkeypatch.setattr(solving, "find_mirrored", lambda names, *others: ["0.jpg"])
+    monkeypatch.setattr(solving, "camera_groups", lambda records, folder: [])
+    monkeypatch.setattr(solving, "resect", lambda *given: None)
+    records = [FrameRecord(name=f"{i}.jpg", source=f"IMG {i}.jpg", sharpness=1.0, selected=True) for i in range(4)]
+    _, fault = solving._by_face(records, SimpleNamespace(frames=None), scene[2], Matches(), None, Reporter("cameras"))
+    assert "and IMG 0.jpg is mirrored" in fault
 
 
 def test_tracks_hang_together_and_ambiguous_ones_go():

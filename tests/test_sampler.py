@@ -3,12 +3,15 @@
 """The sampler on problems small enough to know the answer: a Gaussian prior with its closed-form posterior, and a
 shadow to remove."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from core.contract.messages import Problem
 from core.solve import checkpoint
+from core.solve.light_fit import light_loss, update_lights
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.prior import coordinates
 from core.solve.problem import Observation, State
@@ -138,6 +141,35 @@ def test_the_paper_and_its_code_remove_a_known_shadow_too(name):
     assert error[:, shadow].mean() < 0.7 * before[:, shadow].mean()
     # lights fitted one after the other leave more outside than lights fitted together
     assert error[:, support == 0].mean() < 0.05
+
+
+def test_the_lights_move_as_far_on_a_finer_map_as_on_a_coarse_one():
+    """On maps that are even there is no difference between the sizes but the number of texels, which Adam ignores."""
+    found = []
+    for coarse in ((), ((2, 1.0),)):
+        seen = {factor: observation(torch.full((3, SIZE // factor, SIZE // factor), 0.2)) for factor in (1, 2)}
+        seen = {factor: replace(o, shader=Shader(torch.tensor([0.0, 0, 1])[:, None, None].expand(3, *o.weight.shape),
+                                                 0 * o.weight, (4, 4))) for factor, o in seen.items()}
+        recipe = Recipe(steps=20, coarse=coarse, phases=(("main", 0.0, 1.0),), updates=60)
+        sampler = Sampler(lambda x, sigma, coords: torch.zeros_like(x), replace(recipe, guidance="proximal"),
+                          seed_noise(0), fit=lambda state, denoised, *rest: update_lights(state, 0 * denoised, *rest))
+        found.append(sampler.sample(seen, start()).lights.glob)
+    assert (found[0] - start().lights.glob).abs().max() > 0.1
+    assert torch.allclose(found[0], found[1], atol=1e-4), (found[0] - found[1]).abs().max()
+
+
+def test_the_paper_s_total_variation_is_of_all_gamma_and_counts_the_mask_s_border():
+    """Supplement, "Lighting Regularization": of gamma^g + gamma^V M. Under one light in all cells only M's border
+    varies, by that light, once per pair of texels that it parts."""
+    alpha = torch.zeros(32, 32)
+    alpha[8:20, 10:22] = 1
+    clean = SmoothPrior(32).draw(torch.Generator().manual_seed(0))
+    lights, o = start().lights, observation((clean[0, :3] + 1) / 2, alpha)
+    lights.grid = torch.zeros(3, 9, 4, 4)
+    lights.grid[:, 0] = -0.2
+    recipe = replace(RECIPES["paper"], neg=0.0)
+    cost = light_loss(lights, clean, o, recipe) - light_loss(lights, clean, o, replace(recipe, tv=0.0))
+    assert cost.item() == pytest.approx(recipe.tv * 4 * 12 * 3 * 0.2**2, rel=1e-3)
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not():

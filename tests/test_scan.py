@@ -20,7 +20,8 @@ from core.geometry.meshes import Mesh
 from core.geometry.views import read_views
 from core.imaging import images
 from core.scan.fusion import fuse
-from core.scan.pairs import choose_pairs
+from core.scan.pairs import BASELINES_DEG, choose_pairs
+from core.scan.rounds import NEAR_DEG, WIDE_DEG
 from core.scan.stereo import DepthMap
 
 WIDTH, HEIGHT, FOCAL = 360, 480, 460.0
@@ -148,6 +149,35 @@ def test_pairs_keep_their_baseline_and_go_all_around():
     middles = np.sort([(angles[a] + angles[b]) / 2 for a, b in pairs])
     assert middles[0] < -55 and middles[-1] > 55 and np.diff(middles).max() < 25
     assert np.mean([sharpness[a] + sharpness[b] for a, b in pairs]) > 1.8
+
+
+@pytest.mark.parametrize("farther", [1.3, 1.5, 2.0])
+def test_pairs_of_two_passes_lie_across_the_view(farther):
+    """A second pass a little higher and farther away: of neighbours in direction, one is behind the other."""
+    angles = np.radians(np.linspace(-75, 75, 48))
+    near = 0.5 * np.stack([np.sin(angles), -np.cos(angles), 0 * angles], 1)
+    far = farther * 0.5 * np.stack([np.sin(angles + 0.02), -np.cos(angles + 0.02), 0 * angles + 0.15], 1)
+    centres = np.concatenate([near, far])
+    for baselines in (BASELINES_DEG, NEAR_DEG, WIDE_DEG):
+        pairs = np.array(choose_pairs(centres, np.ones(96), 24, baselines))
+        apart, middle = centres[pairs[:, 1]] - centres[pairs[:, 0]], directions(centres)[pairs].sum(1)
+        assert len(pairs) > 12
+        assert (np.abs((directions(apart) * directions(middle)).sum(1)) < np.sin(np.radians(46))).all()
+
+
+def directions(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def test_a_map_counts_by_the_angle_it_measures_under():
+    """Three maps from 0.4 m that say 0.400, three from twice as far, with twice the baseline, that say 0.404."""
+    maps = []
+    for depth, off in [(0.40, 0.0), (0.80, 0.004)] * 3:
+        seen = np.full((200, 200), depth + off, np.float32)
+        maps.append(DepthMap(np.eye(3), np.array([0, 0, 0.40 - depth]), 500.0 * depth, np.array([-100.0, -100.0]), seen,
+                             0.05 * depth / 0.40, 0.0))
+    fused = fuse(maps, np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]]), 0.002)
+    assert np.median(fused.mesh.vertices[:, 2]) == pytest.approx(0.402, abs=0.0003)
 
 
 def test_few_photographs_far_apart_still_pair_up():

@@ -78,7 +78,7 @@ def test_the_score_is_that_of_the_albedo_and_what_lies_below_the_expected_fails(
         assert figures["score_db"] == pytest.approx(score, abs=0.5) and figures["seconds"] >= 0
         assert any(isinstance(message, Log) and "The sample head was solved again" in message.text for message in said)
     else:
-        assert "from what it should be" in final.problem and "Install Solver" in final.remedy
+        assert "comes only to" in final.problem and "Install Solver" in final.remedy
 
 
 def test_what_is_expected_was_measured_over_seeds_and_precisions():

@@ -117,7 +117,7 @@ def test_the_dialog_asks_again_where_the_frames_changed_meanwhile(addon, item, c
     dialog = type("Dialog", (), {})()
     sending.WILDCAP_OT_allow_sending.tell(dialog)
     (capture / "frames" / "00000.jpg").write_bytes(standin.plain((1, 2, 3)))
-    with pytest.raises(Exception, match="changed while you were asked"):
+    with pytest.raises(Exception, match="changed while the question was open"):
         sending.WILDCAP_OT_allow_sending.work(dialog, bpy.context)
     assert not addon("captures").folder(item).consent.exists()
 

@@ -124,9 +124,9 @@ def test_every_setting_has_a_tooltip_a_valid_default_and_limits_that_hold(stage,
     ({"solve": {"steps": "5"}}, "'5', which is not a int"), ({"seed": "5"}, "not a int"),
     ({"seed": -1}, "0 to 2147483647"),
     ({"device": 0}, "not a str"), ({"device": "abacus"}, "auto, cpu, cuda, mps"), ({"__doc__": "x"}, "no setting"),
-    ({"solve.steps": 5}, "has no 'solve.steps'"), ([1], "no object but \\[1\\]"),
-    ("seed", "no object but 'seed'"), ({"solve": 5}, "settings of the stage solve are no object but 5"),
-    ({"solve": None}, "no object but None"),
+    ({"solve.steps": 5}, "no key 'solve.steps'"), ([1], "object, not \\[1\\]"),
+    ("seed", "object, not 'seed'"), ({"solve": 5}, "settings of the stage solve have to be an object, not 5"),
+    ({"solve": None}, "object, not None"),
     ({"scan": {"voxel_mm": float("nan")}}, "0.3 to 5 mm"), ({"scan": {"voxel_mm": float("inf")}}, "0.3 to 5 mm"),
     ({"scan": {"voxel_mm": 10**400}}, "0.3 to 5 mm")])
 def test_what_is_no_setting_is_refused(values, words):

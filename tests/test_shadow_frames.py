@@ -110,6 +110,19 @@ def test_the_delighter_s_shadows_become_the_proposal(capture):
     assert json.loads(capture.root.joinpath("figures.json").read_text())["frames_judged_by"] == "shading"
 
 
+def test_a_shadow_on_the_neck_is_proposed_where_the_neck_was_seen(capture):
+    """What a frame shows is asked of neck and ears, too; not of the scalp, where hair passes for shadow."""
+    neck = painted_blob((0.88, 0.9), 0.05)
+    everywhere = np.maximum(neck, template.mask("scalp", SIZE))
+    for view in views():
+        images.write_data(capture.delit / "shadow" / view.name.replace("jpg", "png"), seen(view, everywhere))
+    true = (neck > 0.5) & (template.mask("neck", SIZE) > 0.5) & head().covered
+    found = proposal(capture, dilate_px=0) > 0.5
+    assert true.sum() > 300 and (found & true).sum() / (found | true).sum() > 0.5
+    images.write_data(capture.texture_confidence, (template.mask("neck", SIZE) < 0.5).astype(np.float32))
+    assert not (proposal(capture) > 0)[template.mask("neck", SIZE) > 0.5].any()
+
+
 def test_what_softening_lightens_becomes_the_proposal(capture, tmp_path):
     """The softened pictures are brighter as a whole, named by the video's frame numbers, and half the size: any tool
     may have made them."""

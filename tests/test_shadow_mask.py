@@ -20,7 +20,7 @@ from core.contract.settings import from_json
 from core.face import template
 from core.geometry import meshes, raster
 from core.imaging import images
-from core.shadow_mask import run
+from core.shadow_mask import run, share_on_edges
 from core.shadow_mask.tidy import tidy
 
 SIZE = 256
@@ -125,6 +125,23 @@ def test_specks_go_and_edges_are_soft():
     assert mask[102, 102] == 0 and mask[250, 250] == 1
     edge = mask[250, 180:205]
     assert ((edge > 0.1) & (edge < 0.9)).any() and mask[250, 197] == 1
+
+
+def test_the_share_of_a_border_on_edges_is_one_at_most():
+    disc = painted_blob((0.5, 0.5), 0.2)
+    half = np.repeat(np.arange(SIZE)[None] < SIZE // 2, SIZE, 0).astype(np.float32)
+    assert share_on_edges(disc, np.ones_like(disc)) == 1
+    assert share_on_edges(disc, half) == pytest.approx(0.5, abs=0.02)
+    assert share_on_edges(disc, 0 * disc) == share_on_edges(0 * disc, half) == 0
+
+
+def test_the_report_says_how_much_of_the_border_was_laid_on_edges(capture):
+    blob = painted_blob((0.5, 0.25), 0.09)
+    texture = skin_texture() * (1 - blob[..., None] * (1 - SHADOW))
+    images.write_linear(capture.texture, texture)
+    report = Reporter("shadow_mask")
+    run(capture, from_json({"delight": {"delighter": "shading"}}), report)
+    assert 50 < report.figures["laid_on_edges_percent"] <= 100
 
 
 def test_the_benchmark_s_scores_of_masks_with_known_overlap():

@@ -80,6 +80,22 @@ def test_the_material_as_text(patch):
     assert found == EXPECTED.strip(), found
 
 
+def test_a_group_that_is_linked_from_a_library_stays_as_it_is_and_the_head_has_its_own(patch, tmp_path):
+    group = bpy.data.node_groups.new("WildCap Skin", 'ShaderNodeTree')
+    group["wildcap_version"] = 1
+    library = tmp_path / "library.blend"
+    bpy.data.libraries.write(str(library), {group}, fake_user=True)
+    bpy.data.node_groups.remove(group)
+    with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
+        wanted.node_groups = ["WildCap Skin"]
+    linked = wanted.node_groups[0]
+    linked.use_fake_user = True
+    bpy.ops.wildcap.bring_in_head()
+    own = sockets(assembled())[0].node.node_tree
+    assert linked.library is not None and linked["wildcap_version"] == 1 and not linked.interface.items_tree
+    assert own != linked and own.library is None and own["wildcap_version"] > 1
+
+
 def test_a_file_of_version_1_is_rebuilt_inside_and_keeps_what_the_artist_did(patch, addon):
     """The group and the material as version 1 made them, with an artist's roughness, a clear coat inside the group, and
     nodes of their own."""

@@ -12,6 +12,7 @@ import torch
 
 from core import solve
 from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import from_json
 from core.contract.stages import MAPS
 from core.face import template
 from core.face.head import read_head
@@ -20,6 +21,7 @@ from core.solve import initial, tone
 from core.solve.evidence import read_evidence, soften_mask
 from core.solve.prior import WEIGHTS, load
 from core.solve.problem import albedo
+from core.solve.recipes import RECIPES
 from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic.identities import reserved_seeds
 
@@ -97,6 +99,30 @@ def test_cancel_then_run_again_gives_the_same_bytes(capture, brief_light):  # no
     assert maps_of(capture) == unbroken
 
 
+def other_delighter(capture):
+    return from_json({"delight": {"delighter": "none"}}, settings(steps=5))
+
+
+def other_proposal(capture):
+    """Under the mask that was painted."""
+    images.write_data(capture.shadow_mask_auto, np.zeros((SIZE, SIZE), np.float32))
+    return settings(steps=5)
+
+
+@pytest.mark.parametrize("change", [None, other_delighter, other_proposal])
+def test_a_checkpoint_of_another_run_is_not_gone_on_from(capture, brief_light, change):  # noqa: F811
+    images.write_data(capture.shadow_mask, images.read_mask(capture.shadow_mask_auto))
+    logged = []
+    for options in (settings(steps=5), None):
+        said = []
+        report = Reporter("solve", emit=lambda message, said=said: said.append(getattr(message, "text", "")),
+                          cancelled=lambda said=said: any("step 3 of" in text for text in said))
+        with pytest.raises(CancelledError):
+            solve.run(capture, options or (change(capture) if change else settings(steps=5)), report)
+        logged.append("Going on after step 2 of 5." in said)
+    assert logged == [False, change is None]
+
+
 def test_the_artists_masks_win(capture):
     """The painted mask replaces the proposal, and what is protected is no shadow."""
     def albedo_under(**pictures):
@@ -130,6 +156,37 @@ def test_a_shadow_that_the_artist_added_to_the_proposal_is_taken_away(capture):
         step = [np.log(a[inside].mean() / a[around].mean()) for a in (albedo, truth)]
         kept.append((step[0] - step[1]) / np.log(0.5))
     assert kept[1] < 0.2 < kept[0], kept
+
+
+def test_the_border_of_a_shadow_on_the_neck_tells_what_is_missing_there(capture):
+    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
+    distance = np.hypot(x - 0.88, y - 0.9)
+    shadow = 1 / (1 + np.exp((distance - 0.06) / 0.003))
+    albedo = initial.make_uniform_skin(torch.from_numpy(TONE), SIZE)[0, :3].permute(1, 2, 0).numpy() / 2 + 0.5
+    images.write_linear(capture.texture, albedo * (1 - 0.3 * shadow[..., None]))
+    images.write_data(capture.shadow_mask_auto, (distance < 0.06).astype(np.float32))
+    evidence, prior = read_evidence(capture, read_head(capture), SIZE), load()
+    recipe = replace(RECIPES["wildcap"], faint=1.0, reference="uniform", protect_marks=False)
+    start = initial.start_solve(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
+    neck = (shadow > 0.9) & (template.mask("neck", SIZE) > 0.9) & evidence.covered.numpy()
+    assert neck.sum() > 50 and start.observations[1].missing.numpy()[neck].mean() > 0.12
+
+
+def test_a_cancel_is_heard_and_something_is_said_before_the_first_step(capture):
+    """While the light's scales are searched, and at each of the 72 penumbras that are tried."""
+    for enough in (np.inf, 1, 75):
+        said, looks = [], []
+
+        def cancelled(said=said, looks=looks, enough=enough) -> bool:
+            looks.extend(text for text in said[-1:] if text.startswith("telling skin from light"))
+            return len(looks) >= enough or "sampling" in said[-1:]
+
+        def emit(message, said=said) -> None:
+            said.append("sampling" if "sampling" in message.text else message.text)
+
+        with pytest.raises(CancelledError):
+            solve.run(capture, settings(), Reporter("solve", emit, cancelled))
+        assert len(looks) > 80 if enough == np.inf else said[-1].startswith("telling skin from light")
 
 
 def test_unusable_inputs_are_problems(capture):

@@ -3,22 +3,30 @@
 """Cameras of a film whose subject swayed before the room: known poses of a head found again by what matches on it, and
 a head at rest left alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pycolmap
 import pytest
 from scipy.spatial.transform import Rotation
 
+from core.cameras import landmarks
 from core.cameras.matches import Matches
-from core.cameras.settled import MOST_LEFT_SHARE, on_head, settle
-from core.cameras.world import HeadFrame
+from core.cameras.settled import MOST_LEFT_SHARE, head_boxes, on_head, settle
+from core.cameras.solving import Solved, _refined
+from core.cameras.world import PUPILS_M, HeadFrame
+from core.contract.capture import Capture
+from core.contract.frame_records import VIDEO, FrameRecord, Frames
 from core.contract.messages import Reporter
+from core.contract.settings import from_json
 from core.face import template
+from core.face.faces import Face
 from core.geometry.models import pose_of
 from core.synthetic.painted_head import camera
 
 AZIMUTHS = np.linspace(-40, 40, 17)
 NEIGHBOURS, WRONG, NOISE_PX, RAGGED_PX = 5, 0.2, 0.3, 2.0
-IN_HEAD = HeadFrame(pycolmap.Sim3d(), 1.0, 0.01, 0.062, 0.001)
+IN_HEAD = HeadFrame(pycolmap.Sim3d(), 1.0, 0.01, PUPILS_M, 0.001)
 
 
 def filmed(sway_m: float, sway_deg: float, count: int = 700, ragged: float = 0.0):
@@ -127,6 +135,45 @@ def test_a_film_in_which_hardly_anything_of_the_head_matches_is_left_as_it_is():
     model, matches, _, _ = filmed(0.003, 1.0, count=150)
     settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
     assert settled is model and left is None
+
+
+@pytest.mark.parametrize("by", [[], ["00.jpg", "08.jpg"]])
+def test_where_hardly_a_frame_shows_the_head_large_enough_the_cameras_stay(by):
+    model, matches, _, _ = filmed(0.0, 0.0, count=50)
+    assert settle(model, IN_HEAD, matches, Reporter("cameras"), by) == (model, None)
+
+
+def test_a_film_of_a_tiny_head_is_not_looked_at_in_parts(tmp_path):
+    """In pictures of 100 by 133 pixels the head is 40 wide."""
+    model, matches, _, _ = filmed(0.0, 0.0, count=50)
+    model.cameras[1].rescale(100, 133)
+    records = tuple(FrameRecord(name=f"{i:02d}.jpg", sharpness=1.0, selected=False) for i in range(len(AZIMUTHS)))
+    solved = Solved(model, "plain", IN_HEAD, {}, matches=matches)
+    kept = _refined(solved, Frames(records, VIDEO), Capture(tmp_path / "a.wildcap"), from_json({}), Reporter("cameras"))
+    assert kept is solved
+
+
+def test_parts_that_show_the_head_are_as_large_for_a_child():
+    """The pupils' distance that is set makes the world smaller, and the head in it."""
+    model, _, _, _ = filmed(0.0, 0.0, count=50)
+    small = replace(IN_HEAD, world_from_model=pycolmap.Sim3d(50 / 63, pycolmap.Rotation3d(np.eye(3)), np.zeros(3)))
+    assert head_boxes(model, small) == head_boxes(model, IN_HEAD)
+
+
+@pytest.mark.parametrize(("time_s", "looks"), [(1.0, [True, True]), (None, [True, True, False])])
+def test_a_frame_without_a_face_is_looked_at_once_in_a_film(monkeypatch, tmp_path, time_s, looks):
+    """Following the last face comes first there; in a photograph, after looking anew."""
+    face, asked = Face((0, 0, 9, 9), np.zeros((468, 3)), 1.0), []
+
+    def detect(srgb, last=None):
+        asked.append(last is None or time_s is not None)
+        return face if len(asked) == 1 else None
+
+    monkeypatch.setattr(landmarks.faces, "detect", detect)
+    monkeypatch.setattr(landmarks.images, "read_srgb", lambda path: None)
+    records = [FrameRecord(name=f"{i}.jpg", sharpness=1.0, selected=False, time_s=time_s) for i in range(2)]
+    assert list(landmarks.find_landmarks(records, tmp_path, Reporter("cameras"))) == ["0.jpg"]
+    assert asked == looks
 
 
 def test_only_what_matches_on_the_head_counts():

@@ -3,6 +3,7 @@
 """A head without a scan: a synthetic person from a few photographs that lie far apart, under known cameras."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pycolmap
@@ -11,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from core import registration
 from core.contract.capture import Capture
+from core.contract.eyes_record import read_eyes
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
 from core.geometry import meshes
@@ -23,14 +25,14 @@ AZIMUTHS = (-72, -36, 0, 36, 72)
 SCALE = 1.5
 
 
-def shot(root, azimuths=AZIMUTHS, points: int = 300) -> Capture:
-    """A capture up to a scan that measured no surface: photographs of the person, their cameras, and points of the skin
-    that matched, good to 0.3 mm."""
+def shot(root, azimuths=AZIMUTHS, points: int = 300, rise: float = 0.03) -> Capture:
+    """A capture up to a scan that measured no surface: photographs of the person, each `rise` metres higher than the
+    one before, their cameras, and points of the skin that matched, good to 0.3 mm."""
     capture, model, rng = Capture(root), pycolmap.Reconstruction(), np.random.default_rng(0)
     capture.frames.mkdir(parents=True)
     mesh = painted_head.person()[0].mesh
     normals = meshes.vertex_normals(mesh)
-    views = [painted_head.camera(azimuth, 0.03 * i, scale=SCALE) for i, azimuth in enumerate(azimuths)]
+    views = [painted_head.camera(azimuth, rise * i, scale=SCALE) for i, azimuth in enumerate(azimuths)]
     names = [f"{i:05d}.jpg" for i in range(len(views))]
     params = views[0].camera.params
     pinhole = params if len(params) == 4 else [*params[:1], *params[:3]]
@@ -92,6 +94,30 @@ def test_two_sides_make_a_draft_that_says_so(tmp_path):
         report.findings[0]["problem"].startswith("This head is a draft")
         and "from each side" in report.findings[0]["remedy"]
     )
+
+
+def test_open_eyes_from_one_side_make_a_draft_with_eyeballs(tmp_path, monkeypatch):
+    """Nothing can be lifted from views a degree apart: the straightest alone tells where the eyes are."""
+    monkeypatch.setattr(registration.eyes, "opening", lambda seen: 0.35)
+    capture, report = shot(tmp_path / "selfies.wildcap", (-1, 0, 1), points=0, rise=0.0), Reporter("registration")
+    registration.run(capture, from_json({}), report)
+    left, right = read_eyes(capture)
+    assert capture.head_open.is_file() and capture.picture("registration", "eyes").is_file()
+    assert left.centre[0] > 0.02 and right.centre[0] < -0.02
+    assert report.findings[0]["problem"].startswith("This head is a draft")
+
+
+def test_of_many_views_32_spread_over_all_are_asked(monkeypatch):
+    views, asked = [painted_head.camera(azimuth) for azimuth in np.linspace(-70, 70, 61)], []
+
+    def note(capture, chosen, subject, report):
+        asked.extend(chosen)
+        raise InterruptedError
+
+    monkeypatch.setattr(registration, "_shown", note)
+    with pytest.raises(InterruptedError):
+        registration._by_views(None, None, views, SimpleNamespace(model=None, found=None), Reporter("registration"))
+    assert len(asked) == 32 and asked[0] is views[0] and asked[-1] is views[-1]
 
 
 def test_landmarks_that_the_artist_puts_win(fitted, tmp_path):

@@ -100,7 +100,7 @@ def test_a_map_of_another_size_is_named(capture, name):
     write = images.write_linear if name.endswith(".exr") else images.write_data
     write(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
     with pytest.raises(Problem, match=f"{name} is 33 x 33 pixels, but diffuse_albedo.exr is 256 x 256") as caught:
-        read_maps(capture.maps)
+        read_maps(capture.maps, capture.texture_confidence)
     assert caught.value.remedy.startswith("Run the stage Solve again")
 
 
@@ -123,7 +123,7 @@ def rough_maps(size: int) -> HeadMaps:
     return HeadMaps(rng.random((size, size, 3)).astype(np.float32),
                     normal / np.linalg.norm(normal, axis=2, keepdims=True),
                     rng.random((size, size)).astype(np.float32), np.ones((size, size), np.float32),
-                    np.ones((size, size, 3), np.float32))
+                    np.ones((size, size, 3), np.float32), np.ones((size, size), np.float32))
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +161,8 @@ def test_the_body_sees_the_whole_map(busy):
 
 def test_an_untrained_network_resamples(capture):
     """Its tail begins with zeros, so a smooth signal is met as by bicubic resampling."""
-    large = enlarge(read_maps(capture.maps), lambda share: None, network=network.Rcan(1, 1, 16))
+    small = read_maps(capture.maps, capture.texture_confidence)
+    large = enlarge(small, lambda share: None, network=network.Rcan(1, 1, 16))
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]
     linear = np.stack([truth, truth ** 2, truth / 2], 2)
     assert np.abs(images.srgb_to_linear(large[..., :3]) - linear)[inner].max() < 2e-3

@@ -17,7 +17,8 @@ from core.frames.colour import HLG, P3, PQ, REC709, REC2020, to_srgb
 from core.frames.source import evenly_in_time
 from core.imaging import images
 
-WEIGHTS = {1: (0.2126, 0.0722), 9: (0.2627, 0.0593)}  # Kr and Kb of the matrices Rec. 709 and Rec. 2020
+WEIGHTS = {1: (0.2126, 0.0722), 5: (0.299, 0.114), 9: (0.2627, 0.0593)}
+"""Kr and Kb of the matrices Rec. 709, Rec. 601 and Rec. 2020."""
 
 
 def planes(signal: np.ndarray, matrix: int, bits: int, full: bool) -> list[np.ndarray]:
@@ -30,6 +31,27 @@ def planes(signal: np.ndarray, matrix: int, bits: int, full: bool) -> list[np.nd
     kind = np.uint16 if bits > 8 else np.uint8
     return [np.round(p).astype(kind)
             for p in (low + scale * y, 128 * step + chroma * cb[::2, ::2], 128 * step + chroma * cr[::2, ::2])]
+
+
+def signal_of(y: np.ndarray, cb: np.ndarray, cr: np.ndarray, matrix: int, bits: int, full: bool) -> np.ndarray:
+    """R'G'B' [..., 3] in [0, 1] of Y, Cb, Cr, by the standards' formulas."""
+    red, blue = WEIGHTS[matrix]
+    step, top = 2 ** (bits - 8), 2**bits - 1
+    scale, low, chroma = (top, 0, top) if full else (219 * step, 16 * step, 224 * step)
+    luma = (y - float(low)) / scale
+    r = luma + (2 - 2 * red) * (cr - 128.0 * step) / chroma
+    b = luma + (2 - 2 * blue) * (cb - 128.0 * step) / chroma
+    return np.stack([r, (luma - red * r - blue * b) / (1 - red - blue), b], -1)
+
+
+def frame_of(signal: np.ndarray, matrix: int, bits: int, full: bool) -> av.VideoFrame:
+    frame = av.VideoFrame(signal.shape[1], signal.shape[0], f"yuv420p{bits}le" if bits > 8 else "yuv420p")
+    for plane, values in zip(frame.planes, planes(signal, matrix, bits, full), strict=True):
+        rows = np.zeros((plane.height, plane.line_size // values.itemsize), values.dtype)
+        rows[:, :values.shape[1]] = values
+        plane.update(rows.tobytes())
+    frame.colorspace, frame.color_range = matrix, 2 if full else 1
+    return frame
 
 
 def write(path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec="libx265", times=None, base=1000,
@@ -45,13 +67,8 @@ def write(path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec
         context.color_trc, context.color_primaries, context.colorspace = trc, primaries, matrix
         context.color_range = 2 if full else 1
         for i, signal in enumerate(signals):
-            frame = av.VideoFrame(stream.width, stream.height, stream.pix_fmt)
-            for plane, values in zip(frame.planes, planes(signal, matrix, bits, full), strict=True):
-                rows = np.zeros((plane.height, plane.line_size // values.itemsize), values.dtype)
-                rows[:, :values.shape[1]] = values
-                plane.update(rows.tobytes())
+            frame = frame_of(signal, matrix, bits, full)
             frame.pts, frame.time_base = times[i] if times is not None else round(i * base / 24), Fraction(1, base)
-            frame.colorspace, frame.color_range = matrix, 2 if full else 1
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return path
@@ -102,6 +119,17 @@ def test_hdr_of_ten_bits_shows_known_patches_in_known_colours(tmp_path, codec):
         assert np.abs(shown(path) - [srgb for _, srgb in known]).max() < 0.015
 
 
+@pytest.mark.parametrize(("size", "transfer", "matrix"), [((1280, 720), 2, 1), ((720, 1280), 2, 1), ((640, 480), 2, 5),
+                                                           ((640, 480), PQ, 9)])
+def test_a_video_without_tags_is_read_as_players_read_it(size, transfer, matrix):
+    skin = np.array([130, 105, 95]) / 255
+    frame = frame_of(np.full((size[1], size[0], 3), skin), matrix, 10, False)
+    frame.colorspace = video.UNSPECIFIED
+    srgb = video._srgb(frame, size, transfer, video.UNSPECIFIED)
+    true = to_srgb(skin.astype(np.float32), transfer, video.UNSPECIFIED)
+    assert np.abs(srgb - true).max() < 1 / 255
+
+
 def test_saturated_colours_keep_luminance_and_hue_and_nothing_leaves_the_gamut():
     pure = 0.38 * np.eye(3, dtype=np.float32)  # far outside sRGB
     srgb = to_srgb(pure, PQ, REC2020)
@@ -130,6 +158,26 @@ def test_full_and_narrow_range_are_told_apart(tmp_path, full):
     colours = [[0.2] * 3, [0.8] * 3, [0.7, 0.5, 0.4], [0.1, 0.3, 0.2]]
     assert np.abs(shown(write(tmp_path / "a.mp4", [patches(colours)] * 3, full=full, codec="libx264"))
                   - colours).max() < 0.012
+
+
+@pytest.mark.parametrize("size", [(320, 180), (160, 90)], ids=["as it is", "shrunk"])
+@pytest.mark.parametrize("full", [False, True], ids=["narrow", "full"])
+@pytest.mark.parametrize("bits", [8, 10])
+def test_skin_is_as_bright_as_it_was_filmed(bits, full, size):
+    """Flat patches, dark skin in a shadow among them, against the standards' formulas of the very values in the
+    frame; whole codes of 255 are half a code off, and the full range's a little more."""
+    most = (1.0 if full else 0.75) / 255
+    for colour in [(200, 140, 115), (90, 60, 50), (40, 30, 25), (250, 250, 250)]:
+        flat = np.full((180, 320, 3), np.array(colour) / 255)
+        stored = [plane[0, 0] for plane in planes(flat[:2, :2], 1, bits, full)]
+        true = np.clip(signal_of(*stored, 1, bits, full), 0, 1)
+        frame = frame_of(flat, 1, bits, full)
+        plain = video._srgb(frame, size, 1, REC709)
+        assert plain.shape == (size[1], size[0], 3) and np.abs(plain - true).max() < most
+        if full and bits == 8:
+            continue  # that no phone records in HDR or in a wide gamut
+        wide = video._srgb(frame, size, 1, P3)
+        assert np.abs(wide - to_srgb(true.astype(np.float32), 1, P3)).max() < most
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -182,6 +230,18 @@ def test_what_lies_between_wanted_frames_is_jumped_over(tmp_path, monkeypatch):
     assert [p.index for p in pictures] == np.round(np.linspace(0, 1199, 12)).astype(int).tolist()
     assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index % 200 / 220 for p in pictures], abs=0.015)
     assert len(decoded) < 12 * 25
+
+
+@pytest.mark.parametrize("suffix", ["mts", "m2ts", "mp4", "mkv"])
+def test_a_jump_that_lands_behind_a_frame_is_made_again(tmp_path, suffix):
+    """As camcorders record; their transport streams are jumped in by what comes first in the file."""
+    signals = [np.full((64, 64, 3), (i % 200) / 220) for i in range(600)]
+    path = write(tmp_path / f"long.{suffix}", signals, codec="libx264", g="24", crf="15", bf="2")
+    report = Reporter("frames")
+    pictures = read(path, 8, report=report)
+    assert [p.index for p in pictures] == np.round(np.linspace(0, 599, 8)).astype(int).tolist()
+    assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index % 200 / 220 for p in pictures], abs=0.015)
+    assert not report.findings
 
 
 def test_8k_is_shrunk_before_it_becomes_an_array(tmp_path):

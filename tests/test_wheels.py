@@ -65,5 +65,5 @@ def test_what_keeps_wheels_from_coming_is_said(index, tmp_path, capsys):
     assert main(["install", str(tmp_path / "env"), "--compute", "cpu"]) == 2
     assert "could not be downloaded" in capsys.readouterr().err
     (tmp_path / "file").touch()
-    with pytest.raises(Problem, match="is no folder"):
+    with pytest.raises(Problem, match="is not a folder"):
         wheels.download(setup_commands.REQUIREMENTS, HERE, "cpu", "pip", tmp_path / "file", lambda command: (0, ""))

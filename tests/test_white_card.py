@@ -42,7 +42,7 @@ def test_a_click_on_a_card_gives_the_white_point_and_the_cross_takes_it_away(add
 
 @pytest.mark.parametrize(("frame", "uv", "said"),
                          [("00000.jpg", (0.5, 0.2), "burnt out or black"),
-                          ("00000.jpg", (1.2, 0.2), "beside the frame"),
+                          ("00000.jpg", (1.2, 0.2), "outside the frame"),
                           ("00009.jpg", (0.5, 0.7), "no such frame")])
 def test_a_click_that_measures_nothing_says_why(item, frame, uv, said):
     with pytest.raises(RuntimeError, match=said):
@@ -65,6 +65,31 @@ def test_the_chart_that_the_solver_finds_reaches_the_settings(addon, item, monke
     assert started[0][0] == "white_point"
     started[0][1]["then"]()
     assert item.solve.white_point == "0.9000,0.8000,0.6000"
+
+
+@pytest.mark.parametrize("ask, figures, kept", [
+    ("estimate_skin_tone", {"skin_tone_srgb": [0.5, 0.4, 0.3]}, lambda item: item.use_skin_tone),
+    ("find_color_checker", {"white_point": [0.9, 0.8, 0.6]}, lambda item: item.solve.white_point != "auto")])
+def test_undo_of_what_came_after_an_estimate_leaves_the_estimate(addon, item, monkeypatch, ask, figures, kept):
+    if not bpy.context.window_manager.windows:
+        pytest.skip("no window in this Blender: the flows in a window hold it")
+    ended = []
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, then: ended.append(then) or type(
+        "Job", (), {"figures": figures}))
+    cube = bpy.data.objects.new("Cube", None)
+    bpy.context.scene.collection.objects.link(cube)
+    bpy.ops.ed.undo_push(message="Cube")
+    getattr(bpy.ops.wildcap, ask)()
+    ended[0]()
+    bpy.data.objects["Cube"].location.x = 1
+    bpy.ops.ed.undo_push(message="Move")
+    bpy.ops.ed.undo()
+    assert bpy.data.objects["Cube"].location.x == 0 and kept(bpy.context.scene.wildcap.captures[0])
+
+
+def test_operators_that_change_the_scene_are_steps_of_undo(addon):
+    for name in ("solve", "solve_edited", "fit_landmarks"):
+        assert 'UNDO' in getattr(bpy.types, f"WILDCAP_OT_{name}").bl_options
 
 
 def test_the_panel_says_where_the_tone_comes_from(addon, capture, item):

@@ -7,9 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from core.contract.messages import Reporter
-from core.face import template
+from core.face import beard, template
+from core.solve.confidence import estimate_confidence
+from core.solve.evidence import FULL_CONFIDENCE
 from core.upscale import grain
 from core.upscale.maps import HeadMaps
 from core.upscale.whole_head import complete, seen_well
@@ -31,7 +34,7 @@ def cut(truth) -> HeadMaps:
     seen = template.mask("face", SIZE)
     hidden = seen < 0.5
     plain = truth.diffuse[template.mask("skin", SIZE) > 0.99].mean(0) * WRONG
-    return replace(truth, confidence=0.7 * seen,
+    return replace(truth, confidence=0.7 * seen, seen=seen,
                    diffuse=np.where(hidden[..., None], plain, truth.diffuse).astype(np.float32),
                    normal=np.where(hidden[..., None], np.float32([0, 0, 1]), truth.normal),
                    specular=np.where(hidden, np.float32(0.2), truth.specular))
@@ -52,7 +55,7 @@ def hidden() -> np.ndarray:
 
 
 def test_what_was_seen_well_keeps_its_bytes(cut, done):
-    seen = seen_well(cut.confidence, surface()) >= 1
+    seen = seen_well(cut.seen, surface()) >= 1
     assert 0.3 < seen.mean() < 0.65
     for name in ("diffuse", "normal", "specular"):
         assert getattr(done, name)[seen].tobytes() == getattr(cut, name)[seen].tobytes()
@@ -116,29 +119,53 @@ def test_seen_hair_is_carried_on_over_the_scalp(cut):
     """The front half of the scalp was seen, and is dark: so is the back then, and the nape is not."""
     scalp = template.mask("scalp", SIZE) > 0.5
     front = scalp & (surface().position[..., 1] < np.median(surface().position[scalp][:, 1]))
-    diffuse, confidence = cut.diffuse.copy(), cut.confidence.copy()
-    diffuse[front], confidence[front] = 0.05, 0.7
-    done = complete(replace(cut, diffuse=diffuse, confidence=confidence), surface(), Reporter("upscale"))
+    diffuse, confidence, seen = cut.diffuse.copy(), cut.confidence.copy(), cut.seen.copy()
+    diffuse[front], confidence[front], seen[front] = 0.05, 0.7, 1
+    done = complete(replace(cut, diffuse=diffuse, confidence=confidence, seen=seen), surface(), Reporter("upscale"))
     back = scalp & ~front & (surface().position[..., 1] > np.percentile(surface().position[scalp][:, 1], 75))
     neck = (template.mask("neck", SIZE) > 0.9) & hidden()
     assert np.median(done.diffuse[back]) < 0.08 and np.median(done.diffuse[neck]) > 0.15
 
 
+def test_a_patch_of_scalp_among_unseen_is_no_stain_and_a_scalp_seen_all_around_keeps_its_bytes(cut):
+    """Two patches of scalp, of 8 and of 45 mm, seen like the face and half as bright as what is around them."""
+    position, scalp = surface().position, template.mask("scalp", SIZE) > 0.9
+    crown = position[scalp][position[scalp][:, 2].argmax()]
+    distance = np.linalg.norm(position - crown, axis=2)
+
+    def seen_within(radius_mm: float) -> tuple[HeadMaps, HeadMaps]:
+        patch = (distance < radius_mm) & scalp
+        told = replace(cut, confidence=np.where(patch, np.float32(0.7), cut.confidence),
+                       seen=np.where(patch, np.float32(1), cut.seen),
+                       diffuse=np.where(patch[..., None], 0.5 * cut.diffuse, cut.diffuse))
+        return told, complete(told, surface(), Reporter("upscale"))
+
+    def contrast(maps: HeadMaps) -> float:
+        light = np.log(maps.diffuse).mean(2)
+        return float(light[(distance < 4) & scalp].mean() - light[(distance > 15) & (distance < 25) & scalp].mean())
+
+    told, done = seen_within(8)
+    assert contrast(told) < -0.5 and abs(contrast(done)) < 0.1
+    told, done = seen_within(45)
+    assert np.array_equal(done.diffuse[(distance < 8) & scalp], told.diffuse[(distance < 8) & scalp])
+
+
 def test_a_stray_patch_that_was_seen_at_a_glance_goes_and_a_mark_that_was_seen_well_stays(truth, cut):
-    """Two patches of the neck seen with half of the usual confidence, one of them three times as bright as its skin;
+    """Two patches of the neck seen half as well as the face, one of them three times as bright as its skin;
     and a mark on the cheek as dark."""
     position, texel = surface().position, surface().texel
     below = np.argwhere((template.mask("neck", SIZE) > 0.9) & (texel < 1.5 * np.median(texel)))
     sides = [tuple(below[np.argsort(position[tuple(below.T)][:, 0])[k]])
              for k in (len(below) // 5, 4 * len(below) // 5)]
     stray, plain = (np.linalg.norm(position - position[at], axis=2) < 14 for at in sides)
-    well = (template.mask("face", SIZE) > 0.99) & (seen_well(cut.confidence, surface()) >= 1)
+    well = (template.mask("face", SIZE) > 0.99) & (seen_well(cut.seen, surface()) >= 1)
     cheek = tuple(np.argwhere(well & (template.mask("skin", SIZE) > 0.99))[5000])
     mark = (np.linalg.norm(position - position[cheek], axis=2) < 3) & well
-    confidence = np.where(stray | plain, np.float32(0.35), cut.confidence)
+    confidence, seen = (np.where(stray | plain, np.float32(half), each)
+                        for half, each in ((0.35, cut.confidence), (0.5, cut.seen)))
     diffuse = np.where((stray | plain)[..., None], truth.diffuse, cut.diffuse)
     diffuse[stray], diffuse[mark] = np.minimum(3 * diffuse[stray], 1), diffuse[mark] / 3
-    told = complete(replace(cut, confidence=confidence, diffuse=diffuse.astype(np.float32)), surface(),
+    told = complete(replace(cut, confidence=confidence, seen=seen, diffuse=diffuse.astype(np.float32)), surface(),
                     Reporter("upscale"))
     inner = [np.linalg.norm(position - position[at], axis=2) < 4 for at in sides]
     off = [float(np.abs(np.log(told.diffuse[at] / truth.diffuse[at])).mean()) for at in inner]
@@ -146,7 +173,24 @@ def test_a_stray_patch_that_was_seen_at_a_glance_goes_and_a_mark_that_was_seen_w
     assert np.array_equal(told.diffuse[mark], diffuse[mark].astype(np.float32)) and mark.sum() > 5
 
 
+@pytest.mark.parametrize("darker", [0.4, 0.12])
+def test_a_beard_that_was_seen_well_keeps_its_bytes(truth, cut, darker):
+    """With the confidence that the solver itself gives a chin that is so much darker than the mean face's."""
+    jaw = beard.zone(template.landmark_points(surface().mesh), surface().position)[..., None]
+    diffuse = (cut.diffuse * (1 - jaw * (1 - darker))).astype(np.float32)
+    planes = [torch.from_numpy(np.ascontiguousarray(each.transpose(2, 0, 1))) for each in (diffuse, truth.diffuse)]
+    weight = torch.from_numpy(np.clip(cut.seen / FULL_CONFIDENCE, 0, 1))
+    confidence = estimate_confidence(weight, torch.zeros_like(weight), *planes, None).numpy()
+    bearded = (jaw[..., 0] > 0.99) & (seen_well(cut.seen, surface()) >= 1)
+    assert bearded.sum() > 100 and (darker > 0.2 or np.median(confidence[bearded]) < 0.3)
+    done = complete(replace(cut, diffuse=diffuse, confidence=confidence), surface(), Reporter("upscale"))
+    assert np.array_equal(done.diffuse[bearded], diffuse[bearded])
+    plain = hidden() & (template.mask("neck", SIZE) > 0.9)
+    shaven = complete(cut, surface(), Reporter("upscale"))
+    assert np.log(done.diffuse[plain]).std() < 1.3 * np.log(shaven.diffuse[plain]).std(), "no grain of hair on the neck"
+
+
 def test_a_head_seen_all_over_or_not_at_all_stays_as_it_is(truth):
     assert complete(truth, surface(), Reporter("upscale")) is truth
-    blind = replace(truth, confidence=np.zeros_like(truth.confidence))
+    blind = replace(truth, confidence=np.zeros_like(truth.confidence), seen=np.zeros_like(truth.seen))
     assert np.isfinite(complete(blind, surface(), Reporter("upscale")).diffuse).all()

@@ -121,5 +121,5 @@ def finish(task) -> Failed | Done:
 
 def test_a_job_file_that_asks_for_what_cannot_be_is_named(tmp_path):
     (tmp_path / "job.json").write_text('{"capture": ".", "source": "", "settings": {"registration": -1}}')
-    with pytest.raises(Problem, match="job.json cannot be used: The settings of the stage registration are no object"):
+    with pytest.raises(Problem, match="job.json cannot be used: The settings of the stage registration have to be"):
         read_job(tmp_path / "job.json")

@@ -37,7 +37,7 @@ class BaseOperator:
     @classmethod
     def in_object_mode(cls, context) -> bool:
         """For `poll`: data-blocks are made in Object Mode only, never in the middle of a stroke."""
-        return cls.allowed(context.mode == 'OBJECT', "Only in Object Mode: leave painting or editing first")
+        return cls.allowed(context.mode == 'OBJECT', "This works in Object Mode only: leave painting or editing first")
 
     @classmethod
     def with_capture(cls, context) -> bool:

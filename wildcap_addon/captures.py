@@ -23,14 +23,22 @@ HAIR_COLOUR = "wildcap_colour"
 
 
 def active(context) -> bpy.types.PropertyGroup | None:
-    """The active head's item of the scene's list, else the list's active one, else None."""
+    """The item of the active head, or of the head whose child is active, in the scene's list; else the list's active
+    one, else None."""
     props = context.scene.wildcap
-    active_object = context.view_layer.objects.active if context.view_layer else None
-    path = active_object.get(HEAD_KEY) if active_object else None
+    path = _path(context.view_layer.objects.active if context.view_layer else None)
     for item in props.captures if path else ():
         if item.path == path:
             return item
     return props.captures[props.active_index] if 0 <= props.active_index < len(props.captures) else None
+
+
+def _path(thing: bpy.types.Object | None) -> str | None:
+    """The capture's folder of what an object belongs to: itself, or what it is a child of, as hair and eyes are of a
+    head."""
+    while thing is not None and HEAD_KEY not in thing:
+        thing = thing.parent
+    return thing[HEAD_KEY] if thing is not None else None
 
 
 def require(context) -> bpy.types.PropertyGroup:
@@ -71,8 +79,7 @@ def add(context, path: Path) -> bpy.types.PropertyGroup:
         item.name, item.path = Path(path).stem, str(path)
         index = len(props.captures) - 1
     props.active_index = index
-    active_object = context.view_layer.objects.active
-    if active_object is not None and active_object.get(HEAD_KEY) not in (None, str(path)):
+    if _path(context.view_layer.objects.active) not in (None, str(path)):
         context.view_layer.objects.active = None  # or the other head would keep its capture active
     return props.captures[index]
 
@@ -91,7 +98,7 @@ def choose(context) -> None:
             if thing == wanted or HEAD_KEY in thing:
                 thing.select_set(thing == wanted)
         objects.active = wanted
-    elif objects.active is not None and objects.active.get(HEAD_KEY) not in (None, item.path):
+    elif _path(objects.active) not in (None, item.path):
         objects.active = None
 
 
@@ -136,3 +143,10 @@ def require_head(context, item) -> bpy.types.Object:
         raise Problem("The head is not in this scene.",
                       "Click Bring In Head; if it was never reconstructed, click Reconstruct.")
     return head_object
+
+
+def require_shown(context, obj: bpy.types.Object) -> None:
+    """Raises Problem where the head is in the scene, but not in the view layer, where alone an object can be active."""
+    if obj.name not in context.view_layer.objects:
+        raise Problem("The head is in a collection that is excluded from this view layer.",
+                      "Tick that collection in the Outliner.")

@@ -34,6 +34,12 @@ def load_pixels(path: Path) -> np.ndarray:
     return pixels
 
 
+def find(blocks, name: str) -> bpy.types.ID | None:
+    """Of this file's own data-blocks of a kind (bpy.data.node_groups and the like) the one of that name: what is linked
+    from a library would lose at the next opening whatever is written into it."""
+    return blocks.get((name, None))
+
+
 def replace_data(obj: bpy.types.Object, data, kind) -> None:
     """Gives an object other data of its `kind` (bpy.data.meshes and the like), with the materials and, where nothing
     else uses the old one, the name of what it had."""

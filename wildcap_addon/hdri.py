@@ -54,7 +54,8 @@ def chosen_hdri(props) -> Hdri:
     if path is None:
         raise Problem("This Blender came without pictures of surroundings.", "Choose an HDRI file of your own.")
     if not path.is_file():
-        raise Problem(f"There is no picture at {path}.", "Choose another HDRI file, or none for one of Blender's.")
+        raise Problem(f"There is no picture at {path}.",
+                      "Choose another HDRI file, or empty the field for one of Blender's.")
     return Hdri(path, props.hdri_strength)
 
 

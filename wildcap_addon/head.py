@@ -31,12 +31,12 @@ which is then not needed."""
 
 COMPLETERS = []
 """Functions (head object, capture) of rooms that add to a head whose skin is assembled: the eyes that it was filmed
-with."""
+with. What one returns is to be told to the artist."""
 
 
-def complete(obj, capture: Capture) -> None:
-    for add in COMPLETERS:
-        add(obj, capture)
+def complete(obj, capture: Capture) -> str:
+    """Returns what is to be told of it, '' for nothing."""
+    return " ".join(filter(None, [add(obj, capture) for add in COMPLETERS]))
 
 
 def bring_in(context, item) -> bpy.types.Object:
@@ -45,8 +45,10 @@ def bring_in(context, item) -> bpy.types.Object:
     capture = captures.folder(item)
     if not capture.head.is_file():
         raise Problem("This capture has no head yet.", "Click Reconstruct first.")
-    mesh = read_mesh(context, capture)
     head = captures.head(context, item)
+    if head is not None:
+        captures.require_shown(context, head)
+    mesh = read_mesh(context, capture)
     if head is None:
         head = bpy.data.objects.new(item.name, mesh)
         context.collection.objects.link(head)
@@ -66,7 +68,12 @@ def bring_in(context, item) -> bpy.types.Object:
 
 def _in_place(head, mesh) -> bpy.types.Mesh:
     """The new mesh on an existing head, with its materials; or the mesh it has, where that has followed."""
-    if any(follow(head, mesh) for follow in FOLLOWERS) or _take_shape(head.data, mesh):
+    try:
+        followed = any(follow(head, mesh) for follow in FOLLOWERS)
+    except Problem:
+        bpy.data.meshes.remove(mesh)
+        raise
+    if followed or _take_shape(head.data, mesh):
         bpy.data.meshes.remove(mesh)
         return head.data
     data_blocks.replace_data(head, mesh, bpy.data.meshes)
@@ -138,18 +145,27 @@ def read_mesh_file(context, path: Path) -> bpy.types.Mesh:
 
 def load_image(path, data: bool = False) -> bpy.types.Image:
     """The image of a file, read anew if Blender has it already: a picture in sRGB, or data. One of that file that was
-    painted on, or is packed in the .blend, stays as it is, and stays in the .blend."""
+    painted on, or is packed in the .blend as another one than the file is now, stays as it is, and stays in the
+    .blend."""
     known = [image for image in bpy.data.images if image.source == 'FILE' and image.filepath
              and Path(bpy.path.abspath(image.filepath, library=image.library)) == Path(path)]
-    touched = [image for image in known if image.is_dirty or image.packed_file is not None]
+    touched = [image for image in known
+               if image.is_dirty or image.packed_file is not None and not _is_packed(image, path)]
     for image in touched:
         image.use_fake_user = True
     image = next((image for image in known if image not in touched and image.library is None), None)
     if image is None:
         image = bpy.data.images.load(str(path))
-    image.reload()
+    if image.packed_file is None:
+        image.reload()
     (colours.as_data if data else colours.as_srgb)(image)
     return image
+
+
+def _is_packed(image: bpy.types.Image, path) -> bool:
+    """Whether the .blend holds the very file, as it does where Blender packs resources by itself."""
+    packed, path = image.packed_file, Path(path)
+    return packed.size == path.stat().st_size and bytes(packed.data) == path.read_bytes()
 
 
 def _show_texture(head, capture: Capture) -> None:

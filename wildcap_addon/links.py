@@ -9,11 +9,13 @@ opening where it leads to a folder: a copied project works on its own copy. Othe
 """
 
 import os
-from pathlib import Path
+from dataclasses import fields
+from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
 import bpy
 
 from ..core.contract.capture import Capture
+from ..core.contract.settings import STAGE_KINDS
 from . import captures, preferences
 
 
@@ -22,31 +24,51 @@ def is_capture(path: Path) -> bool:
 
 
 def move(item, path: Path) -> None:
-    """The list item, its head, cameras and landmarks, and the pictures of the capture that are in the .blend, now mean
-    the folder `path`."""
-    old, before = Path(bpy.path.abspath(item.path)), item.path
+    """The list item, its head, cameras and landmarks, the pictures of the capture that are in the .blend, and the
+    settings that name something in it, now mean the folder `path`."""
+    before = item.path
     for thing in bpy.data.objects:
         if thing.get(captures.HEAD_KEY) == before:
             thing[captures.HEAD_KEY] = str(path)
     for image in bpy.data.images:
-        file = (Path(bpy.path.abspath(image.filepath)) if image.source == 'FILE' and image.filepath
-                and not image.packed_file else Path())
-        if file.is_relative_to(old) and (path / file.relative_to(old)).is_file():
-            moved = str(path / file.relative_to(old))
+        file = image.filepath if image.source == 'FILE' and not image.packed_file else ""
+        moved = _moved(file, before, path)
+        if moved and Path(moved).is_file():
             image.filepath = bpy.path.relpath(moved) if image.filepath.startswith("//") and bpy.data.filepath else moved
+    for stage, kind in STAGE_KINDS.items():
+        settings = getattr(item, stage)
+        for name in (field.name for field in fields(kind) if "path" in field.metadata):
+            setattr(settings, name, _moved(getattr(settings, name), before, path) or getattr(settings, name))
     item.path = str(path)
+
+
+def _moved(file: str, before: str, path: Path) -> str:
+    """Where a file of the capture that was at `before` is now that it is at `path`; '' for what lies elsewhere."""
+    place, root = _as_written(bpy.path.abspath(file)), _as_written(bpy.path.abspath(before))
+    inside = bool(file) and type(place) is type(root) and place.is_relative_to(root)
+    return str(path.joinpath(*place.relative_to(root).parts)) if inside else ""
+
+
+def _as_written(path: str) -> PurePath:
+    """A path as the system reads it that wrote it: a .blend goes from Windows to others, and back."""
+    windows = not path.startswith("/") and bool(PureWindowsPath(path).drive)
+    return PureWindowsPath(path) if windows else PurePosixPath(path)
+
+
+def name(item) -> str:
+    """The name of its folder."""
+    return _as_written(item.path).name
 
 
 def find(item) -> Path | None:
     """A missing capture where it is likely to be: beside the .blend or one folder further down, among the captures of
     the preferences, where 0.1.0 put them, or beside another one of the scene. None where there is none of its name."""
-    name = Path(item.path).name
     parents = [captures.folder(other).root.parent for other in captures.listed()]
     parents += [preferences.captures_folder(saved=False), preferences.CAPTURES_0_1]
     if bpy.data.filepath:
         blend = Path(bpy.data.filepath).parent
         parents = [blend, *sorted(p for p in blend.iterdir() if p.is_dir()), *parents]
-    return next((parent / name for parent in parents if is_capture(parent / name)), None)
+    return next((parent / name(item) for parent in parents if is_capture(parent / name(item))), None)
 
 
 def missing() -> list:
@@ -70,7 +92,7 @@ def follow_on_opening(*_):
     blend = Path(bpy.data.filepath).parent
     for item in captures.listed():
         here = Path(os.path.normpath(blend / item.from_blend)) if item.from_blend else None
-        beside = blend / Path(item.path).name
+        beside = blend / name(item)
         if here is not None and here.is_dir():
             _follow(item, here)
         elif not captures.folder(item).root.is_dir() and is_capture(beside):

@@ -117,7 +117,7 @@ def draw_links(layout) -> None:
 def draw_key(layout, label: str) -> None:
     """Where the key of SwitchLight comes from: here, and beside the delighter."""
     if os.environ.get(switchlight_api.KEY_VARIABLE):
-        text = iface_("The key is that of the environment variable {}").format(switchlight_api.KEY_VARIABLE)
+        text = iface_("The key comes from the environment variable {}").format(switchlight_api.KEY_VARIABLE)
         layout.label(text=text, translate=False, icon='CHECKMARK')
     else:
         layout.prop(get(), "switchlight_key", text=label)

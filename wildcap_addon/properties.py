@@ -56,7 +56,7 @@ def _choice(field, value: str) -> tuple[str, str, str]:
         return value, delivery_presets.FORMATS[value].title, " ".join(delivery_presets.FORMATS[value].drops)
     if field.name == "what":
         return value, *delivery_presets.WHAT[value]
-    titles = {"preset": "As the Preset", **delivery_presets.PICTURES, **field.metadata.get("titles", {})}
+    titles = {"preset": "From the Preset", **delivery_presets.PICTURES, **field.metadata.get("titles", {})}
     return value, titles.get(value) or value.replace("_", " ").title(), ""
 
 
@@ -179,10 +179,10 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
                ('LIGHT', "Light", "The light, around a head that stays")],
     )
     turn_frames: bpy.props.IntProperty(name="Frames", min=2, max=1000, default=48,
-                                       description="Pictures of one turn; a film shows 24 in a second")
+                                       description="Pictures of one turn; a video plays 24 per second")
     turn_file: bpy.props.EnumProperty(
         name="As", default='MP4', description="What renders/turntable gets",
-        items=[('MP4', "Film", "One MP4"), ('PNG', "Frames", "A PNG per frame")],
+        items=[('MP4', "Video", "One MP4"), ('PNG', "Frames", "A PNG per frame")],
     )
 
 

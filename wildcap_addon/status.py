@@ -157,25 +157,23 @@ def _changed(path: Path) -> int:
 
 
 def _look(root: str, item) -> None:
-    capture, stamp = _stamp(item)
+    capture = captures.folder(item)
+    stamp = _stamp(capture, repr(properties.job_settings(item)))
     if root not in _known or _known[root][0] != stamp:
         _known[root] = (stamp, look(capture, properties.settings(item)))
 
 
-def _stamp(item) -> tuple[Capture, tuple]:
-    """The capture, and what its status depends on: a few file times and the settings."""
-    capture = captures.folder(item)
-    settings = properties.job_settings(item)
+def _stamp(capture: Capture, settings: str) -> tuple:
+    """What a capture's status depends on: the settings, as text, and a few file times."""
     watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved,
                capture.checkpoints, capture.frames_json, capture.consent, capture.switchlight,
                *delivered(capture), capture.renders)
-    stamp = (repr(settings), *map(_changed, watched))
-    return capture, stamp
+    return settings, *map(_changed, watched)
 
 
 def _tick() -> float:
-    """Has what changed looked at aside: hashing a new capture takes seconds, and longer while a solver takes all
-    cores."""
+    """Has what changed looked at aside: hashing a new capture takes seconds, and longer while a solver takes all cores;
+    and a file server may let one wait for as much as a file's time."""
     while not _found.empty():
         root, stamp, status = _found.get()
         _looking.discard(root)
@@ -185,21 +183,30 @@ def _tick() -> float:
         root = captures.root(item)
         if root not in _wanted or root in _looking:
             continue
-        capture, stamp = _stamp(item)
-        if root not in _known or _known[root][0] != stamp:
-            _looking.add(root)
-            threading.Thread(target=_look_aside, args=(root, stamp, capture, properties.settings(item)),
-                             name="wildcap-status", daemon=True).start()
+        _looking.add(root)
+        threading.Thread(target=_look_aside, name="wildcap-status", daemon=True, args=(
+            root, repr(properties.job_settings(item)), captures.folder(item), properties.settings(item))).start()
+    _wanted.intersection_update(shown())  # the others are again when they are drawn
     return INTERVAL_S
 
 
-def _look_aside(root: str, stamp: tuple, capture: Capture, settings) -> None:
+def shown() -> set[str]:
+    """The capture folders that the windows' tabs are about."""
+    return {captures.root(captures.active(window)) for window in bpy.context.window_manager.windows}
+
+
+def _look_aside(root: str, told: str, capture: Capture, settings) -> None:
+    stamp: tuple = ()
     try:
+        stamp = _stamp(capture, told)
+        if root in _known and _known[root][0] == stamp:
+            _looking.discard(root)
+            return
         _found.put((root, stamp, look(capture, settings)))
     except Exception as error:  # of a folder that changes under the look: the next stamp is another one
         _found.put((root, stamp,
                     Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error}).",
-                                           "It is looked at again in a second."))))
+                                           "WildCap looks again in a second."))))
 
 
 def redraw() -> None:

@@ -17,6 +17,8 @@ import numpy as np
 
 from core.light.shadow_edges import signed_distance
 
+from . import pictures
+
 LINE, SIDES = 0.008, (0.016, 0.048)
 """Half width of the line at the edge, and where the two sides lie, as shares of the face's height: 4 px, and 8 to 24
 px, of a face of 500 px."""
@@ -80,14 +82,7 @@ def _detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray,
             band: np.ndarray) -> tuple[float | None, float | None]:
     """Correlation of the two logarithms between 1 and 3 px, as pictures.detail has it, within a band [H, W] and off
     it."""
-    inner = cv2.erode(mask.astype(np.uint8), np.ones((15, 15))) > 0
-    filtered = []
-    for picture in (log, log_true):
-        picture = np.where(mask, picture, picture[mask].mean()).astype(np.float64)
-        filtered.append(cv2.GaussianBlur(picture, (0, 0), 1) - cv2.GaussianBlur(picture, (0, 0), 3))
-    found = []
-    for where in (inner & band, inner & ~band):
-        one, true = (picture[where] for picture in filtered)
-        found.append(None if len(one) < LEAST_PIXELS else float(np.corrcoef(one, true)[0, 1]) if one.std() > 1e-9
-                     else 0.0)
-    return found[0], found[1]
+    (one, true), inner = pictures.fine_bands(log, log_true, mask)
+    within, away = (pictures.correlation(one[where], true[where]) if where.sum() >= LEAST_PIXELS else None
+                    for where in (inner & band, inner & ~band))
+    return within, away

@@ -49,12 +49,23 @@ def differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> di
 
 def detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
     """Correlation of two logarithms [H, W] between 1 and 3 px; 0 where the first is flat."""
-    inner = cv2.erode(mask.astype(np.uint8), np.ones((15, 15))) > 0
-    bands = []
+    fine, inner = fine_bands(log, log_true, mask)
+    return correlation(*(band[inner] for band in fine))
+
+
+def fine_bands(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """What the two vary by between 1 and 3 px, [H, W] each, and where nothing from off the mask is in it, bool
+    [H, W]."""
+    fine = []
     for picture in (log, log_true):
         picture = np.where(mask, picture, picture[mask].mean()).astype(np.float64)
-        bands.append((cv2.GaussianBlur(picture, (0, 0), 1) - cv2.GaussianBlur(picture, (0, 0), 3))[inner])
-    return float(np.corrcoef(bands)[0, 1]) if bands[0].std() > 1e-9 else 0.0
+        fine.append(cv2.GaussianBlur(picture, (0, 0), 1) - cv2.GaussianBlur(picture, (0, 0), 3))
+    return fine, cv2.erode(mask.astype(np.uint8), np.ones((15, 15))) > 0
+
+
+def correlation(one: np.ndarray, true: np.ndarray) -> float:
+    """Of values [N]; 0 where the first are alike."""
+    return float(np.corrcoef(one, true)[0, 1]) if one.std() > 1e-9 else 0.0
 
 
 def shadow_step(residual: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> float:

@@ -32,7 +32,7 @@ def sections(delight: Figures) -> Sections:
         - *lps_sun*: 14 frames of the head scan's capture, *sample*: 14 of the synthetic sample's, both with cameras and
           head.
         """, table(delight), f"""
-        The captures' rows by the network are older than the whole head's answer, which it asks today
+        The captures' rows by the network are older than the way in which its answers are put together today
         ([the sample](sample.md) is by today's).
 
         The rows of one photograph are older than what keeps brows and eyes in them: [single

@@ -14,12 +14,12 @@ SAYS = ""
 RECORDS = ("state", "demo", "relit", "relit_people", "scan_albedo", "whole_chain", "costs", "comparison", "photographs",
            "whole_head", "skin_tone", "confidence")
 GROUPS = {
-    "The albedo": ("sample", "relit", "state", "split", "scan", "gallery", "comparison", "rerender", "controlled",
-                   "ablation", "prior", "confidence"),
+    "The albedo": ("sample", "relit", "state", "state_0_1_0", "split", "scan", "gallery", "comparison", "rerender",
+                   "controlled", "ablation", "prior", "confidence"),
     "Before the solve": ("geometry", "eyes", "delighters", "answers", "photographs", "shadows", "skin_tone"),
     "After the solve": ("upscale", "whole_head", "hair", "even_light", "engines", "delivery",
                         "reimported"),
-    "Time and memory": ("costs", "solver_speed", "png_levels", "blender"),
+    "Time and memory": ("costs", "png_levels", "blender"),
 }
 ELSEWHERE = """
     - [promises](../promises.md): hostile files and kills at random moments; [farm](../farm.md) and
@@ -32,7 +32,8 @@ def sections(*records: Figures) -> Sections:
     of = Figures(zip(RECORDS, records, strict=True))
     return [("", prose("""
         Every page has the command, the commit and the day that made its figures, all on 2 cores of a shared machine
-        (AMD EPYC, 25 GB), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only. Only the
+        (25 GB; each page names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic
+        subjects only, and may be older than the figures beside them. Only the
         sample and the state of the albedo are by delighter and solver as they are, and *the delighter's answers* by the
         delighter; pages of older code name their commit.
         """)),
@@ -49,13 +50,15 @@ def link(name: str) -> str:
     return f"- [{module.TITLE}]({name}.md): {module.SAYS}"
 
 
+def over_people(summary: Figures, method: str) -> str:
+    """PSNR in dB, mean and spread over the people of the state of the albedo."""
+    return f"{summary[method].psnr.mean:.2f} ± {summary[method].psnr.spread:.2f}"
+
+
 def headline(of: Figures) -> str:
     """The same answers on every set: PSNR in dB."""
     summary, sample, scan, minutes = of.state.summary, of.demo.rows, of.scan_albedo.rows, of.costs.together
     relit, people = of.relit.sample, of.relit_people.mean
-
-    def people_like(method: str) -> str:
-        return f"{summary[method].psnr.mean:.2f} ± {summary[method].psnr.spread:.2f}"
 
     def others(row: str) -> list[str | None]:
         return [found[row] and f"{found[row].psnr:.2f}" for found in sets]
@@ -63,11 +66,11 @@ def headline(of: Figures) -> str:
     sets = [{"raw": sample["raw video"], "flat": sample["flat true tone"], "delit": None, "solved": sample.WildCap},
             {"raw": scan["raw video"], "flat": scan["flat true tone"], "delit": None, "solved": scan.WildCap},
             {**relit, "flat": None}, {**people, "flat": None}]
-    rows = [["the filmed texture", people_like("doing nothing"), *others("raw")],
-            ["one flat colour", people_like("flat colour"), *others("flat")],
-            ["the delit texture", people_like("delit texture"), *others("delit")],
-            ["**WildCap**", people_like("solved"), *others("solved")],
-            ["the true albedo's texture", people_like("true light"), None, None, None, None]]
+    rows = [["the filmed texture", over_people(summary, "doing nothing"), *others("raw")],
+            ["one flat colour", over_people(summary, "flat colour"), *others("flat")],
+            ["the delit texture", over_people(summary, "delit texture"), *others("delit")],
+            ["**WildCap**", over_people(summary, "solved"), *others("solved")],
+            ["the true albedo's texture", over_people(summary, "true light"), None, None, None, None]]
     head = ["PSNR, dB", "[albedo, people like people](state.md)", "[albedo, sample](sample.md)",
             "[albedo, head scan](scan.md)", "[relit, sample](relit.md)", "[relit, six people](relit.md)"]
     return prose(markdown(head, rows), f"""

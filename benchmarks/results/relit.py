@@ -30,8 +30,8 @@ def sections(relit: Figures, people: Figures) -> Sections:
         0.18, one gain per light for all rows; then the sRGB curve, clipped. No AgX.
 
         A cell is PSNR, SSIM and FLIP over the face, mean of the six lights. Every albedo has the true tone as its mean
-        over confident facial skin, the textures by one gain per channel; every row but the fourth wears the solved
-        relief and gloss where it does not say otherwise. Maps are averaged to 1024, where a texel is finer than a
+        over confident facial skin, by one gain per channel; every row wears the solved relief and gloss where it does
+        not say otherwise. Maps are averaged to 1024, where a texel is finer than a
         pixel: nothing of this says what 4K adds.
         """)),
         (SAMPLE, prose(table(relit), f"""

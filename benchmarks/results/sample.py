@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..demo import table
+from ..albedo_score import table
 from ..figures import Figures
 from ..pages import Sections, prose
 
@@ -15,7 +15,11 @@ RECORDS = ("demo",)
 
 def sections(demo: Figures) -> Sections:
     return [("", prose(f"""
-        ![frame, mask, albedo, specular, normal, three lights](../pictures/teaser.jpg)
+        ![Frame, mask over the delit texture, solved albedo; the head under three lights](../pictures/teaser.jpg)
+
+        *Above: a frame, the shadow mask over the delit texture, and the solved albedo, which keeps a faint outline of
+        the leaves and a dark spot where one ends at the brow. Below: the head under the sun, three lamps and a window
+        (`python -m benchmarks.teaser`). What no camera saw well of the scalp is made up, without stubble.*
 
         The solved albedo against the truth, in the picture, on facial skin; the true skin tone is given (mean of
         {demo.views} frames). *After one gain*: per channel, in linear light. *Detail*: the correlation with the truth's

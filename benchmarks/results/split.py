@@ -8,7 +8,7 @@ from .. import split
 from ..figures import Figures
 from ..pages import Sections
 
-TITLE = split.TITLE
+TITLE = "Skin or light"
 SAYS = "what telling them apart is worth, with one capture of a person and with several"
 RECORDS = ("split",)
 

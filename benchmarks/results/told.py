@@ -13,6 +13,7 @@ from pathlib import Path
 from core.contract.messages import Problem
 
 from .. import figures
+from .index import over_people
 
 NUMBER = r"[-+]?\d+(?:\.\d+)?"
 
@@ -55,34 +56,33 @@ def told() -> dict[str, list[str]]:
         "README.md": in_readme(of),
         "docs/cameras.md": in_cameras(of.geometry.lps_sun.cameras.against_truth, of.head_scale),
         "docs/scan_and_head.md": in_scan_and_head(of.geometry.lps_sun, of.sample_surfaces),
-        "docs/guide/install.md": [f"{installed.told_gb:.1f} GB are told, {installed.freed_gb:.1f} GB come off again"],
+        "docs/guide/install.md": [
+            f"it announces {installed.told_gb:.1f} GB, and **Remove Solver**, which says first what it frees, gives "
+            f"back {installed.freed_gb:.1f} GB"],
         "docs/guide/relight.md": [
             f"takes {memory.shown_gb:.1f} GB of memory ({memory.empty_gb:.1f} GB empty; {memory.loading_gb:.1f} GB "
             f"while they load, {memory.mask_opened_gb:.1f} GB when a mask"],
         "docs/delighters.md": [
             f"{cost.tera_multiplications:.2f} x 10^12 multiplications, three quarters of them in the decoder, and "
             f"{cost.peak_gb:.1f} GB of memory",
-            f"a frame took {cost.seconds} s on two threads, while 10^12 multiplications of one large matrix product "
-            f"took {cost.seconds_of_a_product} s there; a cancel was heard within {cost.seconds_to_cancel:.1f} s"],
+            f"a frame took {cost.seconds:.0f} s on two threads, while 10^12 multiplications of one large matrix "
+            f"product took {cost.seconds_of_a_product:.0f} s there; a cancel was heard within "
+            f"{cost.seconds_to_cancel:.1f} s"],
     }
 
 
 def in_readme(of: _Published) -> list[str]:
     together, answers, relit = of.costs.together, of.state.summary, of.relit.sample
-
-    def people_like(method: str) -> str:
-        return f"{answers[method].psnr.mean:.2f} ± {answers[method].psnr.spread:.2f} dB"
-
     return [
         f"{of.installation.freed_gb:.1f} GB for the solver's environment, {of.demo.capture_gb:.1f} GB per face",
         f"the most that a stage took was {together.float32.peak_mb / 1000:.1f} GB",
         f"60 frames take {together.standard.minutes:.1f} minutes on {of.costs.machine.cores} CPU cores",
         f"({together.float32.minutes:.1f} without bfloat16), 300 frames {together['frames-300'].minutes:.1f}, "
         f"a draft {together.draft.minutes:.1f}",
-        f"| the filmed texture | {relit.raw.psnr:.2f} dB | {people_like('doing nothing')} |",
-        f"| one flat colour | - | {people_like('flat colour')} |",
-        f"| the delit texture | {relit.delit.psnr:.2f} dB | {people_like('delit texture')} |",
-        f"| **WildCap** | {relit.solved.psnr:.2f} dB | {people_like('solved')} |"]
+        f"| the filmed texture | {relit.raw.psnr:.2f} dB | {over_people(answers, 'doing nothing')} dB |",
+        f"| one flat colour | - | {over_people(answers, 'flat colour')} dB |",
+        f"| the delit texture | {relit.delit.psnr:.2f} dB | {over_people(answers, 'delit texture')} dB |",
+        f"| **WildCap** | {relit.solved.psnr:.2f} dB | {over_people(answers, 'solved')} dB |"]
 
 
 def in_cameras(truth: figures.Figures, scale: figures.Figures) -> list[str]:

@@ -88,7 +88,7 @@ def _reach(address: str) -> None:
         return
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal():
-        raise Problem(f"{address} is no address of Ray's head node.",
+        raise Problem(f"{address} is not the address of a Ray head node.",
                       "Write it as HOST:PORT; `ray start --head` tells it. The port is 6379 if you chose none.")
     try:
         socket.create_connection((host.strip("[]"), int(port)), REACH_S).close()
@@ -115,7 +115,7 @@ def _join(begin: Callable[[], object], address: str) -> None:
 
 
 def _unreachable(address: str, why: str) -> Problem:
-    return Problem(f"There is no cluster of Ray's to be reached at {address} ({why}).",
+    return Problem(f"No Ray cluster can be reached at {address} ({why}).",
                    "See that its head node runs (`ray status` there), that this machine is one of its nodes (`ray "
                    "start --address=HOST:PORT --num-cpus=0` makes"
                    " it one), and that both have Ray's token.")

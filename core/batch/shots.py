@@ -42,7 +42,7 @@ def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[lis
             face = _face(row, shots if shots.is_dir() else shots.parent, root, quality, shared)
             other = taken.setdefault(face.root.name.casefold(), place)  # some disks do not tell ANNA from Anna
             if other != place:
-                raise Problem(f"{face.name} is the name of {other}, too.",
+                raise Problem(f"The name {face.name} is taken by {other}.",
                               "Give each face a name of its own in the column name.")
             faces.append(face)
         except Problem as problem:
@@ -93,7 +93,7 @@ def _rows_of_table(table: Path) -> list[tuple[str, dict[str, str]]]:
         if len(content) > MOST_BYTES or "\0" in text:
             raise UnicodeError
     except UnicodeError:
-        raise Problem(f"{table} is no table of text in UTF-8.", "Save it from the spreadsheet as CSV, UTF-8.") from None
+        raise Problem(f"{table} is not a text file in UTF-8.", "Save it from the spreadsheet as CSV, UTF-8.") from None
     heading = next((line for line in text.splitlines() if line.strip()), "")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=heading.count))
     rows: list[tuple[str, dict[str, str]]] = []
@@ -167,4 +167,5 @@ def _check_colour(column: str, text: str) -> None:
     except ValueError:
         parts = []
     if len(parts) != 3 or not all(0 <= channel <= (1 if column == "tone" else 1e3) for channel in parts):
-        raise Problem(f"The {column} {text!r} is no R,G,B.", "Write three numbers as \"0.8,0.6,0.5\", or auto.")
+        raise Problem(f"The {column} {text!r} is not a colour as R,G,B.",
+                      "Write three numbers as \"0.8,0.6,0.5\", or auto.")

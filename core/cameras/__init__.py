@@ -104,7 +104,8 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
     if 1 <= off < IMPORT_NEAR_RATIO and len(frames.records) <= ALL_PAIRS_FRAMES:
         report.log("The imported cameras are a little off; they are refined by what matches in these pictures.")
         matches = solve_structure(frames, capture, False, settings.cameras.matching, settings.seed, report)[1]
-        model = refine(model, faces, matches, False, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
+        told = {image.name: model.cameras[image.camera_id].mean_focal_length() for image in model.images.values()}
+        model = refine(model, faces, matches, told, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
         head, off = checked(model)
     if not off < 1:
         raise Problem(f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by "
@@ -155,11 +156,17 @@ def _left_out(solved: Solved, records: Sequence[FrameRecord], shown_names: dict[
     if not rest:
         return
     sharp = np.median([record.sharpness for record in records if record.name in fits])
+    photographs = all(record.time_s is None for record in records)
     blurred = sum(record.sharpness < BLURRED_SHARPNESS_SHARE * sharp for record in rest)
-    why, remedy = ((f"; {blurred} of them are blurred",
-                    "Move the camera slower, or add light, so that each frame is sharp.") if blurred > len(rest) / 2
-                   else ("",
-                         "Move the camera slower past the places where frames were lost, and keep the whole head in "
-                         "the picture."))
-    report.finding(f"{len(rest)} of {len(records)} frames did not fit the others and were left out{why}.", remedy,
-                   [shown_names[record.name] for record in rest])
+    if blurred > len(rest) / 2:
+        why = f"; {blurred} of them are blurred"
+        remedy = ("Take those again, sharp." if photographs
+                  else "Move the camera slower, or add light, so that each frame is sharp.")
+    else:
+        why = ""
+        remedy = ("Take more between those that fit and those that do not, with the whole head in the picture."
+                  if photographs
+                  else "Move the camera slower past the places where frames were lost, and keep the whole head in the "
+                       "picture.")
+    report.finding(f"{len(rest)} of {len(records)} {'photographs' if photographs else 'frames'} did not fit the others "
+                   f"and were left out{why}.", remedy, [shown_names[record.name] for record in rest])

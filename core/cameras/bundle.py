@@ -20,6 +20,8 @@ OFFSET_M = 0.002
 """How far a landmark of a person strays from the nearest head of the identity space."""
 FOCAL_SIGMA_LOG = 0.35
 """Deviation of the logarithm of an unknown focal length from its prior: from a phone's wide to its portrait lens."""
+TOLD_SIGMA_LOG = 0.03
+"""The same of one that a file told: a whole number of millimetres, and focusing changes it."""
 FEATURE_PX = 1.5
 """Deviation of a match in cameras that come from the face, where what agrees is little and may be wrong."""
 LEAST_LANDMARK_COSINE = 0.15
@@ -28,22 +30,21 @@ LEAST_LANDMARK_COSINE = 0.15
 
 @dataclass(frozen=True)
 class Bundle:
-    """State: rotations [N, 3, 3] and translations [N, 3] into the cameras; focal [G] px with prior [G] and known [G];
-    lens [N], the camera's focal; centre [N, 2], principal points px; coefficients [K]; points [P, 3] metres in the
-    head's frame, the first 468 the landmarks; feature_px, the deviation of a match; focal_spread, that of the logarithm
-    of an unknown focal length."""
+    """State: rotations [N, 3, 3] and translations [N, 3] into the cameras; focal [G] px with prior [G] and
+    spread [G], the deviation of its logarithm from the prior's; lens [N], the camera's focal; centre [N, 2], principal
+    points px; coefficients [K]; points [P, 3] metres in the head's frame, the first 468 the landmarks; feature_px, the
+    deviation of a match."""
 
     rotations: np.ndarray
     translations: np.ndarray
     focal: np.ndarray
     focal_prior: np.ndarray
-    focal_known: np.ndarray
+    focal_spread: np.ndarray
     lens: np.ndarray
     centre: np.ndarray
     coefficients: np.ndarray
     points: np.ndarray
     feature_px: float = FEATURE_PX
-    focal_spread: float = FOCAL_SIGMA_LOG
 
     def local(self, camera: np.ndarray, point: np.ndarray) -> np.ndarray:
         """Points in the frames of cameras [M, 3]."""
@@ -117,7 +118,7 @@ def _cost(bundle: Bundle, observations: Observations, weights: np.ndarray) -> fl
     offset, focal = _priors(bundle)
     error = ((bundle.project(observations.camera, observations.point) - observations.pixel) ** 2).sum(1)
     return float(weights @ error + (offset**2).sum() * _offset_weight() + (bundle.coefficients**2).sum()
-                 + (focal[~bundle.focal_known] ** 2).sum())
+                 + (focal**2).sum())
 
 
 def _offset_weight() -> float:
@@ -140,7 +141,6 @@ def _step(bundle: Bundle, observations: Observations, weights: np.ndarray, dampi
         by_camera[:, :, axis] = (by_local @ np.cross(np.eye(3)[axis], turned)[..., None])[..., 0]
     by_camera[:, :, 3:6] = by_local
     by_camera[:, :, 6] = focal[:, None] * local[:, :2] / depth[:, None]
-    by_camera[bundle.focal_known[bundle.lens[observations.camera]], :, 6] = 0
     by_point = by_local @ bundle.rotations[observations.camera]
 
     # [M, 7]
@@ -169,7 +169,7 @@ def _step(bundle: Bundle, observations: Observations, weights: np.ndarray, dampi
     g[tail] += bundle.coefficients - strength * OFFSET_M * flat.T @ offset.ravel()
     lenses = np.arange(6 * views, 6 * views + groups)
     u[lenses, lenses] += 1 / bundle.focal_spread**2
-    g[lenses] += np.where(bundle.focal_known, 0, focal_off / bundle.focal_spread)
+    g[lenses] += focal_off / bundle.focal_spread
 
     u[np.diag_indices(shared)] *= 1 + damping
     u[np.diag_indices(shared)] += 1e-9

@@ -72,12 +72,12 @@ def read_cameras(path: Path) -> list[Calibrated]:
         raise Problem(f"There is no file or folder of cameras at {path}.",
                       "Check the path in the setting, or empty it to solve the cameras here.")
     if not path.is_dir() and path.suffix.lower() not in readers:
-        raise Problem(f"{path.name} is no kind of camera file that is known here.",
+        raise Problem(f"{path.name} is not a camera file that WildCap can read.",
                       "Choose a COLMAP folder, Metashape's cameras (.xml), RealityScan's internal/external camera "
                       "parameters (.csv), or Blender's (.json).")
     try:
         if path.is_file() and path.stat().st_size > MOST_TEXT_BYTES:
-            raise Problem(f"{path.name} is larger than {MOST_TEXT_BYTES >> 20} MB, which is no list of cameras.",
+            raise Problem(f"{path.name} is larger than {MOST_TEXT_BYTES >> 20} MB, too large for a list of cameras.",
                           "Export the cameras without points.")
         cameras = (colmap_folder.read(path) if path.is_dir()
                    else readers[path.suffix.lower()](path.read_text(encoding="utf-8-sig"), path.name))
@@ -99,8 +99,8 @@ def read_cameras(path: Path) -> list[Calibrated]:
         if not (sized and finite and focal > LEAST_FOCAL_SHARE * (max(camera.width, camera.height) or 1)
                 and np.allclose(camera.rotation @ camera.rotation.T, np.eye(3), atol=1e-4)
                 and np.linalg.det(camera.rotation) > 0):
-            raise Problem(f"The camera of {camera.name} in {path.name} is no camera: its rotation, focal length or "
-                          "size makes no sense.",
+            raise Problem(f"The camera of {camera.name} in {path.name} is damaged: its rotation, focal length or "
+                          "picture size makes no sense.",
                           "Export the cameras again; a file that was edited by hand may be damaged.")
     return cameras
 

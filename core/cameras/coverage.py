@@ -49,8 +49,8 @@ def missing(centres: np.ndarray) -> list[tuple[str, str]]:
                  else f"before the nose, on the person's {other}")
         findings.append((f"{'Nothing' if reach < SIDE_DEG else 'Little'} was seen from the person's {side} side: the "
                          f"pictures end {where}.",
-                         f"Go on around the face until the person's {side} ear is in the middle of the picture; that "
-                         "side is guessed otherwise."))
+                         f"Go on around the face until the person's {side} ear is in the middle of the picture; "
+                         "otherwise that side is guessed."))
     for low, high in zip(azimuth[:-1], azimuth[1:], strict=True):
         if high - low > GAP_DEG:
             findings.append((f"Between {_place(low)} and {_place(high)} there is no picture: a gap of {high - low:.0f} "

@@ -20,11 +20,11 @@ import pycolmap
 from ..contract.messages import Reporter
 from ..face import faces
 from ..geometry.models import pose_of
-from .bundle import Bundle, Observations, adjust
+from .bundle import TOLD_SIGMA_LOG, Bundle, Observations, adjust
 from .landmarks import template_landmarks
 from .matches import Matches
 from .resection import LEAST_MATCHES, agreeing, place_by_matches
-from .world import agreeing_faces, find_head
+from .world import PUPILS_M, agreeing_faces, find_head
 
 AGREE_WIDTH_SHARES = (0.0125, 0.006, 0.004)
 """Shares of the face's width by which matches may miss, round by round."""
@@ -32,15 +32,14 @@ WIDE_WIDTH_SHARES = (0.06, 0.025)
 """What goes before for cameras that may be some pixels off."""
 FEATURE_SIGMA_SHARE = 1 / 3000
 """Deviation of a match, as a share of a picture's longer side: features are looked for at 2,000 pixels."""
-FREE_SIGMA_LOG, TOLD_SIGMA_LOG = 3.0, 0.03
-"""Spreads of the logarithm of a focal length: of an unknown one, which what matches tells, and of one that a file told,
-which focusing changes."""
+FREE_SIGMA_LOG = 3.0
+"""Spread of the logarithm of a focal length that no file told: what matches tells it."""
 FEWEST_TRACKS = 60  # below, what matches on the head says too little to refine by
 
 
-def refine(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], matches: Matches, unknown_focal: bool,
-           report: Reporter,
-           missing: Sequence[dict] = (), agree: Sequence[float] = AGREE_WIDTH_SHARES) -> pycolmap.Reconstruction:
+def refine(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], matches: Matches,
+           told: Mapping[str, float], report: Reporter, missing: Sequence[dict] = (),
+           agree: Sequence[float] = AGREE_WIDTH_SHARES) -> pycolmap.Reconstruction:
     """The cameras refined by what matches on the head.
 
     Parameters
@@ -48,10 +47,10 @@ def refine(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], 
     model : cameras, of any world
     face_by_name : the face in each frame that shows one
     matches : between the frames
-    unknown_focal : whether nothing told the focal length: it is free then
+    told : name -> focal length in pixels, of the frames whose file tells one
     report : hears of progress
-    missing : [{names, width, height}] like camera groups, of frames that have no camera yet and may get one by their
-        matches; they share the lens of the frames of their size
+    missing : [{names, width, height, focal_px}] like camera groups, of frames that have no camera yet and may get one
+        by their matches; they share the lens of the frames of their size, unless another one was told of those
     agree : as AGREE_WIDTH_SHARES, wider first where the cameras may be off
 
     Returns
@@ -64,14 +63,14 @@ def refine(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], 
     Problem
         Where no face is found.
     """
-    head = find_head(model, face_by_name, 0.063)
+    head = find_head(model, face_by_name, PUPILS_M)
     model = pycolmap.Reconstruction(model)
     model.transform(head.world_from_model)
     seen_faces = agreeing_faces(model, face_by_name)
     registered = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
     names = [image.name for image in registered]
     straight = straightened(model, registered, matches)
-    bundle = as_bundle(model, registered, unknown_focal)
+    bundle = as_bundle(model, registered, told)
     marks = _landmarks(model, registered, seen_faces)
     width = float(np.median([face.box[2] - face.box[0] for face in seen_faces.values()]))
     before = None
@@ -87,29 +86,43 @@ def refine(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], 
     if len(tracks) < 0.8 * before:
         report.log("The cameras were not refined by the face: less would match than before.")
         return model
-    lens_of = {(camera.width, camera.height): number for number, camera in model.cameras.items()}
-    groups = [{**group, "lens": lens_of[group["width"], group["height"]]} for group in missing
-              if (group["width"], group["height"]) in lens_of]
+    lenses = _told_of_lenses(model, registered, told)
+    groups = [{**group, "lens": same[-1]} for group in missing if (same := _lenses_of(group, model, lenses))]
     late = _late(bundle, model, groups, names, tracks, straight)
     if late:
         report.log(f"Placed by what matches the refined cameras: {', '.join(sorted(late))}.")
     return rebuilt(model, bundle, registered, tracks, matches, late, groups)
 
 
-def as_bundle(model: pycolmap.Reconstruction, registered: list, unknown_focal: bool) -> Bundle:
-    """The model's cameras, in the head's world, of the frames `registered`."""
+def _told_of_lenses(model: pycolmap.Reconstruction, registered: list, told: Mapping[str, float]) -> dict:
+    """Number of a camera -> the focal length that a file told of it, None where none did."""
+    lenses = dict.fromkeys(model.cameras)
+    return lenses | {image.camera_id: told[image.name] for image in registered if image.name in told}
+
+
+def _lenses_of(group: dict, model: pycolmap.Reconstruction, lenses: Mapping[int, float | None]) -> list[int]:
+    """Numbers of the cameras that may have taken a group of frames."""
+    return [number for number, camera in model.cameras.items()
+            if (camera.width, camera.height) == (group["width"], group["height"])
+            and (None in (lenses[number], group["focal_px"]) or lenses[number] == group["focal_px"])]
+
+
+def as_bundle(model: pycolmap.Reconstruction, registered: list, told: Mapping[str, float]) -> Bundle:
+    """The model's cameras, in the head's world, of the frames `registered`; each focal length with the one that was
+    told as its prior, where one was."""
+    lenses = _told_of_lenses(model, registered, told)
     numbers = sorted(model.cameras)
     poses = [pose_of(image) for image in registered]
     focal = np.array([model.cameras[number].mean_focal_length() for number in numbers])
     used = [model.cameras[image.camera_id] for image in registered]
     return Bundle(np.array([pose.rotation.matrix() for pose in poses]), np.array([pose.translation for pose in poses]),
-                  focal, focal.copy(),
-                  np.zeros(len(numbers), bool), np.array([numbers.index(image.camera_id) for image in registered]),
+                  focal, np.array([lenses[number] or own for number, own in zip(numbers, focal, strict=True)]),
+                  np.array([TOLD_SIGMA_LOG if lenses[number] else FREE_SIGMA_LOG for number in numbers]),
+                  np.array([numbers.index(image.camera_id) for image in registered]),
                   np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]),
                   np.zeros(len(template_landmarks().basis)),
                   template_landmarks().mean.copy(),
-                  FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used),
-                  FREE_SIGMA_LOG if unknown_focal else TOLD_SIGMA_LOG)
+                  FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used))
 
 
 def _landmarks(model: pycolmap.Reconstruction, registered: list, face_by_name: dict[str, faces.Face]) -> Observations:

@@ -83,7 +83,7 @@ def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporte
         report.progress(done, len(records), text)
         srgb = images.read_srgb(folder / record.name)
         face = faces.detect(srgb, last if record.time_s is not None else None)
-        if face is None and last is not None:
+        if face is None and last is not None and record.time_s is None:
             face = faces.detect(srgb, last)
         last = face
         if last is not None:

@@ -19,7 +19,7 @@ import pycolmap
 
 from ..contract.messages import Reporter
 from ..face import faces
-from .bundle import Bundle, Observations, adjust
+from .bundle import FOCAL_SIGMA_LOG, TOLD_SIGMA_LOG, Bundle, Observations, adjust
 from .landmarks import template_landmarks
 from .matches import Matches, tracks
 
@@ -134,7 +134,7 @@ def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -
     prior = np.array([group["focal_px"] or PHONE_FOCAL_SHARE * max(group["width"], group["height"])
                       for group in groups])
     return Bundle(np.array([r for r, _ in poses]), np.array([t for _, t in poses]), focal, prior,
-                  np.array([bool(group["focal_px"]) for group in groups]),
+                  np.array([TOLD_SIGMA_LOG if group["focal_px"] else FOCAL_SIGMA_LOG for group in groups]),
                   np.array([group_of[name] for name in names]),
                   np.array([[groups[group_of[n]][side] / 2 for side in ("width", "height")] for n in names]),
                   np.zeros(len(model.basis)), model.mean.copy())

@@ -34,8 +34,8 @@ MOST_LEFT_SHARE = 0.9
 """Share of the head's error that is left by cameras of its own, in tracks that had no say in these, below which the
 head moved before the room. Poses that fit one half of the tracks predict the other half no better where it kept still;
 a tenth is left to the scatter of the two medians."""
-LEAST_TRACKS = 200
-"""Points on the head that several frames show, for poses of its own."""
+LEAST_TRACKS, LEAST_FRAMES = 200, 3
+"""Points on the head that several frames show, and frames, for poses of its own."""
 CHEST_M = -0.12
 """Height below the eyes where what moves with the head ends."""
 AIR_SHARE = 0.05
@@ -55,7 +55,7 @@ class HeadCameras:
 
 def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter,
            by: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
-    """The model with its cameras placed with respect to the head, in the head's world (metres).
+    """The model with its cameras placed with respect to the head, in the template's world.
 
     Parameters
     ----------
@@ -71,12 +71,14 @@ def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, re
     None where the head kept still, or where too little matches on it to tell.
     """
     room = pycolmap.Reconstruction(model)
-    room.transform(head.world_from_model)
+    room.transform(head.template_from_model)
     everything = sorted((image for image in room.images.values() if image.has_pose), key=lambda image: image.name)
     registered = [image for image in everything if by is None or image.name in by]
+    if len(registered) < LEAST_FRAMES:
+        return model, None
     names, width = [image.name for image in registered], _face_width(room, registered)
     own = on_head(room, everything, matches)
-    straight, bundle = straightened(room, everything, own), as_bundle(room, registered, False)
+    straight, bundle = straightened(room, everything, own), as_bundle(room, registered, {})
     reach = REACH_WIDTH_SHARES[0] * width
     _, tracks, still = agreeing(bundle, names, straight, reach)
     if len(tracks) < LEAST_TRACKS:
@@ -146,7 +148,7 @@ def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tup
     """Name -> left, top, right and bottom, in pixels, of a part that shows the head, with some air around it, in each
     frame of `model` where the head is more than a dot. The parts are of one size, as pictures of one camera are."""
     room, outlines = pycolmap.Reconstruction(model), {}
-    room.transform(head.world_from_model)
+    room.transform(head.template_from_model)
     for image in room.images.values():
         outline = _outline(room, image) if image.has_pose else None
         if outline is not None:

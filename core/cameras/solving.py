@@ -158,8 +158,10 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
         model, left = settle(solved.model, solved.head, solved.matches, report,
                              skeleton.choose(film, skeleton.size(film)))
         if left is None or model is not solved.model:  # a room's features are too coarse for a head
-            fine, chosen = match_crops(head_boxes(solved.model, solved.head), frames, capture, settings.seed, report)
-            model, left = settle(solved.model, solved.head, fine, report, chosen)
+            boxes = head_boxes(solved.model, solved.head)
+            if boxes:
+                fine, chosen = match_crops(boxes, frames, capture, settings.seed, report)
+                model, left = settle(solved.model, solved.head, fine, report, chosen)
         if model is solved.model:
             return solved
         report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % "
@@ -170,9 +172,9 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
         return solved
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
     missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
-    unknown = any(record.focal_px is None for record in frames.records)
+    told = {record.name: record.focal_px for record in frames.records if record.focal_px}
     model = refine(
-        solved.model, solved.face_by_name, solved.matches, unknown, report, camera_groups(missing, capture.frames)
+        solved.model, solved.face_by_name, solved.matches, told, report, camera_groups(missing, capture.frames)
     )
     return replace(solved, model=model, head=find_head(model, solved.face_by_name, apart),
                    every_frame_held=holds_every_frame(model))
@@ -215,6 +217,7 @@ def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | Non
 
 def _by_face(records: Sequence[FrameRecord], capture: Capture, face_by_name: dict, matches: Matches, settings: Settings,
              report: Reporter) -> tuple[Solved | None, str | None]:
+    shown = {record.name: record.shown for record in records}
     mirrored = (
         find_mirrored(sorted(face_by_name), [], capture.frames, report, face_by_name)
         if len(records) <= FEW_PHOTOGRAPHS
@@ -224,7 +227,7 @@ def _by_face(records: Sequence[FrameRecord], capture: Capture, face_by_name: dic
                     {name: face for name, face in face_by_name.items() if name not in mirrored}, matches, report)
     registered = result.model.num_reg_images() if result else 0
     if registered < min(LEAST_VIEWS, len(records)):
-        but = f", and {', '.join(mirrored)} is mirrored" if mirrored else ""
+        but = f", and {', '.join(shown[name] for name in mirrored)} is mirrored" if mirrored else ""
         without = f"A face is found in only {len(face_by_name)} of {len(records)} frames{but}"
         return None, f"{without}; the landmarks of three could have placed the cameras."
     if result.landmark_miss > MOST_LANDMARK_MISS_SHARE:

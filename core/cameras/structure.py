@@ -103,13 +103,13 @@ def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, cap
     with capture.workspace() as work:
         (work / "parts").mkdir()
         names = {}
-        for record in frames.records:
+        for done, record in enumerate(frames.records):
+            report.progress(done, len(frames.records), "cutting out the head")
             if record.name in boxes:
                 left, top, right, bottom = boxes[record.name]
                 images.write_srgb(work / "parts" / record.name,
                                   images.read_srgb(capture.frames / record.name)[top:bottom, left:right], quality=100)
                 names.setdefault((right - left, bottom - top), []).append(record.name)
-                report.check()
         groups = [{"names": same, "width": width, "height": height, "focal_px": None}
                   for (width, height), same in names.items()]
         job = {"images": str(work / "parts"), "groups": groups, "skin": False, "photographs": False, "finer": True,

@@ -24,6 +24,8 @@ SURE_SCORE = 0.8
 """Score of a face that was found; the net gives one that is there 0.95 and more."""
 FRONTAL_DEG = 45.0
 """Landmarks slide along the silhouette of a turned head, so frames within this yaw are taken where there are enough."""
+PUPILS_M = 0.063
+"""How far apart the template's pupils are."""
 MOVED_WIDTH_SHARE = 0.08
 """Share of the face's width by which the landmarks' rays may miss each other in a quarter of the frames before the head
 counts as moved."""
@@ -40,6 +42,13 @@ class HeadFrame:
     miss: float
     pupils_apart: float
     unlike_m: float
+
+    @property
+    def template_from_model(self) -> pycolmap.Sim3d:
+        """The similarity into the template's own world, as the head's but with pupils PUPILS_M apart."""
+        into = self.world_from_model
+        size = PUPILS_M / (into.scale * self.pupils_apart)
+        return pycolmap.Sim3d(size * into.scale, into.rotation, size * into.translation)
 
     @property
     def still(self) -> bool:

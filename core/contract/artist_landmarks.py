@@ -67,7 +67,7 @@ def _checked(points: Mapping, owner: str) -> dict[int, tuple[float, float, float
         except (TypeError, ValueError, OverflowError):
             x = y = z = math.nan
         if not all(abs(v) <= FARTHEST_M for v in (x, y, z)):  # false for nan, too
-            raise Problem(f"{owner}: landmark {index} is at {point!r:.60}, which is no place on the head.",
+            raise Problem(f"{owner}: landmark {index} is at {point!r:.60}, which is not on the head.",
                           "Give x, y and z in metres; the origin lies between the eyes.")
         landmarks[index] = (x, y, z)
     return landmarks

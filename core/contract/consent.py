@@ -69,7 +69,7 @@ def selected(capture: Capture) -> list[str]:
     except Problem:
         names = []
     if not names:
-        raise Problem("This capture has no frames yet that could be agreed to.",
+        raise Problem("This capture has no frames yet that could be sent.",
                       "Reconstruct first: it stops before anything is sent.")
     return names
 

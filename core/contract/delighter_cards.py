@@ -69,7 +69,7 @@ CARDS = {
         "SwitchLight",
         f"A paid service of the company {service.COMPANY} that answers each frame with one without light. It is what "
         "the paper uses.",
-        best_for="Whoever has an account there, and the leave of the person who was filmed.",
+        best_for="Those who have an account there, and the permission of the person who was filmed.",
         runs=f"On the machines of {service.COMPANY}, at {service.BASE.split('/')[2]}; about five seconds per frame, "
              "three at a time.",
         leaves="The chosen frames, which show a person's face, and your key. Only after you agreed to it for this "
@@ -94,13 +94,13 @@ CARDS = {
     ),
     "folder": Card(
         "Folder", "Takes pictures that another program has delit, for instance a relighting network.",
-        best_for="The best model that you have access to. Name the pictures like the frames; neither crop nor turn "
-                 "them.",
+        best_for="Using the best model that you have access to. Name the pictures like the frames; neither crop nor "
+                 "turn them.",
         runs="Wherever you made the pictures.",
         leaves=NOTHING, costs="Nothing here.",
         shadows="No.",
         weights="None here.",
-        licence="That of the program that made the pictures is yours to keep to.",
+        licence="You have to keep to the licence of the program that made the pictures.",
         settings=("folder",), needed=(("folder", "No folder of delit pictures is chosen."),),
     ),
     "none": Card(

@@ -20,7 +20,7 @@ WHOLE_BYTES = 64 << 20
 """Size up to which a source's file is read whole: every photograph, and a phone's video of half a minute."""
 BLOCKS, BLOCK_BYTES = 64, 1 << 20
 """What is read of a longer one, spread evenly from its first byte to its last."""
-PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif", ".avif")
+PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif")
 """Suffixes of the files in a folder of photographs that are read; others may lie beside them."""
 _hashes: dict[tuple, str] = {}
 

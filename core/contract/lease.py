@@ -84,7 +84,7 @@ def _refuse_stranger(path: Path) -> None:
     """Raises Problem for a link, a folder or a pipe under the lock's name, which no worker has put there and none can
     give back."""
     if path.is_symlink() or path.exists() and not path.is_file():
-        raise Problem(f"{path} is in the way: it is no lock of WildCap's.", "Move it away, or delete it.")
+        raise Problem(f"{path} is in the way: it is not one of WildCap's locks.", "Move it away, or delete it.")
 
 
 @contextlib.contextmanager

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether only the part of the maps that a mask edit touched can be solved again: when all but the masks is as it was
-at the last solve.
+"""Whether only the part of the maps that a mask edit touched can be solved again: when all but the artist's masks is as
+it was at the last solve. The proposal has to be, too: what the artist added to it, the light is held back less.
 
 Ground floor: standard library only. What the last solve found stands in maps/solved.safetensors, with the conditions it
 was found under.
@@ -22,6 +22,7 @@ from .settings import Settings, result_settings
 from .slimmed import hash_artefact
 
 FIELD = "conditions"  # of the file's metadata
+PAINTED = ("shadow_mask.png", "protect_mask.png")
 
 
 def obstacle(capture: Capture, settings: Settings) -> str:
@@ -37,11 +38,11 @@ def obstacle(capture: Capture, settings: Settings) -> str:
 
 
 def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
-    """All that a solve depends on beside its masks: name -> hash."""
+    """All that a solve depends on beside the painted masks: name -> hash."""
     stage, record = stages.by_name("solve"), capture.read()
     chosen = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
     files = {name: hash_artefact(capture.root, record, name) for name in (*stage.reads, *stage.optional_reads)
-             if "mask" not in name}
+             if name not in PAINTED}
     inputs = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
     return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest()
             for name, value in inputs.items()}

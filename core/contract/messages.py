@@ -137,6 +137,7 @@ class Reporter:
         self._cancelled = cancelled
         self._clock = clock or time.monotonic
         self._first: tuple[float, float] | None = None  # the first units that were reported as done, and when
+        self._last = (0.0, 0.0)  # what was reported as done before, and of how many
 
     def check(self) -> None:
         """Raises CancelledError if the user asked to stop."""
@@ -145,9 +146,13 @@ class Reporter:
 
     def progress(self, done: float, of: float, text: str = "") -> None:
         """`done` of `of` equal units are finished. The ETA is what is left at the pace since the first finished unit
-        was reported: what comes before it (reading, or going on from a checkpoint) says nothing about the pace."""
+        was reported: what comes before it (reading, or going on from a checkpoint) says nothing about the pace. A stage
+        begins another count by another `of`, or from less than was done."""
         self.check()
         now = self._clock()
+        if of != self._last[1] or done < self._last[0]:
+            self._first = None
+        self._last = done, of
         if self._first is None and done > 0:
             self._first = done, now
         paced = self._first is not None and done > self._first[0]

@@ -64,7 +64,7 @@ def value_from_text(name: str, field: dataclasses.Field, text: str, folder: Path
     try:
         value = kind(text)
     except ValueError:
-        raise Problem(f"{name} is {text!r}, which is no {'whole ' if kind is int else ''}number.",
+        raise Problem(f"{name} is {text!r}, which is not a {'whole ' if kind is int else ''}number.",
                       advise_values(field)) from None
     return check_value(name, field, value)
 

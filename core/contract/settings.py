@@ -121,14 +121,14 @@ def from_json(by_stage: dict, base: Settings | None = None) -> Settings:
     """
     settings = base or Settings()
     if not isinstance(by_stage, dict):
-        raise Problem(f"The settings are no object but {by_stage!r:.60}.", WRITTEN)
+        raise Problem(f"The settings have to be a JSON object, not {by_stage!r:.60}.", WRITTEN)
     for name, value in by_stage.items():
         if "." in name:
-            raise Problem(f"A settings object has no {name!r}: a stage's settings are an object in it.", WRITTEN)
+            raise Problem(f"There is no key {name!r} in the settings: each stage has an object of its own.", WRITTEN)
         if name not in STAGE_KINDS:
             value = check_value(name, find_setting(name), value)
         elif not isinstance(value, dict):
-            raise Problem(f"The settings of the stage {name} are no object but {value!r:.60}.", WRITTEN)
+            raise Problem(f"The settings of the stage {name} have to be an object, not {value!r:.60}.", WRITTEN)
         else:
             value = replace(getattr(settings, name),
                             **{k: check_value(f"{name}.{k}", find_setting(f"{name}.{k}"), v) for k, v in value.items()})

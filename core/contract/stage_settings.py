@@ -27,7 +27,7 @@ class FramesSettings:
     """The pictures are mirrored, as a front camera may save them: flip them back. A head alone cannot show which way
     round it was"""
     no_glasses: bool = setting(False, per_face=True)
-    """The person wears no glasses, whatever the frames look like: a capture with glasses is refused"""
+    """The person wears no glasses, whatever the frames look like. Off: a capture that shows glasses is refused"""
 
 
 @dataclass(frozen=True)
@@ -109,13 +109,12 @@ class SolveSettings:
     size: int = setting(1024, min=128, max=1024, unit="px")
     """Side of the map that is solved"""
     recipe: str = setting("wildcap", choices=("wildcap", "paper", "released"), titles={"wildcap": "WildCap"})
-    """wildcap is the default; paper and released follow the paper and its authors' code to the letter, with their own
-    600 and 599 steps, and are many times slower"""
+    """wildcap is the default; paper and released do as the paper and its authors' code, but for noise levels and light
+    around the mask (paper), cubemap and soft masks (released); their 600 and 599 steps are many times slower"""
     steps: int = setting(20, min=4, max=600)
     """Sampling steps"""
     guidance: str = setting("dps", choices=("dps", "proximal"), titles={"dps": "DPS"})
-    """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast, with smoother
-    normals and specular"""
+    """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast"""
     grid_cells: int = setting(96, min=1, max=512)
     """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
     skin_tone: str = setting("auto", form="R,G,B or auto", flag="--skin-tone", per_face=True)

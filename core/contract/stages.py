@@ -60,7 +60,7 @@ STAGES = (
                           "delit/", *OPEN_EYES)),
     Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)),
           tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale", shared=("seed", "device"), on_device=True,
-          optional_reads=("texture_detail.exr", PARTS)),
+          optional_reads=("texture_confidence.exr", "texture_detail.exr", PARTS)),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
           optional_reads=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/",
                           "cameras/")),
@@ -68,9 +68,9 @@ STAGES = (
 
 SLIMMED = ("frames/", "delit/")
 """What of a finished face may go, and is made again when a stage needs it (slimming.py). Of the sample's 404 MB these
-are 66, made again in 65 of 621 seconds; cameras and scan are another 9 MB, and take 367 s; cameras are moreover not the
-same bytes twice. All else is maps (309 MB, with the state that a solve of an edited part goes on from), masks,
-landmarks, heads, and what is painted on, delivered or looked at."""
+are 66, made again in 30 of 207 seconds (docs/figures/costs.json); cameras and scan are another 9 MB, and take 44 s;
+cameras are moreover not the same bytes twice. All else is maps (309 MB, with the state that a solve of an edited part
+goes on from), masks, landmarks, heads, and what is painted on, delivered or looked at."""
 
 TOOLS = (
     Stage("mask_edges", "Snap to Edges", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),

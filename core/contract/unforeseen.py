@@ -21,8 +21,8 @@ recent: deque[str] = deque(maxlen=10)
 """The last such errors of this process, as they went to the log."""
 LOG = "unforeseen.log"
 """In a capture's folder of logs, for those that no stage was stopped by."""
-KEPT = ("What was finished is kept. Try again; if it stays, Save Report (in a terminal: core report-problem) makes a "
-        "file about it that you can send us.")
+KEPT = ("What was finished is kept. Try again; if it happens again, Save Report (in a terminal: core report-problem) "
+        "writes a file about it that you can send us.")
 
 
 def explain(error: BaseException, stopped: str, log: Path | None = None) -> Problem:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One head has one albedo: what the frames say of it is averaged in the head's UV space, and each frame's shading is
-moved to agree with the mean.
+moved to agree with the mean. Robustly, for highlights move from frame to frame and albedo does not.
 
 Only coarsely, as registration is a pixel off at times, and the frames' own shadow edges are to stay where they are.
 """
@@ -17,11 +17,11 @@ from ..face.head import Unfolded
 from ..geometry.raster import interpolate, sample, sample_uv, visible_from
 from ..geometry.views import View
 from .lit_head import LitHead
-from .texels import estimate_exposures, robust_mean
 
 UV_TEXELS = 256  # side of the map in which the frames' answers are compared
 COARSE_CELLS = 3.0  # cells of the network's map below which nothing is moved
 MIN_WEIGHT = 0.05  # weight from which a texel is known
+HALF_WEIGHT_LOG = 0.12  # natural log units from the others' mean at which what a view says counts half
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,28 @@ def even_out(head: LitHead, views: list[View], looks: list[ShadingEstimate]) -> 
     albedo, known = albedo.reshape(UV_TEXELS, UV_TEXELS, 3), known.reshape(UV_TEXELS, UV_TEXELS)
     return [_agreeing(head, replace(look, shading=look.shading + off), albedo, known)
             for look, off in zip(looks, level, strict=True)]
+
+
+def estimate_exposures(colours: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """How much higher than the others' each view's log colours [V, N, 3] are as a whole, [V, 3] of mean 0: without it,
+    what one view alone sees would keep that view's exposure. weights [V, N]."""
+    level = np.zeros((len(colours), 3), np.float32)
+    shared = (weights > 0) & ((weights > 0).sum(0) > 1)
+    for _ in range(20):
+        mean = robust_mean(colours - level[:, None], weights)
+        for view in np.flatnonzero(shared.any(1)):
+            level[view] += np.median((colours[view] - level[view] - mean)[shared[view]], 0)
+        level -= level.mean(0)
+    return level
+
+
+def robust_mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Over the first axis of [V, N, 3] with weights [V, N]; views far from the others count less (a Cauchy weight)."""
+    mean = (values * weights[..., None]).sum(0) / np.maximum(weights.sum(0), 1e-6)[:, None]
+    for _ in range(4):
+        trust = weights / (1 + ((values - mean) ** 2).mean(-1) / HALF_WEIGHT_LOG**2)
+        mean = (values * trust[..., None]).sum(0) / np.maximum(trust.sum(0), 1e-6)[:, None]
+    return mean
 
 
 def _opinion(surface: Unfolded, view: View, look: ShadingEstimate) -> tuple[np.ndarray, np.ndarray]:

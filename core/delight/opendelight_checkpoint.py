@@ -61,7 +61,7 @@ def _read(path: Path, shapes: Callable, fault: Callable[[dict], str], device: st
         wrong = [f"{what} is missing or of another kind"]
     if wrong:
         more = f" ({len(wrong) - 1} more such faults)" if wrong[1:] else ""
-        raise Problem(f"{path} is not the network of OpenDelight that belongs here: {wrong[0]}{more}.", CHOOSE)
+        raise Problem(f"{path} is not the OpenDelight network that is expected here: {wrong[0]}{more}.", CHOOSE)
     return {name: tensor.to(device).float().contiguous() for name, tensor in state.items()}
 
 

@@ -79,7 +79,7 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
     seen_colours[hidden] = np.nan
     count = np.isfinite(seen_colours[..., 0]).sum(0)
     if (count > 0).sum() < 100:
-        raise Problem("The selected frames hardly see the registered head.",
+        raise Problem("The registered head is hardly visible in the selected frames.",
                       "Click Open Report, and look at the pictures of Cameras and Head (in a terminal: report.html).")
     colours = np.zeros((len(mesh.vertices), 3))
     colours[count > 0] = np.nanmedian(seen_colours[:, count > 0], 0)

@@ -74,7 +74,7 @@ def parcel(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
     kind that the service does not take."""
     path = capture.frames / name
     if path.suffix.lower() not in MEDIA_TYPES:
-        raise Problem(f"SwitchLight does not take pictures as {name} is.",
+        raise Problem(f"SwitchLight does not accept pictures like {name}.",
                       "Run the stage Frames again, which writes JPEG.")
     data = path.read_bytes()
     if hash_bytes(data) != content:

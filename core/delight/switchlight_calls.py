@@ -203,9 +203,9 @@ def _refusal(account: Account, status: int, body: bytes) -> Problem | None:
         return AccountProblem(f"SwitchLight does not accept the key ({status}{f': {said}' if said else ''}).",
                               f"Compare it with the one on your account's page at {service.WEBSITE}.")
     if status != 200 or said:
-        return Problem(f"SwitchLight did not do what its documents say ({status}{f': {said}' if said else ''}).",
-                       "What came is kept. If it stays, the service may have changed: look for a newer version of this "
-                       "extension.")
+        return Problem(f"SwitchLight's answer is not as documented ({status}{f': {said}' if said else ''}).",
+                       "What came is kept. If this happens again, the service may have changed: look for a newer "
+                       "version of this extension.")
     return None
 
 

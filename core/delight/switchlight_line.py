@@ -160,7 +160,7 @@ class _Line:
         """All threads leave the service alone for a while: what it asks for, and never less than our own wait."""
         wait = min(self._patience.most_s, self._patience.first_s * 2 ** attempt) * random.uniform(0.5, 1.0)
         if error.after_s is not None and error.after_s > self._patience.longest_s:
-            raise Problem(f"SwitchLight asks to wait for {error.after_s / 60:.0f} minutes.",
+            raise Problem(f"SwitchLight asks you to wait {error.after_s / 60:.0f} minutes.",
                           "Run again then: the answers that came are kept.")
         with self._lock:
             self._not_before = max(self._not_before, time.monotonic() + max(wait, error.after_s or 0.0))

@@ -55,30 +55,23 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     return layers, middle
 
 
-class Trunk(Ladder):
-    """A U-Net whose coarsest level attends to all of itself."""
+class DelightNet(Ladder):
+    """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2].
+    S is a multiple of MULTIPLE_PX. The coarsest level attends to all of itself."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__()
         self.add_levels(widths, depths)
         self.attention = Attention(widths[-1])
-
-    def look_at_all(self, x: torch.Tensor) -> torch.Tensor:
-        return self.attention(x)
-
-
-class DelightNet(Trunk):
-    """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2].
-    S is a multiple of MULTIPLE_PX."""
-
-    def __init__(self, widths: list[int], depths: list[int]):
-        super().__init__(widths, depths)
         self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2,
                                           padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
         self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)  # the finest level, where pictures are large, is kept thin
         self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1), nn.Conv2d(2 * FINE, 4, 3, padding=1)
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
+
+    def look_at_all(self, x: torch.Tensor) -> torch.Tensor:
+        return self.attention(x)
 
     def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         fine = functional.gelu(self.stem(x))

@@ -99,8 +99,8 @@ def detect(srgb: np.ndarray, last: Face | None = None) -> Face | None:
         if face is not None and face.score > 0.6:
             return face
     for margin in (0.0, 0.5):  # a face that fills the picture is found once it is made smaller
-        regions = _detect_regions(image, margin)
-        face = _landmarks(image, regions[0]) if regions else None
+        # the most prominent may be none: a print on a shirt
+        face = next(filter(None, (_landmarks(image, region) for region in _detect_regions(image, margin))), None)
         if face is not None:
             return _landmarks(image, _region_of_landmarks(face.landmarks)) or face
     return None

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import torch
@@ -21,14 +20,12 @@ def has_files(weights: Path) -> bool:
     return weights.is_file() and weights.with_suffix(".json").is_file()
 
 
-def read_network(kind: type[nn.Module], weights: Path, unpack: Callable[[dict], dict] | None = None,
-                 **options) -> nn.Module:
+def read_network(kind: type[nn.Module], weights: Path, **options) -> nn.Module:
     """A network of that class with its weights, ready to be asked; the card beside them says how large it is. Raises
     Problem where a shipped file is damaged."""
     shipped_files.require_whole(weights)
     network = kind(**json.loads(weights.with_suffix(".json").read_text(encoding="utf-8"))["model"], **options)
-    tensors = load_file(weights)
-    network.load_state_dict(unpack(tensors) if unpack else {name: value.float() for name, value in tensors.items()})
+    network.load_state_dict({name: value.float() for name, value in load_file(weights).items()})
     return network.eval()
 
 

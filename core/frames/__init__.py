@@ -23,7 +23,7 @@ from ..contract.settings import Settings
 from ..face import faces
 from ..face.glasses import sureness
 from ..imaging import images
-from .doctor import FEW_FRAMES, blurred, diagnose, examine
+from .doctor import FEW_FRAMES, FIND_FACE, blurred, diagnose, examine
 from .drift import content_of, gains_of
 from .eyes import blinks
 from .glasses import judge
@@ -109,18 +109,29 @@ def _subject(srgb: np.ndarray, last: faces.Face | None) -> tuple[faces.Face | No
 
 
 def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Face | None, rival: float) -> FrameRecord:
-    """`last` tells where the head is, more or less, where no face is found."""
+    """`last` tells where the head is in a frame of a film, more or less, where no face is found."""
+    near = _box_of_head(picture, face, last)
     return FrameRecord(
         name=name, video_frame=picture.index, time_s=None if picture.time_s is None else round(picture.time_s, 4),
         source=picture.source,
         size=(picture.srgb.shape[1], picture.srgb.shape[0]),
-        sharpness=round(sharpness(picture.srgb, face.box if face else None), 5), selected=False,
+        sharpness=round(sharpness(picture.srgb, near), 5), selected=False,
         face_box=tuple(round(x, 1) for x in face.box) if face else None,
         face_score=round(face.score, 4) if face else 0.0,
         yaw_deg=round(face.yaw_deg, 1) if face else None, focal_px=picture.focal_px,
-        **examine(picture.srgb, last.box if last else None),
+        **examine(picture.srgb, near),
         eyes_open=tuple(round(x, 3) for x in faces.eye_openness(picture.srgb, face)) if face else None,
         other_face=round(rival, 3))
+
+
+def _box_of_head(picture: Picture, face: faces.Face | None, last: faces.Face | None) -> tuple | None:
+    """Left, top, right and bottom of where a picture is measured: the face's box; in a film the last one's, in a
+    photograph the person's, where no face is found. None where there is none of these."""
+    near = face or (last if picture.time_s is not None else None)
+    if near or picture.time_s is not None:
+        return near.box if near else None
+    y, x = np.nonzero(faces.segment_person(picture.srgb) > 0.5)
+    return (x.min(), y.min(), x.max() + 1, y.max() + 1) if len(x) else None
 
 
 def _drop_blurred(records: list[FrameRecord], contents: list,
@@ -164,17 +175,13 @@ def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
 
 
 def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photographs: bool) -> None:
-    if not records:
-        raise Problem(f"None of the photographs in {path.name} could be read.", "Save them again as JPEG, PNG or TIFF.")
     if len(records) < FEWEST_FRAMES and not photographs:
         raise Problem(f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be "
                       "built from.",
-                      "Film the face for 5 to 30 seconds while you walk half around it; a damaged file may be whole "
-                      "once copied again.")
+                      "Film the face for 5 to 30 seconds while you walk half around it; if the file may be damaged, "
+                      "copy it again.")
     if not any(r.face_box for r in records):
-        raise Problem("No face was found in any frame.",
-                      "Film one face, upright, filling a third of the picture or more, and lit well enough to see the "
-                      "eyes.")
+        raise Problem("No face was found in any frame.", FIND_FACE)
     if len(records) > 1 and np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL_DIFFERENCE:
         raise Problem("All frames show the same picture: the camera did not move.",
                       "Let the person sit still and move the camera from one ear around the face to the other.")

@@ -18,6 +18,8 @@ SDR, HLG, PQ = 1, 18, 16
 """Transfer characteristics as ITU-T H.273 numbers them; all that is neither HLG nor PQ is shown as it is."""
 REC709, REC2020, P3 = 1, 9, 12
 """Colour primaries, likewise; P3 is Display P3."""
+COMPACT_SRGB = ("c2", "c2ci")
+"""What small profiles of sRGB call themselves, as social networks write them."""
 WHITE_NITS, PEAK_NITS = 203.0, 1000.0
 KNEE_LINEAR = 0.8
 """Linear light below which the tone curve changes nothing: all of a face but its highlights."""
@@ -29,6 +31,23 @@ TO_REC709 = {
     P3: np.array([[1.224940, -0.224940, 0.0], [-0.042057, 1.042057, 0.0], [-0.019638, -0.078636, 1.098274]],
                  np.float32),
 }
+
+ADOBE_GAMMA = 563 / 256
+ADOBE_TO_REC709 = np.array([[1.398356, -0.398356, 0.0], [0.0, 1.0, 0.0], [0.0, -0.042929, 1.042929]], np.float32)
+"""Adobe RGB (1998), Adobe Systems, 2005: its exponent, and its primaries, whose white is sRGB's."""
+
+
+def from_profile(signal: np.ndarray, profile: str) -> np.ndarray | None:
+    """A picture's values [..., 3] in [0, 1] as sRGB, by the name of its colour profile ('' is sRGB); None for a profile
+    that is not known."""
+    name = profile.lower().replace(" ", "")
+    if not name or "srgb" in name or name in COMPACT_SRGB:
+        return signal
+    if "displayp3" in name:  # an iPhone's JPEG
+        return to_srgb(signal, SDR, P3)
+    if "adobergb" in name:
+        return images.linear_to_srgb(into_gamut(np.clip(signal, 0, 1) ** ADOBE_GAMMA @ ADOBE_TO_REC709.T))
+    return None
 
 
 def to_srgb(signal: np.ndarray, transfer: int, primaries: int) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 from skimage.measure import blur_effect
 
 from ..contract.frame_records import FrameRecord
-from ..contract.messages import Problem, Reporter
+from ..contract.messages import Problem, Reporter, name_some
 from .select import inside_box, turns
 
 UNMEASURED = {"blur": 1.0, "brightness": 0.0, "clipped": 0.0, "noise": 0.0}
@@ -35,6 +35,10 @@ DRIFT_RATIO = 1.12
 EQUAL_RATIO, OFTEN_SHARE = 0.75, 0.5
 """Prominence of a second face over the first above which nobody can say whom the video shows; and the share of frames
 in which it is so."""
+
+FEW_SIDES = ("Take one from the front, one about 40 degrees to each side, both profiles, and some from below and "
+             "above, while the person sits still.")
+FIND_FACE = "Film one face, upright, filling a third of the picture or more, and lit well enough to see the eyes."
 
 
 def examine(srgb: np.ndarray, box: tuple | None) -> dict:
@@ -66,13 +70,17 @@ def blurred(records: list[FrameRecord], around: int = 10) -> np.ndarray:
 
 def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, report: Reporter) -> None:
     """Reports a finding for each shortcoming of the kept frames; `dropped` names those left out as blurred. Raises
-    Problem where it is not clear whose face is meant."""
+    Problem where they show no face, or it is not clear whose face is meant."""
     with_face = [r for r in records if r.face_box]
+    if not with_face:
+        raise Problem("A face was found only in frames that are blurred and were left out.", FIND_FACE)
     count, shots = len(records), "photographs" if photographs else "frames"
-    _other_faces(with_face, report)
+    _other_faces(with_face, shots, report)
     if count < FEW_FRAMES:
         there = f"There are only {count} {shots}" if count > 1 else f"There is only one {shots[:-1]}"
-        report.finding(f"{there}: expect a rough head with holes at the sides and a texture from few directions.",
+        expect = ("a head that follows features and outlines, with less detail than a film's" if photographs
+                  else "a rough head with holes at the sides")
+        report.finding(f"{there}: expect {expect}, and a texture from few directions.",
                        "Take 60 or more around the face for a full one.")
     lost = [r.name for r in records if not r.face_box]
     if len(lost) > 0.4 * count:
@@ -84,23 +92,27 @@ def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, 
     _sharpness(with_face, dropped, count, shots, report)
 
 
-def _other_faces(records: list[FrameRecord], report: Reporter) -> None:
+def _other_faces(records: list[FrameRecord], shots: str, report: Reporter) -> None:
     second = [r for r in records if r.other_face > 0]
     if sum(r.other_face > EQUAL_RATIO for r in records) > OFTEN_SHARE * len(records):
         raise Problem("There are two faces in the picture, and it is not clear which one is meant.",
-                      "Film one person alone, or crop the video so that one face fills the middle of the picture.")
+                      f"Film one person alone, or crop the {'video' if shots == 'frames' else shots} so that one face "
+                      "fills the middle of the picture.")
     if len(second) > max(1, 0.05 * len(records)):
         report.finding(
-            f"A second face is in {len(second)} of {len(records)} frames; the larger one near the middle was followed.",
+            f"A second face is in {len(second)} of {len(records)} {shots}; the larger one near the middle was "
+            "followed.",
             "Film one person alone, and away from pictures of faces.",
             _names(second),
         )
 
 
 def _angles(records: list[FrameRecord], photographs: bool, report: Reporter) -> None:
-    turn = turns(records)
+    # the neighbours of a photograph in the alphabet say nothing about it
+    turn = (np.array([r.yaw_deg for r in records if r.yaw_deg is not None]) if photographs else turns(records))
     turn = np.sort(turn[np.isfinite(turn)])
-    again = "Start at one ear and walk around the face to the other, at arm's length, while the person sits still."
+    again = (FEW_SIDES if photographs and len(records) < FEW_FRAMES else
+             "Start at one ear and walk around the face to the other, at arm's length, while the person sits still.")
     left, right = -turn[0], turn[-1]
     if max(left, right) < REACH_DEG:
         report.finding("The face is seen from in front only: "
@@ -111,7 +123,7 @@ def _angles(records: list[FrameRecord], photographs: bool, report: Reporter) -> 
         report.finding(f"The {side} side of the face is hardly seen: the camera came only {reach:.0f} degrees around "
                        "to it." if reach > 0
                        else f"The {side} side of the face is not seen at all.", again)
-    gaps = np.diff(turn)
+    gaps = np.diff(turn) if not photographs or len(records) >= FEW_FRAMES else []
     if len(gaps) and turn[0] < 0 < turn[-1] and gaps.max() > GAP_DEG:
         at = int(gaps.argmax())
         report.finding(f"Between {turn[at]:.0f} and {turn[at + 1]:.0f} degrees of turn the face was not seen.",
@@ -166,6 +178,11 @@ def _sharpness(records: list[FrameRecord], dropped: list[str], count: int, shots
     elif len(dropped) > 0.1 * (count + len(dropped)):
         report.finding(f"{len(dropped)} of {count + len(dropped)} {shots} are blurred and were left out.",
                        "Move more slowly, and film in more light.", dropped)
+    soft = [r for r in records if r.blur > BLURRED_CRETE]
+    if soft and shots == "photographs" and len(soft) < len(records) / 2:
+        report.finding(f"{len(soft)} of {count} photographs {'is' if len(soft) == 1 else 'are'} blurred: "
+                       f"{name_some([r.shown for r in soft])}.",
+                       "Take them again with the focus on the face.", _names(soft))
 
 
 def _names(records: list[FrameRecord]) -> list[str]:

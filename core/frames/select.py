@@ -16,15 +16,15 @@ detectors fail."""
 
 
 def inside_box(srgb: np.ndarray, box: tuple | None) -> np.ndarray:
-    """The part of a picture in a face's box; its middle where there is none."""
+    """The part of a picture in a box; its middle where there is none."""
     height, width = srgb.shape[:2]
     x0, y0, x1, y1 = box or (width / 4, height / 4, 3 * width / 4, 3 * height / 4)
     return srgb[max(0, int(y0)):max(1, int(y1)), max(0, int(x0)):max(1, int(x1))]
 
 
 def sharpness(srgb: np.ndarray, box: tuple | None) -> float:
-    """Tenengrad of the face (of the middle of the picture where there is none), relative to its brightness; higher is
-    sharper.
+    """Tenengrad of what lies in a box (of the middle of the picture where there is none), relative to its brightness;
+    higher is sharper.
 
     Mean squared Sobel gradient of luma over squared mean luma: exposure cancels, motion blur and defocus do not.
     """
@@ -39,12 +39,10 @@ def sharpness(srgb: np.ndarray, box: tuple | None) -> float:
 
 def turns(records: list[FrameRecord]) -> np.ndarray:
     """From where each frame sees the head [N]: its yaw in degrees, carried on along the sequence where no face is
-    found; nan too far from any face."""
+    found; nan too far from any face. One at least shows a face."""
     order = np.arange(len(records))
     known = np.array([r.yaw_deg is not None for r in records])
     yaw = np.array([r.yaw_deg or 0.0 for r in records])
-    if not known.any():
-        return order.astype(float)
     turn = np.interp(order, order[known], yaw[known])
     for end, inner in ((order[known][0], slice(None, 5)), (order[known][-1], slice(-5, None))):
         beyond = order < end if end == order[known][0] else order > end

@@ -16,12 +16,24 @@ from pathlib import Path
 
 import av
 import numpy as np
+from av.video.reformatter import Interpolation
 
 from ..contract.messages import Problem, Reporter
-from .colour import HLG, PQ, REC709, to_srgb
+from .colour import HLG, PQ, REC709, REC2020, to_srgb
 from .source import Picture, evenly_in_time, fitted
 
 UNSPECIFIED, FULL_RANGE = 2, 2
+REC709_MATRIX, REC601_MATRIX, REC2020_MATRIX = 1, 5, 9
+"""Matrices from R'G'B' to Y'CbCr as ITU-T H.273 numbers them."""
+EXACT_16 = Interpolation.AREA | Interpolation.ACCURATE_RND
+EXACT = EXACT_16 | Interpolation.FULL_CHR_H_INT
+"""How swscale shrinks and converts: without these it truncates, and a frame comes up to 3 codes of 255 too dark, a
+tenth of the light of dark skin. To 16 bits FULL_CHR_H_INT is left out: where the size stays, swscale 9.5 takes a wrong
+chroma with it."""
+WHITE_16 = 255 << 8
+"""What swscale makes of the narrow range's white in 16 bits."""
+STARTS = 3
+"""Key frames that are tried to come before a wanted frame."""
 LARGE_PX = 2560 * 1440
 """Pixels above which the decoder works on few frames at a time: each of its threads keeps one, of 100 MB in 8K."""
 
@@ -46,8 +58,8 @@ def read_video(path: Path, most: int, long_side: int, report: Reporter) -> Itera
                 report.log("The video is HDR; its highlights are compressed into sRGB.")
             turns, mirrored = orientation(frame)
             if not given and mirrored:
-                report.finding("The video is marked to be shown as in a mirror, as selfie cameras do; it was turned "
-                               "back, so that left is left.",
+                report.finding("The video is marked to be shown as in a mirror, as selfie cameras do; it was "
+                               "flipped back, so that left is left again.",
                                "If moles end up on the wrong side, switch off the mirroring of the front camera, or "
                                "film with the back camera.")
             size = fitted(frame.width * (stream.sample_aspect_ratio or 1), frame.height, long_side)
@@ -130,13 +142,9 @@ def _index(path: Path, report: Reporter) -> _Index:
 def _frames(container, stream, index: _Index, frame_numbers: np.ndarray,
             report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
     """The frames of these numbers, or where one is lost the next that can be decoded, with their numbers."""
-    for first, numbers in _stretches(index, frame_numbers):
-        if first is not None:
-            container.seek(int(first), stream=stream)
+    for starts, numbers in _stretches(index, frame_numbers):
         targets = list(numbers)
-        for count, frame in enumerate(_decode(container, stream, report)):
-            number = (int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None
-                      else count)
+        for number, frame in _from(container, stream, index, starts, targets[0], report):
             if number < targets[0]:
                 report.check()
                 continue
@@ -147,16 +155,39 @@ def _frames(container, stream, index: _Index, frame_numbers: np.ndarray,
                 break
 
 
-def _stretches(index: _Index, frame_numbers: np.ndarray) -> list[tuple[int | None, list[int]]]:
-    """Wanted numbers in stretches that are decoded in one go, each with the time stamp to jump to (None: read on from
-    the start)."""
+def _from(container, stream, index: _Index, starts: list[int], first: int,
+          report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
+    """All frames with their numbers from one of `starts` on, the first of them from which frame `first` is not missed:
+    in a transport stream a jump lands behind where it was to. From where the container is, if there are no starts."""
+    for left, start in zip(range(len(starts))[::-1], starts, strict=True):
+        container.seek(start, stream=stream)
+        frames = _numbered(container, stream, index, report)
+        landed = next(frames, None)
+        if landed is not None and (landed[0] <= first or not left):
+            yield landed
+            yield from frames
+            return
+    if not starts:
+        yield from _numbered(container, stream, index, report)
+
+
+def _numbered(container, stream, index: _Index, report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
+    for count, frame in enumerate(_decode(container, stream, report)):
+        yield (int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None
+               else count), frame
+
+
+def _stretches(index: _Index, frame_numbers: np.ndarray) -> list[tuple[list[int], list[int]]]:
+    """Wanted numbers in stretches that are decoded in one go, each with the time stamps to jump to, the nearest first
+    (none: read on from the start)."""
     begin = np.searchsorted(index.keys, index.times[frame_numbers], side="right") - 1  # the key frame each needs
-    stretches: list[tuple[int | None, list[int]]] = []
+    stretches: list[tuple[list[int], list[int]]] = []
     for i, number in enumerate(frame_numbers.tolist()):
         if i and begin[i] <= begin[i - 1] + 1:
             stretches[-1][1].append(number)
         else:
-            stretches.append((index.keys[begin[i]] if begin[i] > 0 else None, [number]))
+            starts = index.keys[max(begin[i] - STARTS + 1, 0):begin[i] + 1][::-1] if begin[i] > 0 else []
+            stretches.append(([int(start) for start in starts], [number]))
     return stretches
 
 
@@ -176,13 +207,25 @@ def _decode(container, stream, report: Reporter) -> Iterator[av.VideoFrame]:
 
 def _srgb(frame: av.VideoFrame, size: tuple[int, int], transfer: int, primaries: int) -> np.ndarray:
     """A decoded frame as sRGB float32 [H, W, 3] of that width and height, not yet turned."""
-    how = {"width": size[0], "height": size[1], "interpolation": "AREA"} if size != (frame.width, frame.height) else {}
+    plain = transfer not in (HLG, PQ) and primaries in (REC709, UNSPECIFIED)
+    full = frame.color_range == FULL_RANGE
     # Unless told, swscale takes Rec. 601 for every matrix, and a phone's Rec. 709 skin turns greenish; and full-range
     # values for the narrow range
-    if frame.colorspace != UNSPECIFIED:
-        how |= {"src_colorspace": frame.colorspace, "dst_colorspace": "DEFAULT"}
-    if frame.color_range == FULL_RANGE:
+    how = {"width": size[0], "height": size[1], "interpolation": EXACT if plain else EXACT_16,
+           "src_colorspace": _matrix(frame, transfer, primaries), "dst_colorspace": "DEFAULT"}
+    if full:
         how |= {"src_color_range": FULL_RANGE, "dst_color_range": FULL_RANGE}
-    if transfer not in (HLG, PQ) and primaries in (REC709, UNSPECIFIED):
+    if plain:
         return frame.reformat(format="rgb24", **how).to_ndarray().astype(np.float32) / 255
-    return to_srgb(frame.reformat(format="rgb48le", **how).to_ndarray().astype(np.float32) / 65535, transfer, primaries)
+    white = 65535 if full or frame.format.is_rgb else WHITE_16
+    signal = frame.reformat(format="rgb48le", **how).to_ndarray().astype(np.float32) / white
+    return to_srgb(np.minimum(signal, 1), transfer, primaries)
+
+
+def _matrix(frame: av.VideoFrame, transfer: int, primaries: int) -> int:
+    """H.273's number of the frame's matrix; where no tag tells it, what players take: by the size, of HDR Rec. 2020."""
+    if frame.colorspace != UNSPECIFIED:
+        return frame.colorspace
+    if transfer in (HLG, PQ) or primaries == REC2020:
+        return REC2020_MATRIX
+    return REC709_MATRIX if frame.width >= 1280 or frame.height > 576 else REC601_MATRIX

@@ -35,7 +35,8 @@ def open_picture(path: Path) -> oiio.ImageInput:
     spec = image.spec()
     if min(spec.width, spec.height, spec.nchannels) < 1 or spec.depth > 1 or spec.deep:
         image.close()
-        raise Problem(f"{path} is no flat picture: it has {spec.width} x {spec.height} x {spec.depth} pixels.",
+        raise Problem(f"{path} is not a two-dimensional picture: it has {spec.width} x {spec.height} x "
+                      f"{spec.depth} pixels.",
                       advise_remaking(path, SAVE_ANEW))
     # what is grey becomes R, G, B with those who want colours
     if 4 * spec.width * spec.height * max(spec.nchannels, 3) > MOST_PICTURE_BYTES:

@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""HEIC, HEIF and AVIF, as telephones write them, by libheif (package pillow-heif), which OpenImageIO's wheel lacks.
-libheif turns pictures upright itself, so their EXIF orientation is told already.
+"""HEIC and HEIF, as telephones write them, by libheif (package pillow-heif), which OpenImageIO's wheel lacks. libheif
+turns pictures upright itself, so their EXIF orientation is told already.
 
 The package brings Pillow along; nothing here uses it.
 """
 
 from __future__ import annotations
 
+import math
 import struct
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from ..contract.messages import Problem
 
-SUFFIXES = (".heic", ".heif", ".avif")
+SUFFIXES = (".heic", ".heif")
 EXPORT = "Export it as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible)."
 EXIF_FOLDER, FOCAL_LENGTH, FOCAL_35MM, PLANE_RESOLUTION, PLANE_UNIT, WIDTH, HEIGHT = (
     0x8769,
@@ -27,6 +28,12 @@ EXIF_FOLDER, FOCAL_LENGTH, FOCAL_35MM, PLANE_RESOLUTION, PLANE_UNIT, WIDTH, HEIG
     0xA003,
 )
 """EXIF 2.3's numbers of its tags."""
+DIAGONAL_35MM = 43.267
+"""Diagonal in millimetres of a frame of 35 mm film, 36 x 24 mm: a picture of another shape is compared by its own
+(CIPA DCG-001)."""
+
+PROFILES = ("Display P3", "Adobe RGB", "ProPhoto RGB")
+"""Colour profiles that are looked for by name."""
 
 
 def is_heif(path: Path) -> bool:
@@ -55,13 +62,14 @@ def size(path: Path) -> tuple[int, int]:
 
 
 def read_profile(path: Path) -> str:
-    """ "Display P3" where the picture's colours are in it, else ""."""
+    """Name of the picture's colours where they are none of sRGB: one of PROFILES, or PQ or HLG; else ""."""
     info = _opened(path).info
     icc, nclx = info.get("icc_profile") or b"", info.get("nclx_profile") or {}
-    wide = (
-        b"Display P3" in icc or "Display P3".encode("utf-16-be") in icc or not icc and nclx.get("color_primaries") == 12
-    )
-    return "Display P3" if wide else ""
+    named = [name for name in PROFILES if name.encode() in icc or name.encode("utf-16-be") in icc]
+    if named or icc:
+        return named[0] if named else ""
+    hdr = {16: "PQ", 18: "HLG"}.get(nclx.get("transfer_characteristics"), "")
+    return hdr or ("Display P3" if nclx.get("color_primaries") == 12 else "")
 
 
 def read_exif(path: Path) -> dict[int, float]:
@@ -94,15 +102,16 @@ def parse_exif(block: bytes) -> dict[int, float]:
 
 
 def focal_35mm(tags: dict[int, float], width: int, height: int) -> float | None:
-    """Millimetres of 35 mm film: as told, or from the lens and the sensor's resolution; None where neither is. width,
-    height: the picture's."""
+    """Millimetres of 35 mm film, by the diagonal: as told, or from the lens and the sensor's resolution; None where
+    neither is. width, height: the picture's."""
     if tags.get(FOCAL_35MM, 0) > 0:
         return tags[FOCAL_35MM]
     unit = {2: 25.4, 3: 10.0, 4: 1.0}.get(int(tags.get(PLANE_UNIT, 2)))
     if not unit or min(tags.get(FOCAL_LENGTH, 0), tags.get(PLANE_RESOLUTION, 0)) <= 0:
         return None
     sensor_mm = max(tags.get(WIDTH, width), tags.get(HEIGHT, height)) / tags[PLANE_RESOLUTION] * unit
-    return 36 * tags[FOCAL_LENGTH] / sensor_mm if 1 < sensor_mm < 100 else None
+    diagonal_mm = sensor_mm * math.hypot(width, height) / max(width, height)
+    return DIAGONAL_35MM * tags[FOCAL_LENGTH] / diagonal_mm if 1 < sensor_mm < 100 else None
 
 
 def _opened(path: Path):

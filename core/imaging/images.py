@@ -121,8 +121,8 @@ def bits(path: Path) -> int:
 
 
 def read_focal_35mm(path: Path) -> float | None:
-    """The focal length in millimetres of 35 mm film that a photograph's EXIF tells, of itself or by the lens and the
-    sensor's resolution, or None."""
+    """The focal length in millimetres of 35 mm film, by the diagonal, that a photograph's EXIF tells, of itself or
+    by the lens and the sensor's resolution, or None."""
     if heif.is_heif(path):
         return heif.focal_35mm(heif.read_exif(path), *heif.size(path))
     image = oiio.ImageInput.open(str(path))

@@ -12,6 +12,7 @@ map.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -40,7 +41,8 @@ class Edge:
     colour: np.ndarray
 
 
-def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float) -> Edge:
+def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float,
+          check: Callable[[], None] = lambda: None) -> Edge:
     """The edge of the shadow under a rough mask. Deeper than INWARD_TEXELS inside the mask alpha is never lowered.
 
     Parameters
@@ -49,13 +51,15 @@ def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: flo
     painted : [S, S] in [0, 1], the mask, as soft as it shall stay where no edge is found
     weight : [S, S] in [0, 1], how far a texel tells of light (0: unseen, or a brow)
     texel : side of a texel in texels of a 1024 map
+    check : may raise to cancel
     """
     nothing = Edge(painted, np.zeros_like(painted), np.zeros(3))
     inside = painted > 0.5
     if not inside.any() or inside.all():
         return nothing
     box = _box(inside, (OUTWARD_TEXELS + 3 * WINDOW_TEXELS) / texel)
-    edge = _place(np.clip(light[box], 0, 4).astype(np.float32), painted[box], weight[box].astype(np.float32), texel)
+    edge = _place(np.clip(light[box], 0, 4).astype(np.float32), painted[box], weight[box].astype(np.float32), texel,
+                  check)
     if edge is None:
         return nothing
     alpha, sure, colour = edge
@@ -64,15 +68,15 @@ def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: flo
     return whole
 
 
-def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray,
-           texel: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float,
+           check: Callable[[], None]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     depth = signed_distance(painted > 0.5) * texel  # negative inside
     dark = _segmented(light.mean(-1), painted > 0.5, depth, weight, texel)
     if not dark.any() or dark.all():
         return None
     distance = cv2.GaussianBlur(signed_distance(dark), (0, 0), max(1.5 / texel, 0.5)) * texel
     near = weight * (np.abs(distance) < 2.5 * BAND_TEXELS)
-    shift, width, step = _profile(light, distance, near, texel)
+    shift, width, step = _profile(light, distance, near, texel, check)
     sure, colour = _sureness(step, near * (np.abs(distance) < BAND_TEXELS))
     if sure is None:
         return None
@@ -113,8 +117,8 @@ def _segmented(light: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight:
     return dark > 0.5
 
 
-def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray,
-             texel: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray, texel: float,
+             check: Callable[[], None]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Place [h, w] and width [h, w] of the penumbra along the edge, in the window about each texel, and the step's
     height [h, w, 3] there.
 
@@ -129,6 +133,7 @@ def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray,
     best, shift, width = np.full(value.shape, np.inf, np.float32), np.zeros_like(value), np.zeros_like(value)
     for w in WIDTHS_TEXELS:
         for p in SHIFTS_TEXELS:
+            check()
             shape = penumbra(distance - p, np.float32(max(w, 0.7 * texel))).astype(np.float32)
             m = _blur(weight * shape, sigma) / total
             spread = np.maximum(_blur(weight * shape**2, sigma) / total - m**2, 1e-5)

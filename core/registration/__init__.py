@@ -108,7 +108,8 @@ def _subject(face_marks: landmarks.Landmarks, report: Reporter) -> Subject:
 
 def _by_views(capture: Capture, settings: Settings, views: list[View], subject: Subject, report: Reporter) -> None:
     model, face_marks = subject.model, subject.landmarks
-    fitted = unscanned.fit(model, _shown(capture, views, subject, report), report, 10, 0.9 * STEPS)
+    chosen = landmarks.spread(views, landmarks.MOST_VIEWS)
+    fitted = unscanned.fit(model, _shown(capture, chosen, subject, report), report, 10, 0.9 * STEPS)
     placed = _as_bust(model.mesh, fitted.pose.apply(model.mesh.vertices))
     aligned = _as_bust(model.mesh, fitted.pose.apply(model.shape(fitted.coefficients)))
     head = model.mesh.moved(_finished(placed, aligned, fitted.vertices, report))

@@ -15,6 +15,9 @@ from ..geometry.views import View
 from ..imaging import images
 from .landmarks import Landmarks
 
+CORNERS = (LEFT_EYE[::-1], RIGHT_EYE)
+"""Landmarks at the outer and the inner corner of the left (0) and the right (1) eye."""
+
 
 @dataclass(frozen=True)
 class EyeLook:
@@ -34,20 +37,28 @@ def usable(sights: list[tuple[float, Eye]], side: int) -> list[int]:
 
 
 def look(views: list[View], landmarks: Landmarks, report: Reporter) -> tuple[list[EyeLook], list[EyeLook]]:
-    """The left and the right eye as the reader sees them in the views that show them well."""
-    seen = [view for view in views if view.name in landmarks.eyes]
-    use = [usable([(landmarks.eyes[view.name][0], landmarks.eyes[view.name][2 - side]) for view in seen], side)
-           for side in (0, 1)]  # the right eye stands first there
+    """The left and the right eye as the reader sees them in the views that show them well, and in which the eye's
+    landmarks were not thrown out."""
+    use = [_names_of(views, landmarks, side) for side in (0, 1)]
     looks: tuple[list[EyeLook], list[EyeLook]] = [], []
-    for number, view in enumerate(seen):
-        if number not in use[0] + use[1]:
+    for view in views:
+        if view.name not in use[0] | use[1]:
             continue
         report.check()
         srgb = images.read_srgb(view.path)
         shrink = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
         pixels = landmarks.images[view.name][0]
-        for side, corners in enumerate((LEFT_EYE[::-1], RIGHT_EYE)):
-            if number in use[side]:
+        for side, corners in enumerate(CORNERS):
+            if view.name in use[side]:
                 eye = read_eye(srgb, pixels[list(corners)] * shrink, side == 0)
                 looks[side].append(EyeLook(view, EyeShares(eye.ball, eye.iris, eye.move * [*shrink, 1.0])))
     return looks
+
+
+def _names_of(views: list[View], found: Landmarks, side: int) -> set[str]:
+    """The views whose look at one eye is usable."""
+    names = [view.name for view in views if view.name in found.eyes
+             and found.images[view.name][1][list(CORNERS[side])].any()]
+    # the right eye stands first there
+    chosen = usable([(found.eyes[name][0], found.eyes[name][2 - side]) for name in names], side)
+    return {names[i] for i in chosen}

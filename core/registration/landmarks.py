@@ -18,7 +18,7 @@ from ..imaging import images
 from . import eyes
 
 MOST_VIEWS = 32
-"""In which the face is looked for, spread over all."""
+"""In which the face is looked for, spread over all; and, where there is no scan, its outlines."""
 FEW_VIEWS = 6
 """Of so few views two with a face will do: the others may be profiles."""
 BEHIND_FACE_M = 0.06
@@ -29,8 +29,8 @@ BEHIND_FACE_M = 0.06
 class Landmarks:
     """points [468, 3] in metres (nan: not lifted), trust [468] in [0, 1], error_px the median reprojection error;
     images maps a frame's name to what was found in it: pixels [468, 2], and used bool [468]; opening of the eyes,
-    height over width; by_artist bool [468]: which points the artist has given; eyes: by a frame's name the yaw of the
-    head in degrees and the right and the left eye, in its pixels."""
+    height over width; by_artist bool [468]: which points the artist has given; eyes: by the name of a frame whose
+    landmarks were used the yaw of the head in degrees and the right and the left eye, in its pixels."""
 
     points: np.ndarray
     trust: np.ndarray
@@ -62,9 +62,11 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
     lifted = triangulate([view for view, _ in detections], np.stack([pixels for _, pixels in detections]))
     if not np.isfinite(lifted.points).any():  # a single view, or several from one side
         lifted = lift_alone(*min(detections, key=lambda pair: abs(seen[pair[0].name][0])))
+    # another person's eyes say nothing, nor does what the net guesses of a profile
+    kept = {name: seen[name] for name, (_, used) in lifted.images.items() if used.any()}
     return replace(lifted,
-                   opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in seen.values()]),
-                   eyes=seen)
+                   opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in kept.values()]),
+                   eyes=kept)
 
 
 def spread(views: list[View], count: int) -> list[View]:
@@ -115,10 +117,13 @@ def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Land
 def lift_alone(view: View, pixels: np.ndarray) -> Landmarks:
     """Lifts the pixels [468, 2] of a single view to where their rays pass nearest to the mean head's landmarks: across
     the view they are the person's, along it the mean's. The mean head stands as the world has it, its pupils about the
-    origin."""
-    mean = template.landmark_points(template.load())
-    rays = view.rays(pixels)
-    points = view.centre + rays * ((mean - view.centre) * rays).sum(1, keepdims=True)
+    origin, and is made as large as the person's looks."""
+    mean, rays = template.landmark_points(template.load()), view.rays(pixels)
+    across, size = np.eye(3) - np.outer(view.axis, view.axis), 1.0
+    for _ in range(3):  # what lies nearer or farther looks larger or smaller
+        points = view.centre + rays * ((size * mean - view.centre) * rays).sum(1, keepdims=True)
+        size = float(np.linalg.norm((points - points.mean(0)) @ across)
+                     / np.linalg.norm((mean - mean.mean(0)) @ across))
     used = _facing(points, np.repeat(view.centre[None, None], len(points), 0))[:, 0] > 0
     return Landmarks(points, np.where(used, 0.25, 0.0), 0.0, {view.name: (pixels, used)})
 

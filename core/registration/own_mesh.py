@@ -165,8 +165,8 @@ def _check(mesh: Mesh, path: Path) -> None:
         raise Problem(f"{path.name} is flat.", "Export it again as OBJ.")
     if not LEAST_VERTICES <= count <= MOST_VERTICES:
         raise Problem(f"{path.name} has {count} vertices.",
-                      f"Choose a head of {LEAST_VERTICES} to {MOST_VERTICES} vertices: no primitive, and no sculpt at "
-                      "its finest.")
+                      f"Choose a head with {LEAST_VERTICES} to {MOST_VERTICES} vertices, neither a primitive nor a "
+                      "sculpt at its highest level.")
 
 
 def _same_uvs(a: Mesh, b: Mesh) -> bool:

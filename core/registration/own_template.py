@@ -185,7 +185,7 @@ def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, 
     over = nonrigid.fit(ours.model, pose.apply(ours.model.shape(coefficients)), cover,
                         np.maximum(ours.follow, 0.5 * ours.shaped), targets,
                         COVER_ITERATIONS,
-                        lambda share: report.progress(0.5 * share, 0.5, "fitting the head to the scan"))
+                        lambda share: report.progress(0.5 * share, 1, "fitting the head to the scan"))
     known = np.flatnonzero(follow > 0.1)
     source = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M)
     face, bary = source.nearest(start[known], vertex_normals(skin)[known], REACH_M[1])

@@ -21,7 +21,7 @@ LEAST_FOLLOWED_SHARE, FARTHEST_M = 0.3, 0.004
 """A fit holds when this share of the followed vertices finds a partner on the scan, at this distance or nearer in the
 median."""
 MOST_MISS_WIDTH_SHARE = 0.05
-"""Share of the face's width by which landmarks may miss a head that is fitted without a scan."""
+"""Share of the head's width, ears and all, by which landmarks may miss one that is fitted without a scan."""
 APART_DEG, WANTED_VIEWS = 25.0, 3
 """So many photographs, so far apart as seen from the head, make a head; fewer a draft."""
 LEAST_SHARE_OF_PHOTOGRAPHS = 0.6
@@ -117,7 +117,7 @@ def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follo
 
 
 def figures_of_views(report: Reporter, fitted, views: list[View], head: Mesh) -> None:
-    """Figures of a fit (unscanned.Fitted) to what the views show."""
+    """Figures of a fit (unscanned.FittedHead) to what the views show."""
     for name, count in fitted.used.items():
         report.figure(f"constraints_by_{name}", count)
         report.figure(f"miss_of_{name}_mm", round(1e3 * fitted.miss_m[name], 2) if count else None)
@@ -135,14 +135,14 @@ def judge_views(head: Mesh, fitted) -> None:
 
 
 def tell_draft(report: Reporter, views: list[View], head: Mesh) -> None:
-    """Tells where photographs show too few sides of a head to make more than a draft."""
+    """Tells where pictures show too few sides of a head to make more than a draft."""
     apart = views_apart(views, head)
     if apart < WANTED_VIEWS:
         sides = "one side" if apart < 2 else f"{apart} sides that are at least {APART_DEG:.0f} degrees apart"
-        report.finding(f"This head is a draft: the photographs show the face from {sides} only, and its depth is "
+        report.finding(f"This head is a draft: its pictures show the face from {sides} only, and its depth is "
                        "mostly guessed.",
-                       "Add photographs: one from the front and one from each side, about 40 degrees around, are the "
-                       "least for a likeness.")
+                       "Show the face from the front and from each side, about 40 degrees around: these are the least "
+                       "for a likeness.")
 
 
 def views_apart(views: list[View], head: Mesh) -> int:

@@ -51,7 +51,8 @@ class Fused:
 
 def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float,
          tick: Callable[[int], None] = lambda done: None) -> Fused | None:
-    """The surface of depth maps. A map counts with the square of its baseline: so much finer does it measure depth.
+    """The surface of depth maps. A map counts with the square of its baseline over its distance: heads are matched at
+    one size, so that from twice as far the same angle measures depth as finely.
 
     Parameters
     ----------
@@ -74,9 +75,10 @@ def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float,
     voxels = (base[:, None] + corner[None]).reshape(-1, 3)
     sums = np.zeros((4, len(voxels)), np.float32)  # facing, weight, weight x distance, weight x distance squared
     points = np.ascontiguousarray((low + voxels * voxel).astype(np.float32).T)
-    usual = np.median([seen.baseline for seen in maps])
+    angles = np.array([seen.baseline / np.nanmedian(seen.depth) for seen in maps])
+    finer = np.clip(angles / np.median(angles), 0.25, 2)
     for done, seen in enumerate(maps):
-        _integrate(seen, points, voxel, float(np.clip(seen.baseline / usual, 0.25, 2) ** 2), sums)
+        _integrate(seen, points, voxel, float(finer[done] ** 2), sums)
         tick(done + 1)
     facing, weight = sums[0], np.maximum(sums[1], 1e-6)
     mean = sums[2] / weight

@@ -10,6 +10,10 @@ import numpy as np
 BASELINES_DEG = ((4.0, 9.0), (2.5, 14.0), (1.5, 30.0))
 """Angles between two cameras as seen from the head, from the best range to what a handful of photographs leaves."""
 
+LEAST_ACROSS = 0.7
+"""Least share of the way between two cameras that must lie across their view, as of 45 degrees: along it, the second
+sees little but the same picture larger."""
+
 
 def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int,
                  baselines: tuple = BASELINES_DEG) -> list[tuple[int, int]]:
@@ -19,7 +23,7 @@ def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int,
     Parameters
     ----------
     centres : [N, 3], of the cameras; the head lies at the origin
-    sharpness : [N]; the sharper are preferred
+    sharpness : [N]; the sharper, and those that lie side by side, are preferred
     count : of pairs, at most
     baselines : ranges of degrees between two cameras as the head sees them, the best first
     """
@@ -28,12 +32,15 @@ def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int,
     angle = np.degrees(np.arccos(np.clip((directions[first] * directions[second]).sum(1), -1, 1)))
     middle = directions[first] + directions[second]
     middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    apart = centres[second] - centres[first]
+    along = (apart * middle).sum(1) / np.maximum(np.linalg.norm(apart, axis=1), 1e-12)
+    across = np.sqrt(np.clip(1 - along**2, 0, 1))
     relative = sharpness / max(np.median(sharpness), 1e-9)
-    quality = np.minimum(np.minimum(relative[first], relative[second]), 1.5)
+    quality = across * np.minimum(np.minimum(relative[first], relative[second]), 1.5)
     chosen: list[int] = []
     reach = np.full(len(first), np.inf)  # angle from each candidate to the nearest chosen pair, in degrees
     for low, high in baselines:
-        candidates = np.flatnonzero((angle >= low) & (angle <= high))
+        candidates = np.flatnonzero((angle >= low) & (angle <= high) & (across > LEAST_ACROSS))
         least = 0.0 if not chosen else 5.0  # a poorer baseline only where nothing better looks from
         while len(chosen) < count and len(candidates):
             score = np.minimum(reach[candidates], 90.0) * quality[candidates]

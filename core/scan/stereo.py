@@ -102,6 +102,8 @@ def match_pair(first: View, second: View, pictures: tuple, masks: tuple, box: np
     total = disparity + cv2.remap(expected, x - np.nan_to_num(disparity).astype(np.float32), y, cv2.INTER_LINEAR,
                                   borderMode=cv2.BORDER_REPLICATE)
     depth = np.where(total > 0, focal * length / total, np.nan).astype(np.float32)
+    if not np.isfinite(depth).any():
+        return None
     return DepthMap(rotation, first.centre, focal, origin, depth, length, disagreement)
 
 

@@ -38,13 +38,15 @@ UNLIKE_SKIN = ("lips", "brows", "eyes", "nostrils", "scalp")  # their darkness i
 @dataclass(frozen=True)
 class ShadowEvidence:
     """At the working size: texture (I_UV) and filmed (with its light) linear [S, S, 3]; normals [S, S, 3]; visible [S,
-    S]: the sky's share that reaches the surface; judged bool [S, S]: texels of the face that somebody saw, and no beard
-    or hair; skin, brows [S, S] in [0, 1]: plain skin, and brows."""
+    S]: the sky's share that reaches the surface; bare bool [S, S]: texels of face, neck and ears that somebody saw, and
+    no beard, hair or cloth; judged bool [S, S]: those of the face; skin, brows [S, S] in [0, 1]: plain skin, and
+    brows."""
 
     texture: np.ndarray
     filmed: np.ndarray
     normals: np.ndarray
     visible: np.ndarray
+    bare: np.ndarray
     judged: np.ndarray
     skin: np.ndarray
     brows: np.ndarray
@@ -67,7 +69,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         seen = out_of_sun(evidence.filmed, transfer, head, evidence.judged, evidence.skin > 0.5,
                           settings.shadow_mask.sensitivity, report)
     elif source:
-        seen = over_brows(lift_shadows(head, *shadow_frames(capture, settings, source), report), evidence.judged,
+        seen = over_brows(lift_shadows(head, *shadow_frames(capture, settings, source), report), evidence.bare,
                           evidence.brows) > 0.5
     report.progress(7, 8, "Looking for shadows in the texture")
     proposal = propose(evidence, seen, settings.shadow_mask.sensitivity, settings.shadow_mask.dilate_px)
@@ -90,6 +92,9 @@ class Proposal:
 def propose(evidence: ShadowEvidence, in_frames: np.ndarray, sensitivity: float, dilate_px: float) -> Proposal:
     """The proposal from the evidence and the shadow that was seen.
 
+    Frames tell of neck and ears as well, but not of the scalp, where hair passes for shadow; what a texture alone says
+    is asked on the face, whose colours are known.
+
     Parameters
     ----------
     evidence : of the capture
@@ -97,15 +102,15 @@ def propose(evidence: ShadowEvidence, in_frames: np.ndarray, sensitivity: float,
     sensitivity : in [0, 1]
     dilate_px : texels by which the mask is grown, at 1024 texels
     """
-    judged, skin = evidence.judged, evidence.skin
+    bare, judged, skin = evidence.bare, evidence.judged, evidence.skin
     texture = still_dark(evidence.texture, evidence.normals, judged, skin > 0.5, sensitivity)
-    mask = tidy((in_frames & judged) | texture, judged, dilate_px * len(judged) / 1024)
+    mask = tidy((in_frames & bare) | texture, bare, dilate_px * len(bare) / 1024)
     mask, edges = snapped(mask, evidence.filmed, evidence.normals,
-                          np.where(judged, 0.2 + 0.8 * skin, 0).astype(np.float32))
+                          np.where(bare, 0.2 + 0.8 * skin, 0).astype(np.float32))
     luminance = np.log(np.maximum(evidence.texture.mean(-1), 2e-3))
     occlusion = baked_occlusion(luminance, evidence.visible, np.where(judged, skin, 0) * (1 - mask))
     return Proposal(
-        (np.maximum(mask, occlusion) * judged).astype(np.float32), in_frames & judged, texture, occlusion, edges
+        (np.maximum(mask, occlusion) * bare).astype(np.float32), in_frames & bare, texture, occlusion, edges
     )
 
 
@@ -146,15 +151,19 @@ def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> ShadowEv
     face, skin = (template.mask(name, size) if built_in else np.ones((size, size), np.float32)
                   for name in ("face", "skin"))
     brows = template.mask("brows", size) if built_in else np.zeros_like(skin)
+    scalp = template.mask("scalp", size) if built_in else np.zeros_like(skin)
     for name in UNLIKE_SKIN if built_in else ():
         skin = skin * (1 - template.mask(name, size))
     visible = interpolate(visible[:, None], head.mesh.faces, head.face, head.bary)[..., 0]
+    # the texture has no confidence where it shows a cloth
+    bare = head.covered & (confidence > MIN_CONFIDENCE) & (scalp < 0.5) & (read_hidden_skin(capture, size) < 0.5)
     return ShadowEvidence(
         texture,
         filmed,
         bleed(head.spread(head.normals), head.covered),
         bleed(visible, head.covered).astype(np.float32),
-        head.covered & (confidence > MIN_CONFIDENCE) & (face > 0.5) & (read_hidden_skin(capture, size) < 0.5),
+        bare,
+        bare & (face > 0.5),
         skin,
         brows,
     )
@@ -171,9 +180,7 @@ def _leave_figures(
     report.figure("seen_in_frames_percent", percent(proposal.frames))
     report.figure("left_in_texture_percent", percent(proposal.texture))
     report.figure("occlusion_percent", percent(proposal.occlusion > 0.1))
-    report.figure(
-        "laid_on_edges_percent", round(100 * float(proposal.edges.sum() / max(_border(proposal.mask).sum(), 1)), 1)
-    )
+    report.figure("laid_on_edges_percent", round(100 * share_on_edges(proposal.mask, proposal.edges), 1))
     filmed = images.linear_to_srgb(evidence.filmed)
     # red, green, blue
     shown = np.stack(
@@ -184,6 +191,8 @@ def _leave_figures(
                       np.hstack([filmed, tinted, np.repeat(proposal.mask[..., None], 3, -1)]))
 
 
-def _border(mask: np.ndarray) -> np.ndarray:
+def share_on_edges(mask: np.ndarray, edges: np.ndarray) -> float:
+    """The share in [0, 1] of the border of a mask [S, S] that lies on edges [S, S] in [0, 1]; 0 without a border."""
     inside = mask > 0.5
-    return (inside ^ np.roll(inside, 1, 0)) | (inside ^ np.roll(inside, 1, 1))
+    border = (inside ^ np.roll(inside, 1, 0)) | (inside ^ np.roll(inside, 1, 1))
+    return float(edges[border].sum() / max(border.sum(), 1))

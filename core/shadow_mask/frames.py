@@ -22,8 +22,7 @@ from ..geometry.views import View, read_views
 from ..imaging import images
 from .tidy import without_small
 
-THRESHOLDS = {"shading": 0.5, "network": 0.5, "softened": 0.5}
-"""Shadow alpha from which a pixel is in shadow at a sensitivity of 0.5, by who said so."""
+THRESHOLD = 0.5  # shadow alpha from which a pixel is in shadow at a sensitivity of 0.5
 # natural log units by which softening lightens: less is no shadow, more is one for certain
 LEAST_STEP_LOG, SURE_STEP_LOG = 0.10, 0.40
 # share of the pixels that softening has lightened least: they are lit, and tell the two pictures' gain
@@ -52,7 +51,7 @@ def shadow_frames(capture: Capture, settings: Settings, source: str) -> tuple[in
 
     Raises Problem where the folder of softened pictures holds none of a registered frame.
     """
-    threshold = THRESHOLDS.get(source, 0.5) + 0.5 * (0.5 - settings.shadow_mask.sensitivity)
+    threshold = THRESHOLD + 0.5 * (0.5 - settings.shadow_mask.sensitivity)
     if source == "softened":
         pairs = pictures_of(capture, settings.shadow_mask.softened, source)
         return len(pairs), ((view,

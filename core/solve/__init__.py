@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from ..contract import mask_edit
 from ..contract.capture import Capture
@@ -80,7 +81,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     witness = (lambda marks: confirm_marks(capture, head, marks, evidence.size)) if elsewhere is None else list
     tone = resolve_skin_tone(capture, head, settings, known, evidence, prior.tones, report)
     others = read_others(capture, settings, report)
-    start = initial.start_solve(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, witness, others)
+    report.progress(0, recipe.steps, "telling skin from light and laying the mask on the shadow's edges")
+    start = initial.start_solve(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, witness, others,
+                                report.check)
     if others and not start.recipe.linear:
         report.log("The other captures were not used: they help where a delighter has left a faint light, on the "
                    "built-in head, by the default recipe.")
@@ -123,7 +126,7 @@ def _sampled(capture: Capture, settings: Settings, start: initial.Start, denoise
 
     sampler = Sampler(denoiser, start.recipe, seed_noise(settings.seed, denoiser.device))
     state = sample_within_memory(sampler, seen, state.to(denoiser.device), on_step, report.log)
-    state.denoised = restore_maps(denoiser, state.denoised, seen[1].coords, start.recipe, settings.seed)
+    state.denoised = restore_maps(denoiser, state.denoised, seen[1].coords, settings.seed)
     return state.to("cpu")
 
 
@@ -167,10 +170,12 @@ def _check_often(prior: Prior, report: Reporter) -> None:
 
 def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
     """Stands for everything a run's bytes depend on."""
-    digest = hashlib.blake2b(digest_size=16)
-    for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, start.tone.tensor,
-                   start.state.lights.glob, start.local):
-        digest.update(tensor.numpy().tobytes())
+    digest, o = hashlib.blake2b(digest_size=16), start.observations[1]
+    for values in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, start.tone.tensor,
+                   start.state.lights.glob, start.local, start.reference, start.alpha, o.texture, o.trust, o.restraint,
+                   o.missing):
+        digest.update(torch.as_tensor(values).numpy().tobytes())
+    digest.update(repr(start.recipe).encode())
     digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.compute_device]).encode())
     digest.update(code_key(__package__).encode())  # with the prior's weights
     own_prior = hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior else ""

@@ -5,6 +5,7 @@ can live in M alone."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import torch
@@ -13,11 +14,12 @@ from ..light.shadow_edges import place
 from .evidence import Evidence
 
 
-def snap_to_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor) -> Evidence:
-    """The evidence with `place`'s alpha for its own; light [3, S, S] and weight [S, S] as there. What is protected
-    stays out of M."""
+def snap_to_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor,
+                  check: Callable[[], None] = lambda: None) -> Evidence:
+    """The evidence with `place`'s alpha for its own; light [3, S, S], weight [S, S] and check as there. What is
+    protected stays out of M."""
     edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), (weight * evidence.covered).numpy(),
-                 evidence.texel)
+                 evidence.texel, check)
     alpha = torch.from_numpy(edge.alpha) * (1 - evidence.protected) * evidence.covered
     return replace(
         evidence, alpha=alpha, edge=torch.from_numpy(edge.on_edge), shadow_colour=tuple(edge.colour.tolist())

@@ -51,11 +51,12 @@ class Extent:
 class Evidence:
     """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow
     mask M; normal [3, S, S], unit, world space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin
-    without lips, brows, eyes and hair; trust [S, S]: 1, less where a texel's colour says little of the light; protected
-    [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is seen;
-    shadow_colour [3]: the colour of what shadows take of the light, over its mean, zeros where that is not known; added
-    [S, S]: how far the artist added to the proposal for M, None where the maps are in other UVs; missing [S, S]: the
-    share of the light that M's border says is missing, None where nobody asked it."""
+    without lips, brows, eyes and hair; bare [S, S]: that of neck and ears as well; trust [S, S]: 1, less where a
+    texel's colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's
+    border lies on a shadow's edge that is seen; shadow_colour [3]: the colour of what shadows take of the light, over
+    its mean, zeros where that is not known; added [S, S]: how far the artist added to the proposal for M, None where
+    the maps are in other UVs; missing [S, S]: the share of the light that M's border says is missing, None where nobody
+    asked it."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -63,6 +64,7 @@ class Evidence:
     normal: torch.Tensor
     covered: torch.Tensor
     skin: torch.Tensor
+    bare: torch.Tensor
     trust: torch.Tensor
     protected: torch.Tensor
     edge: torch.Tensor
@@ -94,7 +96,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     if texture.shape[:2] != confidence.shape or texture.shape[0] != texture.shape[1]:
         raise Problem(f"{capture.texture} is {texture.shape[1]} x {texture.shape[0]} pixels and "
                       f"{capture.texture_confidence.name} {confidence.shape[1]} x "
-                      f"{confidence.shape[0]}: they have to be alike and square.", advise_again("texture"))
+                      f"{confidence.shape[0]}: both have to be square and of one size.", advise_again("texture"))
     confidence, texture = np.clip(confidence, 0, 1), np.clip(texture, 0, None)
     if confidence.max() < 1e-3:
         raise Problem("No texel of the texture was seen by any frame.",
@@ -121,9 +123,10 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
                for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
     unlike_skin = np.maximum.reduce([template.mask(name, size)
                                      for name in ("brows", "lips", "eyes", "nostrils", "scalp")])
+    bare = (1 - unlike_skin) * (1 - bearded)
     trust = np.minimum(1 - (1 - FEATURE_TRUST) * unlike_skin, 1 - (1 - BEARD_TRUST) * bearded)
     parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32))
-             for a in (skin, trust, protected, np.zeros_like(alpha))]
+             for a in (skin, bare, trust, protected, np.zeros_like(alpha))]
     return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, added=torch.from_numpy(added))
 
 

@@ -75,10 +75,14 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
         loss = loss + recipe.tv * ((gamma.diff(dim=-1) ** 2).sum() + (gamma.diff(dim=-2) ** 2).sum())
     elif recipe.tv:
         loss = loss + recipe.tv * total_variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
+    if recipe.seam:
+        seam = total_variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
+        loss = loss + recipe.seam * brightness / o.texel * seam
     if recipe.faint:
         restraint, missing = (value[o.shader.box] if isinstance(value, torch.Tensor) else value
                               for value in (o.restraint, o.missing))
-        loss = loss + recipe.faint * brightness * (restraint * (local + missing * o.shader.box_alpha) ** 2).sum()
+        gone = missing * o.shader.box_alpha * o.shader.main(lights)[(slice(None), *o.shader.box)].detach()
+        loss = loss + recipe.faint * brightness * (restraint * (local + gone) ** 2).sum()
     if recipe.smooth:
         # a shadow's own edge is in M and costs nothing
         free = o.shader.unmodulated(lights) if recipe.sharp_edges else local

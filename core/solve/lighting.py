@@ -93,11 +93,15 @@ class Shader:
 
     def unmodulated(self, lights: Lights) -> torch.Tensor:
         """Shading by the grid alone as if M were everywhere, on `box` [3, h', w']."""
-        scalar = (self.coefficients(lights) * self.box_basis).sum(1)  # [G, h', w']
+        scalar = (self._read(lights) * self.box_basis).sum(1)  # [G, h', w']
         return scalar * lights.chroma[:, None, None] if len(scalar) == 1 else scalar
 
     def coefficients(self, lights: Lights) -> torch.Tensor:
-        """gamma^V of every texel of `box` [G, 9, h', w'], read from V."""
+        """gamma^V M of every texel of `box` [G, 9, h', w']: what gamma is beyond gamma^g."""
+        return self._read(lights) * self.box_alpha
+
+    def _read(self, lights: Lights) -> torch.Tensor:
+        """gamma^V of every texel of `box` [G, 9, h', w']."""
         return self.up_rows @ lights.grid @ self.up_columns.T
 
     def total(self, lights: Lights) -> torch.Tensor:

@@ -45,8 +45,8 @@ def finish_maps(state: State, evidence: Evidence, start: Start, spread: torch.Te
 
     The albedo is rescaled once so that the mean of the confident facial skin is the skin tone; the shading takes the
     inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn sample would be as
-    likely, but would look like something that was measured. So is the specular albedo: no term of the likelihood knows
-    it, and a draw has twice the squared error of what is expected (docs/results/confidence.md).
+    likely, but would look like something that was measured. So is the specular albedo, of which no term of the
+    likelihood knows.
 
     Parameters
     ----------
@@ -57,7 +57,8 @@ def finish_maps(state: State, evidence: Evidence, start: Start, spread: torch.Te
     gain : [3], by which the albedo is rescaled if it was found before
     """
     shader = start.observations[1].shader
-    x = torch.lerp(start.reference, state.denoised, evidence.weight.sqrt())[0]
+    seen = evidence.weight.sqrt()
+    x = torch.lerp(start.reference, state.denoised, seen)[0]
     with torch.no_grad():
         beside = enlarge_field(start.local, evidence.size).exp() / start.exposure
         shading = shader.total(state.lights).clamp_min(1e-3) * beside
@@ -72,7 +73,7 @@ def finish_maps(state: State, evidence: Evidence, start: Start, spread: torch.Te
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
-    each = gain[:, None, None]
+    each = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], seen)  # the mean face is of the tone already
     trusted = estimate_confidence(evidence.weight, explained, diffuse * each, albedo(start.reference), spread)
     return Maps(to_picture((diffuse * each).clamp(MIN_ALBEDO, 1)), specular, to_picture(normal),
                 to_picture(shading / each), trusted.numpy(), gain)

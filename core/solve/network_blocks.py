@@ -13,7 +13,7 @@ from torch.utils.checkpoint import checkpoint
 
 MEMORY_FORMAT = torch.channels_last
 """Of all maps inside the network: channels first takes longer, in convolutions and in this normalisation
-(benchmarks/solver_speed.py)."""
+(benchmarks/costs/solver.py)."""
 
 STRIP_ROWS = 64
 """Rows of a map inside the network that are shaped at once where that can be done in pieces."""

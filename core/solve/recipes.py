@@ -61,15 +61,19 @@ class Recipe:
     updates: int = 300  # of each phase, spread over its steps; one a step is the least
     rate: float = 0.01  # of Adam ...
     decay: float = 0.995  # ... and its factor per update of a phase
-    tv: float = 0.1
+    tv: float = 0.0
     # L_TV is the squared variation of the SH coefficients; else the L1 variation of the shading on M's ring
     tv_of_gamma: bool = False
+    # the L1 variation of the shading on M's ring, per texel of a 1024 map and mean squared albedo, so that it weighs as
+    # much beside L_pho on dark skin and on a coarse map: L_TV's 0.1 on light skin at a quarter of the size, where eight
+    # of ten updates are made
+    seam: float = 2.0
     neg: float = 1.0
     # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a
     # shadow is
     smooth: float = 1.0
-    # pull of s^V towards what M's border says is missing, per texel and mean squared albedo; not where the artist added
-    # to the proposal for M
+    # pull of s^V towards the share of the main light that M's border says is missing, per mean squared albedo; not
+    # where the artist added to the proposal for M
     faint: float = 0.0
 
     # the end
@@ -84,7 +88,7 @@ OURS = Recipe()
 
 # What neither the paper nor the released code has is off in both.
 _PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, sharp_edges=False, protect_marks=False,
-                 trusting=True, smooth=0.0, linear=0.0)
+                 trusting=True, tv=0.1, seam=0.0, smooth=0.0, linear=0.0)
 
 RECIPES = {
     "wildcap": OURS,

@@ -107,7 +107,7 @@ def read_noise(folder: Path) -> torch.Tensor | None:
         or stored.dtype.kind != "f"
         or not np.isfinite(noise := stored.astype(np.float32)).all()
     ):
-        raise Problem(f"{path} is of shape {shape}, or holds values that are no numbers.",
+        raise Problem(f"{path} has the shape {shape}, or holds values that are not numbers.",
                       "Save the map of the whole UV square, of shape 3, S, S.")
     return torch.from_numpy(noise)[None]
 

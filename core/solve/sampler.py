@@ -64,6 +64,9 @@ class Sampler:
             if state.x is None or state.x.shape[-2:] != o.weight.shape:  # the start, or a finer map from here on
                 clean = _resized(state.denoised, *o.weight.shape)
                 state.x = clean + s * draw(*clean.shape)
+                # the lights' cost is a sum over texels, and Adam's memory of its gradient is longer than a size lasts
+                grown = o.weight.numel() / state.denoised[0, 0].numel()
+                state.moments = [moment * grown ** (1 + k % 2) for k, moment in enumerate(state.moments)]
             self.step(o, state, (s, sigmas[i + 1]), steps, draw)
             if not state.x.abs().max() <= 1e3 * (1 + s):  # nor where it is no number
                 raise Problem(f"The solver diverged at step {i + 1} of {steps}.",

@@ -37,7 +37,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.figure(name, value)
     where = settings.compute_device
     if not score >= least:
-        raise Problem(f"The sample head, solved again on {where}, is {score:.2f} dB from what it should be: "
+        raise Problem(f"The sample head, solved again on {where}, comes only to {score:.2f} dB of the shipped one: "
                       f"{least:.2f} dB or more were expected.",
                       "Click Remove Solver and Install Solver again; if that does not help, Save Report and send it "
                       "with a question.")

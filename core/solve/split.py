@@ -21,6 +21,7 @@ outcome.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cache
 
@@ -143,13 +144,14 @@ class Covariances:
         return parts + LEVEL_DEVIATION**2 * self.level + 1e-6 * np.eye(*self.level.shape)
 
 
-def split_captures(captures: list[Shapes], typical: Scales = TYPICAL_SCALES) -> Split:
+def split_captures(captures: list[Shapes], typical: Scales = TYPICAL_SCALES,
+                   check: Callable[[], None] = lambda: None) -> Split:
     """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the
-    scales' prior."""
+    scales' prior. `check` may raise to cancel."""
     fewer = len(captures) ** -0.5
     most = captures[0].weight.shape[0] // MIN_CELL_TEXELS
     seen, ratios = join_seen([average_cells(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures])
-    scales = find_scales(model_covariances(seen, seen), ratios, typical)
+    scales = find_scales(model_covariances(seen, seen), ratios, typical, check)
     return infer_split([average_cells(shapes, round(min(CELLS, most) * fewer)) for shapes in captures], scales)
 
 
@@ -198,7 +200,8 @@ def model_covariances(rows: Places, columns: Places) -> Covariances:
                        np.exp(-apart / NOISE_REACH_M) * same, same)
 
 
-def find_scales(together: Covariances, log_ratio: np.ndarray, typical: Scales = TYPICAL_SCALES) -> Scales:
+def find_scales(together: Covariances, log_ratio: np.ndarray, typical: Scales = TYPICAL_SCALES,
+                check: Callable[[], None] = lambda: None) -> Scales:
     """The most probable scales, by a search along one of them after the other."""
     best, most = typical, log_probability(together, log_ratio, typical, typical)
     for step in (2.0, 1.4, 1.2):
@@ -207,6 +210,7 @@ def find_scales(together: Covariances, log_ratio: np.ndarray, typical: Scales = 
             moved = False
             for name in (field.name for field in fields(Scales)):
                 for factor in (step, 1 / step):
+                    check()
                     tried = replace(best, **{name: getattr(best, name) * factor})
                     probable = log_probability(together, log_ratio, tried, typical)
                     if probable > most:

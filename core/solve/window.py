@@ -135,7 +135,7 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
     local = replace(recipe, steps=min(recipe.steps, MAX_STEPS), phases=(("cells", 0.0, last),), refit=0.0)
     state = sample_within_memory(Sampler(prior, local, seed_noise(seed, device), with_known), here, state, keep_frozen,
                                  report.log)
-    restored = restore_maps(prior, state.denoised, observations[1].coords.to(device), recipe, seed, window.context)
+    restored = restore_maps(prior, state.denoised, observations[1].coords.to(device), seed, window.context)
     solved, moved = denoised.clone(), lights.grid.clone()
     moved[(..., *window.cells)] = state.lights.grid.cpu()
     solved[(..., *window.context)] = torch.where(inside > 0, restored, known).cpu()

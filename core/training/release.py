@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,12 +27,7 @@ class TrainingCard:
     more: dict = field(default_factory=dict)
 
 
-def in_half(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    return {name: value.half().contiguous() for name, value in weights.items()}
-
-
-def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch.Tensor] | None = None,
-            store: Callable[[dict], dict] = in_half) -> dict:
+def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch.Tensor] | None = None) -> dict:
     """Writes the averaged weights of a training and their card.
 
     Parameters
@@ -42,7 +36,6 @@ def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch
     state : the training's (descent.py)
     card : what the state does not tell
     tensors : go into the file beside the weights, as they are
-    store : weights as they are written, in 16 bits if nothing else is said
 
     Returns
     -------
@@ -50,7 +43,8 @@ def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch
     """
     out, named = Path(out), state["data"]
     with replacing(out) as temporary:
-        save_file({**store(state["average"]), **(tensors or {})}, temporary)
+        half = {name: value.half().contiguous() for name, value in state["average"].items()}
+        save_file({**half, **(tensors or {})}, temporary)
     told = {**card.config, "data": card.data, "licence": "GPL-3.0-or-later", "notices": named["notices"],
             "command": card.command, "steps": state["step"],
             "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()),
@@ -60,15 +54,6 @@ def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch
     with replacing(out.with_suffix(".json")) as temporary:
         temporary.write_text(json.dumps(told, indent=1), encoding="utf-8")
     return told
-
-
-def card_before(start: Path | None) -> dict:
-    """Of the card beside the weights that a training begins with: how these were made; empty where there is none."""
-    path = Path(start).with_suffix(".json") if start else None
-    if path is None or not path.is_file():
-        return {}
-    card = json.loads(path.read_text(encoding="utf-8"))
-    return {name: card[name] for name in ("command", "steps", "minutes", "people", "before") if name in card}
 
 
 def again(training: str, state: dict) -> str:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the trainings of the delighters hold a log-shading to: errors [N, 3, S, S] in natural log units, weights [N, 1,
+"""What the training of the delighter holds a log-shading to: errors [N, 3, S, S] in natural log units, weights [N, 1,
 S, S]."""
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Writes capture.maps_4k, whole or not at all."""
     size, method = settings.upscale.size, settings.upscale.method
     guided = settings.upscale.frames_detail and capture.texture_detail.is_file()
-    maps = read_maps(capture.maps)
+    maps = read_maps(capture.maps, capture.texture_confidence)
     report.figure("method", method)
     report.figure("size_from_px", len(maps.diffuse))
     report.figure("size_px", size)
@@ -103,7 +103,7 @@ def _whole(capture: Capture, maps: HeadMaps, settings: Settings,
     behind = round(100 * float((masks.hidden * masks.brows).sum() / max(masks.brows.sum(), 1e-6)))
     if behind:
         report.figure("brows_hidden_percent", behind)
-        report.log(f"Hair lies before {behind} % of the brows: there they are grown like the other side, or as brows "
+        report.log(f"Hair covers {behind} % of the brows: there they are grown like the other side, or as brows "
                    "usually are.")
     images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, masks, cleaned))
     report.progress(0, 1, "growing hair")

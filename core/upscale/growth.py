@@ -44,21 +44,21 @@ class Growth:
     by_parser: bool
 
 
-def find(light: np.ndarray, confidence: np.ndarray, zones: dict[str, np.ndarray], surface: HeadSurface,
+def find(light: np.ndarray, seen: np.ndarray, zones: dict[str, np.ndarray], surface: HeadSurface,
          part_shares: np.ndarray | None) -> Growth:
     """Where hair grows.
 
     Parameters
     ----------
     light : [S, S], mean of the log albedo
-    confidence : [S, S] in [0, 1], how well each texel was seen
+    seen : [S, S] in [0, 1], how well each texel was seen
     zones : [S, S] in [0, 1] each, where brows and beard may grow
     surface : of the head
     part_shares : [S, S, len(GROWTHS)] in [0, 1], what the parser saw; None where it was not asked
     """
     size, texel = surface.size, float(np.median(surface.texel))
     bare = ((template.mask("skin", size) > 0.99) & (zones["beard"] < 0.05) & (zones["brows"] < 0.01)
-            & (seen_well(confidence, surface) >= 1))
+            & (seen_well(seen, surface) >= 1))
     head = (
         np.zeros((size, size), np.float32) if part_shares is None else _faded(part_shares[..., GROWTHS.index("hair")])
     )

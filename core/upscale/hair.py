@@ -63,7 +63,7 @@ def find(maps: HeadMaps, surface: HeadSurface, part_shares: np.ndarray | None = 
     light = channels[..., :3].mean(2)
     zones, texel = _zones(surface), float(np.median(surface.texel))
     check()
-    grown = growth.find(light, maps.confidence, zones, surface, part_shares)
+    grown = growth.find(light, maps.seen, zones, surface, part_shares)
     check()
     darker = _skin(light[..., None], zones, grown.beard, grown.head, surface)[..., 0] - light
     lashes = _cover(_closed(light, texel) - light, zones["lashes"], grown.grain)
@@ -107,7 +107,7 @@ def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0,
     check()
     lids = zones["lashes"][..., None]
     skin = skin * (1 - lids) + _closed(channels, texel) * lids  # a field from beyond the sockets knows no lid
-    bare = template.mask("skin", surface.size) * (1 - np.clip(20 * share, 0, 1)) * seen_well(maps.confidence, surface)
+    bare = template.mask("skin", surface.size) * (1 - np.clip(20 * share, 0, 1)) * seen_well(maps.seen, surface)
     check()
     learnt = grain.measure(channels, slopes, (bare > 0.99).astype(np.float32), surface, seed)
     check()

@@ -24,13 +24,21 @@ from . import grain
 from .maps import HeadMaps
 from .surface import HeadSurface
 
-UNSEEN_CONFIDENCE, SEEN_CONFIDENCE = 0.05, 0.30
-"""Confidence at which a texel counts as not seen, and from which on as seen well."""
+UNSEEN_CONFIDENCE, SEEN_CONFIDENCE = 0.015, 0.09
+"""The texture's confidence at which a texel counts as not seen, and from which on as seen well."""
+BELIEVED = 0.3
+"""The solver's confidence from which on skin is plain enough to learn its grain from: a beard is not."""
 SPECK_MM = 1.5
-"""mm: darker lines and dots of the confidence are hairs and marks, not holes in what was seen."""
+"""mm: darker lines and dots of it are strands before the face, not holes in what was seen."""
 SKIRT_MM, FEATHER_MM = 2.5, 5.0
 """mm inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the
 mean face; then comes the fade."""
+ISLAND = 10.0
+"""mm around a place on the scalp that count as its surroundings. A patch seen between hair, shadow and the border of
+the pictures is of another tone and another stubble than what is made up around it, and looks like a stain."""
+GLANCED, WATCHED = 0.5, 0.8
+"""Shares of usual skin's confidence: a scalp whose surroundings were seen with the first is made up, with the second
+kept."""
 REACH_MM = 2.5
 """mm below which detail is no tone."""
 ODD_LOG = 0.20
@@ -49,13 +57,14 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
 
     Parameters
     ----------
-    maps : of the head; texels whose `seen_well` is 1 keep their bytes, but for stray ones beyond the face
+    maps : of the head; texels whose `seen_well` is 1 keep their bytes, but for stray ones beyond the face and a scalp
+        that was seen badly
     surface : of the head, at their size
     report : hears whether it is cancelled, takes the share that was completed
     seed : of the grain that is painted
     """
     report.check()
-    seen = seen_well(maps.confidence, surface)
+    seen = seen_well(maps.seen, surface)
     size = surface.size
     if not ((seen < 1) & surface.covered).any() or seen.max() < 1:
         report.figure("completed_share_percent", 0.0)
@@ -63,13 +72,14 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     channels, slopes = apart(maps)
     tone = _tone(channels, seen * maps.confidence**2, surface, seed)
     report.check()
-    seen = _without_strays(seen, maps.confidence, np.abs(_low(channels, seen, surface) - tone)[..., :3].mean(2))
+    seen = seen * _scalp_share(maps.confidence, seen, surface)
+    seen = _without_strays(seen, maps.seen, np.abs(_low(channels, seen, surface) - tone)[..., :3].mean(2))
     holes = (seen < 1) & surface.covered
     area = surface.covered * surface.texel**2
     completed = ((1 - seen) * area).sum() / area.sum()
     report.figure("completed_share_percent", round(100 * float(completed), 1))
-    skin = template.mask("skin", size) * seen
-    learnt = grain.measure(channels, slopes, (skin >= 0.99).astype(np.float32), surface, seed)
+    plain = (template.mask("skin", size) * seen >= 0.99) & (maps.confidence >= BELIEVED)
+    learnt = grain.measure(channels, slopes, plain.astype(np.float32), surface, seed)
     report.check()
     painted, tilt = grain.paint(learnt, surface, holes, seed)
     share, own = seen[holes][:, None], channels - _low(channels, seen, surface)
@@ -80,36 +90,42 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     return joined(maps, holes, filled, tilted)
 
 
-def seen_well(confidence: np.ndarray, surface: HeadSurface) -> np.ndarray:
-    """[S, S] in [0, 1]: 1 where the cameras saw enough, 0 where the solver had nothing but the mean face, and a soft
-    border on the seen side.
+def seen_well(seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
+    """HeadMaps' seen -> [S, S] in [0, 1]: 1 where the cameras saw enough, 0 where the solver had nothing but the mean
+    face, and a soft border on the seen side.
 
     Holes in the face's features count as seen: their shape comes with the mean face, and no smooth field knows it.
     """
     texel = float(np.median(surface.texel))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(1, round(SPECK_MM / texel)) + 1,) * 2)
-    closed = cv2.morphologyEx(confidence, cv2.MORPH_CLOSE, disc)
+    closed = cv2.morphologyEx(seen, cv2.MORPH_CLOSE, disc)
     closed = np.maximum(closed, _features(surface.size))
-    seen = _smoothstep((closed - UNSEEN_CONFIDENCE) / (SEEN_CONFIDENCE - UNSEEN_CONFIDENCE))
+    enough = _smoothstep((closed - UNSEEN_CONFIDENCE) / (SEEN_CONFIDENCE - UNSEEN_CONFIDENCE))
     inside = cv2.distanceTransform(
         np.pad((closed >= UNSEEN_CONFIDENCE) | ~surface.covered, 1, mode="edge").astype(np.uint8), cv2.DIST_L2, 5
     )[1:-1, 1:-1]
-    return (seen * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT_MM) / FEATHER_MM)
+    return (enough * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT_MM) / FEATHER_MM)
             * surface.covered).astype(np.float32)
 
 
-def _without_strays(observed: np.ndarray, confidence: np.ndarray, off: np.ndarray) -> np.ndarray:
-    """`observed` [S, S] without what was seen at a glance only and lies `off` the head's tone (log albedo [S, S]):
-    light that was divided out wrongly, cloth, hair.
+def _scalp_share(confidence: np.ndarray, seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
+    """[S, S] in [0, 1]: 1 off the scalp, and on it where its surroundings were seen about as well as usual skin."""
+    usual = float(np.median(confidence[seen == 1])) if (seen == 1).any() else 1.0
+    around = surface.smooth(confidence[..., None], np.ones_like(confidence), ISLAND)[..., 0]
+    kept = _smoothstep((around / max(usual, 1e-6) - GLANCED) / (WATCHED - GLANCED))
+    return 1 - template.mask("scalp", surface.size) * (1 - kept)
 
-    What one believes of a texel is a matter of both: off by ODD_LOG it needs as much confidence as is missing to that
-    of usual skin. Nothing goes from the face, which every capture sees well and where marks are.
+
+def _without_strays(enough: np.ndarray, seen: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """`enough` [S, S] without what was `seen` [S, S] at a glance only and lies `off` the head's tone (log albedo [S,
+    S]): light that was divided out wrongly, cloth, hair.
+
+    What one believes of a texel is a matter of both: off by ODD_LOG it has to be seen as much better as is missing to
+    usual skin. Nothing goes from the face, which every capture sees well and where marks are.
     """
-    sure = np.clip(confidence / max(float(np.median(confidence[observed == 1])), 1e-6), 0, 1)
-    missing = (1 - sure) * (1 - template.mask("face", len(observed))) * off / ODD_LOG
-    return np.where(missing > 0, observed * sure**2 / np.maximum(sure**2 + missing**2, 1e-12), observed).astype(
-        np.float32
-    )
+    sure = np.clip(seen / max(float(np.median(seen[enough == 1])), 1e-6), 0, 1)
+    missing = (1 - sure) * (1 - template.mask("face", len(seen))) * off / ODD_LOG
+    return np.where(missing > 0, enough * sure**2 / np.maximum(sure**2 + missing**2, 1e-12), enough).astype(np.float32)
 
 
 def apart(maps: HeadMaps) -> tuple[np.ndarray, np.ndarray]:

@@ -40,12 +40,12 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
     python = python_of(folder)
     if answer(python, "import sys; print(sys.prefix != sys.base_prefix)") != "True":
         raise Problem(f"No environment can be made from {base} ({error or 'it does not start'}).",
-                      "Use an Existing Python.")
+                      "Click Use an Existing Python.")
     has_pip = not wheel_only and answer(python, "import ensurepip; print(ensurepip.version())")
     if not has_pip or run([python, "-m", "ensurepip", "--default-pip"])[0]:
         unpack_pip(folder, pip_source.fetch(requirements, wheels))
     if answer(python, "import pip; print('pip')") != "pip":
-        raise Problem(f"pip does not work in {folder}.", "Use an Existing Python, or choose another folder.")
+        raise Problem(f"pip does not work in {folder}.", "Click Use an Existing Python, or choose another folder.")
     return python
 
 
@@ -54,7 +54,8 @@ def unpack_pip(folder: Path, wheel: bytes) -> None:
     needs."""
     said = answer(python_of(folder), "import sysconfig; print(sysconfig.get_paths()['purelib'])")
     if not said:
-        raise Problem(f"The environment {folder} does not answer.", "Use an Existing Python, or choose another folder.")
+        raise Problem(f"The environment {folder} does not answer.",
+                      "Click Use an Existing Python, or choose another folder.")
     try:
         with zipfile.ZipFile(io.BytesIO(wheel)) as file:
             file.extractall(said)
@@ -78,7 +79,7 @@ def _by_hand(folder: Path, base: Path) -> None:
     said = answer(base,
                   "import sys; print(sys._base_executable); print('%d.%d.%d' % sys.version_info[:3])").splitlines()
     if len(said) != 2:
-        raise Problem(f"{base} is not a working Python.", "Use an Existing Python, or install Blender again.")
+        raise Problem(f"{base} is not a working Python.", "Click Use an Existing Python, or install Blender again.")
     real, version = Path(said[0]), said[1]
     python = python_of(folder)
     short = ".".join(version.split(".")[:2])

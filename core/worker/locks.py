@@ -29,8 +29,8 @@ MACOS, GLIBC = (14, 0), (2, 28)
 """The oldest that the wheels are made for."""
 LONGEST_PATH = 250
 """Characters that no path of an installation exceeds; Windows without long paths switched on stops at 259."""
-ELSEWHERE = ("Use an Existing Python that has what requirements/worker.txt lists; masks, materials and renders work "
-             "without it.")
+ELSEWHERE = ("Click Use an Existing Python and choose one with the packages of requirements/worker.txt; masks, "
+             "materials and renders work without the solver.")
 
 DESCRIBE = """
 import json, platform, struct, sys, sysconfig
@@ -78,19 +78,20 @@ def lock_name(description: str) -> str:
         python, system, machine = tuple(about["python"]), about["system"], about["machine"]
     except (ValueError, KeyError, TypeError):
         raise Problem("The Python that the solver was to be made from does not answer.",
-                      "Use an Existing Python, or install Blender again.") from None
+                      "Click Use an Existing Python, or install Blender again.") from None
     version = ".".join(map(str, python))
     if python not in PYTHONS or about["free_threaded"]:
         kind = f"{version} without its global lock" if about["free_threaded"] else version
         raise Problem(f"This Python is {kind}; the solver's packages are made for "
                       f"{' and '.join(f'{a}.{b}' for a, b in PYTHONS)}.",
-                      "Use an Existing Python of one of these, or the Blender from blender.org, which brings its own.")
+                      "Click Use an Existing Python and choose one of these versions, or take the Blender from "
+                      "blender.org, which brings its own.")
     if system == "darwin" and machine != "arm64":
         raise Problem("There is no solver for Macs with an Intel processor: PyTorch and pycolmap are no longer made "
                       "for them.", ELSEWHERE)
     if system == "darwin" and _numbers(about["macos"]) < MACOS:
         raise Problem(f"The solver needs macOS {MACOS[0]} or newer; this is {about['macos']}.",
-                      f"Update macOS. Or: {ELSEWHERE}")
+                      f"Update macOS. Or {ELSEWHERE[0].lower()}{ELSEWHERE[1:]}")
     known = machine in ("arm64", "x86_64", "amd64") and about["bits"] == 64
     if not known or (machine == "arm64" and system != "darwin"):
         raise Problem(f"There is no solver for this processor ({machine}, {about['bits']} bits): pycolmap is not made "

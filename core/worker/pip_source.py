@@ -43,7 +43,7 @@ def fetch(requirements: Path, wheels: Path | None = None) -> bytes:
         content = _download(name)
     if hashlib.sha256(content).hexdigest() != digest:
         raise Problem(f"{name} is not the file that WildCap was made with: its hash is another.",
-                      "Try again; if it stays so, use an Existing Python.")
+                      "Try again; if that does not help, click Use an Existing Python.")
     return content
 
 
@@ -82,9 +82,9 @@ def _download(name: str) -> bytes:
             return _get(urllib.parse.urljoin(page, links[0].replace("&amp;", "&").partition("#")[0]))
     except (OSError, ValueError) as error:
         raise Problem(f"pip could not be downloaded ({error}).",
-                      "Check the network connection and install again, or use an Existing Python.") from error
+                      "Check the network connection and install again, or click Use an Existing Python.") from error
     raise Problem(f"The package index has no {name}.",
-                  "Put it on your mirror, install from a folder of wheels, or use an Existing Python.")
+                  "Put it on your mirror, install from a folder of wheels, or click Use an Existing Python.")
 
 
 def _get(url: str) -> bytes:

@@ -54,8 +54,8 @@ def write(target: Path, root: Path, python: Path | None, capture: Capture | None
     if target.suffix.lower() != ".zip":
         target = target.with_name(f"{target.name}.zip")
     if target.exists():
-        raise Problem(f"{target} is there already.",
-                      "Choose another name for the report: nothing of yours is written over.")
+        raise Problem(f"{target} already exists.",
+                      "Choose another name for the report: WildCap overwrites nothing of yours.")
     scrub = Scrubber(root, python, capture)
     texts = {"doctor.txt": _examined(root, python), "unforeseen.txt": "\n".join(unforeseen.recent), **_logs(capture)}
     told = {"versions": {"WildCap": __version__, "Python": platform.python_version(), "system": platform.system(),

@@ -25,7 +25,7 @@ def download(requirements: Path, name: str, compute: str, source: str, folder: P
     lock = locks.read(requirements, name)
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
-        raise Problem(f"{folder} is no folder.", "Choose a folder for the wheels.")
+        raise Problem(f"{folder} is not a folder.", "Choose a folder for the wheels.")
     pip = [sys.executable, "-m", "pip", "download", "--disable-pip-version-check", "--no-input", "--progress-bar",
            "off", "--dest", folder, *tags(name)]
     with tempfile.TemporaryDirectory(prefix="wildcap_wheels_") as scratch:

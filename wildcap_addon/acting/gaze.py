@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core.contract.messages import Problem
 from .. import local_view
+from . import mesh
 from .asset import LEFT_EYE, SIDES, load
 from .close_up.ball import places
 
@@ -55,17 +56,18 @@ def add(context, obj) -> bpy.types.Object:
 
 
 def remove(obj) -> None:
-    """The units are sliders again, at zero."""
-    for name in _units():
-        obj.data.shape_keys.key_blocks[name].driver_remove("value")
-        obj.data.shape_keys.key_blocks[name].value, obj.data.shape_keys.key_blocks[name].slider_max = 0.0, 1.0
+    """The units that are still there are sliders again, at zero."""
+    for key in filter(None, map(obj.data.shape_keys.key_blocks.get, _units())):
+        key.driver_remove("value")
+        key.value, key.slider_max = 0.0, 1.0
     del obj.data.shape_keys[KEY]
     bpy.data.objects.remove(of(obj))
 
 
 def keep_up(obj, _capture) -> None:
-    """The eyes of a head that was reconstructed anew lie elsewhere. `head.complete` asks."""
-    if of(obj) is not None and obj.data.shape_keys is not None:
+    """The eyes of a head that was reconstructed anew lie elsewhere; those of one that was cut since, or lost a unit,
+    stay as they are. `head.complete` asks."""
+    if of(obj) is not None and mesh.is_complete(obj):
         drive(obj, of(obj))
 
 
@@ -98,7 +100,7 @@ def _refuse_own(keys: bpy.types.Key) -> None:
     drivers = [] if KEY in keys or keys.animation_data is None else keys.animation_data.drivers
     taken = [name for name in _units() if any(f'"{name}"' in curve.data_path for curve in drivers)]
     if taken:
-        raise Problem(f"{taken[0]} has a driver of yours already.", "Remove that driver, or go on without Gaze.")
+        raise Problem(f"{taken[0]} already has a driver of its own.", "Remove that driver, or go on without Gaze.")
 
 
 def _units() -> list[str]:

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from .. import node_trees
+from ..data_blocks import find
 
 SIZE_PX = 512
 IRIS_ANGLE_RAD = 0.42  # radians from the pupil's middle to the iris' rim, seen from the eye's centre
@@ -15,6 +16,8 @@ IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0
           "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
 """Linear colours."""
 DEFAULT = "brown"
+SLOTS = ("Eyes", "Mouth", "Teeth")
+"""Of a head that is cut open, after the skin's; the artist's own follow."""
 KEY = "wildcap_inside"
 IRIS, IRIS_NODE = "iris", "WildCap Iris"
 """Kind of the material of an iris that is an object of its own (close_up), and its node that has the colour."""
@@ -60,7 +63,7 @@ def colour_of(obj) -> tuple[float, float, float]:
 
 
 def _material(name: str, kind: str, colour: tuple, roughness: float, coat: float) -> bpy.types.Material:
-    existing = bpy.data.materials.get(name)
+    existing = find(bpy.data.materials, name)
     if existing is not None and existing.get(KEY) == kind:
         return existing
     material = bpy.data.materials.new(name)

@@ -18,18 +18,28 @@ from ...core.contract.messages import Problem
 from .. import captures
 from ..data_blocks import read_field
 from ..head import OUTER
-from . import carrying, filmed, materials
+from . import carrying, filmed, going_over, materials
 from .asset import GAZE, SIDES, FaceUnits, load
 
 MARK = "wildcap_face_units"
 OPEN = "eyesOpen"
 """Custom property of the shape keys: how far the lids are open, 0 to 1."""
-LAYOUT = {'FLOAT': ("value", 1), 'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4)}
-"""Kinds of attributes that are carried over: field, and how many numbers it has."""
 
 
 def has(obj) -> bool:
     return MARK in obj.data and obj.data.shape_keys is not None
+
+
+def is_whole(obj) -> bool:
+    """Whether a head that has face units has all of its vertices still, by whose numbers the units find them."""
+    asset = load()
+    return len(obj.data.vertices) == len(asset.template) + len(asset.copies) + len(asset.parts)
+
+
+def is_complete(obj) -> bool:
+    """Whether it has its face units, every one of them, and all of its vertices: what gaze and close-up are made
+    from."""
+    return has(obj) and is_whole(obj) and load().units.keys() <= set(obj.data.shape_keys.key_blocks.keys())
 
 
 def open_filmed_eyes(obj, capture: Capture) -> None:
@@ -51,11 +61,13 @@ def add(obj, iris: str = "") -> None:
     head, normals = _vertices(old), _corner_normals(old)
     seen = filmed_eyes(obj, asset)
     carried = carrying.carried(asset, head, seen)
-    new = _built(old, asset, carried[0])
-    slots = list(old.materials) or [None]
-    for material in slots[:1] + materials.inside(obj.name, iris or measured_iris(seen) or materials.DEFAULT):
+    new, weights = _built(old, asset, carried[0]), going_over.read_weights(obj)
+    skin, *others = list(old.materials) or [None]
+    for material in (skin, *materials.inside(obj.name, iris or measured_iris(seen) or materials.DEFAULT), *others):
         new.materials.append(material)
+    _attributes(old, new, asset)
     obj.data = new
+    going_over.write_weights(obj, weights, _origin(asset))
     name = old.name
     if old.users == 0:
         bpy.data.meshes.remove(old)
@@ -123,14 +135,20 @@ def rest(obj) -> None:
     for key in keys.key_blocks:
         if key.name in units:
             key.value = 0
-    keys[OPEN] = float(keys.id_properties_ui(OPEN).as_dict()["default"])
+    if OPEN in keys:
+        keys[OPEN] = float(keys.id_properties_ui(OPEN).as_dict()["default"])
     keys.update_tag()
 
 
 def renewed(obj, mesh) -> bool:
-    """Whether the head has units and now follows the new mesh, which is then not needed; `head.bring_in` asks."""
+    """Whether the head has units and now follows the new mesh, which is then not needed; `head.bring_in` asks. Raises
+    Problem where vertices were deleted or added since: what the artist made of it is then neither moved nor
+    replaced."""
     if not has(obj) or len(mesh.vertices) != len(load().template):
         return False
+    if not is_whole(obj):
+        raise Problem("This head's mesh was changed since it got its face units, and cannot follow a new shape.",
+                      "Keep it as it is, or delete it and click Bring In Head.")
     follow(obj, _vertices(mesh), _corner_normals(mesh))
     return True
 
@@ -151,12 +169,14 @@ def is_built_in(obj, asset: FaceUnits) -> bool:
 
 
 def _built(head_mesh, asset: FaceUnits, rest_points: np.ndarray):
-    """The mesh at rest, its UVs those of the head; inner parts but the skin's have theirs in tiles to the right, where
-    no map of the skin lies."""
+    """The mesh at rest, with the UVs and the settings of the head's; inner parts but the skin's have their UVs in tiles
+    to the right, where no map of the skin lies."""
     triangles = asset.triangles.copy()
     triangles[asset.corners[:, 0], asset.corners[:, 1]] = asset.corners[:, 2]
     inner = [[i for i in face if i >= 0] for face in asset.faces.tolist()]
-    mesh = bpy.data.meshes.new(head_mesh.name)
+    mesh = head_mesh.copy()
+    mesh.clear_geometry()
+    mesh.materials.clear()  # before any polygon says in which slot it is
     mesh.from_pydata(rest_points, [], triangles.tolist() + inner)
     uv = read_field(head_mesh.uv_layers[0].data, "uv", 2)
     first = len(rest_points) - len(asset.parts)
@@ -168,29 +188,34 @@ def _built(head_mesh, asset: FaceUnits, rest_points: np.ndarray):
     extra = known[corners] + np.stack([tile, 0 * tile], 1)
     layer = mesh.uv_layers.new(name=head_mesh.uv_layers[0].name)
     layer.data.foreach_set("uv", np.concatenate([uv, extra.astype(np.float32)]).ravel())
-    mesh.polygons.foreach_set("material_index",
-                              np.concatenate([np.zeros(len(triangles), np.int32), asset.slots.astype(np.int32)]))
+    slots = read_field(head_mesh.polygons, "material_index", kind=np.int32)
+    slots[slots > 0] += len(materials.SLOTS)  # the artist's own come after those of the inner parts
+    mesh.polygons.foreach_set("material_index", np.concatenate([slots, asset.slots.astype(np.int32)]))
     mesh.shade_smooth()
-    _attributes(head_mesh, mesh, asset)
     mesh.update()
     return mesh
 
 
 def _attributes(source, target, asset: FaceUnits) -> None:
-    """What is kept for each vertex of the head (its roughness, an artist's mask), on the copies as on what they double;
-    zero inside."""
-    for attribute in source.attributes:
-        if (
-            attribute.domain == 'POINT'
-            and attribute.data_type in LAYOUT
-            and not attribute.is_internal
-            and not attribute.is_required
-        ):
-            field, width = LAYOUT[attribute.data_type]
-            values = read_field(attribute.data, field, width)
-            inner = np.zeros((len(asset.parts), *values.shape[1:]), np.float32)
-            every = np.concatenate([values, values[asset.copies], inner])
-            target.attributes.new(attribute.name, attribute.data_type, 'POINT').data.foreach_set(field, every.ravel())
+    """What the artist and we know of each vertex, edge, face and corner of the head (its roughness, a mask, other UV
+    maps), on the copies as on what they double; zero inside."""
+    origin = _origin(asset)
+    known, ends = (read_field(mesh.edges, "vertices", 2, np.int32) for mesh in (source, target))
+    edges = {tuple(sorted(pair)): at for at, pair in enumerate(known.tolist())}
+    going_over.copy_attributes(source, target, {
+        'POINT': origin, 'EDGE': np.array([edges.get(tuple(sorted(pair)), -1) for pair in origin[ends].tolist()]),
+        'FACE': _first(len(source.polygons), len(target.polygons)),
+        'CORNER': _first(len(source.loops), len(target.loops))})
+
+
+def _origin(asset: FaceUnits) -> np.ndarray:
+    """Of each vertex of the head cut open the one that it was or doubles, -1 inside, [V + C + P]."""
+    return np.concatenate([np.arange(len(asset.template)), asset.copies, np.full(len(asset.parts), -1)])
+
+
+def _first(known: int, count: int) -> np.ndarray:
+    """Where the first of `count` come from: each from its own place; -1 for the others."""
+    return np.where(np.arange(count) < known, np.arange(count), -1)
 
 
 def _vertices(mesh) -> np.ndarray:

@@ -53,7 +53,7 @@ class WILDCAP_OT_iris(HeadOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_rest_face(HeadOperator, bpy.types.Operator):
-    """Bring all face units back to zero and the lids to where they were filmed"""
+    """Set all face units back to zero and the lids to where they were filmed"""
 
     bl_idname = "wildcap.rest_face"
     bl_label = "Rest"
@@ -72,8 +72,11 @@ class _Toggle(HeadOperator):
         obj = _acting(context)
         if self.switched.of(obj):
             self.switched.remove(obj)
-        else:
+        elif mesh.is_complete(obj):
             self.switched.add(context, obj)
+        else:
+            raise Problem("This head lost vertices or face units since it got them.",
+                          "Undo that, or delete the head, click Bring In Head and Add Face Units, then this.")
 
 
 class WILDCAP_OT_gaze(_Toggle, bpy.types.Operator):

@@ -23,7 +23,7 @@ class AllFaces(BaseOperator):
     @classmethod
     def poll(cls, context):
         many = batches.current() is not None or len(context.scene.wildcap.captures) > 1
-        return (cls.allowed(many, "The list has no two captures: use the buttons of the one")
+        return (cls.allowed(many, "The list has fewer than two captures: use that capture's own buttons")
                 and cls.allowed(not running.running(), "A batch is running: wait for it, or cancel it")
                 and cls.allowed(not jobs.elsewhere(""), "A job is running: wait for it, or click Cancel"))
 
@@ -136,7 +136,7 @@ class MaskWalk(BaseOperator):
     def poll(cls, context):
         return (cls.allowed(batches.current() is not None, "No batch is open: click Open Batch first")
                 and cls.allowed(context.mode == 'OBJECT' or walking.painting(),
-                                "Only in Object Mode, or while a mask is painted"))
+                                "This works in Object Mode only, or while you paint a mask"))
 
 
 class WILDCAP_OT_next_mask(MaskWalk, bpy.types.Operator):

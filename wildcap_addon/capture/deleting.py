@@ -58,8 +58,8 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
     def work(self, context):
         capture = captures.folder(captures.require(context))
         if self.root not in ("", str(capture.root)):
-            raise Problem("Another face is chosen now than the one that was to be deleted.",
-                          "Choose that one, and click Delete Face again.")
+            raise Problem("Another face is selected now, not the one that you wanted to delete.",
+                          "Select that one, and click Delete Face again.")
         jobs.begin("", "ask", BackgroundTask("setup", lambda task: delete(task, capture)),
                    lambda: forget(str(capture.root)))
 

@@ -48,7 +48,7 @@ class WILDCAP_OT_locate_capture(FileOperator, CaptureOperator, bpy.types.Operato
 
     def work(self, context):
         item = captures.require(context)
-        name = Path(item.path).name
+        name = links.name(item)
         if not self.directory and captures.folder(item).root.is_dir():
             raise Problem(f"{name} is where it was.",
                           "To work on another copy of it, click Locate Capture and choose its folder.")
@@ -63,8 +63,8 @@ class WILDCAP_OT_locate_capture(FileOperator, CaptureOperator, bpy.types.Operato
         Capture(place).read()  # refuses a damaged or newer one
         links.move(item, place)
         for other in links.missing():
-            if links.is_capture(place.parent / Path(other.path).name):
-                links.move(other, place.parent / Path(other.path).name)
+            if links.is_capture(place.parent / links.name(other)):
+                links.move(other, place.parent / links.name(other))
 
 
 class WILDCAP_OT_close_capture(CaptureOperator, bpy.types.Operator):

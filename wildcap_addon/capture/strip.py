@@ -82,6 +82,7 @@ def _tick() -> float:
     for root in list(_wanted):
         if look(root):
             status.redraw()
+    _wanted.intersection_update(status.shown())
     return INTERVAL_S
 
 

@@ -33,7 +33,9 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         where = iface_("{} with its maps, for {}, goes to {}").format(plan.mesh, plan.preset.title, plan.target)
         replaced = ((iface_("The delivery that is there is replaced once the new one is complete; files that you added "
                             "stay."),) if plan.target.exists() else ())
-        return (where, *replaced, *plan.format.drops, plan.preset.hint)
+        obj = captures.head(bpy.context, captures.require(bpy.context))
+        left = stand.left_behind(obj, plan.what, plan.format.suffix)
+        return (where, *replaced, *plan.format.drops, *left, plan.preset.hint)
 
     def work(self, context):
         item = captures.require(context)
@@ -78,7 +80,7 @@ class WILDCAP_OT_open_delivery(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         known = cls.with_capture(context) and waiting.last(captures.root(captures.active(context))) is not None
-        return cls.allowed(known, "Nothing was delivered since Blender was started")
+        return cls.allowed(known, "Nothing has been delivered since Blender was started")
 
     def work(self, context):
         folder = waiting.last(captures.root(captures.require(context)))

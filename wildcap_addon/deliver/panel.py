@@ -10,7 +10,7 @@ from ...core.contract import stages
 from ...core.contract.delivery_presets import FORMATS, PICTURES, PRESETS
 from .. import captures, problems
 from ..base_panel import CapturePanel, draw_settings, region_width
-from . import waiting
+from . import stand, waiting
 
 
 class WILDCAP_PT_deliver(CapturePanel, bpy.types.Panel):
@@ -39,7 +39,8 @@ class WILDCAP_PT_deliver(CapturePanel, bpy.types.Panel):
             layout.operator("wildcap.open_delivery", icon='FILE_FOLDER')
         header, body = layout.panel("wildcap_deliver_drops", default_closed=False)
         header.label(text="What This Drops")
-        for sentence in chosen.drops if body else ():
+        left = stand.left_behind(captures.head(context, item), settings.what, chosen.suffix)
+        for sentence in (*chosen.drops, *left) if body else ():
             problems.draw_text(body, sentence, width, 'INFO')
         header, body = layout.panel("wildcap_deliver_maps", default_closed=True)
         header.label(text="Maps")

@@ -41,7 +41,7 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
     packing = json.loads((plan.staged / PACKING).read_text(encoding="utf-8"))
     before = {name: set(getattr(bpy.data, name))
               for name in ("materials", "images", "meshes", "hair_curves", "objects", "scenes", "shape_keys")}
-    window, shown = context.window, context.window.scene
+    window, shown, seen = context.window, context.window.scene, _looks(context)
     try:
         scene = bpy.data.scenes.new(SCENE)
         scene.unit_settings.scale_length = 1 / FACTORS[plan.unit]
@@ -70,6 +70,37 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
             kept = getattr(bpy.data, name)
             for thing in set(kept) - before[name]:
                 kept.remove(thing)
+        _look_again(context, *seen)
+
+
+def left_behind(obj: bpy.types.Object | None, what: str, suffix: str) -> tuple[str, ...]:
+    """What the head wears that a delivery leaves out, a sentence each."""
+    if obj is None or what != "head":
+        return ()
+    hair = ("The hair stays here: of these formats only USD holds it.",)
+    eyes = ("The close-up eyes and mouth stay here: the delivered head has its plain ones.",)
+    return ((hair if captures.hair(obj) and suffix != HAIR_IN else ()) + (eyes if captures.close_up(obj) else ()))
+
+
+def _looks(context) -> tuple[list, str, list[str]]:
+    """What another scene in the window and an import change: of each 3D view the space, from where it looks and through
+    which camera; the names of the active object and of those that are selected."""
+    spaces = [area.spaces.active for area in context.window.screen.areas if area.type == 'VIEW_3D']
+    views = [(space, space.region_3d.view_perspective, space.camera) for space in spaces]
+    active = context.view_layer.objects.active
+    return (views, active.name if active else "",
+            [thing.name for thing in context.view_layer.objects if thing.select_get()])
+
+
+def _look_again(context, views: list, active: str, selected: list[str]) -> None:
+    for space, perspective, camera in views:
+        space.camera = camera
+        space.region_3d.view_perspective = perspective
+    layer = context.view_layer
+    layer.update()  # which knows of what was removed only now
+    for thing in layer.objects:
+        thing.select_set(thing.name in selected)
+    layer.objects.active = layer.objects.get(active)
 
 
 def _hairs(plan: DeliveryPlan, source: bpy.types.Object, obj) -> list[bpy.types.Object]:

@@ -16,7 +16,7 @@ from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
 from .. import captures, head, local_view, node_trees
-from ..data_blocks import read_field, replace_data
+from ..data_blocks import find, read_field, replace_data
 
 TITLES = {"brows": "Brows", "lashes": "Lashes", "beard": "Beard"}
 GROWN, MATERIAL = "wildcap_grown", "wildcap_hair_material"
@@ -169,7 +169,7 @@ def _skin(mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _deform_group() -> bpy.types.NodeTree:
     """Curves go along with the surface that they are rooted in: made once per file."""
-    group = bpy.data.node_groups.get(DEFORM)
+    group = find(bpy.data.node_groups, DEFORM)
     if group is None:
         group = bpy.data.node_groups.new(DEFORM, 'GeometryNodeTree')
         group.is_modifier = True
@@ -188,7 +188,7 @@ def _material(name: str, mean: np.ndarray) -> bpy.types.Material:
 
     Opaque: what was measured is an albedo. Principled Hair's colour is that of a whole head of hair, and single hairs
     of it over light skin come out blond."""
-    existing = bpy.data.materials.get(name)
+    existing = find(bpy.data.materials, name)
     if existing is not None and MATERIAL in existing:
         return existing
     material = bpy.data.materials.new(name)

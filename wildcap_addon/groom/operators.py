@@ -55,7 +55,7 @@ class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
         show_skin_below(captures.folder(item))
         if combed:
             self.report({'INFO'},
-                        f"{', '.join(combed)}: combed since, and left as they are; delete them to grow them anew")
+                        f"{', '.join(combed)}: left as you combed them; delete them to grow them anew")
 
 
 def keep_up(obj, capture: Capture) -> None:
@@ -101,10 +101,10 @@ def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np
             or colour.shape != (shape[0], 3)
             or not finite
         ):
-            raise Problem(f"{path} is damaged (what it holds are no hairs).", AGAIN)
+            raise Problem(f"{path} is damaged (it holds no hair strands).", AGAIN)
     if not hairs:
         raise Problem("No brows and no beard were found on this face.",
-                      "Hair that is as light as the skin is not told from it; comb curves of your own.")
+                      "Hair that is as light as the skin cannot be told from it: add curves of your own.")
     return hairs
 
 

@@ -27,8 +27,8 @@ class WILDCAP_OT_make_my_head(JobOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_accept_proposal(JobOperator, bpy.types.Operator):
-    """Solve with the shadow mask that was found by itself, or as it was painted, and go on to a relit head; painting it
-    and solving again stays possible"""
+    """Solve with the shadow mask that was found automatically, or as it was painted, and go on to a relit head;
+    painting it and solving again stays possible"""
 
     bl_idname = "wildcap.accept_proposal"
     bl_label = "Accept Proposal"

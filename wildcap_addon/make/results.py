@@ -58,7 +58,11 @@ def take(context, item) -> None:
         return
     if "texture" in made.stages and captures.folder(item).head.is_file():
         made.stages.discard("texture")
-        bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)
+        try:
+            bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)
+        except RuntimeError:  # the tab shows why; maps of another shape do not go onto the head that stays
+            del _making[root]
+            return
     if made.stages & MAPS:
         made.stages -= MAPS
         bpy.ops.wildcap.assemble_material('EXEC_DEFAULT', True, unless_edited=True)

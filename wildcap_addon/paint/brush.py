@@ -41,8 +41,9 @@ def restore(context, before: dict) -> None:
         setattr(unified, name, value)
     paint = context.scene.tool_settings.image_paint
     reference = before["reference"]
+    painting = context.mode == 'PAINT_TEXTURE'  # or Blender crashes: the head is gone, or excluded from the view layer
     with contextlib.suppress(RuntimeError):  # its library may be gone
-        if reference is not None and reference["relative_asset_identifier"]:
+        if painting and reference is not None and reference["relative_asset_identifier"]:
             bpy.ops.brush.asset_activate(**reference)
     other = before["brush"] and (paint.brush is None or paint.brush.name != before["brush"])
     if other and before["brush"] in bpy.data.brushes:

@@ -65,7 +65,7 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         ('MIRROR', "Mirror", "What is masked on one side is masked on the other, too"),
         ('INVERT', "Invert", "Shadow where there was none"),
         ('CLEAR', "Clear", "No shadow anywhere"),
-        ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found by itself"),
+        ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found automatically"),
         ('SNAPPED', "Take Snapped Mask", "The mask that was painted, laid on the shadow's edges")])
 
     @classmethod
@@ -82,7 +82,7 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         if self.kind == 'SNAPPED' and session.offered() != 'SNAPPED':
             raise Problem("There is no snapped mask.", "Click Snap to Edges first, and wait until it is done.")
         if self.kind == 'PROPOSAL' and session.painted_kind() == 'PROTECT':
-            raise Problem("What is to be protected is never proposed.", "Paint it by hand, or click Clear.")
+            raise Problem("There is no proposal for the protect mask.", "Paint it by hand, or click Clear.")
         image = session.mask()
         mask = mask_image.mask_values(image)
         files = {"PROPOSAL": capture.shadow_mask_auto, "SNAPPED": capture.shadow_mask_edges}

@@ -6,7 +6,20 @@ Which of them it is, the scene says, for an undo may take the sheet away or brin
 import bpy
 
 from ...core.contract.messages import Problem
+from .. import captures
 from . import sheet, view
+
+
+def follow_name(session) -> None:
+    """A head that was renamed since is known by its capture; the session then goes on by its new name."""
+    scene = bpy.data.scenes.get(session.scene)
+    heads = [item.head for item in scene.wildcap.captures if captures.root(item) == session.root] if scene else []
+    old, new = session.head, heads[0].name if heads and heads[0] is not None else session.head
+    if new != old:
+        told = session.before
+        told["selected"] = [new if name == old else name for name in told["selected"]]
+        told.update({key: new for key in ("active", "head") if told.get(key) == old})
+        session.head = new
 
 
 def turn(context, session, use_sheet: bool) -> None:
@@ -23,6 +36,7 @@ def enter(context, session, use_sheet: bool) -> None:
     target = bpy.data.objects.get(session.head)
     if target is None or target.name not in context.scene.objects:
         raise Problem("The head is not in this scene any more.", "Undo, or bring the head in again.")
+    captures.require_shown(context, target)
     if use_sheet:
         target = sheet.make(context, context.scene.tool_settings.image_paint.canvas, target)
     face(session, use_sheet)

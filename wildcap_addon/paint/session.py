@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field
 
 import bpy
 
+from ...core.contract import unforeseen
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from .. import captures, head, problems
@@ -98,6 +99,7 @@ def begin(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') -> None:
     """Enters Texture Paint on the head or on the sheet, the mask as its tinted stencil and the mask brush in hand."""
     global _session
     if _session is not None and _session.which == mask_kind:
+        places.follow_name(_session)
         places.turn(context, _session, use_sheet)
         return
     end(context)
@@ -136,8 +138,9 @@ def end(context) -> None:
     if session is None:
         return
     save()  # a Problem here leaves the session open, and nothing is lost
+    places.follow_name(session)
     # only in this mode does Blender let go of a brush
-    if context.mode != 'PAINT_TEXTURE' and session.head in context.scene.objects:
+    if context.mode != 'PAINT_TEXTURE' and session.head in context.view_layer.objects:
         places.enter(context, session, sheet.is_there())
     brush.restore(context, session.brush)
     _keep_tint(context)
@@ -156,6 +159,8 @@ def after_undo(context) -> None:
     """Undo and redo bring objects and modes back, but not what the views look at, and nothing of a painting that has
     ended: the mask stays as it was left."""
     active = context.view_layer.objects.active
+    if _ended is not None:
+        places.follow_name(_ended)
     # undone past its start: the watch ends it, and what was saved before goes to the history
     if _session is not None and context.mode == 'OBJECT':
         _session.written = ()
@@ -233,8 +238,8 @@ def _watch() -> float | None:
             root = _session.root
             try:
                 end(bpy.context)
-            except Problem as problem:
-                problems.show(root, problem)
+            except Exception as error:  # nobody is above a timer: without this, Blender would drop it
+                problems.show(root, error if isinstance(error, Problem) else unforeseen.explain(error, "painting"))
                 return WATCH_S * 4
         else:
             keep_up(any(operator.bl_idname == 'PAINT_OT_image_paint' for operator in window.modal_operators))

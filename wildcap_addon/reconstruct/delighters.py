@@ -37,7 +37,7 @@ def show(capture: Capture, index: int, wipe: float) -> None:
     global _pair
     frame_names = frames(capture)
     if not frame_names:
-        raise Problem("No frame has been delit yet.", "Click Reconstruct: it is a stage of it.")
+        raise Problem("No frame has been delit yet.", "Click Reconstruct: Delight is one of its stages.")
     name = frame_names[index % len(frame_names)]
     before = next((path for path in capture.frames.glob(f"{name}.*")), None)
     if before is None:

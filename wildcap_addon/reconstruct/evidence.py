@@ -7,6 +7,7 @@ capture's world (metres).
 """
 
 import contextlib
+from collections.abc import Iterable
 
 import bpy
 
@@ -28,23 +29,27 @@ SENSOR_MM = 36.0  # width; Blender's own default
 
 
 def bring_in_cameras(context, item, every: bool = False) -> int:
-    """A camera for each frame that the texture uses, or for every registered one, in place of those that are there.
-    Returns how many. Raises Problem where the capture has none."""
+    """A camera for each frame that the texture uses, or for every registered one; those that are there are set anew, or
+    go where they are not wanted. Returns how many. Raises Problem where the capture has none."""
     capture = captures.folder(item)
     cameras = colmap_cameras.read(capture.cameras)
     if not every:
         chosen = _chosen(capture)
         cameras = [camera for camera in cameras if camera.name in chosen] or cameras
     frame = context.scene.camera.get(FRAME_KEY) if context.scene.camera is not None else None
-    _remove(item, 'camera')
-    collection = bpy.data.collections.new(f"{item.name} Cameras")
-    context.scene.collection.children.link(collection)
-    for camera in cameras:
-        collection.objects.link(_camera(context, item, capture, camera))
+    known = {thing[FRAME_KEY]: thing for thing in _brought_in(item, 'camera')}
+    homes = [home for thing in known.values() for home in thing.users_collection]
+    things = [_camera(context, item, capture, camera, known.pop(camera.name, None)) for camera in cameras]
+    new = [thing for thing in things if not thing.users_collection]
+    if new and not homes:
+        homes = [bpy.data.collections.new(f"{item.name} Cameras")]
+        context.scene.collection.children.link(homes[0])
+    for thing in new:
+        homes[0].objects.link(thing)
+    _remove(known.values())
     if context.scene.camera is None:
-        context.scene.camera = next((thing for thing in collection.objects if thing[FRAME_KEY] == frame),
-                                    collection.objects[0])
-    local_view.join(context, collection.objects)
+        context.scene.camera = next((thing for thing in things if thing[FRAME_KEY] == frame), things[0])
+    local_view.join(context, new)
     return len(cameras)
 
 
@@ -63,7 +68,7 @@ def bring_in_scan(context, item) -> bpy.types.Object:
         for thing in new:
             bpy.data.objects.remove(thing)
         raise Problem(f"{capture.scan} cannot be read.", advise_again("scan"))
-    _remove(item, 'scan')
+    _remove(_brought_in(item, 'scan'))
     scan = new[0]
     scan.name = scan.data.name = f"{item.name} Scan"
     _belongs(scan, context, item, 'scan')
@@ -75,8 +80,11 @@ def bring_in_scan(context, item) -> bpy.types.Object:
     return scan
 
 
-def _camera(context, item, capture: Capture, camera: colmap_cameras.FrameCamera) -> bpy.types.Object:
-    lens = bpy.data.cameras.new(f"{item.name} {camera.name}")
+def _camera(context, item, capture: Capture, camera: colmap_cameras.FrameCamera,
+            thing: bpy.types.Object | None) -> bpy.types.Object:
+    """The camera of a frame, made where there is none: what was tied to it (markers, constraints) stays so."""
+    lens = thing.data if thing is not None and thing.data.users == 1 else (
+        bpy.data.cameras.new(f"{item.name} {camera.name}"))  # another one's is a copy of the artist's
     lens.sensor_fit, lens.sensor_width = 'HORIZONTAL', SENSOR_MM
     lens.lens = camera.focal / camera.width * SENSOR_MM
     lens.shift_x = (camera.width / 2 - camera.centre[0]) / camera.width
@@ -85,14 +93,18 @@ def _camera(context, item, capture: Capture, camera: colmap_cameras.FrameCamera)
     lens.clip_start = 0.01
     if (capture.frames / camera.name).is_file():
         lens.show_background_images = True
-        behind = lens.background_images.new()
-        behind.image = bpy.data.images.load(str(capture.frames / camera.name), check_existing=True)
-        behind.alpha = 1.0
+        image = bpy.data.images.load(str(capture.frames / camera.name), check_existing=True)
+        behind = next((known for known in lens.background_images if known.image == image), None)
+        if behind is None:
+            behind = lens.background_images.new()
+            behind.image, behind.alpha = image, 1.0
         # the frame's width is the sensor's: of a wider picture the height is cut, of a narrower one there is more
         render = context.scene.render
         behind.frame_method = ('CROP' if camera.width * render.resolution_y <= camera.height * render.resolution_x
                                else 'FIT')
-    thing = bpy.data.objects.new(lens.name, lens)
+    if thing is None:
+        thing = bpy.data.objects.new(lens.name, lens)
+    thing.data = lens
     thing.lock_location = thing.lock_rotation = thing.lock_scale = (True, True, True)
     _belongs(thing, context, item, 'camera')
     thing.matrix_basis, thing[FRAME_KEY] = camera.matrix, camera.name
@@ -104,12 +116,16 @@ def _belongs(obj: bpy.types.Object, context, item, kind: str) -> None:
     obj[KIND_KEY], obj[captures.HEAD_KEY], obj[MADE_KEY] = kind, item.path, obj.name
 
 
-def _remove(item, kind: str) -> None:
-    """Takes away what was brought in before, with its data, where no copy of the artist's has that, and an empty
-    collection."""
-    for thing in [t for t in bpy.data.objects if t.get(KIND_KEY) == kind and t.get(captures.HEAD_KEY) == item.path
-                  and t.get(MADE_KEY, t.name) == t.name]:
-        data, homes = thing.data, list(thing.users_collection)
+def _brought_in(item, kind: str) -> list[bpy.types.Object]:
+    """What was brought in before, without copies of the artist's."""
+    return [t for t in bpy.data.objects if t.get(KIND_KEY) == kind and t.get(captures.HEAD_KEY) == item.path
+            and t.get(MADE_KEY, t.name) == t.name]
+
+
+def _remove(things: Iterable[bpy.types.Object]) -> None:
+    """Takes them away, with their data, where no copy of the artist's has that, and an empty collection."""
+    for thing in things:
+        kind, data, homes = thing[KIND_KEY], thing.data, list(thing.users_collection)
         bpy.data.objects.remove(thing)
         if data.users == 0:
             (bpy.data.cameras if kind == 'camera' else bpy.data.meshes).remove(data)

@@ -40,7 +40,7 @@ def show(context, item) -> int:
     capture = captures.folder(item)
     head = captures.require_head(context, item)
     points = _known(capture)
-    hide()
+    hide(item)
     collection = bpy.data.collections.new(COLLECTION)
     context.scene.collection.children.link(collection)
     for index, name in NAMES.items():
@@ -58,27 +58,26 @@ def show(context, item) -> int:
     return len(collection.objects)
 
 
-def shown_landmarks() -> list[bpy.types.Object]:
-    collection = bpy.data.collections.get(COLLECTION)
-    return [o for o in collection.objects if INDEX_KEY in o] if collection else []
+def shown_landmarks(item) -> list[bpy.types.Object]:
+    """Those of a list item's head; none for None."""
+    return [o for o in bpy.data.objects if INDEX_KEY in o and o.get(captures.HEAD_KEY) == item.path] if item else []
 
 
 def keep_moved(item) -> int:
     """Writes the landmarks that were moved to the capture, where they win over what the frames say. Returns how
     many."""
-    moved = {o[INDEX_KEY]: tuple(o.location) for o in shown_landmarks()
-             if o.get(captures.HEAD_KEY) == item.path and (o.location - Vector(o[FOUND_KEY])).length > MOVED_M}
+    moved = {o[INDEX_KEY]: tuple(o.location) for o in shown_landmarks(item)
+             if (o.location - Vector(o[FOUND_KEY])).length > MOVED_M}
     if moved:
         artist_landmarks.put(captures.folder(item), moved)
     return len(moved)
 
 
-def hide() -> None:
-    """Takes the empties off the scene."""
-    for empty in shown_landmarks():
+def hide(item) -> None:
+    """Takes the empties of a list item's head off the scene."""
+    for empty in shown_landmarks(item):
         bpy.data.objects.remove(empty)
-    collection = bpy.data.collections.get(COLLECTION)
-    if collection is not None and not collection.objects:
+    for collection in [c for c in bpy.data.collections if c.name.startswith(COLLECTION) and not c.all_objects]:
         bpy.data.collections.remove(collection)
 
 

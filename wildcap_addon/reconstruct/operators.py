@@ -130,10 +130,10 @@ class WILDCAP_OT_hide_landmarks(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         return cls.in_object_mode(context) and cls.allowed(
-            landmarks.shown_landmarks(), "No landmarks are shown: click Show Landmarks first")
+            landmarks.shown_landmarks(captures.active(context)), "No landmarks are shown: click Show Landmarks first")
 
     def work(self, context):
-        landmarks.hide()
+        landmarks.hide(captures.require(context))
 
 
 class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
@@ -141,11 +141,12 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.fit_landmarks"
     bl_label = "Fit Head Again"
+    bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):
         shown = cls.in_object_mode(context) and cls.allowed(
-            landmarks.shown_landmarks(), "No landmarks are shown: click Show Landmarks first")
+            landmarks.shown_landmarks(captures.active(context)), "No landmarks are shown: click Show Landmarks first")
         return shown and jobs.can_start(cls, context)
 
     def work(self, context):
@@ -154,7 +155,7 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
             raise Problem("No landmark was moved.",
                           "Move a sphere to where it belongs on the face, then click Fit Head Again.")
         jobs.start(item, "reconstruct", first="registration", last=stages.MASK_STAGE)
-        landmarks.hide()
+        landmarks.hide(item)
 
 
 CLASSES = (WILDCAP_OT_reconstruct, WILDCAP_OT_cancel, WILDCAP_OT_bring_in_head, WILDCAP_OT_bring_in_cameras,

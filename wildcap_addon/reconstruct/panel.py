@@ -26,7 +26,7 @@ class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
         for name, icon in (("head", 'MESH_MONKEY'), ("cameras", 'CAMERA_DATA'), ("scan", 'OUTLINER_DATA_POINTCLOUD')):
             row.operator(f"wildcap.bring_in_{name}", text=name.title(), icon=icon)
         row = layout.row(align=True)
-        row.operator("wildcap.hide_landmarks" if landmarks.shown_landmarks() else "wildcap.show_landmarks",
+        row.operator("wildcap.hide_landmarks" if landmarks.shown_landmarks(item) else "wildcap.show_landmarks",
                      icon='EMPTY_AXIS')
         row.operator("wildcap.fit_landmarks")
         for stage in stages.STAGES[:stages.NAMES.index(stages.MASK_STAGE) + 1]:

@@ -47,7 +47,7 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
         item = captures.require(context)
         now = plan(item)
         if self.sending_plan is not None and now != self.sending_plan:
-            raise Problem("The frames have changed while you were asked.",
+            raise Problem("The frames changed while the question was open.",
                           "Click Allow Sending again, and look at what would be sent now.")
         consent.give(captures.folder(item), now)
 

@@ -18,7 +18,7 @@ SHOWN = {
     'SKIN': ("Skin Below Hair", "clean_albedo.png",
              "The albedo without brows, lashes and beard, for hair to grow over"),
 }
-REMEDIES = ("Click Solve: it leaves what is compared, as long as the frames are there.",
+REMEDIES = ("Click Solve: it writes the pictures to compare, as long as the frames are there.",
             "Switch on Hair among the settings of 4K Maps, and run that stage.")
 
 

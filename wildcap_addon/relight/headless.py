@@ -79,10 +79,16 @@ def turntable(obj, renders: Path, light: str | Hdri, turn: Turn, settings: Rende
 
     Raises
     ------
-    Problem : where a film is asked of a Blender that cannot write one
+    Problem : where a film is asked of a Blender that cannot write one, or in an odd size; where the light is to turn,
+        and is the same all round
     """
     if turn.film and not reel.can_film():
         raise Problem("This Blender was built without FFmpeg: it cannot write MP4.", "Choose PNG frames.")
+    if turn.film and settings.resolution % 2:
+        raise Problem("MP4 needs a resolution that is even.", "Choose an even one, or PNG frames.")
+    if turn.turns == 'LIGHT' and isinstance(light, str) and not lights.preset(light).lamps:
+        raise Problem("This light is the same from every side: turning it changes nothing.",
+                      "Choose another light, or turn the head.")
     scene = reel.turning(obj, light, turn.turns, turn.frames, settings)
     if turn.film:
         reel.as_film(scene, FRAMES_PER_SECOND)
@@ -99,6 +105,7 @@ def light_of(name: str | Hdri) -> str | Hdri:
 def open_head(capture_folder: Path):
     """A file with nothing but the capture's head in its material, and the capture's list item."""
     bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.context.scene.cycles.device = 'CPU'  # whatever the start-up file says: the same pictures on every machine
     item = captures.add(bpy.context, Path(capture_folder).absolute())
     obj = head.bring_in(bpy.context, item)
     material.assemble(bpy.context, item)

@@ -30,9 +30,9 @@ SET = "wildcap_set"
 """Where the material keeps what was set by itself: a value that is another one now is the artist's"""
 
 
-def assemble(context, item) -> bpy.types.Material:
+def assemble(context, item) -> tuple[bpy.types.Material, str]:
     """The skin material on the capture's head, from the 4K maps where they are newest, else from the solved ones; and
-    what else belongs to a finished head."""
+    what else belongs to a finished head, with what is to be told of that."""
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
     maps = status.delivered(capture)
@@ -48,9 +48,11 @@ def assemble(context, item) -> bpy.types.Material:
          {"Specular Amount": _specular_amount(capture), "Subsurface Scale": node_group.SCATTERING_M * _scale(obj)},
          before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
-    head.complete(obj, capture)
-    material[MADE] = node_trees.fingerprint(material, head.PREVIEW)
-    return material
+    try:
+        told = head.complete(obj, capture)
+    finally:  # the maps are in, whatever is wrong with the rest of the head
+        material[MADE] = node_trees.fingerprint(material, head.PREVIEW)
+    return material, told
 
 
 def is_edited(obj) -> bool:
@@ -69,10 +71,12 @@ def _is_preview(material) -> bool:
 
 def _material(obj) -> bpy.types.Material:
     """The head's skin material; somebody else's material in the first slot is replaced on this head only, never
-    changed."""
+    changed. Of a skin that another face has, too, the head gets a copy, with all that was set in it."""
     slots = obj.data.materials
     current = slots[0] if slots else None
     if current is not None:
+        if KEY in current and _is_another_face_s(current, obj):
+            current = slots[0] = current.copy()
         if KEY in current or _is_preview(current):
             return current
         current.use_fake_user = True  # it may have no other head
@@ -83,6 +87,11 @@ def _material(obj) -> bpy.types.Material:
     else:
         slots.append(material)
     return material
+
+
+def _is_another_face_s(material, obj) -> bool:
+    return any(other.data.materials[:1] == [material] and other.get(captures.HEAD_KEY) != obj.get(captures.HEAD_KEY)
+               for other in bpy.data.objects if other.type == 'MESH' and captures.HEAD_KEY in other)
 
 
 def _build(material, paths: dict, obj) -> None:

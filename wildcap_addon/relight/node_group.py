@@ -14,6 +14,7 @@ sockets, their values, and an artist's own nodes and links stay.
 import bpy
 
 from ...core.contract import skin_regions
+from ..data_blocks import find
 
 NAME = "WildCap Skin"
 VERSION = 4
@@ -97,7 +98,7 @@ LINKS = (
 
 def skin_group() -> bpy.types.NodeTree:
     """The group, made once per file; one of an older version is rebuilt inside."""
-    group = bpy.data.node_groups.get(NAME)
+    group = find(bpy.data.node_groups, NAME)
     if group is None:
         group = bpy.data.node_groups.new(NAME, 'ShaderNodeTree')
     if group.get("wildcap_version") != VERSION:

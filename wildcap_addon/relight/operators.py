@@ -24,7 +24,9 @@ class WILDCAP_OT_assemble_material(HeadOperator, bpy.types.Operator):
         item = captures.require(context)
         if self.unless_edited and material.is_edited(captures.require_head(context, item)):
             return
-        skin = material.assemble(context, item)
+        skin, told = material.assemble(context, item)
+        if told:
+            self.report({'INFO'}, told)
         self.warn(colours.missing(skin.node_tree.nodes[material.IMAGES[0][0]].image))
 
 

@@ -16,7 +16,12 @@ from pathlib import Path
 
 import bpy
 
+from ...core.contract import unforeseen
 from ...core.contract.files import place_file, place_folder, storage_problem
+from ...core.contract.messages import Problem
+from .. import problems, status
+from ..data_blocks import find
+from . import lights
 
 SCENE = "WildCap Relight"
 
@@ -124,7 +129,7 @@ def _hidden(path: Path) -> Path:
 def completed(scene, *_):
     """The whole render is there. Without a window, who asked for it waits for it."""
     if scene.name == SCENE and not bpy.app.background:
-        bpy.app.timers.register(_finish, first_interval=0.0)
+        bpy.app.timers.register(_finish_or_show, first_interval=0.0)
 
 
 @bpy.app.handlers.persistent
@@ -148,32 +153,57 @@ def drop() -> None:
     _free()
 
 
+def _finish_or_show() -> float | None:
+    """As `_finish`, in a timer, where nobody catches what it raises: it is shown in the tab."""
+    if busy():  # its last moments
+        return 0.1
+    try:
+        _finish()
+    except Problem as problem:
+        problems.show("", problem)
+    except OSError as error:
+        problems.show("", storage_problem(error, Path(error.filename or "the render")))
+    except Exception as error:
+        problems.show("", unforeseen.explain(error, "Render"))
+    status.redraw()
+    return None
+
+
 def _finish() -> None:
     """Gives what is complete its name."""
     global _running
-    if busy():  # its last moments
-        bpy.app.timers.register(_finish, first_interval=0.1)
-        return
     running, _running = _running, Running()
-    for source, path in running.stills.items():
-        place_file(source, path.with_suffix(".exr"))
-        _picture(path)
-    if running.folder is not None:
-        place_folder(_hidden(running.folder), running.folder)
-    _free()
+    try:
+        for source, path in running.stills.items():
+            place_file(source, path.with_suffix(".exr"))
+            _picture(path)
+        if running.folder is not None:
+            place_folder(_hidden(running.folder), running.folder)
+    finally:
+        _free()
     if running.then is not None:
         running.then()
 
 
 def _free() -> None:
-    scene = bpy.data.scenes.get(SCENE)
-    if scene is not None and scene.render.use_persistent_data:
-        scene.render.use_persistent_data = False  # which frees what was kept
+    scene = find(bpy.data.scenes, SCENE)
+    if scene is not None:
+        if scene.render.use_persistent_data:
+            scene.render.use_persistent_data = False  # which frees what was kept
+        let_go(scene)
+
+
+def let_go(scene: bpy.types.Scene) -> None:
+    """Takes the head and what it wears out of the relight scene, which nobody looks at: a head that the artist deletes
+    is to be gone from the file. Camera and lights stay."""
+    for thing in [o for o in scene.collection.objects if o.type not in ('CAMERA', 'LIGHT')
+                  and not (o.type == 'EMPTY' and o.name.startswith(lights.RIG))]:
+        scene.collection.objects.unlink(thing)
 
 
 def _picture(path: Path) -> None:
     """The PNG of an EXR, as the relight scene shows it; its metadata say by which view transform."""
-    scene = bpy.data.scenes[SCENE]
+    scene = find(bpy.data.scenes, SCENE)
     image = bpy.data.images.load(str(path.with_suffix(".exr")))
     try:
         as_picture(scene)

@@ -12,9 +12,9 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .. import captures, colours
-from ..data_blocks import stop_animation
+from ..data_blocks import find, stop_animation
 from ..hdri import Hdri
-from . import lights
+from . import lights, output
 from .output import SCENE, view_label
 
 CAMERA_DIRECTION = (-0.28, -1.0, 0.05)  # from the head to the camera, in the head's axes
@@ -40,9 +40,8 @@ def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, sam
            view: str = colours.VIEWS[0]) -> bpy.types.Scene:
     """The relight scene with this head and what it wears alone in it, framed and lit (None: dark); the light is turned
     by `turn` radians about the head. The picture is shown by the view transform `view`, and its file says so."""
-    scene = bpy.data.scenes.get(SCENE) or bpy.data.scenes.new(SCENE)
-    for other in [o for o in scene.collection.objects if o.type not in ('CAMERA', 'LIGHT')]:
-        scene.collection.objects.unlink(other)
+    scene = find(bpy.data.scenes, SCENE) or bpy.data.scenes.new(SCENE)
+    output.let_go(scene)
     for thing in (obj, *captures.worn(obj)):
         scene.collection.objects.link(thing)
     frame, radius = frame_of(obj)
@@ -55,6 +54,8 @@ def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, sam
     render.resolution_x = render.resolution_y = resolution
     render.resolution_percentage = 100
     render.use_lock_interface = True  # the views wait, so that no thread draws what another changes
+    scene.cycles.device = now.cycles.device  # the artist's choice; a file without one renders on the CPU
+    render.threads_mode, render.threads = now.render.threads_mode, now.render.threads
     scene.cycles.samples = samples
     scene.cycles.use_denoising = has_denoiser()
     colours.show_by(scene, view)

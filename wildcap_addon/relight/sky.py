@@ -12,7 +12,7 @@ import bpy
 from mathutils import Matrix
 
 from .. import node_trees
-from ..data_blocks import stop_animation
+from ..data_blocks import find, stop_animation
 
 WORLD = "WildCap Relight"
 HORIZON_BLEND = 0.04
@@ -37,7 +37,7 @@ def even(colour: tuple[float, float, float]) -> Sky:
 
 def world() -> bpy.types.World:
     """The relight scene's world, with a background at strength 1 and nothing before it."""
-    sky_world = bpy.data.worlds.get(WORLD) or bpy.data.worlds.new(WORLD)
+    sky_world = find(bpy.data.worlds, WORLD) or bpy.data.worlds.new(WORLD)
     tree = node_trees.of(sky_world)
     stop_animation(tree)
     for node in [n for n in tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:

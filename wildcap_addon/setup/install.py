@@ -51,8 +51,8 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
 
 
 class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
-    """Delete the folder that Install Solver made, also one that it did not finish; you are told first how much that
-    frees. Captures stay"""
+    """Delete the folder that Install Solver made, including one that it did not finish; you are told first how much
+    that frees. Captures stay"""
 
     bl_idname = "wildcap.remove_solver"
     bl_label = "Remove Solver"

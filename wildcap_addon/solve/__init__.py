@@ -4,12 +4,21 @@
 
 import bpy
 
-from . import eyedropper, operators, panel, preview, white_card
+from .. import incoming
+from . import eyedropper, live, operators, panel, preview, white_card
 
-register, _unregister = bpy.utils.register_classes_factory(
+RESULTS = incoming.Results(live.take, live.waits)
+_register, _unregister = bpy.utils.register_classes_factory(
     (*operators.CLASSES, *eyedropper.CLASSES, *white_card.CLASSES, *panel.CLASSES))
 
 
+def register():
+    _register()
+    incoming.on_results.append(RESULTS)
+
+
 def unregister():
+    incoming.on_results.remove(RESULTS)
     _unregister()
     preview.forget()
+    live.forget()

@@ -14,6 +14,23 @@ import bpy
 from ...core.contract.capture import Capture
 from .. import captures, head, jobs
 
+_ended: set[str] = set()  # captures whose solve has ended while somebody painted
+
+
+def waits(root: str) -> bool:
+    """Whether a capture's heads still show a solve that has ended."""
+    return root in _ended
+
+
+def take(_context, item) -> None:
+    """What waited for the end of a painting; called in Object Mode."""
+    if captures.root(item) in _ended:
+        update(captures.root(item))
+
+
+def forget() -> None:
+    _ended.clear()
+
 
 def prepare(context, item) -> None:
     """Puts the node into the head's material, for `update` to show once there is a picture. Without a head or a
@@ -38,12 +55,16 @@ def prepare(context, item) -> None:
 
 
 def update(root: str) -> None:
-    """Shows the newest picture of the capture's solve on its heads, and what they showed before once it has ended.
-    Makes no data-blocks."""
-    if bpy.context.mode != 'OBJECT':
+    """Shows the newest picture of the capture's solve on its heads, and what they showed before once it has ended, or
+    once nobody paints any more. Makes no data-blocks."""
+    ended = jobs.of(root) is None
+    _ended.discard(root)
+    if ended and bpy.context.mode == 'PAINT_TEXTURE':
+        _ended.add(root)  # the active node may be what is painted on
+    if root in _ended or not ended and bpy.context.mode != 'OBJECT':
         return
     for nodes, node in _nodes(root):
-        if jobs.of(root) is None:
+        if ended:
             nodes.active = nodes.get(node.get("before", "")) or nodes.active
         elif Path(bpy.path.abspath(node.image.filepath)).is_file():
             node.image.reload()

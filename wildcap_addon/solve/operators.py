@@ -5,7 +5,7 @@
 import bpy
 
 from ...core.contract.messages import Problem
-from .. import captures, jobs, status
+from .. import captures, jobs, status, undo
 from ..base_operator import BaseOperator, JobOperator
 from . import live, preview
 
@@ -15,6 +15,7 @@ class WILDCAP_OT_solve(JobOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.solve"
     bl_label = "Solve"
+    bl_options = {'REGISTER', 'UNDO'}
 
     def work(self, context):
         item = captures.require(context)
@@ -29,6 +30,7 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.solve_edited"
     bl_label = "Solve the Edited Part"
+    bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):
@@ -51,7 +53,12 @@ class WILDCAP_OT_estimate_skin_tone(JobOperator, bpy.types.Operator):
 
     def work(self, context):
         root = captures.root(captures.require(context))
-        job = jobs.start_tool(captures.require(context), "skin_tone", then=lambda: set_tone(root, job.figures))
+
+        def then() -> None:
+            set_tone(root, job.figures)
+            undo.push("Estimate Skin Tone")
+
+        job = jobs.start_tool(captures.require(context), "skin_tone", then=then)
 
 
 def begin(context, item, **shared) -> None:

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract.messages import Problem
 from ...core.contract.settings import CARDS
-from .. import bring_back, captures, jobs
+from .. import bring_back, captures, jobs, undo
 from ..base_operator import CaptureOperator, JobOperator
 from .eyedropper import colour_at
 
@@ -26,8 +26,12 @@ class WILDCAP_OT_find_color_checker(JobOperator, bpy.types.Operator):
 
     def work(self, context):
         root = captures.root(captures.require(context))
-        job = jobs.start_tool(captures.require(context), "white_point",
-                              then=lambda: set_white(root, job.figures["white_point"]))
+
+        def then() -> None:
+            set_white(root, job.figures["white_point"])
+            undo.push("Find ColorChecker")
+
+        job = jobs.start_tool(captures.require(context), "white_point", then=then)
 
 
 class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
@@ -80,7 +84,7 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
             raise Problem("There is no such frame in this capture.",
                           "Click Reconstruct first: the frames come with it.")
         if not all(0 <= c < 1 for c in self.uv):
-            raise Problem("That was beside the frame: nothing was measured.", "Click on the card.")
+            raise Problem("That click was outside the frame: nothing was measured.", "Click on the card.")
         image = bpy.data.images.load(str(path))
         try:
             colour = np.array(colour_at(image, self.uv))
@@ -113,7 +117,7 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_clear_white_point(CaptureOperator, bpy.types.Operator):
-    """Forget the measured white point: the scene tells it again"""
+    """Forget the measured white point: it is estimated from the scene again"""
 
     bl_idname = "wildcap.clear_white_point"
     bl_label = "Clear White Point"

@@ -26,7 +26,7 @@ def read(text: str, name: str) -> list[Calibrated]:
     except ValueError as error:
         raise Problem(f"{name} is damaged ({error}).", "Write the cameras from Blender again.") from error
     if not isinstance(record, dict) or not isinstance(record.get("cameras"), list):
-        raise Problem(f"{name} is JSON, but no list of Blender's cameras.",
+        raise Problem(f"{name} is a JSON file, but not a list of Blender's cameras.",
                       "Write the cameras from Blender's scene with the add-on.")
     cameras = []
     for index, camera in enumerate(record["cameras"]):

@@ -67,10 +67,16 @@ def render(root: Path):
     props, path = bpy.context.scene.wildcap, root / "renders" / "three_point.png"
     props.light, props.resolution, props.samples = 'three_point', SIDE, SAMPLES
     yield from d.scroll(-END)
+    shown: set[str] = set()  # by name: when it has been rendered, the head leaves the scene again
+
+    def look(scene, *_):
+        shown.update(thing.name for thing in scene.collection.objects)
+
+    bpy.app.handlers.render_pre.append(look)
     yield from d.press("wildcap.render")
     yield from d.until(path.is_file, "the render", 120)
-    shown = set(bpy.data.scenes["WildCap Relight"].collection.objects)
-    assert shown >= {*hair(), *things()}, "the render leaves out what the head wears"
+    bpy.app.handlers.render_pre.remove(look)
+    assert shown >= {thing.name for thing in (*hair(), *things())}, "the render leaves out what the head wears"
     (d.OUT / "acting_render.png").write_bytes(path.read_bytes())
 
 

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ... import captures, data_blocks, local_view
 from .. import materials as of_the_head
 from .. import mesh
 from ..asset import load
-from . import eyes, mouth, nodes, pictures, shapes
+from . import eyes, keeping, mouth, nodes, pictures, shapes
 
 KEY = captures.CLOSE_UP_KEY
 
@@ -20,12 +21,18 @@ def of(obj) -> list[bpy.types.Object]:
     return captures.close_up(obj)
 
 
-def add(context, obj) -> None:
-    """Makes the close-up, or renews it: objects that are there keep their materials, and what was set in them."""
+def add(context, obj) -> list[str]:
+    """Makes the close-up, or renews it: objects that are there keep their materials, and what was set in them; those on
+    which somebody modelled stay as they are. Returns the names of these."""
     made: list = []
+    left: list[str] = []
 
-    def keep(kind: str, data):
+    def keep(kind: str, data, finish):
         thing = next((child for child in of(obj) if child[KEY] == kind), None)
+        if thing is not None and keeping.is_modelled(thing):
+            bpy.data.meshes.remove(data)
+            left.append(thing.name)
+            return thing
         if thing is None:
             thing = bpy.data.objects.new(f"{obj.name} {kind}", data)
             for collection in obj.users_collection:
@@ -34,11 +41,14 @@ def add(context, obj) -> None:
             made.append(thing)
         else:
             data_blocks.replace_data(thing, data, bpy.data.meshes)
+        finish(thing)
+        keeping.note(thing)
         return thing
 
     eyes.build(obj, keep, _irises(obj))
     mouth.build(obj, keep)
     local_view.join(context, made)
+    return left
 
 
 def remove(obj) -> None:
@@ -55,20 +65,22 @@ def remove(obj) -> None:
         bpy.data.objects.remove(thing)
     _drop(bpy.data.meshes, data)
     _drop(bpy.data.materials, made)
-    _drop(bpy.data.images,
-          [image for image in map(bpy.data.images.get, (pictures.IRIS, pictures.WHITE)) if image is not None])
-    _drop(bpy.data.node_groups,
-          [tree for tree in map(bpy.data.node_groups.get, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE))
-           if tree is not None])
+    for blocks, names in ((bpy.data.images, (pictures.IRIS, pictures.WHITE)),
+                          (bpy.data.node_groups, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE))):
+        _drop(blocks, filter(None, [data_blocks.find(blocks, name) for name in names]))
 
 
-def keep_up(obj, _capture) -> None:
-    """The close-up of a head that was reconstructed anew is made for its new shape; one of a head that has its units no
-    more goes. `head.complete` asks."""
-    if of(obj) and mesh.has(obj):
-        add(bpy.context, obj)
-    elif of(obj):
+def keep_up(obj, _capture) -> str:
+    """The close-up of a head that was reconstructed anew is made for its new shape; one of a head that was cut since,
+    or lost a unit, stays as it is; one of a head that has its units no more goes. Returns what is to be told.
+    `head.complete` asks."""
+    left = []
+    if of(obj) and mesh.is_complete(obj):
+        left = add(bpy.context, obj)
+    elif of(obj) and not mesh.has(obj):
         remove(obj)
+    return rpt_("{}: changed since, and left as they are; delete them to have them made anew").format(
+        ", ".join(left)) if left else ""
 
 
 def _drop(collection, blocks) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from ...data_blocks import read_field
 from .. import materials as of_the_head
 from ..asset import LEFT_EYE, SIDES, FaceUnits, load
-from . import ball, materials, nodes, shapes
+from . import ball, keeping, materials, nodes, shapes
 
 REACH_M = 0.00042
 """How far tears climb onto the ball and up the margin of a lid."""
@@ -30,33 +30,47 @@ LIFT_SHARE = 0.10
 
 
 def build(obj, keep, iris_m: tuple[float, float]) -> None:
-    """Makes or renews the objects of both eyes; `keep(kind, data)` gives the object of a kind with new mesh data.
-    iris_m: radii in metres."""
+    """Makes or renews the objects of both eyes; `keep(kind, data, finish)` gives the object of a kind, which has the
+    new mesh data and went through `finish`, or is as the artist left it. iris_m: radii in metres."""
     asset = load()
     shells = []
     for number, side in enumerate(SIDES):
         eye = ball.of(obj, number)
         edge = shapes.limbus(eye.radius, iris_m[number])
-        inner = keep(f"{side} Eye", _turned(f"{obj.name} {side} Eye", shapes.inner(eye.radius, edge), number))
-        shell = keep(f"{side} Cornea", _turned(f"{obj.name} {side} Cornea", shapes.shell(eye.radius, edge), 0))
-        for thing in (inner, shell):
+
+        def finish_inner(thing, eye=eye, side=side):
             _place(thing, obj, eye, side)
-        materials.fill(inner, materials.white(obj.name), materials.iris(obj.name, of_the_head.colour_of(obj)),
-                       materials.pupil(obj.name))
-        materials.fill(shell, materials.cornea(obj.name))
-        _let_light_in(shell)
+            materials.fill(thing, materials.white(obj.name), materials.iris(obj.name, of_the_head.colour_of(obj)),
+                           materials.pupil(obj.name))
+
+        def finish_shell(thing, eye=eye, side=side):
+            _place(thing, obj, eye, side)
+            materials.fill(thing, materials.cornea(obj.name))
+            _let_light_in(thing)
+
+        keep(f"{side} Eye", _turned(f"{obj.name} {side} Eye", shapes.inner(eye.radius, edge), number), finish_inner)
+        shell = keep(f"{side} Cornea", _turned(f"{obj.name} {side} Cornea", shapes.shell(eye.radius, edge), 0),
+                     finish_shell)
+
+        def finish_margin(thing, shell=shell):
+            materials.fill(thing, obj.data.materials[0])  # the head's skin, in the colour of the rim
+            nodes.modify(thing, nodes.lid_margin(), Head=obj, Shell=shell)
+
+        def finish_wet(thing, shell=shell):
+            materials.fill(thing, materials.tears(obj.name))
+            _let_light_in(thing)
+            nodes.modify(thing, nodes.wet_line(), Head=obj, Shell=shell)
+            _smoothed(thing)
+
+        def finish_flesh(thing, shell=shell):
+            materials.fill(thing, materials.flesh(obj.name))
+            nodes.modify(thing, nodes.caruncle(), Head=obj, Shell=shell)
+            _smoothed(thing)
+
         rims = ball.rims(asset, number)
-        margin = keep(f"{side} Lid Margin", _margin(f"{obj.name} {side} Lid Margin", rims, obj.data))
-        materials.fill(margin, obj.data.materials[0])  # the head's skin, in the colour of the rim
-        wet = keep(f"{side} Wet Line", _along_lids(f"{obj.name} {side} Wet Line", rims, {"reach": REACH_M}))
-        materials.fill(wet, materials.tears(obj.name))
-        _let_light_in(wet)
-        flesh = keep(f"{side} Caruncle", _caruncle(f"{obj.name} {side} Caruncle", rims, asset))
-        materials.fill(flesh, materials.flesh(obj.name))
-        for thing, tree in ((margin, nodes.lid_margin()), (wet, nodes.wet_line()), (flesh, nodes.caruncle())):
-            nodes.modify(thing, tree, Head=obj, Shell=shell)
-            if thing is not margin:  # which ends at the rim's own vertices
-                _smoothed(thing)
+        keep(f"{side} Lid Margin", _margin(f"{obj.name} {side} Lid Margin", rims, obj.data), finish_margin)
+        keep(f"{side} Wet Line", _along_lids(f"{obj.name} {side} Wet Line", rims, {"reach": REACH_M}), finish_wet)
+        keep(f"{side} Caruncle", _caruncle(f"{obj.name} {side} Caruncle", rims, asset), finish_flesh)
         shells.append(shell)
     first = len(asset.template) + len(asset.copies) + int(np.flatnonzero(asset.kind == LEFT_EYE)[0])
     nodes.modify(obj, nodes.lids_on_eyes(), Left=shells[0], Right=shells[1], First=first)
@@ -155,8 +169,10 @@ def _place(eye_object, obj, eye: ball.RiggedEyeball, side: str) -> None:
 
 
 def _let_light_in(obj) -> None:
-    """What is clear throws no shadow on what is behind; light that was scattered there goes out through it."""
-    obj.visible_shadow = obj.visible_diffuse = False
+    """What is clear throws no shadow on what is behind; light that was scattered there goes out through it. Set once:
+    afterwards it is the artist's."""
+    if keeping.MADE not in obj:
+        obj.visible_shadow = obj.visible_diffuse = False
 
 
 def _smoothed(obj) -> None:

@@ -7,6 +7,7 @@ has an output of its own."""
 import bpy
 
 from ... import node_trees
+from ...data_blocks import find
 from .. import materials
 from . import pictures
 from .nodes import add, math
@@ -178,7 +179,7 @@ def _uneven(tree, shader, scale: float, strength: float, distance: float) -> Non
 def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
     """The material of a name and its shader; None for the shader of one that is there and keeps the artist's
     changes."""
-    existing = bpy.data.materials.get(name)
+    existing = find(bpy.data.materials, name)
     if existing is not None and existing.get(materials.KEY) == kind:
         return existing, None
     material = bpy.data.materials.new(name)

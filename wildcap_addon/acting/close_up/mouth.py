@@ -29,7 +29,7 @@ OUT_BY = "min(tongueOut, jawOpen)"
 
 
 def build(obj, keep) -> None:
-    """Makes or renews teeth and tongue; `keep(kind, data)` gives the object of a kind with new mesh data."""
+    """Makes or renews teeth and tongue; `keep(kind, data, finish)` is as the eyes have it."""
     asset = load()
     upper, lower, tongue = mouth_shapes.bands(asset)
     first = len(asset.template) + len(asset.copies)
@@ -44,19 +44,24 @@ def build(obj, keep) -> None:
     placed = placed + lower_by
     turned = {name: np.where(shape.lower[:, None], _affine(rest[lower], moved[lower], placed), 0)
               for name, moved in moves.items()}
-    teeth = keep("Teeth", _data(f"{obj.name} Teeth and Gums", placed, shape.faces, shape.slots))
     front = float(placed[:, 1].min())
-    materials.fill(teeth, materials.teeth(obj.name, front), materials.gums(obj.name, front))
+
+    def finish_teeth(thing):
+        materials.fill(thing, materials.teeth(obj.name, front), materials.gums(obj.name, front))
+        _keyed(thing, obj, placed, turned)
+
+    def finish_tongue(thing):
+        materials.fill(thing, materials.tongue(obj.name, front))
+        _keyed(thing, obj, rest[tongue] + lower_by, _tongue_moves(moves, tongue),
+               {OUT: OUT_BY, OVER: f"4 * {OUT_BY} * (1 - {OUT_BY})"})
+        modifier = thing.modifiers.get("Subdivision") or thing.modifiers.new("Subdivision", 'SUBSURF')
+        modifier.levels, modifier.render_levels = 1, 2
+
+    keep("Teeth", _data(f"{obj.name} Teeth and Gums", placed, shape.faces, shape.slots), finish_teeth)
     nodes.modify(obj, nodes.lids_on_eyes(), Lining=materials.gums(obj.name, front))
-    _keyed(teeth, obj, placed, turned)
     faces = [[int(where) for where in np.searchsorted(tongue, [i - first for i in face if i >= 0])]
              for face in _faces(asset, first, tongue)]
-    flesh = keep("Tongue", _data(f"{obj.name} Tongue", rest[tongue] + lower_by, faces, np.zeros(len(faces))))
-    materials.fill(flesh, materials.tongue(obj.name, front))
-    _keyed(flesh, obj, rest[tongue] + lower_by, _tongue_moves(moves, tongue),
-           {OUT: OUT_BY, OVER: f"4 * {OUT_BY} * (1 - {OUT_BY})"})
-    modifier = flesh.modifiers.get("Subdivision") or flesh.modifiers.new("Subdivision", 'SUBSURF')
-    modifier.levels, modifier.render_levels = 1, 2
+    keep("Tongue", _data(f"{obj.name} Tongue", rest[tongue] + lower_by, faces, np.zeros(len(faces))), finish_tongue)
 
 
 def _tongue_moves(moves: dict[str, np.ndarray], tongue: np.ndarray) -> dict[str, np.ndarray]:

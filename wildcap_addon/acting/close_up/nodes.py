@@ -5,6 +5,8 @@ turns or reshapes the head."""
 
 import bpy
 
+from ...data_blocks import find
+
 LIDS, MARGIN, WET, CARUNCLE = "WildCap Lids on Eyes", "WildCap Lid Margin", "WildCap Wet Line", "WildCap Caruncle"
 CLEAR_M = 0.00015
 """At which lids stay from the clear shell: the film of tears."""
@@ -50,7 +52,7 @@ def scaled(tree, direction, factor):
 
 def group(name: str, inputs: dict[str, str], build) -> bpy.types.NodeTree:
     """The geometry nodes of a name, made once per file: inputs, name -> kind of socket, follow the geometry."""
-    tree = bpy.data.node_groups.get(name)
+    tree = find(bpy.data.node_groups, name)
     if tree is None:
         tree = bpy.data.node_groups.new(name, 'GeometryNodeTree')
         tree.is_modifier = True

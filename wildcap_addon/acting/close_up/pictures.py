@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ... import colours
+from ...data_blocks import find
 
 IRIS, WHITE = "WildCap Iris", "WildCap White"
 IRIS_SIZE, WHITE_SIZE = (384, 1536), (640, 2048)  # rows from the pupil, or from the limbus, outwards; columns around
@@ -136,7 +137,7 @@ def _smooth(x: np.ndarray, low: np.ndarray | float, high: np.ndarray | float) ->
 
 
 def _image(name: str, pattern) -> bpy.types.Image:
-    image = bpy.data.images.get(name)
+    image = find(bpy.data.images, name)
     if image is not None and image.packed_file is not None:
         return image
     pixels = pattern()

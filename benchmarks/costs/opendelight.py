@@ -1,10 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a frame costs by OpenDelight's networks: python -m benchmarks.opendelight_cost [--frames N] [--device cpu|cuda]
+"""What a frame costs by OpenDelight's networks:
+
+    python -m benchmarks.costs opendelight [--frames N] [--device cpu|cuda] [--json OUT.json]
 
 The checkpoint is random, of the published shapes, so the time and the memory are those of the real one and the pictures
-mean nothing. Printed are the multiplications of a frame, seconds per frame, beside them how long 10^12 multiplications
-of one large matrix product take on the same machine at the same time, and the peak memory.
+mean nothing. Told are the multiplications of a frame, seconds per frame, beside them how long 10^12 multiplications of
+one large matrix product take on the same machine at the same time, the longest time between two looks at a cancel, and
+the peak memory.
 """
 
 from __future__ import annotations
@@ -22,30 +25,35 @@ from torch.utils.flop_counter import FlopCounterMode
 from core.delight.opendelight_checkpoint import BASE, ENHANCER, load
 from core.delight.opendelight_network import delight_crop
 
+from ..figures import plain, write
+from .meter import peak, spending
+
 SIZE = 512
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.opendelight_cost", description=__doc__,
+def main(arguments: list[str]) -> None:
+    parser = argparse.ArgumentParser("python -m benchmarks.costs opendelight", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", type=int, default=1)
     parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
-    options = parser.parse_args()
-    print(f"{multiplications():.2f} x 10^12 multiplications per frame")
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/opendelight_cost.json")
+    options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
         write_random(Path(folder))
         checkpoint = load(folder, options.device)
-    before = _peak(options.device)
+    before = _peak_gb(options.device)
     picture = torch.rand(1, 3, SIZE, SIZE, generator=torch.Generator().manual_seed(0)).to(options.device)
     yardsticks, frames, steps = [_yardstick(options.device)], [], []
     for _ in range(options.frames):
         frames.append(_seconds(lambda: delight_crop(checkpoint.base, checkpoint.enhancer, picture,
                                                     lambda: steps.append(time.monotonic())), options.device))
         yardsticks.append(_yardstick(options.device))
-    print(f"{np.mean(frames):.1f} s per frame on {options.device}, {torch.get_num_threads()} threads; 10^12 "
-          f"multiplications: {np.mean(yardsticks):.1f} s; "
-          f"longest time between two looks at a cancel: {np.diff(steps).max():.2f} s; "
-          f"memory: {_peak(options.device):.0f} MB at most, {before:.0f} MB before the first frame")
+    found = plain({"tera_multiplications": round(multiplications(), 2), "peak_gb": round(_peak_gb(options.device), 1),
+                   "seconds": round(np.mean(frames), 1), "seconds_of_a_product": round(np.mean(yardsticks), 1),
+                   "seconds_to_cancel": round(np.diff(steps).max(), 1)})
+    print(f"{options.device}, {torch.get_num_threads()} threads, {before:.1f} GB before the first frame:", found)
+    if options.json:
+        write(options.json, "costs", "python -m benchmarks.costs opendelight", found)
 
 
 def multiplications() -> float:
@@ -127,21 +135,11 @@ def _yardstick(device: str) -> float:
 
 
 def _seconds(work, device: str) -> float:
-    started = time.monotonic()
-    work()
-    if device == "cuda":
-        torch.cuda.synchronize()
-    return time.monotonic() - started
+    with spending(torch.cuda.synchronize if device == "cuda" else lambda: None) as spent:
+        work()
+    return spent.seconds
 
 
-def _peak(device: str) -> float:
-    """Megabytes: of the process, or of the graphics card."""
-    if device == "cuda":
-        return torch.cuda.max_memory_allocated() / 1e6
-    import resource  # Windows has none
-
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-
-
-if __name__ == "__main__":
-    main()
+def _peak_gb(device: str) -> float:
+    """Of the process, or of the graphics card."""
+    return (torch.cuda.max_memory_allocated() if device == "cuda" else peak()) / 1e9

@@ -3,8 +3,8 @@
 """How fast the solver is and how much memory it takes, each row in a fresh process: seconds per sampling step, peak
 memory, the ratio to the plain recipe.
 
-    python -m benchmarks.solver_speed [--rows plain ours ...] [--size 1024] [--steps 6] [--network ours|60M] [--device
-                                      cpu|cuda] [--compile] [--capture FOLDER] [--json FILE]
+    python -m benchmarks.costs solver [--rows plain ours ...] [--size 1024] [--steps 6] [--network ours|60M]
+                                      [--device cpu|cuda] [--compile] [--capture FOLDER] [--json FILE]
 
 The first rows sample `--steps` steps of the walk, with their share of the light's updates: "plain" in float32, channels
 first, the whole map from the first step on; "ours" in the precision that is chosen here, channels last, coarse to fine;
@@ -19,16 +19,31 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
+import shlex
+import shutil
 import sys
 import tempfile
-import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .figures import write
+import torch
 
-ROOT = Path(__file__).resolve().parent.parent
+from core import shadow_mask, solve
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
+from core.face.head import read_head
+from core.solve import initial, network, network_blocks
+from core.solve import prior as priors
+from core.solve.evidence import read_evidence
+from core.solve.memory import sample_within_memory, spare_memory
+from core.solve.recipes import OURS
+from core.solve.sampler import Sampler, seed_noise
+from core.solve.skin_tone import parse_skin_tone
+
+from ..figures import write
+from .meter import GIB, peak, run_alone, spending
+
 AUTHORS = {"model": {"type": "image_v1", "input_channels": 7, "patch_size": 1, "mapping_out": 256,
                      "depths": [2, 2, 4, 4], "channels": [128, 256, 256, 512],
                      "augment_wrapper": True, "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80},
@@ -65,8 +80,9 @@ ROWS = {
 }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def main(arguments: list[str]) -> None:
+    parser = argparse.ArgumentParser("python -m benchmarks.costs solver", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS)[:-2])
     parser.add_argument("--size", type=int, default=1024, help="of the rows of single steps")
     parser.add_argument("--steps", type=int, default=6)
@@ -76,22 +92,21 @@ def main() -> None:
     parser.add_argument("--capture", type=Path, help="a capture whose chain came as far as the texture")
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/solver_speed.json")
     parser.add_argument("--child", nargs=2, metavar=("ROW", "FOLDER"), help=argparse.SUPPRESS)
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     if options.child:
         print(json.dumps(measured(ROWS[options.child[0]], Path(options.child[1]), options)))
         return
     rows = {}
     with tempfile.TemporaryDirectory() as folder:
-        prepare(Path(folder), options.capture)
+        run_alone(["-c", f"from {__name__} import make; make({folder!r}, {str(options.capture or '')!r})"]).checked()
         for name in options.rows:
-            given = [*sys.argv[1:], "--child", name, folder]
-            child = subprocess.run([sys.executable, "-m", "benchmarks.solver_speed", *given], cwd=ROOT,
-                                   stdout=subprocess.PIPE, text=True, check=True)
-            rows[name] = json.loads(child.stdout.splitlines()[-1])
+            ran = run_alone(["-m", __package__, "solver", *arguments, "--child", name, folder]).checked()
+            rows[name] = json.loads(ran.said.splitlines()[-1])
             print(line(name, rows[name], rows.get("plain")), flush=True)
     if options.json:
         plain = rows.get("plain", {}).get("seconds_per_step")
-        write(options.json, "solver_speed", "python -m benchmarks.solver_speed", {
+        command = f"python -m benchmarks.costs solver --rows {shlex.join(options.rows)} --steps {options.steps}"
+        write(options.json, "costs", command, {
             "network": options.network, "device": options.device, "size": options.size,
             "python_gib": next(row["peak_gib"] - row["added_gib"] for row in rows.values()),
             "steps": {name: {**row, "to_plain": plain and row["seconds_per_step"] / plain} for name, row in rows.items()
@@ -101,13 +116,13 @@ def main() -> None:
 
 def line(name: str, row: dict, plain: dict | None) -> str:
     """What a row says, for the screen."""
-    parts = [f"{row['seconds']:7.2f} s, of the processor's {row['processor_seconds']:.2f} s"]
+    parts = [f"{row['seconds']:7.2f} s, of the processor's {row['processor_s']:.2f} s"]
     if "seconds_per_step" in row:
         parts.append(f"{row['seconds_per_step']:.3f} s a step, of the processor's "
-                     f"{row['processor_seconds_per_step']:.3f} s")
+                     f"{row['processor_s_per_step']:.3f} s")
         if plain is not None:
             parts.append(" and ".join(f"{row[name] / plain[name]:.2f}"
-                                      for name in ("seconds_per_step", "processor_seconds_per_step")) + " of plain's")
+                                      for name in ("seconds_per_step", "processor_s_per_step")) + " of plain's")
     if ROWS[name].target:
         parts.append(f"{ROWS[name].target} s allowed on two cores alone")
     parts.append(f"{row['peak_gib']:5.2f} GiB, {row['added_gib']:.2f} of it since the libraries were loaded")
@@ -116,18 +131,9 @@ def line(name: str, row: dict, plain: dict | None) -> str:
     return f"{name:>30}: {', '.join(parts)}  ({row['dtype']}, {row['threads']} threads)"
 
 
-def prepare(folder: Path, source: Path | None) -> None:
-    """A capture that is ready to be solved, in a process of its own as well: a copy of `source`, or a synthetic
-    subject's texture."""
-    code = f"from benchmarks.solver_speed import make; make({str(folder)!r}, {str(source) if source else None!r})"
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
-
-
-def make(folder: str, source: str | None) -> None:
-    import shutil
-
-    from benchmarks.uv_problems import plain_problem
-    from core.contract.capture import Capture
+def make(folder: str, source: str) -> None:
+    """A capture that is ready to be solved: a copy of `source`, or where that is "" a synthetic subject's texture."""
+    from ..uv_problems import plain_problem  # its libraries are not the solver's
 
     capture = Capture(Path(folder) / "a.wildcap")
     if source:
@@ -139,37 +145,19 @@ def make(folder: str, source: str | None) -> None:
 
 def measured(row: SolverVariant, folder: Path, options: argparse.Namespace) -> dict:
     """A row's figures, in this process."""
-    import torch
-
-    from core import solve  # noqa: F401 - all that the stage imports counts as loaded
-    from core.contract.capture import Capture
-
-    before = peak_gib()
+    before = peak()  # all that the stage imports counts as loaded
     capture = Capture(folder / "a.wildcap")
     found = whole_stage(row, capture, options) if row.stage else single_steps(row, capture, options)
-    found |= {"peak_gib": round(peak_gib(), 3), "added_gib": round(peak_gib() - before, 3),
+    found |= {"peak_gib": round(peak() / GIB, 3), "added_gib": round((peak() - before) / GIB, 3),
               "threads": torch.get_num_threads()}
     if options.device.startswith("cuda"):
-        found["device_peak_gib"] = round(torch.cuda.max_memory_allocated() / 2**30, 3)
+        found["device_peak_gib"] = round(torch.cuda.max_memory_allocated() / GIB, 3)
     return found
 
 
-def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> dict:
+def single_steps(row: SolverVariant, capture: Capture, options: argparse.Namespace) -> dict:
     """`options.steps` steps that lie along the walk as all of them do, each with as many light updates as one of
     theirs."""
-    from dataclasses import replace
-
-    import torch
-
-    from core.contract.messages import Reporter
-    from core.face.head import read_head
-    from core.solve import initial
-    from core.solve.evidence import read_evidence
-    from core.solve.memory import sample_within_memory
-    from core.solve.recipes import OURS
-    from core.solve.sampler import Sampler, seed_noise
-    from core.solve.skin_tone import parse_skin_tone
-
     prior = prior_of(row, options)
     coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
@@ -183,72 +171,43 @@ def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> di
         sample_within_memory(Sampler(conditioned, short, seed_noise(0)), begun.observations, begun.state)  # warms up
         begun.state.step, begun.state.x, begun.state.denoised = 0, None, begun.reference
     report = Reporter("solve", emit=lambda message: print(message.text, file=sys.stderr))
-    began, worked = time.perf_counter(), time.process_time()
-    sample_within_memory(Sampler(conditioned, short, seed_noise(0)), begun.observations, begun.state, log=report.log)
-    seconds, worked = time.perf_counter() - began, time.process_time() - worked
+    with spending() as spent:
+        sample_within_memory(Sampler(conditioned, short, seed_noise(0)), begun.observations, begun.state,
+                             log=report.log)
     dtype = str(prior.network.proj_in.weight.dtype).removeprefix("torch.")
-    return {"seconds": round(seconds, 3), "processor_seconds": round(worked, 2),
-            "seconds_per_step": round(seconds / short.steps, 4),
-            "processor_seconds_per_step": round(worked / short.steps, 4), "steps": short.steps, "dtype": dtype}
+    return {"seconds": round(spent.seconds, 3), "processor_s": round(spent.processor_s, 2),
+            "seconds_per_step": round(spent.seconds / short.steps, 4),
+            "processor_s_per_step": round(spent.processor_s / short.steps, 4), "steps": short.steps, "dtype": dtype}
 
 
-def whole_stage(row: SolverVariant, capture, options: argparse.Namespace) -> dict:
-    """The stage solve, the mask's proposal before it where the capture has frames; imports and loading count."""
-    import torch
-
-    from core import shadow_mask, solve
-    from core.contract.messages import Reporter
-    from core.contract.settings import from_json
-    from core.solve import prior
-
-    dtype = torch.float32 if row.float32 else prior.fast_dtype(options.device)
-    prior.fast_dtype = lambda device: dtype
+def whole_stage(row: SolverVariant, capture: Capture, options: argparse.Namespace) -> dict:
+    """The stage solve, the mask's proposal before it where the capture has frames; loading the prior counts."""
+    dtype = torch.float32 if row.float32 else priors.fast_dtype(options.device)
+    priors.fast_dtype = lambda device: dtype
     settings = from_json({"device": options.device, "solve": row.stage})
     report = Reporter("solve", emit=lambda message: None)
-    began, worked = time.perf_counter(), time.process_time()
-    if capture.delit.is_dir():
-        shadow_mask.run(capture, settings, report)
-    solve.run(capture, settings, report)
-    return {"seconds": round(time.perf_counter() - began, 2),
-            "processor_seconds": round(time.process_time() - worked, 2), "dtype": str(dtype).removeprefix("torch.")}
+    with spending() as spent:
+        if capture.delit.is_dir():
+            shadow_mask.run(capture, settings, report)
+        solve.run(capture, settings, report)
+    return {"seconds": round(spent.seconds, 2), "processor_s": round(spent.processor_s, 2),
+            "dtype": str(dtype).removeprefix("torch.")}
 
 
-def prior_of(row: SolverVariant, options: argparse.Namespace):
+def prior_of(row: SolverVariant, options: argparse.Namespace) -> priors.Prior:
     """The shipped prior, or one of the authors' size, as the row has it."""
-    import torch
-
-    from core.solve import network as networks
-    from core.solve import network_blocks
-    from core.solve.memory import spare_memory
-    from core.solve.prior import ReleasedPrior, build_network, fast_dtype, load
-
-    dtype = torch.float32 if row.float32 else fast_dtype(options.device)
+    dtype = torch.float32 if row.float32 else priors.fast_dtype(options.device)
     if row.channels_first:
-        networks.MEMORY_FORMAT = network_blocks.MEMORY_FORMAT = torch.contiguous_format
+        network.MEMORY_FORMAT = network_blocks.MEMORY_FORMAT = torch.contiguous_format
     if options.network == "ours":
-        prior = load(device=options.device, dtype=dtype)
+        prior = priors.load(device=options.device, dtype=dtype)
     else:
         torch.manual_seed(0)
-        network = build_network(AUTHORS)
-        for parameter in network.parameters():  # those that begin at zero as well: their products are to be worked out
+        made = priors.build_network(AUTHORS)
+        for parameter in made.parameters():  # those that begin at zero as well: their products are to be worked out
             torch.nn.init.normal_(parameter, std=0.02)
-        prior = ReleasedPrior(network, "coord", 0, (0.01, 80.0), None)
-        network.to(options.device).lower(dtype)
+        prior = priors.ReleasedPrior(made, "coord", 0, (0.01, 80.0), None)
+        made.to(options.device).lower(dtype)
     if row.low_memory:
         spare_memory(prior)
     return prior
-
-
-def peak_gib() -> float:
-    """The largest resident size of this process so far."""
-    try:
-        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-        return int(next(each for each in lines if each.startswith("VmHWM")).split()[1]) / 2**20
-    except OSError:
-        import resource
-
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**30 if sys.platform == "darwin" else 2**20)
-
-
-if __name__ == "__main__":
-    main()

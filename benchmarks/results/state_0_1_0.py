@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/results/state_0_1_0.md: the same captures, heads and measures by version 0.1.0."""
+
+from __future__ import annotations
+
+from .. import state
+from ..figures import Figures
+from ..measures.table import Scores, summarise, to_markdown
+from ..pages import Sections, prose
+from ..state_captures import DELIT, SOLVED
+
+TITLE = "The state of version 0.1.0"
+SAYS = "the same captures, heads and measures by the delighter and the solver of 0.1.0, and what has changed since"
+RECORDS = ("state_0_1_0", "state")
+COMPARED = {name: state.TABLES[table][name]
+            for table, names in (("In the picture", ("psnr", "ssim", "flip", "detail", "shadow_step")),
+                                 ("Up to a light, and across lights", ("psnr_shared", "agreement")),
+                                 ("Features kept", ("lost",)))
+            for name in names}
+
+
+def sections(before: Figures, now: Figures) -> Sections:
+    return [("", prose("""
+        `python -m benchmarks.earlier` took the captures of [the state](state.md) through 0.1.0's own code and weights,
+        from the delighter on; frames, cameras and heads are today's. The tables below the first are those of that page.
+        """)),
+            ("What has changed", changes(before, now)),
+            *((title or "By 0.1.0 alone", text) for title, text in state.sections(before.people, before.captures))]
+
+
+def changes(before: Figures, now: Figures) -> str:
+    """Today's texture and albedo less those of 0.1.0, person by person, of people with the same captures in both."""
+    return "\n\n".join(
+        to_markdown(summarise(paired(before.people[method], now.people[method], method), COMPARED,
+                              f"{method}, 0.1.0"),
+                    COMPARED, "taken for albedo", f"{method}, 0.1.0")
+        for method in (DELIT, SOLVED))
+
+
+def paired(before: Figures, now: Figures, method: str) -> Scores:
+    """Method of then and of now -> person -> figures, where as many captures of the person were measured."""
+    same = [person for person, row in before.items() if now.get(person, {}).get("captures") == row["captures"]]
+    return {f"{method}, 0.1.0": {person: before[person] for person in same},
+            method: {person: now[person] for person in same}}

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an artist models on a close-up's eyes, teeth and tongue stays when the material is assembled again, and is
+named; the rest follows the head's shape."""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from tests.test_acting import coordinates, head, write_head  # noqa: E402, F401  (head is a fixture)
+from tests.test_close_up import close_up, drawn_once, things  # noqa: E402, F401  (fixtures)
+
+
+def test_what_was_modelled_stays_and_is_named_and_the_rest_follows_the_head(close_up, capture, addon):  # noqa: F811
+    worn = things(close_up)
+    worn["Teeth"].shape_key_add(name="Gap").data[0].co.x += 0.01
+    worn["Right Wet Line"].data.attributes.new("stain", 'FLOAT', 'POINT')
+    worn["Left Eye"].data.vertices[0].co.x += 0.002
+    worn["Right Eye"].location.y -= 0.001
+    worn["Tongue"].vertex_groups.new(name="Jaw").add([0], 1.0, 'REPLACE')
+    worn["Left Cornea"].data.uv_layers[0].data[5].uv.x += 0.1
+    kept = {kind: (worn[kind].data, worn[kind].location.copy(), coordinates(worn[kind].data.vertices))
+            for kind in ("Teeth", "Right Wet Line", "Left Eye", "Right Eye", "Tongue", "Left Cornea")}
+    place = worn["Right Cornea"].location.copy()
+    write_head(capture, 0.9)
+    bpy.ops.wildcap.bring_in_head()
+    meshes = len(bpy.data.meshes)
+    material, told = addon("relight.material").assemble(bpy.context, addon("captures").active(bpy.context))
+    assert material == close_up.data.materials[0] and things(close_up) == worn and len(bpy.data.meshes) == meshes
+    names = told.partition(": changed since")[0].split(", ")
+    assert sorted(names) == sorted(worn[kind].name for kind in kept)
+    for kind, (mesh, where, vertices) in kept.items():
+        assert worn[kind].data == mesh and worn[kind].location == where
+        assert np.array_equal(coordinates(mesh.vertices), vertices)
+    assert worn["Right Cornea"].location != place
+    assert "Gap" in worn["Teeth"].data.shape_keys.key_blocks
+    assert len(worn["Right Eye"].animation_data.drivers) == 2
+
+
+def test_an_object_that_nobody_touched_follows_and_nothing_is_told(close_up, capture, addon, tmp_path):  # noqa: F811
+    name, file = close_up.name, str(tmp_path / "face.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    obj = bpy.data.objects[name]
+    before = {kind: coordinates(thing.data.vertices) for kind, thing in things(obj).items()}
+    write_head(capture, 0.9)
+    bpy.ops.wildcap.bring_in_head()
+    _, told = addon("relight.material").assemble(bpy.context, addon("captures").active(bpy.context))
+    assert told == ""
+    assert not np.array_equal(coordinates(things(obj)["Teeth"].data.vertices), before["Teeth"])
+
+
+def test_what_the_artist_lets_the_cornea_shade_stays(close_up):  # noqa: F811
+    cornea = things(close_up)["Left Cornea"]
+    assert not cornea.visible_shadow
+    cornea.visible_shadow = True
+    bpy.ops.wildcap.assemble_material()
+    assert cornea.visible_shadow
