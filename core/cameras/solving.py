@@ -46,12 +46,12 @@ FILM_AGAIN = ("Film again: the person sits still, the camera moves slowly around
 
 @dataclass(frozen=True)
 class Solved:
-    """A model in a world of its own; how it was face_by_name: plain, skin or face; the head in it; the faces it was
-    found by; whether the head moved before its background, and whether the camera stood still then; mirrored frames
-    that were left out; tracks that refined a model from the face, and whether they are enough to trust it; the matches
-    it comes from, where more is to be made of them; whether after that every frame is held by what matches; swayed: the
-    share of the error of the head's matches that went when the room had no say; to_place: the frames that were to be
-    placed, where those are not all."""
+    """A model in a world of its own; how it was found: plain, skin or face; the head in it; the faces it was found by;
+    whether the head moved before its background, and whether the camera stood still then; mirrored frames that were
+    left out; tracks that refined a model from the face, and whether they are enough to trust it; the matches it comes
+    from, where more is to be made of them; whether after that every frame is held by what matches; swayed: the share of
+    the error of the head's matches that went when the room had no say; to_place: the frames that were to be placed,
+    where those are not all."""
 
     model: pycolmap.Reconstruction
     way: str
@@ -187,7 +187,7 @@ def _by_features(skin: bool, frames: Frames, capture: Capture, face_by_name: dic
     with capture.workspace() as work:
         if alone:
             face_by_name = (face_by_name if len(face_by_name) > len(frames.records) / 2
-                     else find_landmarks(frames.records, capture.frames, report))
+                            else find_landmarks(frames.records, capture.frames, report))
             head_masks(face_by_name, frames.records, capture.frames, work, report)
         model, matches = solve_structure(frames, capture, skin, settings.cameras.matching, settings.seed, report,
                                          work if alone else None)
