@@ -156,10 +156,10 @@ def _held_out(folder: Path) -> list[str]:
     return [str(folder / f"{name}.png") for name in names]
 
 
-def _solve_problem(subject: str, shadows: str, wanted: list[tuple[str, int]], options: argparse.Namespace) -> dict:
+def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], options: argparse.Namespace) -> dict:
     torch.set_num_threads(1)
     given, found = problem(subject, shadows, options.size, options.kind), {}
-    for row, seed in wanted:
+    for row, seed in solves:
         began = time.monotonic()
         about = {"row": row, "seed": seed, "problem": [Path(subject).stem, shadows, options.size, options.kind]}
         if row.startswith("tone "):
@@ -172,23 +172,25 @@ def _solve_problem(subject: str, shadows: str, wanted: list[tuple[str, int]], op
     return found
 
 
-def solve_row(given: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
+def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
     """The linear albedo [S, S, 3] that one row's method finds; it is told the true skin tone."""
     if row == "the texture itself":
-        return given.texture
+        return uv_problem.texture
     changes, cells, mask, with_prior = ROWS[row]
     recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": steps, **changes})
-    return solved(given, recipe, given.tone, seed, cells, mask, with_prior)
+    return solved(uv_problem, recipe, uv_problem.tone, seed, cells, mask, with_prior)
 
 
-def solved(given: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS,
+def solved(uv_problem: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS,
            mask: str = "painted", with_prior: bool = True) -> np.ndarray:
     """The linear albedo [S, S, 3] under a recipe and a requested tone."""
-    size, prior = len(given.albedo), _prior()
+    size, prior = len(uv_problem.albedo), _prior()
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
-        replace(given, mask={"painted": given.mask, "empty": 0 * given.mask, "full": 0 * given.mask + 1}[mask]
-                ).write(capture)
+        replace(
+            uv_problem,
+            mask={"painted": uv_problem.mask, "empty": 0 * uv_problem.mask, "full": 0 * uv_problem.mask + 1}[mask],
+        ).write(capture)
         evidence = read_evidence(capture, read_head(capture), size)
     start = initial.start_solve(prior, evidence, tone, FACE_CROP / cells, recipe)
     if with_prior:
@@ -222,12 +224,12 @@ def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: 
     return state
 
 
-def tone_error(given: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
+def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
     """CIEDE2000 between a requested skin tone and the mean of the solved facial skin: as it is delivered, and before
     the mean is brought to the request."""
-    skin, found = skin_weight(len(given.albedo)), []
+    skin, found = skin_weight(len(uv_problem.albedo)), []
     for rescale in (OURS.rescale, "none"):
-        albedo = solved(given, replace(OURS, steps=steps, rescale=rescale), np.array(tone))
+        albedo = solved(uv_problem, replace(OURS, steps=steps, rescale=rescale), np.array(tone))
         mean = images.linear_to_srgb((albedo * skin[..., None]).sum((0, 1)) / skin.sum())
         found.append(round(float(deltaE_ciede2000(rgb2lab(mean), rgb2lab(np.array(tone)))), 3))
     return found[0], found[1]

@@ -41,7 +41,7 @@ def measure(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray,
             for name, where in regions.items()}
 
 
-def feature_distance(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
+def feature_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray | None:
     """[S, S]: squared difference of a network's unit features, summed over its layers (Zhang et al. 2018); None where
     requirements/perceptual.txt is not installed. Not LPIPS: the network is EfficientNet-Lite0 without learned weights
     per channel. sRGB [S, S, 3]."""
@@ -49,11 +49,11 @@ def feature_distance(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
         return None
     with torch.no_grad():
         layers = [network.layers(torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1)))[None])
-                  for image in (one, other)]
+                  for image in (first, second)]
         total = 0
         for a, b in zip(*layers, strict=True):
             apart = (functional.normalize(a, dim=1) - functional.normalize(b, dim=1)) ** 2
-            total = total + functional.interpolate(apart.sum(1, keepdim=True), one.shape[:2], mode="bilinear")
+            total = total + functional.interpolate(apart.sum(1, keepdim=True), first.shape[:2], mode="bilinear")
     return total[0, 0].numpy()
 
 

@@ -111,10 +111,10 @@ def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
     return seen, missing
 
 
-def score_map(albedo: np.ndarray, seen: list[HeadInView]) -> dict:
-    """The figures of an albedo map, sRGB [S, S, 3], in the UVs of the head that `seen` sees."""
-    results = [compare(look.picture(albedo), look.true, look.true.face & look.hit) for look in seen]
-    coverage = [(look.hit & look.true.face).sum() / look.true.face.sum() for look in seen]
+def score_map(albedo: np.ndarray, looks: list[HeadInView]) -> dict:
+    """The figures of an albedo map, sRGB [S, S, 3], in the UVs of the head that `looks` sees."""
+    results = [compare(look.picture(albedo), look.true, look.true.face & look.hit) for look in looks]
+    coverage = [(look.hit & look.true.face).sum() / look.true.face.sum() for look in looks]
     return {"views": len(results), "face_coverage": float(np.mean(coverage)), **mean_scores(results)}
 
 

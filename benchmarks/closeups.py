@@ -48,10 +48,10 @@ class CloseUp:
 Shots = Callable[[str], dict[str, CloseUp]]
 
 
-def run(module: str, told: str, shots: Shots, resolution: int, samples: int) -> None:
-    """The command of `module`, whose docstring is `told`: a row for each person, its pictures those of `shots`, name ->
-    CloseUp for the name of a person."""
-    parser = argparse.ArgumentParser(description=told, formatter_class=argparse.RawDescriptionHelpFormatter)
+def run(module: str, description: str, shots: Shots, resolution: int, samples: int) -> None:
+    """The command of `module`, whose docstring is `description`: a row for each person, its pictures those of `shots`,
+    name -> CloseUp for the name of a person."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of the six people")
@@ -131,34 +131,34 @@ def render(root: Path, shots: dict[str, CloseUp], resolution: int, samples: int)
             shoot(thing, shot, resolution, samples, root / "renders" / f"{name}.png")
 
 
-def shoot(thing, shot: CloseUp, resolution: int, samples: int, path: Path) -> None:
+def shoot(obj, shot: CloseUp, resolution: int, samples: int, path: Path) -> None:
     import bpy
     from bl_ext.user_default.wildcap.wildcap_addon.relight import picture
 
-    keys = thing.data.shape_keys
+    keys = obj.data.shape_keys
     bpy.ops.wildcap.rest_face()
     keys["eyesOpen"] = shot.opened
     for unit, value in shot.units.items():
         keys.key_blocks[unit].value = value
     keys.update_tag()
-    scene = picture.set_up(thing, shot.light, resolution, samples)
+    scene = picture.set_up(obj, shot.light, resolution, samples)
     if shot.engine == "EEVEE":
         scene.render.engine = 'BLENDER_EEVEE_NEXT' if bpy.app.version < (5, 0, 0) else 'BLENDER_EEVEE'
         scene.eevee.taa_render_samples = EEVEE_SAMPLES
         scene.render.hair_type = 'STRIP'  # as wide as they are: a strand is a pixel wide
-    aim(scene.camera, thing, shot)
+    aim(scene.camera, obj, shot)
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True, scene=scene.name)
 
 
-def aim(camera, thing, shot: CloseUp) -> None:
+def aim(camera, obj, shot: CloseUp) -> None:
     from bl_ext.user_default.wildcap.wildcap_addon.acting import asset
     from mathutils import Vector
 
     cut = asset.load()
-    basis = thing.data.shape_keys.reference_key.data
+    basis = obj.data.shape_keys.reference_key.data
     rim = [basis[int(row)].co for row in cut.copies[cut.seam == SEAMS[shot.at]]]
-    at = thing.matrix_world @ (sum(rim, Vector()) / len(rim) + Vector((0, 0, shot.above_m)))
+    at = obj.matrix_world @ (sum(rim, Vector()) / len(rim) + Vector((0, 0, shot.above_m)))
     camera.matrix_world.translation = at + AWAY_M * Vector(shot.way).normalized()
     camera.rotation_euler = (at - camera.matrix_world.translation).to_track_quat('-Z', 'Y').to_euler()
     camera.data.lens, camera.data.clip_start = shot.lens_mm, 0.01

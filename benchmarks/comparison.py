@@ -120,9 +120,9 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
     return found
 
 
-def row_folder(work: Path, given: str, method: str, seed: int = 0) -> Path:
+def row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
     """Where a row's diffuse_albedo.exr, shading.exr and score.json lie."""
-    return work / f"{given}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
+    return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
 
 
 def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
@@ -165,8 +165,8 @@ def _by_hand(capture: Capture, evidence: Evidence, settings: Settings, method: s
     return (texture / shading * gain).astype(np.float32), (shading / gain).astype(np.float32)
 
 
-def _keep(row: Path, diffuse: np.ndarray, shading: np.ndarray, seconds: float, seen: list) -> None:
-    score = {**score_map(images.linear_to_srgb(np.clip(diffuse, 0, 1)), seen), "seconds": round(seconds, 1)}
+def _keep(row: Path, diffuse: np.ndarray, shading: np.ndarray, seconds: float, looks: list) -> None:
+    score = {**score_map(images.linear_to_srgb(np.clip(diffuse, 0, 1)), looks), "seconds": round(seconds, 1)}
     with replacing_folder(row) as folder:
         images.write_linear(folder / "diffuse_albedo.exr", diffuse)
         images.write_linear(folder / "shading.exr", shading)
@@ -211,16 +211,16 @@ def means(subjects: list[dict]) -> dict:
                              for column, value in COLUMNS.items()}}
 
 
-def table(found: dict) -> str:
+def table(record: dict) -> str:
     """Markdown: a line per row with the means over the people, of each input's rows the best of each column and what
     ties with it in bold; then the scan's."""
     parts = []
     for key, title in (("people", "mean of the people"), ("scan", "head scan")):
-        if key not in found:
+        if key not in record:
             continue
-        lines, spread = [], found[key]["spread"]
+        lines, spread = [], record[key]["spread"]
         for given in INPUTS:
-            rows = found[key].get(given, {})
+            rows = record[key].get(given, {})
             for method, cells in rows.items():
                 line = [_cell(column, cells[column], [r[column] for r in rows.values()], spread[column])
                         for column in COLUMNS]
@@ -230,22 +230,22 @@ def table(found: dict) -> str:
     return "\n\n".join(parts)
 
 
-def _cell(column: str, value: float | None, column_values: list[float | None], spread: float | None) -> str:
+def _cell(column: str, figure: float | None, column_values: list[float | None], spread: float | None) -> str:
     known = [_badness(column, v) for v in column_values if v is not None]
-    text = _text(column, value)
-    return f"**{text}**" if value is not None and _badness(column, value) <= min(known) + (spread or 0) else text
+    text = _text(column, figure)
+    return f"**{text}**" if figure is not None and _badness(column, figure) <= min(known) + (spread or 0) else text
 
 
-def _badness(column: str, value: float) -> float:
-    return abs(value) if column == "shadow step" else value if column == "FLIP" else -value
+def _badness(column: str, figure: float) -> float:
+    return abs(figure) if column == "shadow step" else figure if column == "FLIP" else -figure
 
 
-def _text(column: str, value: float | None) -> str:
-    return "-" if value is None else FORMATS[column].format(value)
+def _text(column: str, figure: float | None) -> str:
+    return "-" if figure is None else FORMATS[column].format(figure)
 
 
-def _mean(values: list[float | None]) -> float | None:
-    known = [v for v in values if v is not None]
+def _mean(scores: list[float | None]) -> float | None:
+    known = [v for v in scores if v is not None]
     return float(np.mean(known)) if known else None
 
 

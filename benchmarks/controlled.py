@@ -130,28 +130,28 @@ def side_by_side(folder: Path, name: str, size: int = 512) -> np.ndarray:
     return np.hstack([images.resize(images.read_srgb(path), size, size)[box] for path in paths if path.is_file()])
 
 
-def means(found: dict[str, dict]) -> dict[str, dict]:
+def means(rows_of_people: dict[str, dict]) -> dict[str, dict]:
     """Row -> figure -> mean over the people that have all rows of the same table."""
     out = {}
     for table_rows in (GAP, STUDIO):
-        people = whole(found, table_rows)
+        people = whole(rows_of_people, table_rows)
         out |= {row: {figure: round(float(np.mean([rows[row][figure] for rows in people])), 4)
                       for figure in people[0][row]
                       if all(rows[row].get(figure) is not None for rows in people)} for row in table_rows if people}
     return out
 
 
-def whole(found: dict[str, dict], table_rows: dict) -> list[dict]:
+def whole(rows_of_people: dict[str, dict], table_rows: dict) -> list[dict]:
     """The people whose rows of one table are all there."""
-    return [rows for rows in found.values() if {*table_rows} <= {*rows}]
+    return [rows for rows in rows_of_people.values() if {*table_rows} <= {*rows}]
 
 
-def table(found: dict) -> str:
+def table(record: dict) -> str:
     """Markdown: the means of the gap to a controlled capture and of the studio, then both per person."""
-    mean, everyone = found["mean"], {**found["people"], "mean": found["mean"]}
+    mean, everyone = record["mean"], {**record["people"], "mean": record["mean"]}
     parts = []
     for rows in (GAP, STUDIO):
-        head = [f"mean of {len(whole(found['people'], rows))} people", *(label for label, _ in COLUMNS.values())]
+        head = [f"mean of {len(whole(record['people'], rows))} people", *(label for label, _ in COLUMNS.values())]
         parts.append((head, [[label, *(figures.number(mean[row].get(figure), digits)
                                        for figure, (_, digits) in COLUMNS.items())]
                              for row, label in rows.items() if row in mean]))

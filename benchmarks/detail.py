@@ -65,28 +65,28 @@ def look(caster: raster.RayCaster, view: View, true: AlbedoTruth, margin: int = 
                                 None if true.shadow is None else true.shadow[box]), at, hit, bare)
 
 
-def centre_rays(seen: FaceRays, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def centre_rays(rays: FaceRays, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The map sRGB [S, S, 3] by one ray per pixel, as albedo_score renders it: sRGB [h, w, 3] and the pixels that
     hit."""
-    at, hit = (x[RAYS // 2::RAYS, RAYS // 2::RAYS] for x in (seen.at, seen.hit))
+    at, hit = (x[RAYS // 2::RAYS, RAYS // 2::RAYS] for x in (rays.at, rays.hit))
     return raster.sample(texture, at.reshape(-1, 2) * len(texture)).reshape(*hit.shape, 3) * hit[..., None], hit
 
 
-def marks(seen: FaceRays, texture: np.ndarray) -> dict | None:
+def marks(rays: FaceRays, texture: np.ndarray) -> dict | None:
     """Figures of one frame for a texture sRGB [S, S, 3] in the head's UVs.
 
     mole_contrast: regression of the rendered moles on the true ones, 1 keeps their depth and place, 0 lost them all;
     moles: how many; pore_contrast: ratio of deviations in the band; pore_correlation. None where nothing is left to
     judge.
     """
-    colours = raster.sample(images.srgb_to_linear(texture), seen.at.reshape(-1, 2) * len(texture))
-    linear = colours.reshape(*seen.hit.shape, 3) * seen.hit[..., None]
-    whole = _shrunk(seen.hit.astype(np.float32))
-    known = seen.true.face & (whole > 0.99)
-    inner = cv2.erode((known & seen.bare).astype(np.uint8), np.ones((17, 17))) > 0
+    colours = raster.sample(images.srgb_to_linear(texture), rays.at.reshape(-1, 2) * len(texture))
+    linear = colours.reshape(*rays.hit.shape, 3) * rays.hit[..., None]
+    whole = _shrunk(rays.hit.astype(np.float32))
+    known = rays.true.face & (whole > 0.99)
+    inner = cv2.erode((known & rays.bare).astype(np.uint8), np.ones((17, 17))) > 0
     if inner.sum() < 500:
         return None
-    greens = _shrunk(linear[..., 1]) / np.maximum(whole, 1e-6), images.srgb_to_linear(seen.true.albedo)[..., 1]
+    greens = _shrunk(linear[..., 1]) / np.maximum(whole, 1e-6), images.srgb_to_linear(rays.true.albedo)[..., 1]
     logs = [np.log(np.maximum(green, 2e-3)) for green in greens]
     logs = [np.where(known, log, log[known].mean()).astype(np.float32) for log in logs]
     (pores, true_pores), (spots, true_spots) = ([_band(log, *sigmas) for log in logs] for sigmas in (PORE_PX, MOLE_PX))
@@ -127,6 +127,6 @@ def _band(log: np.ndarray, fine: float, coarse: float) -> np.ndarray:
     return cv2.GaussianBlur(log, (0, 0), fine) - cv2.GaussianBlur(log, (0, 0), coarse)
 
 
-def _slope(found: np.ndarray, true: np.ndarray, y: int, x: int, reach: int = 5) -> float:
-    a, b = (band[y - reach:y + reach + 1, x - reach:x + reach + 1] for band in (found, true))
+def _slope(rendered: np.ndarray, true: np.ndarray, y: int, x: int, reach: int = 5) -> float:
+    a, b = (band[y - reach:y + reach + 1, x - reach:x + reach + 1] for band in (rendered, true))
     return float((a * b).sum() / (b * b).sum())

@@ -37,12 +37,12 @@ def main() -> None:
     print(table(found))
 
 
-def table(found: dict) -> str:
+def table(ratios_of_lights: dict) -> str:
     """Rows: lights. Columns: EEVEE over Cycles in red, green and blue, linear."""
     return figures.markdown(["light", *SHOWN.values()],
                             [[light.replace("_", " "),
                               *(", ".join(f"{ratio:.3f}" for ratio in ratios[what].values()) for what in SHOWN)]
-                             for light, ratios in found.items()])
+                             for light, ratios in ratios_of_lights.items()])
 
 
 if __name__ == "__main__":

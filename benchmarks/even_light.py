@@ -97,10 +97,14 @@ def _tree(owner):
     return node_trees.of(owner)
 
 
-def table(found: dict) -> str:
-    return figures.markdown(["tone", *WAYS],
-                            [[tone, *(", ".join(f"{share:.3f}" for share in found[way][tone].values()) for way in WAYS)]
-                             for tone in TONES])
+def table(record: dict) -> str:
+    return figures.markdown(
+        ["tone", *WAYS],
+        [
+            [tone, *(", ".join(f"{share:.3f}" for share in record[way][tone].values()) for way in WAYS)]
+            for tone in TONES
+        ],
+    )
 
 
 if __name__ == "__main__":

@@ -71,9 +71,9 @@ def misses(head: meshes.Mesh, views: dict[str, View], marks: dict) -> dict[str, 
     return found
 
 
-def summary(found: dict[str, dict[str, float]], names: Collection[str] | None = None) -> dict:
+def summary(errors_of_views: dict[str, dict[str, float]], names: Collection[str] | None = None) -> dict:
     """Over the views `names` (None: all): points, median, 90th percentile [% of the face's width], share under 3 %."""
-    values = np.array([value for name, points in found.items() if names is None or name in names
+    values = np.array([value for name, points in errors_of_views.items() if names is None or name in names
                        for value in points.values()])
     return {"points": len(values), "median_percent": round(float(np.median(values)), 2),
             "p90_percent": round(float(np.percentile(values, 90)), 2),

@@ -82,8 +82,8 @@ class FarmTrial:
     def save(self) -> None:
         write_json(self.path, self.state)
 
-    def note(self, host: str | None, pid: int | None, what: str) -> None:
-        self.state["kills"].append({"at": time.time(), "host": host, "pid": pid, "what": what})
+    def note(self, host: str | None, pid: int | None, action: str) -> None:
+        self.state["kills"].append({"at": time.time(), "host": host, "pid": pid, "what": action})
 
     def run(self, record: Path | None) -> int:
         farm_batch.lay_out(self.folder, self.captures)

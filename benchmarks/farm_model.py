@@ -124,42 +124,49 @@ def time_starts(count: int) -> dict[str, dict[str, float]]:
     return found
 
 
-def model(costs: dict, disk: dict[str, float], starts: dict, given: Assumptions) -> dict:
+def model(costs: dict, disk: dict[str, float], starts: dict, assumptions: Assumptions) -> dict:
     """All figures of the page. `costs` is what benchmarks/costs recorded. Raises Problem where its standard row is
     not whole."""
     row, cores = costs.get("standard", {}), costs["machine"]["cores"]
     if any("seconds" not in row.get(stage, {}) for stage in stages.NAMES):
         raise Problem("docs/figures/costs.json has no whole row 'standard'.",
                       "Run `python -m benchmarks.costs chain WORK --json docs/figures/costs.json`.")
-    tasks = {group.name: _task(group, row, disk, given.film_mb) for group in GROUPS}
+    tasks = {group.name: _task(group, row, disk, assumptions.film_mb) for group in GROUPS}
     seconds, traffic = (sum(task[key] for task in tasks.values()) for key in ("seconds", "traffic_mb"))
-    solve, faces, hour = tasks[GATE]["seconds"], given.faces, 3600.0
-    kept = (sum(disk.values()) + given.film_mb) / 1000
+    solve, faces, hour = tasks[GATE]["seconds"], assumptions.faces, 3600.0
+    kept = (sum(disk.values()) + assumptions.film_mb) / 1000
     slim = kept - sum(disk[name] for name in SLIMMED) / 1000
-    more = faces * (1 + given.repeats) / hour  # hours of all faces for a second of one
-    core_hours, gpu_hours = seconds * cores * more, given.gpu_solve_minutes * 60 * more
+    more = faces * (1 + assumptions.repeats) / hour  # hours of all faces for a second of one
+    core_hours, gpu_hours = seconds * cores * more, assumptions.gpu_solve_minutes * 60 * more
     totals = {
-        "used_core_hours": sum(task["processor_s"] for task in tasks.values()) * more, "core_hours": core_hours,
-        "eur_cores": core_hours * given.eur_core_hour,
-        "gpu_hours": gpu_hours, "core_hours_beside_gpu": (seconds - solve) * cores * more,
-        "eur_with_gpu": gpu_hours * given.eur_gpu_hour + (seconds - solve) * cores * more * given.eur_core_hour,
-        "tb": faces * kept / 1000, "tb_slim": faces * slim / 1000,
-        "eur_disk": faces * kept * given.months * given.eur_gb_month,
-        "eur_disk_slim": faces * slim * given.months * given.eur_gb_month,
-        "artist_hours": faces * given.gate_minutes / 60,
-        "eur_artist": faces * given.gate_minutes / 60 * given.eur_artist_hour,
-        "days": core_hours / cores / given.workers / 24,
+        "used_core_hours": sum(task["processor_s"] for task in tasks.values()) * more,
+        "core_hours": core_hours,
+        "eur_cores": core_hours * assumptions.eur_core_hour,
+        "gpu_hours": gpu_hours,
+        "core_hours_beside_gpu": (seconds - solve) * cores * more,
+        "eur_with_gpu": gpu_hours * assumptions.eur_gpu_hour
+        + (seconds - solve) * cores * more * assumptions.eur_core_hour,
+        "tb": faces * kept / 1000,
+        "tb_slim": faces * slim / 1000,
+        "eur_disk": faces * kept * assumptions.months * assumptions.eur_gb_month,
+        "eur_disk_slim": faces * slim * assumptions.months * assumptions.eur_gb_month,
+        "artist_hours": faces * assumptions.gate_minutes / 60,
+        "eur_artist": faces * assumptions.gate_minutes / 60 * assumptions.eur_artist_hour,
+        "days": core_hours / cores / assumptions.workers / 24,
     }
     start = starts["command"]["seconds"] * len(GROUPS)
-    limits = {"artist": seconds / (given.gate_minutes * 60), "storage": given.storage_mb_s * seconds / traffic,
-              "start_share": start / (seconds + start),
-              "peak_gb": max(task["peak_gb"] for task in tasks.values()),
-              "gb_a_core": max(task["peak_gb"] for task in tasks.values()) / cores}
+    limits = {
+        "artist": seconds / (assumptions.gate_minutes * 60),
+        "storage": assumptions.storage_mb_s * seconds / traffic,
+        "start_share": start / (seconds + start),
+        "peak_gb": max(task["peak_gb"] for task in tasks.values()),
+        "gb_a_core": max(task["peak_gb"] for task in tasks.values()) / cores,
+    }
     return {"cores": cores, "processor": costs["machine"]["processor"], "networks": costs["machine"]["networks"],
             "frames": _frames(costs, row), "stages": {
         stage: row[stage]["seconds"] for stage in stages.NAMES}, "tasks": tasks, "seconds": seconds,
             "traffic_mb": traffic, "gb": kept, "gb_slim": slim,
-        "totals": totals, "limits": limits, "starts": starts, "disk_mb": disk, "assumed": asdict(given)}
+        "totals": totals, "limits": limits, "starts": starts, "disk_mb": disk, "assumed": asdict(assumptions)}
 
 
 def _task(group, row: dict, disk: dict[str, float], film_mb: float) -> dict[str, float]:

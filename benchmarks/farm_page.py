@@ -33,11 +33,11 @@ SAID = {
 }
 
 
-def bottleneck(found: dict) -> str:
+def bottleneck(record: dict) -> str:
     """What limits a farm, in words, by the smallest number of workers that something keeps up with."""
-    limits, assumed = found["limits"], found["assumed"]
-    slowest = sorted(found["stages"], key=found["stages"].get, reverse=True)[:2]
-    share = sum(found["stages"][stage] for stage in slowest) / found["seconds"]
+    limits, assumed = record["limits"], record["assumed"]
+    slowest = sorted(record["stages"], key=record["stages"].get, reverse=True)[:2]
+    share = sum(record["stages"][stage] for stage in slowest) / record["seconds"]
     workers, artist, storage, peak = assumed["workers"], limits["artist"], limits["storage"], limits["peak_gb"]
     return (f"With the artist's gate it is **the artist**: one who takes {assumed['gate_minutes']:g} minutes a mask "
             f"keeps up with {artist:.1f} workers, so "
@@ -50,35 +50,35 @@ def bottleneck(found: dict) -> str:
             f"idle. Starting a task's command is {100 * limits['start_share']:.1f} % of a face's time.")
 
 
-def page(found: dict) -> str:
+def page(record: dict) -> str:
     """docs/growth.md."""
-    given = found["assumed"]
+    given = record["assumed"]
     grown = [[count, f"{cost['seconds']:.0f} s", f"{cost['processor_s']:.0f} s"]
-             for count, cost in found["frames"].items()]
+             for count, cost in record["frames"].items()]
     assumed = [[f"`--{name.replace('_', '-')}`", f"{value:g}", SAID[name]] for name, value in given.items()]
     parts = [
         f"<!-- Written by `{COMMAND}`: edit benchmarks/farm_page.py. -->\n# What {given['faces']:,} faces cost, on "
         "paper",
-        wrapped(f"Measured: the sample's 60 frames at standard quality on {found['cores']} cores "
-                f"({found['processor']}, networks in {found['networks']}), "
+        wrapped(f"Measured: the sample's 60 frames at standard quality on {record['cores']} cores "
+                f"({record['processor']}, networks in {record['networks']}), "
                 "stage by stage (`docs/figures/costs.json`), and what a finished capture of it weighs. Assumed: all of "
                 "the last table. Computed: the rest. "
                 f"No farm and no GPU was at hand. `{COMMAND}` writes this page, with any argument of the last table; "
                 "without `--capture` and `--starts` it "
                 "takes what was measured before."),
         "## Measured: one face",
-        figures.markdown(["task", "time", "processor time", "peak memory", "reads", "writes"], _tasks(found)),
-        wrapped(_measured(found))]
+        figures.markdown(["task", "time", "processor time", "peak memory", "reads", "writes"], _tasks(record)),
+        wrapped(_measured(record))]
     if grown:
         parts += ["With other numbers of frames (the sample's, thinned out or played to and fro), and the other stages "
                   "as they are:",
                   figures.markdown(["frames", "time", "processor time"], grown)]
     parts += [
         f"## Computed: {given['faces']:,} faces",
-        figures.markdown(["what", "how much", "price"], _totals(found)),
-        wrapped(_on_gpus(found)),
+        figures.markdown(["what", "how much", "price"], _totals(record)),
+        wrapped(_on_gpus(record)),
         "## The bottleneck",
-        wrapped(bottleneck(found)),
+        wrapped(bottleneck(record)),
         "## The formulas",
         "Faces know nothing of each other, so everything is linear in their number F:",
         FORMULAS,
@@ -105,21 +105,21 @@ FORMULAS = """    core hours = F x (1 + repeats) x seconds of a face x cores of 
     the storage keeps up with  MB/s x seconds of a face / MB that it reads and writes   workers"""
 
 
-def _tasks(found: dict) -> list[list[str]]:
+def _tasks(record: dict) -> list[list[str]]:
     def cells(name: str, task: dict, mark: str) -> list[str]:
         texts = (name, f"{task['seconds']:.0f} s", f"{task['processor_s']:.0f} s", f"{task['peak_gb']:.1f} GB",
                  f"{task['read_mb']:.0f} MB", f"{task['write_mb']:.0f} MB")
         return [f"{mark}{text}{mark}" for text in texts]
 
-    tasks = found["tasks"]
+    tasks = record["tasks"]
     whole = {key: sum(task[key] for task in tasks.values())
              for key in ("seconds", "processor_s", "read_mb", "write_mb")}
     return [*(cells(name, task, "") for name, task in tasks.items()),
-            cells("a face", {**whole, "peak_gb": found["limits"]["peak_gb"]}, "**")]
+            cells("a face", {**whole, "peak_gb": record["limits"]["peak_gb"]}, "**")]
 
 
-def _measured(found: dict) -> str:
-    disk, command, torch = found["disk_mb"], found["starts"]["command"], found["starts"]["torch"]
+def _measured(record: dict) -> str:
+    disk, command, torch = record["disk_mb"], record["starts"]["command"], record["starts"]["torch"]
     gone = sum(disk[name] for name in SLIMMED)
     return (f"A capture weighs {sum(disk.values()):.0f} MB: {disk['maps_4k']:.0f} MB of maps at 4K, "
             f"{disk['frames']:.0f} MB of frames, which grow with their "
@@ -132,8 +132,8 @@ def _measured(found: dict) -> str:
             "already).")
 
 
-def _totals(found: dict) -> list[list]:
-    totals, given = found["totals"], found["assumed"]
+def _totals(record: dict) -> list[list]:
+    totals, given = record["totals"], record["assumed"]
     return [
         ["cores, reserved", f"{totals['core_hours']:,.0f} core hours", f"{totals['eur_cores']:,.0f} EUR"],
         ["of these at work", f"{totals['used_core_hours']:,.0f} core hours", None],
@@ -141,16 +141,16 @@ def _totals(found: dict) -> list[list]:
         ["the same, slim", f"{totals['tb_slim']:.1f} TB", f"{totals['eur_disk_slim']:,.0f} EUR"],
         ["the artist's gate, where it is wanted", f"{totals['artist_hours']:,.0f} hours",
          f"{totals['eur_artist']:,.0f} EUR"],
-        [f"time, {given['workers']} workers of {found['cores']} cores", f"{totals['days']:.1f} days", None],
+        [f"time, {given['workers']} workers of {record['cores']} cores", f"{totals['days']:.1f} days", None],
         ["cores, with the task solve on GPUs (assumed)",
          f"{totals['core_hours_beside_gpu']:,.0f} core hours, {totals['gpu_hours']:,.0f} GPU hours",
          f"{totals['eur_with_gpu']:,.0f} EUR"]]
 
 
-def _on_gpus(found: dict) -> str:
-    minutes, ours = found["assumed"]["gpu_solve_minutes"], found["tasks"][GATE]["seconds"] / 60
+def _on_gpus(record: dict) -> str:
+    minutes, ours = record["assumed"]["gpu_solve_minutes"], record["tasks"][GATE]["seconds"] / 60
     return (f"GPU hours are an assumption: the {minutes:g} minutes that the paper reports for its own code on an RTX "
             "4090, "
             f"{'more' if minutes > ours else 'less'} than the {ours:.1f} minutes that our solver and upscaler take on "
-            f"these {found['cores']} cores. Ours was "
+            f"these {record['cores']} cores. Ours was "
             "not measured on a GPU, and needs none.")

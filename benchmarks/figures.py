@@ -84,11 +84,11 @@ def number(value: float | None, digits: int, unit: str = "") -> str | None:
     return None if value is None else f"{value:.{digits}f}{unit}"
 
 
-def merged(old: dict, new: dict) -> dict:
-    """Nested figures: `new` over `old`."""
-    return {**old,
-            **{key: merged(old[key], value) if isinstance(value, dict) and isinstance(old.get(key), dict) else value
-               for key, value in new.items()}}
+def merged(base: dict, update: dict) -> dict:
+    """Nested figures: `update` over `base`."""
+    return {**base,
+            **{key: merged(base[key], value) if isinstance(value, dict) and isinstance(base.get(key), dict) else value
+               for key, value in update.items()}}
 
 
 def plain(figures, name: str = "figures"):

@@ -98,11 +98,13 @@ def highlight(frames: list[Lit], surface: Unfolded) -> Highlight:
     return Highlight(fits[best][0], ROUGHNESSES[best])
 
 
-def matte(frame: Lit, found: Highlight) -> np.ndarray:
+def matte(frame: Lit, highlight: Highlight) -> np.ndarray:
     """A frame over its shading without its highlight, linear [H, W, 3], zero beside the head."""
-    at = np.stack([frame.uv[..., 0], 1 - frame.uv[..., 1]], -1).reshape(-1, 2) * len(found.strength)
-    strength = raster.sample(found.strength, at).reshape(frame.unshaded.shape)
-    return np.maximum(frame.unshaded - strength * lobe(frame.cosine, found.roughness)[..., None], LEFT * frame.unshaded)
+    at = np.stack([frame.uv[..., 0], 1 - frame.uv[..., 1]], -1).reshape(-1, 2) * len(highlight.strength)
+    strength = raster.sample(highlight.strength, at).reshape(frame.unshaded.shape)
+    return np.maximum(
+        frame.unshaded - strength * lobe(frame.cosine, highlight.roughness)[..., None], LEFT * frame.unshaded
+    )
 
 
 def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
@@ -129,17 +131,17 @@ def _observed(frame: Lit, surface: Unfolded) -> tuple[np.ndarray, np.ndarray, np
     return np.exp(seen.log_colour), cosine, np.where(cosine > LEAST, weight, 0).astype(np.float32)
 
 
-def _fit(seen: list[tuple], roughness: float) -> tuple[np.ndarray, float]:
+def _fit(samples: list[tuple], roughness: float) -> tuple[np.ndarray, float]:
     """The strength [S, S, 3] for one roughness, and the sum of squares that it leaves."""
-    lobes = [lobe(cosine, roughness)[..., None].astype(np.float32) for _, cosine, _ in seen]
-    weights = [weight[..., None] for *_, weight in seen]
+    lobes = [lobe(cosine, roughness)[..., None].astype(np.float32) for _, cosine, _ in samples]
+    weights = [weight[..., None] for *_, weight in samples]
     total = sum(weights) + 1e-6
     mean_lobe = sum(w * f for w, f in zip(weights, lobes, strict=True)) / total
-    mean = sum(w * colour for w, (colour, *_) in zip(weights, seen, strict=True)) / total
+    mean = sum(w * colour for w, (colour, *_) in zip(weights, samples, strict=True)) / total
     spread = sum(w * (f - mean_lobe) ** 2 for w, f in zip(weights, lobes, strict=True))
     together = sum(w * (f - mean_lobe) * (colour - mean)
-                   for w, f, (colour, *_) in zip(weights, lobes, seen, strict=True))
-    squares = sum(float((w * (colour - mean) ** 2).sum()) for w, (colour, *_) in zip(weights, seen, strict=True))
+                   for w, f, (colour, *_) in zip(weights, lobes, samples, strict=True))
+    squares = sum(float((w * (colour - mean) ** 2).sum()) for w, (colour, *_) in zip(weights, samples, strict=True))
     everywhere = np.maximum(together.sum((0, 1)) / max(float(spread.sum()), 1e-9), 0)
     near_spread, near_together = (cv2.GaussianBlur(a, (0, 0), SMOOTH).reshape(a.shape) for a in (spread, together))
     held = HELD * float(spread[spread > 0].mean()) if (spread > 0).any() else 1.0

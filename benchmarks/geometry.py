@@ -105,7 +105,7 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
     return costs, None
 
 
-def _cameras(capture: Capture, subject: ScannedSubject, part: str) -> dict:
+def _cameras(capture: Capture, subject: ScannedSubject, section: str) -> dict:
     import pycolmap
 
     from core.geometry.views import read_views
@@ -121,18 +121,18 @@ def _cameras(capture: Capture, subject: ScannedSubject, part: str) -> dict:
                else {})}
 
 
-def _surface(capture: Capture, subject: ScannedSubject, part: str) -> dict:
+def _surface(capture: Capture, subject: ScannedSubject, section: str) -> dict:
     from .head_against_truth import compare
 
-    figures = capture.read()["stages"].get({"scan": "scan", "head": "registration"}[part], {}).get("figures", {})
+    figures = capture.read()["stages"].get({"scan": "scan", "head": "registration"}[section], {}).get("figures", {})
     if subject.truth is None:
         return {"own": figures}
     return {"own": figures,
             "against_truth": compare(capture, subject.truth, subject.mesh,
-                                     {"scan": "scan.ply", "head": "head.obj"}[part])}
+                                     {"scan": "scan.ply", "head": "head.obj"}[section])}
 
 
-def _texture(capture: Capture, subject: ScannedSubject, part: str) -> dict:
+def _texture(capture: Capture, subject: ScannedSubject, section: str) -> dict:
     from .texture import measure as measure_texture
 
     figures = capture.read()["stages"].get("texture", {}).get("figures", {})

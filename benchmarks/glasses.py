@@ -25,7 +25,7 @@ from skimage.data import astronaut
 from core.contract.messages import Problem, Reporter
 from core.face import faces
 from core.face.glasses import sureness
-from core.frames.glasses import LIKELY, judge
+from core.frames.glasses import LIKELY_LOG_ODDS, judge
 from core.imaging import images
 from core.synthetic.environments import read_panoramas
 from core.synthetic.people import glasses
@@ -44,11 +44,11 @@ FILMED = 12
 LONG_SIDE = 960
 
 
-def verdict(told: list[float]) -> str:
+def verdict(probabilities: list[float]) -> str:
     """refused, warned or passed: what the stage frames does with a capture whose frames are so sure of glasses."""
     report = Reporter("frames")
     try:
-        judge(told, False, report)
+        judge(probabilities, False, report)
     except Problem:
         return "refused"
     return "warned" if report.findings else "passed"
@@ -86,7 +86,7 @@ def counted(captures: list[list[float]]) -> dict:
     ends = [verdict(capture) for capture in captures]
     return {"captures": len(captures), **{end: ends.count(end) for end in ("refused", "warned", "passed")},
             "pictures": len(single),
-            "likely_percent": round(100 * float((single > LIKELY).mean()), 1) if len(single) else None,
+            "likely_percent": round(100 * float((single > LIKELY_LOG_ODDS).mean()), 1) if len(single) else None,
             "surest": round(float(single.max()), 1) if len(single) else None}
 
 
@@ -114,12 +114,12 @@ def filmed(video: Path) -> list[np.ndarray]:
     return [frames[k].astype(np.float32) / 255 for k in np.linspace(0, len(frames) - 1, FILMED).astype(int)]
 
 
-def sheet(shown: list) -> np.ndarray:
+def sheet(judged_pictures: list) -> np.ndarray:
     rows = []
-    for picture, sure in shown:
+    for picture, sure in judged_pictures:
         tile = cv2.resize(picture, (180, 180), interpolation=cv2.INTER_AREA)
         cv2.putText(tile, f"{sure:.1f}", (6, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.55,
-                    (1.0, 1.0, 0.2) if sure > LIKELY else (0.4, 1.0, 1.0), 2)
+                    (1.0, 1.0, 0.2) if sure > LIKELY_LOG_ODDS else (0.4, 1.0, 1.0), 2)
         rows.append(tile)
     rows += [np.zeros_like(rows[0])] * (-len(rows) % ACROSS)
     return np.vstack([np.hstack(rows[k:k + ACROSS]) for k in range(0, len(rows), ACROSS)])

@@ -136,8 +136,8 @@ def try_trusts(folder: Path, seed: int) -> list[list]:
     found = hair.find(maps, surface, shown.shares[..., :len(GROWTHS)])
     landmarks, rows = template.landmark_points(surface.mesh), []
     for true in (hairs for hairs in figure.strands if hairs.part in ("brows", "beard")):
-        where = (getattr(found, true.part) > grooming.LEAST_COVER) & surface.covered
-        if where.sum() < grooming.FEWEST:
+        where = (getattr(found, true.part) > grooming.LEAST_COVER_SHARE) & surface.covered
+        if where.sum() < grooming.FEWEST_TEXELS:
             continue
         texels = strokes.lay_texels(surface, where)
         tensors = strokes.measure_tensors(maps.diffuse, texels, float(np.median(surface.texel[where])))
@@ -167,10 +167,14 @@ def _off(true: Strands, grown: Strands, figure: Figure) -> float:
     return round(_median_angle(one, other, normals), 1)
 
 
-def _median_angle(one: np.ndarray, other: np.ndarray, normals: np.ndarray) -> float:
+def _median_angle(directions: np.ndarray, true_directions: np.ndarray, normals: np.ndarray) -> float:
     """Degrees between directions [N, 3] on the skin."""
-    one, other = (way - (way * normals).sum(1, keepdims=True) * normals for way in (one, other))
-    cosine = (one * other).sum(1) / np.maximum(np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1), 1e-12)
+    directions, true_directions = (
+        way - (way * normals).sum(1, keepdims=True) * normals for way in (directions, true_directions)
+    )
+    cosine = (directions * true_directions).sum(1) / np.maximum(
+        np.linalg.norm(directions, axis=1) * np.linalg.norm(true_directions, axis=1), 1e-12
+    )
     return float(np.median(np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
 
 
@@ -183,12 +187,12 @@ def _overlap(figure: Figure, views: list[View], true: Strands | None, grown: Str
     return round(float(both / max(either, 1)), 3)
 
 
-def _told(figure: Figure, shown: PartsShown, part: str) -> float:
+def _told(figure: Figure, parts_shown: PartsShown, part: str) -> float:
     """Intersection over union of the texels to which the parser gives more than half and of those where such hair
     grows, as far as a view shows them."""
     grows = (images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth
              else np.zeros((SIZE, SIZE), bool))
-    told, grows = (where[shown.told] for where in (shown.shares[..., GROWTHS.index(part)] > 0.5, grows))
+    told, grows = (where[parts_shown.judged] for where in (parts_shown.shares[..., GROWTHS.index(part)] > 0.5, grows))
     return round(float((told & grows).sum() / max((told | grows).sum(), 1)), 3)
 
 

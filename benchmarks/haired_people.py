@@ -66,12 +66,12 @@ def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
     return shrink(colour), normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
 
 
-def read_maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> tuple[HeadMaps, PartsShown]:
+def read_maps(figure: Figure, views: list[View], colours: list[np.ndarray]) -> tuple[HeadMaps, PartsShown]:
     """The texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's), and
     what the parser says of the views."""
     surface = Head(figure.head).unfold(SIZE)
     total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
-    looks = [observe(view, colour, surface, 1.0) for view, colour in zip(views, seen, strict=True)]
+    looks = [observe(view, colour, surface, 1.0) for view, colour in zip(views, colours, strict=True)]
     for look in looks:
         weight = look.weight[..., None] ** 2
         total, weights = total + weight * look.log_colour, weights + weight

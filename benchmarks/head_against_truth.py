@@ -111,8 +111,8 @@ def _percentiles(distances: np.ndarray) -> dict:
             for name, percent in (("median", 50), ("p90", 90), ("p95", 95))}
 
 
-def _round(value: float) -> float:
-    return round(float(value), 3)
+def _round(figure: float) -> float:
+    return round(float(figure), 3)
 
 
 def main() -> None:

@@ -220,12 +220,12 @@ def _put(path: Path, content: bytes) -> None:
     path.write_bytes(content)
 
 
-def _places(value, way: str = ""):
+def _places(content, way: str = ""):
     """(container, key, way to it) of everything in a JSON value."""
-    for key in list(value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()):
-        yield value, key, f"{way}/{key}"
-        yield from _places(value[key], f"{way}/{key}")
+    for key in list(content if isinstance(content, dict) else range(len(content)) if isinstance(content, list) else ()):
+        yield content, key, f"{way}/{key}"
+        yield from _places(content[key], f"{way}/{key}")
 
 
-def _dump(value) -> str:
-    return json.dumps(value, ensure_ascii=False)
+def _dump(content) -> str:
+    return json.dumps(content, ensure_ascii=False)

@@ -146,15 +146,17 @@ def _outside(watched: tuple[Path, Path]) -> list[Path]:
     return found
 
 
-def _tell(found: dict[str, list], arguments: argparse.Namespace, figures, private: bool, seconds: float) -> int:
+def _tell(
+    trials_by_kind: dict[str, list], arguments: argparse.Namespace, figures, private: bool, seconds: float
+) -> int:
     rows = {kind: {"trials": len(trials), "struck": sum(trial.struck for trial in trials),
                    "faultless": sum(not trial.faults for trial in trials)}
-            for kind, trials in sorted(found.items(), key=lambda item: list(MIX).index(item[0]))}
+            for kind, trials in sorted(trials_by_kind.items(), key=lambda item: list(MIX).index(item[0]))}
     rows["all"] = {name: sum(row[name] for row in rows.values()) for name in ("trials", "struck", "faultless")}
     print(f"\n{'':10}{'trials':>8}{'struck':>8}{'faultless':>11}")
     for kind, row in rows.items():
         print(f"{kind:10}{row['trials']:8}{row['struck']:8}{row['faultless']:11}")
-    for trial in (trial for trials in found.values() for trial in trials if trial.faults):
+    for trial in (trial for trials in trials_by_kind.values() for trial in trials if trial.faults):
         print(f"Again: python -m benchmarks.kills --count {arguments.count} --seed {arguments.seed} --only "
               f"{trial.number}  # {trial.kind}: {trial.faults[0]}")
     print(f"\n{rows['all']['trials']} trials in {seconds / 60:.1f} minutes.")

@@ -144,10 +144,10 @@ def capture_at(place: Path) -> Capture:
     return Capture(place / "face.wildcap")
 
 
-def start(place: Path, moment: Moment | None = None, *, told: str = "told", limits: dict | None = None,
+def start(place: Path, moment: Moment | None = None, *, log_name: str = "told", limits: dict | None = None,
           **job) -> Forked:
     """Writes a job and starts a worker at it."""
-    return fork_worker(write_job(capture_at(place), **job), place.with_name(f"{place.name}.{told}"), moment,
+    return fork_worker(write_job(capture_at(place), **job), place.with_name(f"{place.name}.{log_name}"), moment,
                        **(limits or {}))
 
 

@@ -25,11 +25,15 @@ PASSING = ("preview/", "checkpoints/")
 """What they hold in the middle of a stage no other run need have had: it has to be readable."""
 
 
-def after_kill(place: Path, known: Mapping[str, Collection[str]], masks: Mapping[str, Collection[bytes]] | None = None,
-               within: Collection[str] = ()) -> list[str]:
-    """Faults of a place in which something was killed: `known` are the complete contents that each file may have
-    (hashes), `masks` those of the masks that were being painted. `within`: folders in which files are new in every run,
-    of which only the user's are judged."""
+def after_kill(
+    place: Path,
+    known_contents: Mapping[str, Collection[str]],
+    masks: Mapping[str, Collection[bytes]] | None = None,
+    within: Collection[str] = (),
+) -> list[str]:
+    """Faults of a place in which something was killed: `known_contents` are the complete contents that each file may
+    have (hashes), `masks` those of the masks that were being painted. `within`: folders in which files are new in every
+    run, of which only the user's are judged."""
     root = capture_at(place).root
     found = find_lost(place, aside=True)
     for name, contents in (masks or {}).items():
@@ -44,7 +48,7 @@ def after_kill(place: Path, known: Mapping[str, Collection[str]], masks: Mapping
         elif name.startswith(PASSING):
             fault = _read(path)
         else:
-            fault = "" if read_hash(path) in known.get(name, ()) else "is no complete content of any run"
+            fault = "" if read_hash(path) in known_contents.get(name, ()) else "is no complete content of any run"
         found += [f"{name} {fault}"] if fault else []
     return found
 

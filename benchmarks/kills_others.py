@@ -69,7 +69,7 @@ def saving(trial: KillTrial) -> None:
         trial.fault("the history has an incomplete mask")
 
 
-def _save_masks(root: Path, which: str, seed: int, painted: Path) -> None:
+def _save_masks(root: Path, mask_kind: str, seed: int, painted: Path) -> None:
     """What the add-on does after strokes, in this process; what the files are to hold goes to `painted` first."""
     import numpy as np
 
@@ -87,7 +87,7 @@ def _save_masks(root: Path, which: str, seed: int, painted: Path) -> None:
     half.rename(painted)
     stamp = ()
     for mask in masks:
-        stamp = keeping.store(mask, contract.Capture(root), which, stamp)
+        stamp = keeping.store(mask, contract.Capture(root), mask_kind, stamp)
 
 
 def delivering(trial: KillTrial) -> None:

@@ -65,11 +65,11 @@ class Forked:
     """A forked process that does `work`, in a group of its own, and what strikes it. Its output goes to `told`, its
     errors beside that."""
 
-    def __init__(self, work: Callable[[], None], root: Path, told: Path, moment: Moment | None = None):
-        self.moment, self.told, self.code = moment, told, None
+    def __init__(self, work: Callable[[], None], root: Path, log: Path, moment: Moment | None = None):
+        self.moment, self.told, self.code = moment, log, None
         self._shared = mmap.mmap(-1, 16)  # changes so far, and whether a process that waits to be struck may go on
         self._stdin, end = os.pipe()[::-1]
-        told.unlink(missing_ok=True)
+        log.unlink(missing_ok=True)
         sys.stdout.flush()
         self.began = time.monotonic()
         self.pid = os.fork()
@@ -78,7 +78,7 @@ class Forked:
             try:
                 os.close(self._stdin)
                 os.setsid()
-                _redirect(end, told)
+                _redirect(end, log)
                 sys.addaudithook(self._hook(f"{root}/"))
                 work()
                 code = 0
@@ -150,12 +150,12 @@ class Forked:
         return hook
 
 
-def fork_worker(job: Path, told: Path, moment: Moment | None = None, *, term_s: float = lease.TERM_S,
+def fork_worker(job: Path, log: Path, moment: Moment | None = None, *, term_s: float = lease.TERM_S,
                 most_bytes: int | None = None) -> Forked:
     """A worker at a job file. `term_s`: its lease's; `most_bytes`: of a single file that it writes."""
     def work() -> None:
         main = importlib.import_module("core.worker.__main__")
-        main.PRIORITY = 0  # beside it nobody paints
+        main.NICE_VALUE = 0  # beside it nobody paints
         lease.TERM_S = term_s
         sys.argv = ["core.worker", str(job)]
         if most_bytes is not None:
@@ -163,12 +163,12 @@ def fork_worker(job: Path, told: Path, moment: Moment | None = None, *, term_s: 
             resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, resource.RLIM_INFINITY))
         main.main()
 
-    return Forked(work, job.parent.parent, told, moment)
+    return Forked(work, job.parent.parent, log, moment)
 
 
-def last_message(told: Path) -> Message | None:
+def last_message(log: Path) -> Message | None:
     """The final message among the lines that a worker wrote; None where there is none, as of one that was killed."""
-    lines = told.read_text(encoding="utf-8").splitlines() if told.is_file() else []
+    lines = log.read_text(encoding="utf-8").splitlines() if log.is_file() else []
     try:
         message = from_line(lines[-1]) if lines else None
     except ValueError:  # cut off
@@ -225,10 +225,10 @@ def _changes(event: str, arguments: tuple, root: str) -> bool:
     return any(path.startswith(root) or not os.path.isabs(path) for path in paths)
 
 
-def _redirect(stdin: int, told: Path) -> None:
+def _redirect(stdin: int, log: Path) -> None:
     """The descriptors 0 to 2: the pipe that ends with this process's parent, and files for what it says."""
     os.dup2(stdin, 0)
-    for number, path in ((1, told), (2, told.with_suffix(".err"))):
+    for number, path in ((1, log), (2, log.with_suffix(".err"))):
         descriptor = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND, 0o666)
         os.dup2(descriptor, number)
         os.close(descriptor)

@@ -35,7 +35,7 @@ SCALE, SAMPLES = 5 / 6, 4  # of 720 x 960; rays per pixel before denoising
 PACE = 6
 
 
-def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, said: str, frames: int,
+def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, description: str, frames: int,
          room: bool) -> Capture:
     """FOLDER/NAME (the truth, with the video) and FOLDER/NAME.wildcap (frames, true cameras and a head half a
     millimetre off, where the room has nothing that cameras could be found by), made if they are not there; prints the
@@ -53,7 +53,7 @@ def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, said:
     inside = np.linalg.inv(poses) @ cameras
     views = [sample.view_of(matrix, SCALE) for matrix in inside]
     faces = _write_truth(target, figure, light, views, poses)
-    _write_record(target, figure, light, said, inside, poses, taken)
+    _write_record(target, figure, light, description, inside, poses, taken)
     flows = _flows(figure, cameras, poses)
     sample.write_video(target / "capture.mp4", _developed(work, frames, faces, flows, taken, seed), taken.crf)
     if not room:
@@ -102,8 +102,8 @@ def _write_truth(target: Path, figure: Figure, light: scene.SceneLight, views: l
     return faces
 
 
-def _write_record(target: Path, figure: Figure, light: scene.SceneLight, said: str, inside: np.ndarray,
-                  poses: np.ndarray, taken: phone.Phone) -> None:
+def _write_record(target: Path, figure: Figure, light: scene.SceneLight, description: str, inside: np.ndarray,
+                  poses: np.ndarray, camera: phone.Phone) -> None:
     """head.obj (closed lids), opened.obj, strands, the true maps and maps/part_*.png, cameras.json, and light.json with
     sky.exr."""
     meshes.write_obj(target / "head.obj", figure.head)
@@ -125,8 +125,8 @@ def _write_record(target: Path, figure: Figure, light: scene.SceneLight, said: s
                {"sky": sky, "sun": sun, "lamps": [asdict(lamp) for lamp in light.lamps],
                 "blockers": bool(light.blockers)})
     write_json(target / "cameras.json", {
-        "name": target.name, "light": said, "focal_px": scene.FOCAL * SCALE, "width": round(scene.WIDTH * SCALE),
-        "height": round(scene.HEIGHT * SCALE), "person": asdict(figure.person), "phone": asdict(taken),
+        "name": target.name, "light": description, "focal_px": scene.FOCAL * SCALE, "width": round(scene.WIDTH * SCALE),
+        "height": round(scene.HEIGHT * SCALE), "person": asdict(figure.person), "phone": asdict(camera),
         "cameras": [{"frame": k, "matrix_world": inside[k].tolist(), "head_pose": poses[k].tolist()}
                     for k in range(len(inside))]})
 
@@ -151,12 +151,12 @@ def _flows(figure: Figure, cameras: np.ndarray, poses: np.ndarray) -> list[np.nd
     return flows
 
 
-def _developed(work: Path, count: int, faces: dict, flows: list[np.ndarray], taken: phone.Phone,
+def _developed(work: Path, count: int, faces: dict, flows: list[np.ndarray], camera: phone.Phone,
                seed: int) -> Iterator[np.ndarray]:
     """The frames as the phone shows them, sRGB [H, W, 3]."""
     gain = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}, faces)
     for frame in range(count):
         linear = images.read_linear(work / f"{frame:05d}.exr").astype(np.float32)
-        moved = motion.motion_blur(motion.rolling_shutter(linear, flows[frame], taken.readout), flows[frame],
-                                   taken.shutter)
-        yield phone.develop(moved, taken, gain, np.random.default_rng([seed, 72, frame]))
+        moved = motion.motion_blur(motion.rolling_shutter(linear, flows[frame], camera.readout), flows[frame],
+                                   camera.shutter)
+        yield phone.develop(moved, camera, gain, np.random.default_rng([seed, 72, frame]))

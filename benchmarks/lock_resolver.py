@@ -70,14 +70,14 @@ def is_cuda(wheel: Wheel, need: Requirement) -> bool:
     return wheel.name == "torch" and need.marker is not None and '"Linux"' in str(need.marker)
 
 
-def ask(name: str, wanted: list[str], *more: str) -> dict[str, Wheel]:
+def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
     """The wheels that pip chooses for a lock's platform and Python, without what they need in turn. Raises Problem
     where one is not to be had."""
     with tempfile.TemporaryDirectory(prefix="wildcap_lock_") as folder:
         report = Path(folder) / "report.json"
         command = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--quiet", "--dry-run",
                    "--ignore-installed", "--no-deps",
-                   "--target", folder, "--report", report, *wheels.tags(name), *more, *wanted]
+                   "--target", folder, "--report", report, *wheels.tags(name), *more, *packages]
         ended = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         if ended.returncode:
             errors = [line for line in ended.stderr.splitlines() if line.startswith("ERROR")]

@@ -101,7 +101,7 @@ def chosen_frames(count: int) -> list[int]:
 
 
 def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: np.ndarray,
-               taken: phone.Phone) -> Iterator[np.ndarray]:
+               camera: phone.Phone) -> Iterator[np.ndarray]:
     """The frames as the phone shows them, sRGB [H, W, 3]. Its rows are read at once: a rolling shutter has no one true
     camera."""
     views, still = [sample.view_of(matrix) for matrix in cameras], np.tile(np.eye(4), (3, 1, 1))
@@ -111,8 +111,8 @@ def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: 
     for k in numbers:
         around = max(k - 1, 0), k, min(k + 1, len(views) - 1)
         flow = motion.image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])
-        linear = motion.motion_blur(images.read_linear(work / f"{k:05d}.exr").astype(np.float32), flow, taken.shutter)
-        yield phone.develop(linear, taken, np.full(3, gain), np.random.default_rng([SEED, 72, k]))
+        linear = motion.motion_blur(images.read_linear(work / f"{k:05d}.exr").astype(np.float32), flow, camera.shutter)
+        yield phone.develop(linear, camera, np.full(3, gain), np.random.default_rng([SEED, 72, k]))
 
 
 def row(folder: Path, count: int, plain_times: float) -> dict:
@@ -183,12 +183,12 @@ def growth(rows: dict) -> float | None:
     return math.log(known[-1][1] / known[0][1]) / math.log(known[-1][0] / known[0][0]) if len(known) > 1 else None
 
 
-def table(found: dict) -> str:
+def table(record: dict) -> str:
     """The record's table."""
     head = ["frames", "cameras: seconds (of processor)", "registered",
             "centre error, median and most, % of the distance", "rotation, degrees", "found by",
             "plain pycolmap: seconds (of processor)", "its registered, centre error", "times as long (of processor)"]
-    return figures.markdown(head, [[count, *_cells(of)] for count, of in found["frames"].items()])
+    return figures.markdown(head, [[count, *_cells(of)] for count, of in record["frames"].items()])
 
 
 def _cells(of: dict) -> list:

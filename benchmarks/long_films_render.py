@@ -54,10 +54,10 @@ def main() -> None:
     render_frames(scene, add_camera(scene, job), job)
 
 
-def traced(parts: dict[str, bpy.types.Object], sun: dict, sky: np.ndarray) -> dict[str, np.ndarray]:
+def traced(objects: dict[str, bpy.types.Object], sun: dict, sky: np.ndarray) -> dict[str, np.ndarray]:
     """What the albedo of each vertex is to be multiplied with, linear [V, 3] by part: the sky [H, W, 3] and the sun
     past the person."""
-    whole = meshes.joined([_mesh(thing) for thing in parts.values()])
+    whole = meshes.joined([_mesh(thing) for thing in objects.values()])
     caster, points, normals = raster.RayCaster(whole), whole.vertices, meshes.vertex_normals(whole)
     rng, light, start = np.random.default_rng(0), np.zeros((len(points), 3)), points + LIFT_M * normals
     for _ in range(RAYS):  # directions by the cosine, so that each counts alike
@@ -79,15 +79,15 @@ def traced(parts: dict[str, bpy.types.Object], sun: dict, sky: np.ndarray) -> di
             / np.pi
             / SUN_RAYS
         )
-    ends = np.cumsum([len(thing.data.vertices) for thing in parts.values()])
-    return dict(zip(parts, np.split(light, ends[:-1]), strict=True))
+    ends = np.cumsum([len(thing.data.vertices) for thing in objects.values()])
+    return dict(zip(objects, np.split(light, ends[:-1]), strict=True))
 
 
-def _mesh(thing: bpy.types.Object) -> meshes.Mesh:
-    """A thing's triangles; it stands where it was made."""
-    vertices = np.zeros(3 * len(thing.data.vertices))
-    thing.data.vertices.foreach_get("co", vertices)
-    return meshes.Mesh(vertices.reshape(-1, 3), np.array([polygon.vertices[:] for polygon in thing.data.polygons]))
+def _mesh(obj: bpy.types.Object) -> meshes.Mesh:
+    """An object's triangles; it stands where it was made."""
+    vertices = np.zeros(3 * len(obj.data.vertices))
+    obj.data.vertices.foreach_get("co", vertices)
+    return meshes.Mesh(vertices.reshape(-1, 3), np.array([polygon.vertices[:] for polygon in obj.data.polygons]))
 
 
 def _unit(directions: np.ndarray) -> np.ndarray:
@@ -118,20 +118,22 @@ def _colour(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
     return node.outputs[0]
 
 
-def _vector(tree: bpy.types.NodeTree, operation: str, one: bpy.types.NodeSocket, other: Sequence[float] = (0, 0, 0),
+def _vector(tree: bpy.types.NodeTree, operation: str, first: bpy.types.NodeSocket, second: Sequence[float] = (0, 0, 0),
             output: int = 0) -> bpy.types.NodeSocket:
     node = tree.nodes.new("ShaderNodeVectorMath")
     node.operation = operation
-    tree.links.new(one, node.inputs[0])
-    node.inputs[1].default_value = other
+    tree.links.new(first, node.inputs[0])
+    node.inputs[1].default_value = second
     return node.outputs[output]
 
 
-def _product(tree: bpy.types.NodeTree, one: bpy.types.NodeSocket, other: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _product(
+    tree: bpy.types.NodeTree, first: bpy.types.NodeSocket, second: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
     node = tree.nodes.new("ShaderNodeVectorMath")
     node.operation = 'MULTIPLY'
-    tree.links.new(one, node.inputs[0])
-    tree.links.new(other, node.inputs[1])
+    tree.links.new(first, node.inputs[0])
+    tree.links.new(second, node.inputs[1])
     return node.outputs[0]
 
 

@@ -146,8 +146,8 @@ def _off(points: np.ndarray, curve: np.ndarray) -> np.ndarray:
     return np.linalg.norm(points[:, None] - curve[None], axis=2).min(1)
 
 
-def _plain(value: float | None) -> float | None:
-    return None if value is None else round(float(value), 3)
+def _plain(figure: float | None) -> float | None:
+    return None if figure is None else round(float(figure), 3)
 
 
 if __name__ == "__main__":

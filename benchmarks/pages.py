@@ -49,9 +49,9 @@ def made_by(records: list[dict]) -> str:
     return f"Made by {lines[0]}" if len(lines) == 1 else "Made by\n\n" + "\n".join(f"- {line}" for line in lines)
 
 
-def prose(*parts: str) -> str:
+def prose(*paragraphs: str) -> str:
     """Paragraphs, tables and pictures with a blank line between them, without the source's indentation."""
-    return "\n\n".join(inspect.cleandoc(part) for part in parts)
+    return "\n\n".join(inspect.cleandoc(part) for part in paragraphs)
 
 
 def reflow(block: str) -> str:

@@ -68,8 +68,8 @@ def blotches(sight: Sight, rng: np.random.Generator) -> np.ndarray:
     return np.exp(total.reshape(-1, 3)[sight.pixel])
 
 
-def _pair(seed: int, kind: str, group: str, one: Portrait, other: Portrait) -> Pair:
-    skin = cv2.erode((np.minimum(one.skin, other.skin) > 0.9).astype(np.uint8), np.ones((5, 5))) > 0
-    levels = np.stack([images.srgb_to_linear(each.srgb) for each in (one, other)])
+def _pair(seed: int, kind: str, group: str, first: Portrait, second: Portrait) -> Pair:
+    skin = cv2.erode((np.minimum(first.skin, second.skin) > 0.9).astype(np.uint8), np.ones((5, 5))) > 0
+    levels = np.stack([images.srgb_to_linear(each.srgb) for each in (first, second)])
     lit = (levels.min((0, 3)) > LIT[0]) & (levels.max((0, 3)) < LIT[1])
-    return Pair(f"{seed} {kind}", kind, group, (one.srgb, other.srgb), (one.albedo, other.albedo), skin & lit)
+    return Pair(f"{seed} {kind}", kind, group, (first.srgb, second.srgb), (first.albedo, second.albedo), skin & lit)

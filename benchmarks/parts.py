@@ -28,7 +28,7 @@ import numpy as np
 
 from core.face import faces, parser
 from core.face.parser_network import ParseNet
-from core.face.parts import PARTS, SIDE, cut, inside, to_crop
+from core.face.parts import PARTS, SIDE_PX, cut, inside, to_crop
 from core.imaging import images
 from core.synthetic.people import snapshot, unlit
 from core.synthetic.people.figure import PARTS as GROWN
@@ -132,8 +132,8 @@ def row(crops: list[tuple[np.ndarray, np.ndarray, np.ndarray]], pictures: int) -
             "skin_as_hair": _share(counted[skin, hair], counted[skin].sum())}
 
 
-def _share(some: int, whole: int) -> float | None:
-    return float(some / whole) if whole else None
+def _share(count: int, total: int) -> float | None:
+    return float(count / total) if total else None
 
 
 def write_sheet(out: Path, pictures: list[Path], network: ParseNet, brighter: float) -> None:
@@ -149,7 +149,7 @@ def write_sheet(out: Path, pictures: list[Path], network: ParseNet, brighter: fl
         crop = cut(srgb, to_crop(face.landmarks))
         drawn = (parser.parse(srgb, face.landmarks, network).crop @ COLOURS).astype(np.float32)
         rows.append(np.hstack([crop, drawn, 0.55 * crop + 0.45 * drawn]))
-    rows += [np.zeros((SIDE, 3 * SIDE, 3), np.float32)] * (-len(rows) % 2)
+    rows += [np.zeros((SIDE_PX, 3 * SIDE_PX, 3), np.float32)] * (-len(rows) % 2)
     sheet = np.vstack([np.hstack(pair) for pair in zip(rows[0::2], rows[1::2], strict=True)])
     images.write_srgb(out, sheet)
 

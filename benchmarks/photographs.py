@@ -225,15 +225,15 @@ def lamp_sitters(data: Path) -> Iterator[LightSeries]:
 SITTERS: dict[str, Callable[[Path], Iterator[LightSeries]]] = {"faceolat": light_stage_sitters, "lamps": lamp_sitters}
 
 
-def sheet(sitter: LightSeries, given: list[dict[str, np.ndarray]], side: int = 256) -> np.ndarray:
+def sheet(sitter: LightSeries, answers: list[dict[str, np.ndarray]], side: int = 256) -> np.ndarray:
     """Three of a sitter's lights, a row per answer at the truth's tone; sRGB."""
     rows, columns = (np.flatnonzero(sitter.face.any(axis)) for axis in (1, 0))
     box, tone = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1], sitter.albedo[sitter.face].mean(0)
     shown = []
-    for name in given[0]:
+    for name in answers[0]:
         row = []
-        for i in range(0, len(given), max(1, len(given) // 3)):
-            answer, lit = given[i][name], sitter.lit[i]
+        for i in range(0, len(answers), max(1, len(answers) // 3)):
+            answer, lit = answers[i][name], sitter.lit[i]
             toned = np.clip(answer * tone / np.maximum(answer[lit].mean(0), 1e-6), 0, 1)
             row.append(images.resize(images.linear_to_srgb(toned)[box], side, side))
         shown.append(row)

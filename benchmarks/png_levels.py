@@ -68,11 +68,13 @@ def encoded(pixels: np.ndarray, bits: int, into: Path, level: int, flag: int | N
     return {"seconds": round(time.process_time() - began, 2), "mb": round(into.stat().st_size / 1e6, 1)}
 
 
-def table(found: dict) -> str:
+def table(record: dict) -> str:
     """A Markdown table: a picture a row, a way to write it a column."""
     ways = [f"{name} {level}" for name in FILTERS for level in LEVELS]
-    rows = [[f"{name} ({row['raw_mb']:.0f} MB)",
-             *(f"{row[way]['seconds']:.2f} s, {row[way]['mb']:.1f} MB" for way in ways)] for name, row in found.items()]
+    rows = [
+        [f"{name} ({row['raw_mb']:.0f} MB)", *(f"{row[way]['seconds']:.2f} s, {row[way]['mb']:.1f} MB" for way in ways)]
+        for name, row in record.items()
+    ]
     return figures.markdown(["picture (in memory)", *ways], rows)
 
 

@@ -65,12 +65,12 @@ def main() -> None:
         figures.write(asked.json, "reimported", COMMAND, record)
 
 
-def table(found: figures.Figures) -> str:
+def table(record: figures.Figures) -> str:
     """Rows: deliveries."""
     return figures.markdown(
         ["preset and format", "PSNR, dB", "without scattering, dB", "points, mm", "shape keys", "maps"],
         [[name.replace("_", " "), f"{back.psnr_db:.1f}", f"{back.flat_psnr_db:.1f}", f"{back.off_mm:.3f}",
-          str(back.shape_keys), str(back.maps)] for name, back in found.items()])
+          str(back.shape_keys), str(back.maps)] for name, back in record.items()])
 
 
 def compare(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int, samples: int,
@@ -187,8 +187,8 @@ def without_scattering(head) -> Iterator[None]:
             node.inputs["Subsurface"].default_value = value
 
 
-def psnr(shown: np.ndarray, wanted: np.ndarray, covered: np.ndarray) -> float:
-    return float(-10 * np.log10(max(np.square(shown - wanted)[covered].mean(), 1e-10)))
+def psnr(picture: np.ndarray, reference: np.ndarray, covered: np.ndarray) -> float:
+    return float(-10 * np.log10(max(np.square(picture - reference)[covered].mean(), 1e-10)))
 
 
 def off(head, back: list) -> float:
@@ -198,12 +198,12 @@ def off(head, back: list) -> float:
     return float(cKDTree(points_of(head)).query(np.concatenate([points_of(thing) for thing in back]))[0].max())
 
 
-def points_of(thing) -> np.ndarray:
+def points_of(obj) -> np.ndarray:
     """Vertices [V, 3] at rest in the world, metres."""
-    points = np.empty(3 * len(thing.data.vertices), np.float32)
-    keys = thing.data.shape_keys
-    (thing.data.vertices if keys is None else keys.reference_key.data).foreach_get("co", points)
-    return points.reshape(-1, 3) @ np.array(thing.matrix_world)[:3, :3].T + np.array(thing.matrix_world)[:3, 3]
+    points = np.empty(3 * len(obj.data.vertices), np.float32)
+    keys = obj.data.shape_keys
+    (obj.data.vertices if keys is None else keys.reference_key.data).foreach_get("co", points)
+    return points.reshape(-1, 3) @ np.array(obj.matrix_world)[:3, :3].T + np.array(obj.matrix_world)[:3, 3]
 
 
 def counted(back: list) -> tuple[int, int]:

@@ -131,13 +131,13 @@ def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubjec
             print(f"{person.name} has not been solved and is left out.", file=sys.stderr)
 
 
-def render(subject: RelitSubject, work: Path, lights: list[str], wanted: list[str]) -> None:
+def render(subject: RelitSubject, work: Path, lights: list[str], row_names: list[str]) -> None:
     """work/renders/ROW_LIGHT.exr of all rows, and face.exr."""
     capture, truth = subject.capture, subject.maps
     renders, mask = work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)
     pictures = [renders / name
-                for name in (*(f"{row}_{Path(light).stem}.exr" for row in ("truth", *wanted) for light in lights),
+                for name in (*(f"{row}_{Path(light).stem}.exr" for row in ("truth", *row_names) for light in lights),
                              "face.exr")]
     old = [picture for picture in pictures if not is_newer(picture, capture, truth)]
     if not old:
@@ -147,7 +147,7 @@ def render(subject: RelitSubject, work: Path, lights: list[str], wanted: list[st
     face_mask(mask)
     rows = []
     for name, worn in read_rows(capture, subject.worn()).items():
-        if name not in ("truth", *wanted):
+        if name not in ("truth", *row_names):
             continue
         folder = work / f"{name}.wildcap"
         write_row(folder, capture, worn)
@@ -203,11 +203,16 @@ def side_by_side(pictures: list[np.ndarray]) -> np.ndarray:
     return np.hstack([np.vstack(columns[:half]), np.vstack(columns[half:])])
 
 
-def mean_over_lights(found: dict[str, dict[str, dict]]) -> dict[str, dict[str, float]]:
+def mean_over_lights(figures_by_light: dict[str, dict[str, dict]]) -> dict[str, dict[str, float]]:
     """Row -> figures, each the mean over the lights."""
-    rows = next(iter(found.values()))
-    return {row: {figure: float(np.mean([found[light][row][figure] for light in found])) for figure in rows[row]}
-            for row in rows}
+    rows = next(iter(figures_by_light.values()))
+    return {
+        row: {
+            figure: float(np.mean([figures_by_light[light][row][figure] for light in figures_by_light]))
+            for figure in rows[row]
+        }
+        for row in rows
+    }
 
 
 def shortfall(rows: dict[str, dict[str, float]]) -> str:

@@ -78,7 +78,7 @@ def _about_face(scene, mask: Path) -> None:
     render.border_min_y, render.border_max_y = (rows[0] - margin) / red.shape[0], (rows[-1] + margin) / red.shape[0]
 
 
-def _render_mask(thing, scene, mask: str, path: Path) -> None:
+def _render_mask(obj, scene, mask: str, path: Path) -> None:
     """The head in a material that shines as a picture says, whatever the light; its own comes back."""
     import bpy
 
@@ -93,10 +93,10 @@ def _render_mask(thing, scene, mask: str, path: Path) -> None:
     image.image.colorspace_settings.name = "Non-Color"
     links.new(image.outputs["Color"], emission.inputs["Color"])
     links.new(emission.outputs["Emission"], output.inputs["Surface"])
-    own, thing.data.materials[0] = thing.data.materials[0], material
+    own, obj.data.materials[0] = obj.data.materials[0], material
     scene.cycles.use_denoising, scene.render.use_border, scene.world = False, False, None
     _render(scene, path, 0)
-    thing.data.materials[0] = own
+    obj.data.materials[0] = own
 
 
 if __name__ == "__main__":

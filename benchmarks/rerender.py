@@ -119,11 +119,11 @@ def score(rendered: np.ndarray, views: list[DelitFrame]) -> dict[str, float]:
     return {figure: round(float(np.mean([one[figure] for one in found])), 4) for figure in found[0]}
 
 
-def table(found: dict) -> str:
+def table(record: dict) -> str:
     """Markdown: a line per row with the mean over the people, beside the paper's figures for its own captures."""
-    known = [figure for figure in FORMATS if figure in found["mean"][OURS]]
+    known = [figure for figure in FORMATS if figure in record["mean"][OURS]]
     lines = []
-    for row, cells in found["mean"].items():
+    for row, cells in record["mean"].items():
         paper = PAPER.get(row if row in PAPER else row.rsplit(" ", 1)[0])
         lines.append([f"**{row}**" if row == OURS else row,
                       *(FORMATS[figure].format(cells[figure]) for figure in known),

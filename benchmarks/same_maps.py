@@ -42,11 +42,13 @@ def main() -> int:
     return 1 if different or not compared else 0
 
 
-def same_pixels(one: Path, other: Path) -> bool:
+def same_pixels(first: Path, second: Path) -> bool:
     """Whether two PNG files that are packed differently hold the same values."""
-    if one.suffix != ".png" or not (one.is_file() and other.is_file()):
+    if first.suffix != ".png" or not (first.is_file() and second.is_file()):
         return False
-    return images.bits(one) == images.bits(other) and np.array_equal(images.read_data(one), images.read_data(other))
+    return images.bits(first) == images.bits(second) and np.array_equal(
+        images.read_data(first), images.read_data(second)
+    )
 
 
 def written(capture: Capture, stage: stages.Stage) -> dict[str, str]:

@@ -65,21 +65,28 @@ def main() -> None:
         write(asked.json, "shadow_mask", "python -m benchmarks.shadow_mask", {"rows": found}, keep=True)
 
 
-def scores(found: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:
+def scores(proposed: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:
     """Shares of the judged texels that are in shadow and masked, intersection over union, precision, recall and the
     F-score of the border at NEAR texels of a 1024 map, of masks bool [S, S] over texels bool [S, S]."""
-    both = (found & true)[judged].sum()
-    reach = NEAR * len(found) / 1024
+    both = (proposed & true)[judged].sum()
+    reach = NEAR * len(proposed) / 1024
     borders = [_border(mask) & cv2.erode(judged.astype(np.uint8), np.ones((5, 5))).astype(bool)
-               for mask in (found, true)]
+               for mask in (proposed, true)]
     hits = [float((_distance(other) <= reach)[own].mean()) if own.any() else 0.0
             for own, other in (borders, borders[::-1])]
-    return (float(true[judged].mean()), float(found[judged].mean()), float(both / max((found | true)[judged].sum(), 1)),
-            float(both / max(found[judged].sum(), 1)), float(both / max(true[judged].sum(), 1)),
-            2 * hits[0] * hits[1] / max(sum(hits), 1e-9))
+    return (
+        float(true[judged].mean()),
+        float(proposed[judged].mean()),
+        float(both / max((proposed | true)[judged].sum(), 1)),
+        float(both / max(proposed[judged].sum(), 1)),
+        float(both / max(true[judged].sum(), 1)),
+        2 * hits[0] * hits[1] / max(sum(hits), 1e-9),
+    )
 
 
-def _row(capture: Capture, true: np.ndarray, name: str, delighter: str, asked: argparse.Namespace) -> tuple[float, ...]:
+def _row(
+    capture: Capture, true: np.ndarray, name: str, delighter: str, arguments: argparse.Namespace
+) -> tuple[float, ...]:
     began = time.process_time()
     _run(capture, delighter, "shadow_mask")
     seconds = time.process_time() - began
@@ -88,21 +95,21 @@ def _row(capture: Capture, true: np.ndarray, name: str, delighter: str, asked: a
     skin = (template.mask("skin", SIZE) > 0.5) & (template.mask("face", SIZE) > 0.5)
     found = (*scores(mask > 0.5, true, skin & (confidence > 0.1)), seconds)
     _print(name, delighter, found)
-    if asked.pictures:
+    if arguments.pictures:
         path = capture.texture_filmed if capture.texture_filmed.is_file() else capture.texture_png
         filmed = images.resize(images.read_srgb(path), SIZE, SIZE)
         grey = [np.repeat(m.astype(np.float32)[..., None], 3, -1) for m in (true, mask)]
-        images.write_srgb(asked.work / f"{capture.root.stem}_{delighter}.png", np.hstack([filmed, *grey]))
+        images.write_srgb(arguments.work / f"{capture.root.stem}_{delighter}.png", np.hstack([filmed, *grey]))
     return found
 
 
-def _figures(name: str, delighter: str, values: tuple[float, ...]) -> dict:
+def _figures(name: str, delighter: str, scores: tuple[float, ...]) -> dict:
     return {"capture": name, "delighter": delighter,
-            **{column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, values, strict=True)}}
+            **{column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, scores, strict=True)}}
 
 
-def _print(name: str, delighter: str, values) -> None:
-    print(f"| {name} | {delighter} | " + " | ".join(f"{v:.2f}" for v in values[:-1]) + f" | {values[-1]:.1f} |",
+def _print(name: str, delighter: str, scores) -> None:
+    print(f"| {name} | {delighter} | " + " | ".join(f"{v:.2f}" for v in scores[:-1]) + f" | {scores[-1]:.1f} |",
           flush=True)
 
 

@@ -86,10 +86,10 @@ def expected(seed: int) -> str:
     return name_group(tones[0])
 
 
-def before(look: Look, known: list) -> SkinTone:
+def before(look: Look, tones: list) -> SkinTone:
     """What auto took of a texture whose light was all taken out: the best lit skin."""
     colour = torch.from_numpy(np.asarray(look.best * min(1, BRIGHTEST / look.best.max()), np.float32))
-    return estimate_from_texture(colour[:, None, None].expand(3, 8, 8).contiguous(), torch.ones(8, 8), known)
+    return estimate_from_texture(colour[:, None, None].expand(3, 8, 8).contiguous(), torch.ones(8, 8), tones)
 
 
 def errors(tone: SkinTone, truth: np.ndarray) -> tuple[float, float, float]:
@@ -131,14 +131,14 @@ def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
                       f"{of['delta_e']:8.2f}{stated}")
 
 
-def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> dict:
+def of_capture(capture: Capture, srgb: np.ndarray, tones: list) -> dict:
     """One finished capture: prints its name, then the earlier auto's and the estimate's error of L* and delta E, and
     returns them with its true L*."""
     truth = images.srgb_to_linear(srgb)
     head = read_head(capture)
     evidence, settings = read_evidence(capture, head, TONE_SIDE_TEXELS), from_json({}, Settings())
     lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
-    by_row = {"before": estimate_from_texture(evidence.texture, lit, known),
+    by_row = {"before": estimate_from_texture(evidence.texture, lit, tones),
               "scene": estimate_from_frames(capture, head, settings, evidence, Reporter("skin_tone"))}
     found: dict = {"lightness": to_lab(truth)[0]}
     for row, tone in by_row.items():

@@ -167,11 +167,11 @@ def shapes_of(filmed: Filmed) -> split.Shapes:
     return initial.make_shapes(evidence, albedo(initial.make_reference(prior(), tone, evidence, "mean")))
 
 
-def divided(shapes: split.Shapes, found: split.Split, local: bool) -> np.ndarray:
+def divided(shapes: split.Shapes, fitted: split.Split, local: bool) -> np.ndarray:
     """The delit texture [SIZE, SIZE, 3], linear, over the light that was found, at any exposure."""
-    light = found.light(shapes.normal)
+    light = fitted.light(shapes.normal)
     if local:
-        light = light * split.enlarge_field(torch.from_numpy(found.local), SIZE).exp()
+        light = light * split.enlarge_field(torch.from_numpy(fitted.local), SIZE).exp()
     return (shapes.texture / light).permute(1, 2, 0).numpy()
 
 
@@ -249,12 +249,12 @@ def scale_table(scales: dict[str, dict[str, float]]) -> str:
                                [[name, *(f"{value:.3f}" for value in row.values())] for name, row in scales.items()]))
 
 
-def reach_table(found: dict) -> str:
+def reach_table(record: dict) -> str:
     sides = ("same side", "mirror image")
-    return (f"Correlation of the grey log ratio of {found['skins']} painted skins to their mean, whose deviation is "
-            f"{found['deviation']:.2f}, by distance; the model takes exp(-distance / {1e3 * split.TRAIT_REACH_M:.0f} "
+    return (f"Correlation of the grey log ratio of {record['skins']} painted skins to their mean, whose deviation is "
+            f"{record['deviation']:.2f}, by distance; the model takes exp(-distance / {1e3 * split.TRAIT_REACH_M:.0f} "
             f"mm), and {split.MIRROR_CORRELATION} of it with the mirror image.\n\n"
-            + figures.markdown(["", *found[sides[0]]], [[side, *found[side].values()] for side in sides]))
+            + figures.markdown(["", *record[sides[0]]], [[side, *record[side].values()] for side in sides]))
 
 
 if __name__ == "__main__":

@@ -257,8 +257,8 @@ def _gain(psnr: Figures) -> str | None:
     return None if None in (psnr.get(DELIT), psnr.get(SOLVED)) else f"{psnr[SOLVED] - psnr[DELIT]:+.2f}"
 
 
-def _text(value: float | None) -> str | None:
-    return None if value is None else f"{value:.2f}"
+def _text(figure: float | None) -> str | None:
+    return None if figure is None else f"{figure:.2f}"
 
 
 if __name__ == "__main__":

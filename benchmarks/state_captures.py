@@ -157,11 +157,11 @@ def add_captures(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
 
 
-def captures_asked(parser: argparse.ArgumentParser, asked: argparse.Namespace) -> list[Filmed]:
+def captures_asked(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> list[Filmed]:
     """The captures that these arguments name; ends with an error where there are none."""
-    folder = asked.folder.resolve()
-    found = [filmed for filmed in find(folder, (asked.truths or folder).resolve(), folder / "state")
-             if filmed.name.startswith(tuple(asked.only))]
+    folder = arguments.folder.resolve()
+    found = [filmed for filmed in find(folder, (arguments.truths or folder).resolve(), folder / "state")
+             if filmed.name.startswith(tuple(arguments.only))]
     if not found:
         parser.error(f"{folder} holds no capture with a texture and a truth.")
     return found
@@ -174,9 +174,9 @@ def landmarks_in_uv(size: int = SIZE) -> np.ndarray:
     return np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * size
 
 
-def rotation_between(points: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The rotation [3, 3] that brings points [N, 3] nearest to others of the same order (Kabsch 1976)."""
-    u, _, vt = np.linalg.svd((points - points.mean(0)).T @ (others - others.mean(0)))
+def rotation_between(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """The rotation [3, 3] that brings points [N, 3] nearest to targets [N, 3] of the same order (Kabsch 1976)."""
+    u, _, vt = np.linalg.svd((points - points.mean(0)).T @ (targets - targets.mean(0)))
     return vt.T @ np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
 
 

@@ -141,6 +141,6 @@ def _seen(look: HeadInView, answer: np.ndarray) -> np.ndarray:
     return images.linear_to_srgb(np.clip(look.picture(answer), 0, 1))
 
 
-def _mean(values: list[float | None]) -> float | None:
-    known = [value for value in values if value is not None and np.isfinite(value)]
+def _mean(scores: list[float | None]) -> float | None:
+    known = [value for value in scores if value is not None and np.isfinite(value)]
     return float(np.mean(known)) if known else None

@@ -84,8 +84,8 @@ def main() -> None:
         print(markdown([name, *columns], [[row, *(f"{values[column]:.4g}" for column in columns)]
                                           for row, values in rows.items()]), end="\n\n")
     if arguments.json:
-        def keys(values: dict[str, float]) -> dict[str, float]:
-            return {figure.lower().replace(" ", "_"): value for figure, value in values.items()}
+        def keys(figures_by_name: dict[str, float]) -> dict[str, float]:
+            return {figure.lower().replace(" ", "_"): value for figure, value in figures_by_name.items()}
 
         keyed = {part: {row.replace("lanczos", "Lanczos"): keys(values) for row, values in rows.items()}
                  for part, rows in found.items()}
@@ -212,8 +212,8 @@ def _stacked(srgb: np.ndarray) -> np.ndarray:
     return maps
 
 
-def _fine_figures(albedo: np.ndarray, true: np.ndarray, seen: np.ndarray) -> dict[str, float]:
-    inner = cv2.erode(seen.astype(np.uint8), np.ones((25, 25))) > 0
+def _fine_figures(albedo: np.ndarray, true: np.ndarray, observed: np.ndarray) -> dict[str, float]:
+    inner = cv2.erode(observed.astype(np.uint8), np.ones((25, 25))) > 0
     _, ssim = structural_similarity(albedo, true, channel_axis=2, data_range=1.0, full=True)
     logs = [np.log(np.maximum(images.srgb_to_linear(picture)[..., 1], 2e-3)) for picture in (albedo, true)]
     fine, true_fine = (log - cv2.GaussianBlur(log, (0, 0), 2.0) for log in logs)

@@ -42,7 +42,7 @@ from core.synthetic.skin import make_skin
 from core.upscale import grain, hair
 from core.upscale.maps import HeadMaps, read_maps
 from core.upscale.surface import HeadSurface, lay_out
-from core.upscale.whole_head import UNSEEN, complete
+from core.upscale.whole_head import UNSEEN_CONFIDENCE, complete
 
 from .figures import write
 
@@ -117,7 +117,9 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse))
     report = Reporter("upscale")
     done = complete(maps, surface, report)
-    seen = cv2.morphologyEx((maps.seen >= UNSEEN).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
+    seen = cv2.morphologyEx(
+        (maps.seen >= UNSEEN_CONFIDENCE).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)
+    )
     seen = seen.astype(bool) | (template.mask("face", surface.size) > 0.5)
     inside = (_distance(seen) - _distance(~seen)) * surface.texel
     rings = [(inside > low) & (inside < high) for low, high in RINGS]
@@ -126,9 +128,9 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     if subject is not None:
         truth, hidden = _painted(surface, subject), maps.confidence < 0.02
 
-        def error(shown, region: str):
+        def error(maps, region: str):
             where = hidden & (template.mask(region, surface.size) > 0.9)
-            return _error(*(_tone(m, surface) for m in (shown, truth)), where)
+            return _error(*(_tone(m, surface) for m in (maps, truth)), where)
 
         tones = {"tone": {region: {"fill": error(maps, region), "completed": error(done, region)}
                           for region in ("neck", "ears", "scalp")}}
@@ -147,13 +149,13 @@ def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
                     np.repeat(one[..., None], 3, 2), one)
 
 
-def _step(maps: HeadMaps, here: np.ndarray, there: np.ndarray, surface: HeadSurface) -> float:
+def _step(maps: HeadMaps, ring: np.ndarray, next_ring: np.ndarray, surface: HeadSurface) -> float:
     """Mean difference of the log tone (over 2 mm) between the texels of a ring and the nearest of another on the
     surface."""
     tone = np.log(_tone(maps, surface))
-    _, nearest = cKDTree(surface.position[here][::4]).query(surface.position[there][::4], distance_upper_bound=25.0)
-    met = nearest < len(surface.position[here][::4])
-    return float(np.abs(tone[there][::4][met] - tone[here][::4][nearest[met]]).mean())
+    _, nearest = cKDTree(surface.position[ring][::4]).query(surface.position[next_ring][::4], distance_upper_bound=25.0)
+    met = nearest < len(surface.position[ring][::4])
+    return float(np.abs(tone[next_ring][::4][met] - tone[ring][::4][nearest[met]]).mean())
 
 
 def _tone(maps: HeadMaps, surface: HeadSurface) -> np.ndarray:
@@ -173,24 +175,24 @@ def _cut(maps: HeadMaps, surface: HeadSurface) -> dict:
     return {"across": float(step[away > 50].mean()), "beside": float(step[away < 3].mean())}
 
 
-def _grain(maps: HeadMaps, where: np.ndarray, surface: HeadSurface) -> float:
-    fine = grain.bands(np.log(np.maximum(maps.diffuse, 0.004)), np.ones(where.shape, np.float32),
+def _grain(maps: HeadMaps, mask: np.ndarray, surface: HeadSurface) -> float:
+    fine = grain.bands(np.log(np.maximum(maps.diffuse, 0.004)), np.ones(mask.shape, np.float32),
                        float(np.median(surface.texel)))[2]
-    return float(np.subtract(*np.percentile(fine[where], [83, 17])))
+    return float(np.subtract(*np.percentile(fine[mask], [83, 17])))
 
 
-def _error(albedo: np.ndarray, truth: np.ndarray, where: np.ndarray) -> float:
-    return float(255 * np.abs(images.linear_to_srgb(albedo[where]) - images.linear_to_srgb(truth[where])).mean())
+def _error(albedo: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
+    return float(255 * np.abs(images.linear_to_srgb(albedo[mask]) - images.linear_to_srgb(truth[mask])).mean())
 
 
 def _darker(hairy: HeadMaps, bare: HeadMaps) -> np.ndarray:
     return np.clip(np.log(np.maximum(bare.diffuse, 0.004)) - np.log(np.maximum(hairy.diffuse, 0.004)), 0, None).mean(2)
 
 
-def _alike(found: np.ndarray, true: np.ndarray) -> float:
+def _alike(cover: np.ndarray, true: np.ndarray) -> float:
     """0 where nothing was found."""
-    face = template.mask("face", len(found)) > 0.5
-    return float(np.corrcoef(found[face], true[face])[0, 1]) if found[face].std() > 0 else 0.0
+    face = template.mask("face", len(cover)) > 0.5
+    return float(np.corrcoef(cover[face], true[face])[0, 1]) if cover[face].std() > 0 else 0.0
 
 
 def _cm2(cover: np.ndarray, surface: HeadSurface) -> float:
@@ -202,10 +204,10 @@ def _distance(inside: np.ndarray) -> np.ndarray:
     return np.minimum(cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1], 1e4)
 
 
-def _mean(values: list):
-    if isinstance(values[0], dict):
-        return {name: _mean([value[name] for value in values]) for name in values[0]}
-    return round(float(np.mean(values)), 3)
+def _mean(scores: list):
+    if isinstance(scores[0], dict):
+        return {name: _mean([value[name] for value in scores]) for name in scores[0]}
+    return round(float(np.mean(scores)), 3)
 
 
 if __name__ == "__main__":

@@ -100,7 +100,7 @@ def test_a_machine_that_has_gone_holds_nothing(code, tmp_path, monkeypatch):
     capture = batch.faces[0].capture
     capture.lock.write_text(json.dumps({"host": "gone/1/2", "pid": 1, "began": "", "since": "2026-11-24T00:00:00",
                                         "token": "x"}))
-    assert derive_state(batch, batch.faces[0]).who == "gone"
+    assert derive_state(batch, batch.faces[0]).machine == "gone"
     monkeypatch.setattr(lease, "TERM_S", 0.5)
     heard = []
     monkeypatch.setattr("core.batch.task.ROOT", code)
@@ -110,7 +110,7 @@ def test_a_machine_that_has_gone_holds_nothing(code, tmp_path, monkeypatch):
 
 def test_a_batch_is_run_by_one_at_a_time(code, tmp_path):
     batch = make(code, tmp_path, "a")
-    with lease.hold(batch.root, what="batch"):
+    with lease.hold(batch.root, folder_kind="batch"):
         ran = core(code, "batch", "run", batch.root)
         assert (
             ran.returncode == 2

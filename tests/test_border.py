@@ -82,7 +82,7 @@ def test_the_outline_of_what_was_seen_is_no_border_and_far_from_one_nothing_is_k
 def test_a_beard_says_little_of_the_light(tmp_path):
     """Dark strokes on jaw and chin of a texture that is large enough to show them; without them, or on a small one,
     there is no beard."""
-    size = beard.SIZE
+    size = beard.SIZE_TEXELS
     noise = np.random.default_rng(1).standard_normal((size, size, 1)).astype(np.float32)
     tone = np.array([0.42, 0.26, 0.18], np.float32) * (1 + 0.01 * noise)
     grows = beard._on_template()[0] > 0.9

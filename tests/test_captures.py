@@ -242,7 +242,7 @@ def test_the_strip_shows_frames_of_the_texture_with_their_sharpness(addon, tmp_p
     images = len(bpy.data.images)
     assert strip.look(str(root)) and not strip.look(str(root)), "read once"
     found = strip.of(item)
-    assert (found.count, found.used, found.blurred, len(found.frames)) == (100, 25, 2, strip.MOST)
+    assert (found.count, found.used, found.blurred, len(found.frames)) == (100, 25, 2, strip.MOST_FRAMES)
     assert [frame.name for frame in found.frames][:4] == ["00001", "00009", "00017", "00025"]
     assert found.frames[0].sharpness == pytest.approx(0.201 / 0.299) and not found.frames[0].blurred
     # icons have no numbers without a window

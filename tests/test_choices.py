@@ -74,7 +74,7 @@ def test_the_wipe_shows_a_frame_before_and_after_and_leaves_no_image_behind(addo
     for name, before, after in (("00003", (200, 100, 50), (100, 50, 25)), ("00009", (20, 20, 20), (40, 40, 40))):
         (capture / "frames" / f"{name}.png").write_bytes(standin.png([[before] * 40] * 80))
         (capture / "delit" / f"{name}.png").write_bytes(standin.png([[after] * 40] * 80))
-    manager, side = bpy.context.window_manager, delighters.SIDE
+    manager, side = bpy.context.window_manager, delighters.SIDE_PX
 
     def at(x: float):
         picture = delighters._icons["wipe"]

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.light.shadow_edges import BAND, INWARD, penumbra, place
+from core.light.shadow_edges import BAND_TEXELS, INWARD_TEXELS, penumbra, place
 from core.solve.evidence import soften_mask
 
 SIZE = 512
@@ -40,13 +40,16 @@ def test_alpha_lies_on_the_penumbra(width):
     assert after < 0.01 and after < 0.1 * before
     assert np.abs(edge.alpha - shadow)[np.abs(distance) > width / 2 + 4].max() < 0.05  # no halo to either side
     assert np.abs(edge.colour - TAKEN / TAKEN.mean()).max() < 0.05
-    assert edge.found[np.abs(distance) < BAND - 2].min() > 0.9 and edge.found[np.abs(distance) > BAND + 4].max() == 0
+    assert (
+        edge.on_edge[np.abs(distance) < BAND_TEXELS - 2].min() > 0.9
+        and edge.on_edge[np.abs(distance) > BAND_TEXELS + 4].max() == 0
+    )
 
 
 def test_a_mask_without_a_shadow_stays_as_it_was_painted():
     painted = soften_mask(shadowed(0)[2])
     edge = place(pores(SIZE) * np.ones(3), painted, np.ones((SIZE, SIZE), np.float32), 2.0)
-    assert np.array_equal(edge.alpha, painted) and edge.found.max() == 0
+    assert np.array_equal(edge.alpha, painted) and edge.on_edge.max() == 0
 
 
 @pytest.mark.parametrize("painted",
@@ -79,4 +82,4 @@ def test_deep_strokes_are_never_taken_back():
     shadow = ((np.hypot(x - 500, y - 500) < 200) & (np.hypot(x - 500, y - 500) > 60)).astype(np.float32)
     painted = soften_mask((np.hypot(x - 500, y - 500) < 206).astype(np.float32))
     edge = place(1 - shadow[..., None] * TAKEN, painted, np.ones((size, size), np.float32), 2.0)
-    assert edge.alpha[np.hypot(x - 500, y - 500) < 206 - INWARD - BAND].min() == 1
+    assert edge.alpha[np.hypot(x - 500, y - 500) < 206 - INWARD_TEXELS - BAND_TEXELS].min() == 1

@@ -12,7 +12,7 @@ import torch
 
 from core.contract.messages import Problem, Reporter
 from core.face import eye_reader
-from core.face.eye_reader import SIDE
+from core.face.eye_reader import SIDE_PX
 from core.face.parser_network import ParseNet
 from core.face.parts import cut
 from core.synthetic.identities import reserved_seeds
@@ -62,9 +62,9 @@ def test_an_eye_comes_upright_with_its_outer_corner_to_the_left(turn, left):
     outer, inner = (np.array([200.0, 150.0]) + np.array([c, s]) * off for off in ((30, -30) if left else (-30, 30)))
     move = eye_reader.to_eye_crop(np.stack([outer, inner]), left)
     places = np.stack([outer, inner, (outer + inner) / 2 + 20 * down]) @ move[:, :2].T + move[:, 2]
-    width = SIDE / eye_reader.SPAN
-    assert np.allclose(places, [[SIDE / 2 - width / 2, SIDE / 2], [SIDE / 2 + width / 2, SIDE / 2],
-                                [SIDE / 2, SIDE / 2 + 20 * width / 60]])
+    width = SIDE_PX / eye_reader.SPAN_EYE_WIDTHS
+    assert np.allclose(places, [[SIDE_PX / 2 - width / 2, SIDE_PX / 2], [SIDE_PX / 2 + width / 2, SIDE_PX / 2],
+                                [SIDE_PX / 2, SIDE_PX / 2 + 20 * width / 60]])
 
 
 def test_a_sight_knows_the_white_and_the_iris_of_the_eye_in_its_middle(sights):
@@ -99,13 +99,13 @@ def test_an_example_is_a_right_eye(sights):
         ball = sight.ball.astype(np.float32) / 255
         coded = np.concatenate([ball, ball[..., :1]], -1)  # a picture whose colours are its shares
         layers, shares = training.example(coded, ball, sight, np.random.default_rng(0), augment=False)
-        assert layers.shape == (4, SIDE, SIDE) and shares.shape == (3, SIDE, SIDE)
+        assert layers.shape == (4, SIDE_PX, SIDE_PX) and shares.shape == (3, SIDE_PX, SIDE_PX)
         assert np.abs(shares.sum(0) - 1).max() < 0.005
         white = shares[1] > 0.9
         assert layers[0][white].min() > layers[0][shares[0] > 0.99].max()
         move = eye_reader.to_eye_crop(sight.corners, sight.left)
         outer, inner = sight.corners @ move[:, :2].T + move[:, 2]
-        assert outer[0] < inner[0] and np.array_equal(cut(ball, move, SIDE)[..., 0] > 0.9, white)
+        assert outer[0] < inner[0] and np.array_equal(cut(ball, move, SIDE_PX)[..., 0] > 0.9, white)
 
 
 def test_nothing_is_learnt_from_people_that_are_measured():
@@ -121,7 +121,7 @@ def test_the_shipped_reader_sees_eyes_that_it_never_saw(work):
         for _ in range(4):
             picture, ball = eye_sights.photograph_eye(sight, rng)
             found = eye_reader.read_eye(picture, sight.corners, sight.left)
-            true = cut(ball, found.move, SIDE)
+            true = cut(ball, found.move, SIDE_PX)
             for k, (seen, there) in enumerate(((found.ball, true.sum(-1)), (found.iris, true[..., 1]))):
                 both[k] += [((seen > 0.5) & (there > 0.5)).sum(), ((seen > 0.5) | (there > 0.5)).sum()]
     ball, iris = both[:, 0] / both[:, 1]
@@ -156,7 +156,7 @@ def test_a_little_training_beats_the_constant_answer(work, tiny):
 def _constant(share: float):
     """A network that says the same everywhere."""
     odds = torch.log(torch.tensor([share, (1 - share) / 2, (1 - share) / 2]))
-    return lambda layers: odds[None, :, None, None].expand(len(layers), 3, SIDE, SIDE)
+    return lambda layers: odds[None, :, None, None].expand(len(layers), 3, SIDE_PX, SIDE_PX)
 
 
 def test_a_training_ends_with_weights_that_read(work, tiny, tmp_path, monkeypatch, sights):
@@ -172,7 +172,7 @@ def test_a_training_ends_with_weights_that_read(work, tiny, tmp_path, monkeypatc
     assert card["steps"] == 6 and card["prepared"] == 1 and {"ball", "iris"} < set(card["held_out"]), card
     picture = eye_sights.photograph_eye(sights[0], np.random.default_rng(0))[0]
     seen = eye_reader.read_eye(picture, sights[0].corners, False, eye_reader.load(out))
-    assert seen.ball.shape == (SIDE, SIDE) and 0 <= seen.ball.min() and (seen.iris <= seen.ball + 1e-6).all()
+    assert seen.ball.shape == (SIDE_PX, SIDE_PX) and 0 <= seen.ball.min() and (seen.iris <= seen.ball + 1e-6).all()
     with pytest.raises(Problem, match="other data"):
         monkeypatch.setitem(tiny, "figures", 2)
         training.train_eyes("cpu", out, QUIET, TrainingRun(4, folder, growing=True))

@@ -17,7 +17,7 @@ from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.face import faces, template
 from core.face.glasses import sureness
-from core.frames.glasses import SURE, judge
+from core.frames.glasses import SURE_LOG_ODDS, judge
 from core.geometry.views import View
 from core.imaging import images
 from core.synthetic.identities import reserved_seeds
@@ -58,7 +58,7 @@ def test_rims_are_told_from_a_bare_face():
     face = faces.detect(FACE)
     assert sureness(FACE, face) < -1
     worn = with_rims(FACE)
-    assert sureness(worn, faces.detect(worn)) > SURE
+    assert sureness(worn, faces.detect(worn)) > SURE_LOG_ODDS
 
 
 def test_a_capture_with_glasses_is_refused_and_the_artist_can_overrule_it(tmp_path):

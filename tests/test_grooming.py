@@ -40,10 +40,10 @@ def striped(degrees: float) -> tuple[np.ndarray, np.ndarray]:
     them."""
     texels, turn = brows(), np.radians(degrees)
     across = np.array([-np.sin(turn), np.cos(turn)])
-    v, u = np.nonzero(texels.where)
-    phase = (u * across[0] - v * across[1]) * float(np.median(surface().texel[texels.where]))
+    v, u = np.nonzero(texels.mask)
+    phase = (u * across[0] - v * across[1]) * float(np.median(surface().texel[texels.mask]))
     albedo = np.broadcast_to(SKIN, (SIZE, SIZE, 3)).copy()
-    albedo[texels.where] *= (0.6 + 0.4 * np.cos(2 * np.pi * phase))[:, None]
+    albedo[texels.mask] *= (0.6 + 0.4 * np.cos(2 * np.pi * phase))[:, None]
     return albedo.astype(np.float32), across
 
 
@@ -55,23 +55,27 @@ def angles(way: np.ndarray, across: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("degrees", [-40, 0, 40])
 def test_strokes_are_followed_wherever_they_go(degrees):
     albedo, across = striped(degrees)
-    tensors = strokes.measure_tensors(albedo, brows(), float(np.median(surface().texel[brows().where])))
-    off = angles(strokes.choose_ways(tensors, brows(), usual(), grooming.TRUST), across)
+    tensors = strokes.measure_tensors(albedo, brows(), float(np.median(surface().texel[brows().mask])))
+    off = angles(strokes.choose_ways(tensors, brows(), usual(), grooming.TRUSTED_COHERENCE), across)
     assert np.median(off) < 4 and np.percentile(off, 90) < 15
 
 
 def test_hair_lies_as_usual_where_no_stroke_is_seen_and_never_the_wrong_way_round():
     plain = np.broadcast_to(SKIN, (SIZE, SIZE, 3)).astype(np.float32)
-    way = strokes.choose_ways(strokes.measure_tensors(plain, brows(), 0.25), brows(), usual(), grooming.TRUST)
+    way = strokes.choose_ways(
+        strokes.measure_tensors(plain, brows(), 0.25), brows(), usual(), grooming.TRUSTED_COHERENCE
+    )
     assert (brows().flatten(way) * brows().flatten(usual())).sum(1).min() > 0.999
     albedo, _ = striped(60)
-    way = strokes.choose_ways(strokes.measure_tensors(albedo, brows(), 0.25), brows(), usual(), grooming.TRUST)
+    way = strokes.choose_ways(
+        strokes.measure_tensors(albedo, brows(), 0.25), brows(), usual(), grooming.TRUSTED_COHERENCE
+    )
     assert (brows().flatten(way) * brows().flatten(usual())).sum(1).min() >= 0
 
 
 def groomed(cover: float, seed: int = 0) -> tuple[dict, np.ndarray]:
     """Brows of which hair covers so much everywhere; the hairs, and the mask."""
-    mask = cover * brows().where.astype(np.float32)
+    mask = cover * brows().mask.astype(np.float32)
     skin = np.broadcast_to(SKIN, (SIZE, SIZE, 3)).astype(np.float32)
     albedo = (1 - mask[..., None]) * skin + mask[..., None] * HAIR
     none = np.zeros((SIZE, SIZE), np.float32)
@@ -108,7 +112,7 @@ def test_black_hair_is_not_blue_where_the_skin_below_is_a_little_off():
 
 def test_hair_that_was_hidden_has_the_colour_of_the_rest_and_is_brown_where_none_was_seen():
     skin, cover = np.broadcast_to(SKIN, (64, 64, 3)), np.zeros((64, 64), np.float32)
-    assert grooming._unmix(skin, skin, cover, 2.0) == pytest.approx(np.broadcast_to(grooming.BROWN, skin.shape))
+    assert grooming._unmix(skin, skin, cover, 2.0) == pytest.approx(np.broadcast_to(grooming.BROWN_LINEAR, skin.shape))
     cover[:, :32] = 0.5
     colour = grooming._unmix((1 - cover[..., None]) * skin + cover[..., None] * HAIR, skin, cover, 2.0)
     assert colour[:, 50:] == pytest.approx(np.broadcast_to(HAIR, (64, 14, 3)), rel=0.01)
@@ -137,7 +141,7 @@ def test_the_same_seed_gives_the_same_file_without_pickles(tmp_path):
     with np.load(tmp_path / "a.npz", allow_pickle=False) as stored:
         assert {name.partition("_")[0] for name in stored.files} == {"brows", "lashes"}
         assert (
-            stored["brows_points"].shape[1:] == (grooming.STEPS, 3)
+            stored["brows_points"].shape[1:] == (grooming.POINTS_PER_HAIR, 3)
             and stored["brows_radius"].shape == stored["brows_points"].shape[:2]
         )
 

@@ -78,7 +78,7 @@ def test_a_bare_chin_that_the_parser_doubts_has_no_beard_whatever_moles_it_has()
 def test_hair_of_the_colour_of_its_skin_is_as_usual_where_the_parser_is_sure():
     where = regions()[0]
     seen = found(LIGHT, [], answer(brows=0.9))
-    assert seen.brows[where].mean() == pytest.approx(hair.USUAL["brows"], abs=0.15)
+    assert seen.brows[where].mean() == pytest.approx(hair.USUAL_COVER["brows"], abs=0.15)
     assert found(LIGHT, [], None).brows.max() == 0
 
 
@@ -93,7 +93,7 @@ def test_brows_behind_a_fringe_are_like_the_other_one_or_as_usual(both):
     parts[forehead] = [0, 0, 0.95]
     seen = found(LIGHT, [(brows, BLACK), (fringe, BLACK)], parts)
     hidden = where & forehead
-    usual = hair.USUAL["brows"] if both else brows[where & ~forehead].mean()
+    usual = hair.USUAL_COVER["brows"] if both else brows[where & ~forehead].mean()
     assert seen.brows[hidden].mean() == pytest.approx(usual, abs=0.1)
     assert seen.brows[forehead & ~where].mean() < 0.02 and seen.hidden[hidden].min() > 0.99
 

@@ -86,9 +86,9 @@ def test_what_most_views_show_as_hair_is_left_out_of_all(monkeypatch, views, hea
     assert found[inner & (np.max(before, axis=0) > 0)].mean() > 0.8
     hair = shown.shares[..., parts_shown.ASKED.index("hair")]
     assert (
-        np.median(hair[inner & shown.told]) > 0.7
-        and hair[~shown.told].max() == 0
-        and np.array_equal(shown.told, np.max(before, axis=0) > 0)
+        np.median(hair[inner & shown.judged]) > 0.7
+        and hair[~shown.judged].max() == 0
+        and np.array_equal(shown.judged, np.max(before, axis=0) > 0)
     )
     assert shown.shares[..., parts_shown.ASKED.index("brows")].max() == 0
 

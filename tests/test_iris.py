@@ -14,7 +14,7 @@ pytest.importorskip("OpenImageIO")
 from core.contract.eyes_record import Eyeball  # noqa: E402
 from core.contract.messages import Reporter  # noqa: E402
 from core.face import lids  # noqa: E402
-from core.face.eye_reader import SIDE, EyeShares  # noqa: E402
+from core.face.eye_reader import SIDE_PX, EyeShares  # noqa: E402
 from core.face.head import Head  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
@@ -116,9 +116,9 @@ def test_the_iris_is_what_lids_and_pupil_leave_of_it():
     (middle,), (depth,) = view.project(np.zeros((1, 3)))
     disc = depth - np.sqrt(0.012**2 - 0.0059**2)  # how far away the iris lies
     radius = 0.0059 * view.camera.mean_focal_length() / disc
-    move = np.array([[1.0, 0, SIDE / 2 - middle[0]], [0, 1.0, SIDE / 2 - middle[1]]])
-    share = np.zeros((SIDE, SIDE), np.float32)
-    share[SIDE // 2:] = 1
+    move = np.array([[1.0, 0, SIDE_PX / 2 - middle[0]], [0, 1.0, SIDE_PX / 2 - middle[1]]])
+    share = np.zeros((SIDE_PX, SIDE_PX), np.float32)
+    share[SIDE_PX // 2:] = 1
     rows, columns = iris.find_iris_pixels(view, eye, EyeShares(share, share, move), shape)
     x, y = columns + 0.5 - middle[0], rows + 0.5 - middle[1]
     assert len(rows) == pytest.approx(np.pi * radius**2 * (0.85**2 - 0.55**2) / 2, rel=0.1)

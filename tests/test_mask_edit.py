@@ -149,7 +149,7 @@ def test_windows_lie_on_whole_cells_and_stay_in_the_map():
     now[:9, 100:110] = 1
     part = find_window(before, now, (64, 64), 8, 256)
     assert part.inside == (slice(0, 76), slice(36, 176))
-    assert all(s.start % 32 == 0 and s.stop % 32 == 0 and 0 <= s.start < s.stop <= 256 for s in part.seen)
+    assert all(s.start % 32 == 0 and s.stop % 32 == 0 and 0 <= s.start < s.stop <= 256 for s in part.context)
     moving = torch.nonzero(part.moving)
     assert moving[:, 0].min() == 0, "at the map's border nothing else is read"
     column = (moving[:, 1].min() + part.cells[1].start).item()

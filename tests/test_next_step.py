@@ -44,13 +44,13 @@ def test_the_chain_from_nothing_to_a_picture(step):
         "install_solver", "choose_video", "make_my_head", "bring_in_head", "paint_mask", "solve", "assemble_material",
         "render"]
     assert all(s.state and s.label for s in chain)
-    others = {s.operator.split(".")[1]: s.other[1].split(".")[1] for s in chain if s.other}
+    others = {s.operator.split(".")[1]: s.alternative[1].split(".")[1] for s in chain if s.alternative}
     assert others == {"make_my_head": "reconstruct", "paint_mask": "accept_proposal"}
 
 
 def test_a_cancelled_reconstruction_continues(step):
     assert step(done=("frames", "cameras")).label == "Continue Reconstruction"
-    assert step(done=("frames", "cameras")).other[0] == "Make My Head"
+    assert step(done=("frames", "cameras")).alternative[0] == "Make My Head"
     assert "Scan" in step(done=("frames", "cameras")).state
 
 

@@ -71,14 +71,14 @@ def seen_share(opened: lids.OpenHead, side: int, view: View, slip: float = 0.0) 
     ball, over = opened.balls[side], 3
     caster = raster.RayCaster(meshes.joined([opened.skin, ball.mesh]))
     move = eye_reader.to_eye_crop(view.project(opened.skin.vertices[list(lids.corners()[side])])[0], side == 0)
-    y, x = (np.mgrid[0:eye_reader.SIDE * over, 0:eye_reader.SIDE * over] + 0.5) / over
+    y, x = (np.mgrid[0:eye_reader.SIDE_PX * over, 0:eye_reader.SIDE_PX * over] + 0.5) / over
     pixels = (np.stack([x.ravel(), y.ravel()], 1) - move[:, 2]) @ np.linalg.inv(move[:, :2]).T
     origins = np.repeat((view.centre - slip * view.rotation[0])[None], len(pixels), 0)
     face, bary, _ = caster.first_hits(origins, view.rays(pixels))
     on_ball = face >= len(opened.skin.faces)
     hit = raster.interpolate(caster.mesh.vertices, caster.mesh.faces, np.maximum(face, 0), bary)
     inside = on_ball & (np.linalg.norm(np.cross(hit - ball.centre, ball.gaze), axis=-1) < IRIS_M)
-    white, iris = (share.reshape(eye_reader.SIDE, over, eye_reader.SIDE, over).mean((1, 3), dtype=np.float32)
+    white, iris = (share.reshape(eye_reader.SIDE_PX, over, eye_reader.SIDE_PX, over).mean((1, 3), dtype=np.float32)
                    for share in (on_ball, inside))
     return eye_looks.EyeLook(view, eye_reader.EyeShares(white, iris, move))
 

@@ -14,7 +14,7 @@ from benchmarks import parts as benchmark
 from core.contract.messages import Problem, Reporter
 from core.face import parser
 from core.face.parser_network import ParseNet, network_input
-from core.face.parts import BRIDGE, CHIN, PARTS, SIDE, cut, inside, put_back, to_crop
+from core.face.parts import BRIDGE, CHIN, PARTS, SIDE_PX, cut, inside, put_back, to_crop
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.people import figure, snapshot, unlit
 from core.training import descent, snapshots
@@ -72,19 +72,19 @@ def test_a_crop_is_upright_and_maps_back_to_its_pixels(turn):
     smooth = np.stack([x, y], -1).astype(np.float32)  # a picture of where each pixel is
     crop = cut(smooth, move)
     known = inside(smooth.shape, move) > 0.5
-    v, u = np.mgrid[0:SIDE, 0:SIDE] + 0.5
+    v, u = np.mgrid[0:SIDE_PX, 0:SIDE_PX] + 0.5
     where = (np.stack([u, v], -1) - move[:, 2]) @ np.linalg.inv(move[:, :2]).T
     inner = known & (where > 2).all(-1) & (where < [298, 238]).all(-1)
     assert inner.mean() > 0.5 and np.abs(crop - where)[inner].max() < 0.06, "cv2 counts a 32nd of a pixel"
     again = np.stack([put_back(crop[..., k], move, smooth.shape, -1.0) for k in range(2)], -1)
     at = smooth @ move[:, :2].T + move[:, 2]
-    within = (at > 2).all(-1) & (at < SIDE - 2).all(-1) & (smooth > 4).all(-1) & (smooth < [296, 236]).all(-1)
+    within = (at > 2).all(-1) & (at < SIDE_PX - 2).all(-1) & (smooth > 4).all(-1) & (smooth < [296, 236]).all(-1)
     assert np.abs(again - smooth)[within].max() < 0.15
-    assert (again[((at < -2) | (at > SIDE + 2)).any(-1)] == -1).all()
+    assert (again[((at < -2) | (at > SIDE_PX + 2)).any(-1)] == -1).all()
 
 
 def test_a_face_at_the_crops_own_scale_comes_back_exactly():
-    points = landmarks(size=SIDE / 1.9, middle=(140.0, 130.0))
+    points = landmarks(size=SIDE_PX / 1.9, middle=(140.0, 130.0))
     move = to_crop(points)
     move[:, :2], move[:, 2] = np.eye(2), np.round(move[:, 2])
     picture = np.random.default_rng(1).random((260, 280)).astype(np.float32)
@@ -105,7 +105,7 @@ def test_shares_add_up_to_one_and_beyond_the_crop_is_background():
 
 
 def test_a_mirrored_picture_has_mirrored_parts():
-    rng, points = np.random.default_rng(3), landmarks(0.0, SIDE / 1.9, (120.0, 110.0))
+    rng, points = np.random.default_rng(3), landmarks(0.0, SIDE_PX / 1.9, (120.0, 110.0))
     picture, network = rng.random((220, 240, 3)).astype(np.float32), randomly(ParseNet(**TINY))
     mirrored = points * [-1, 1, 1] + [240, 0, 0]
     one, other = parser.parse(picture, points, network), parser.parse(picture[:, ::-1], mirrored, network)
@@ -113,8 +113,8 @@ def test_a_mirrored_picture_has_mirrored_parts():
 
 
 def test_dark_pictures_are_seen_as_bright_ones():
-    picture = np.random.default_rng(4).uniform(0, 0.8, (SIDE, SIDE, 3)).astype(np.float32)
-    known = np.ones((SIDE, SIDE), np.float32)
+    picture = np.random.default_rng(4).uniform(0, 0.8, (SIDE_PX, SIDE_PX, 3)).astype(np.float32)
+    known = np.ones((SIDE_PX, SIDE_PX), np.float32)
     assert np.abs(network_input(picture, known) - network_input(picture / 4, known)).max() < 1e-4
     known[:40] = 0
     layers = network_input(picture, known)

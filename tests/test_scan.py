@@ -21,7 +21,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 from core.scan.fusion import fuse
 from core.scan.pairs import BASELINES_DEG, choose_pairs
-from core.scan.rounds import NEAR, WIDE
+from core.scan.rounds import NEAR_DEG, WIDE_DEG
 from core.scan.stereo import DepthMap
 
 WIDTH, HEIGHT, FOCAL = 360, 480, 460.0
@@ -158,7 +158,7 @@ def test_pairs_of_two_passes_lie_across_the_view(farther):
     near = 0.5 * np.stack([np.sin(angles), -np.cos(angles), 0 * angles], 1)
     far = farther * 0.5 * np.stack([np.sin(angles + 0.02), -np.cos(angles + 0.02), 0 * angles + 0.15], 1)
     centres = np.concatenate([near, far])
-    for baselines in (BASELINES_DEG, NEAR, WIDE):
+    for baselines in (BASELINES_DEG, NEAR_DEG, WIDE_DEG):
         pairs = np.array(choose_pairs(centres, np.ones(96), 24, baselines))
         apart, middle = centres[pairs[:, 1]] - centres[pairs[:, 0]], directions(centres)[pairs].sum(1)
         assert len(pairs) > 12

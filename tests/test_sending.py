@@ -108,8 +108,8 @@ def test_the_dialog_shows_the_very_pictures_that_would_be_sent(addon, item, capt
     sending, icons = addon("reconstruct.sending"), addon("frame_icons")
     dialog = type("Dialog", (), {})()
     sending.WILDCAP_OT_allow_sending.tell(dialog)
-    assert len(dialog.icons) == len(dialog.told.frames) == 2
-    assert {str(capture / "frames" / name) for name in dialog.told.frames} <= set(icons._icons)
+    assert len(dialog.icons) == len(dialog.sending_plan.frames) == 2
+    assert {str(capture / "frames" / name) for name in dialog.sending_plan.frames} <= set(icons._icons)
 
 
 def test_the_dialog_asks_again_where_the_frames_changed_meanwhile(addon, item, capture, online):

@@ -28,7 +28,7 @@ from core.light.spherical_harmonics import sh_basis
 from core.shadow_mask import run, sunless
 from core.shadow_mask.frames import filtered, softening
 from core.shadow_mask.lift import lift_shadows
-from core.shadow_mask.occlusion import GENTLE, baked_occlusion
+from core.shadow_mask.occlusion import FULL_ALPHA, baked_occlusion
 from core.shadow_mask.tidy import over_brows
 from core.synthetic.painted_head import camera
 from core.worker.job import read_job
@@ -222,7 +222,7 @@ def test_occlusion_is_masked_gently_where_shape_and_texture_agree():
     pores = np.random.default_rng(0).normal(0, 0.03, visible.shape)
     baked = baked_occlusion(np.log(np.clip(visible, 0.05, 1)) + pores, visible, skin)
     deep = (visible < 0.8) & (skin > 0.9)
-    assert deep.sum() > 50 and baked[deep].mean() > 0.25 and baked.max() <= GENTLE
+    assert deep.sum() > 50 and baked[deep].mean() > 0.25 and baked.max() <= FULL_ALPHA
     assert baked[(visible > 0.93) & (skin > 0.9)].max() < 0.05
     assert baked_occlusion(pores, visible, skin)[skin > 0.9].mean() < 0.005  # even skin
     # a dark patch on the forehead, which no shape explains

@@ -194,7 +194,7 @@ def test_the_group_is_an_asset_with_a_preview_and_a_catalogue(patch, addon, tmp_
         group = bpy.data.node_groups["WildCap Skin"]
         assert group.asset_data.catalog_id == asset.CATALOGUE and "skin" in group.asset_data.tags
         pixels = np.array(group.preview.image_pixels_float).reshape(*group.preview.image_size, 4)
-        middle = pixels[asset.SIDE // 2, asset.SIDE // 2]
+        middle = pixels[asset.SIDE_PX // 2, asset.SIDE_PX // 2]
         assert middle[3] == pytest.approx(1) and 1 > middle[0] > middle[1] > middle[2] > 0.2 and pixels[0, 0, 3] == 0
         assert (tmp_path / asset.FILE).read_text(encoding="utf-8").splitlines().count(asset.LINE) == 1
         group.asset_clear()

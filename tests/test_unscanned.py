@@ -116,7 +116,7 @@ def test_of_many_views_32_spread_over_all_are_asked(monkeypatch):
 
     monkeypatch.setattr(registration, "_shown", note)
     with pytest.raises(InterruptedError):
-        registration._by_views(None, None, views, SimpleNamespace(model=None, found=None), Reporter("registration"))
+        registration._by_views(None, None, views, SimpleNamespace(model=None, landmarks=None), Reporter("registration"))
     assert len(asked) == 32 and asked[0] is views[0] and asked[-1] is views[-1]
 
 

@@ -146,7 +146,7 @@ def test_strips_are_the_whole(busy, monkeypatch):
 
 
 def _with_strips(monkeypatch, rows: int, maps: HeadMaps, net: network.Rcan) -> np.ndarray:
-    monkeypatch.setattr("core.upscale.enlarge.STRIP", rows)
+    monkeypatch.setattr("core.upscale.enlarge.STRIP_ROWS", rows)
     return enlarge(maps, lambda share: None, network=net)
 
 

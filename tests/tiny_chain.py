@@ -17,7 +17,7 @@ from py_compile import PycInvalidationMode
 from core.contract import stages
 from core.contract.capture import Capture
 from core.contract.messages import Message
-from core.worker.__main__ import PRIORITY
+from core.worker.__main__ import NICE_VALUE
 from core.worker.client import Worker
 from core.worker.job import write_job
 
@@ -122,8 +122,8 @@ def keep_pace(root: Path) -> None:
     other tests run."""
     main = root / "core" / "worker" / "__main__.py"
     text = main.read_text(encoding="utf-8")
-    assert f"PRIORITY = {PRIORITY}\n" in text
-    main.write_text(text.replace(f"PRIORITY = {PRIORITY}\n", "PRIORITY = 0\n"), encoding="utf-8")
+    assert f"NICE_VALUE = {NICE_VALUE}\n" in text
+    main.write_text(text.replace(f"NICE_VALUE = {NICE_VALUE}\n", "NICE_VALUE = 0\n"), encoding="utf-8")
 
 
 def start(root: Path, capture: Capture, mood: dict | None = None, **job) -> Worker:

@@ -12,7 +12,7 @@ from ..core.contract import unforeseen
 from ..core.contract.messages import Problem
 from . import captures, jobs, problems, status
 
-WIDTH = 460
+WIDTH_PX = 460
 """Of a dialog, pixels"""
 
 
@@ -118,9 +118,9 @@ class Dialog(BaseOperator):
         if self.lines is None:
             return {'CANCELLED'}
         title = f"{iface_(self.bl_label, 'Operator')}?"
-        return context.window_manager.invoke_props_dialog(self, width=WIDTH, title=title,
+        return context.window_manager.invoke_props_dialog(self, width=WIDTH_PX, title=title,
                                                           confirm_text=self.bl_label.partition(" ")[0])
 
     def draw(self, context):
         for line in self.lines:
-            problems.draw_text(self.layout, line, WIDTH)
+            problems.draw_text(self.layout, line, WIDTH_PX)

@@ -37,8 +37,8 @@ class BatchView:
     progress: dict = field(default_factory=dict)
     problem: Problem | None = None
 
-    def count(self, which: str) -> int:
-        return sum(each.state == which for each in self.states.values())
+    def count(self, state: str) -> int:
+        return sum(each.state == state for each in self.states.values())
 
     @cached_property
     def _faces(self) -> dict[str, BatchFace]:

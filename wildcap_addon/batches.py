@@ -24,7 +24,7 @@ from ..core.contract.messages import Problem
 from . import captures, extension
 from .batch_watch import BatchView, Watch, remembered
 
-MOST = 10
+MOST_ROWS = 10
 """Batches that are remembered."""
 ICONS = {DONE: 'CHECKMARK', TO_DO: 'RADIOBUT_OFF', WORKING: 'PLAY', WAITING: 'BRUSH_DATA', STOPPED: 'ERROR'}
 _watch: Watch | None = None
@@ -110,19 +110,19 @@ def poll() -> bool:
     return before != _shown
 
 
-def line(known: BatchView) -> str:
+def line(view: BatchView) -> str:
     """What is being done, and how long all of it takes: 'Anna: Cameras 40 %, about 20 min left'; '' where nothing is
     told."""
     words = [iface_("{}: {} {}").format(name, iface_(each["stage"]), f"{each['share']:.0%}")
-             for name, each in known.progress.get("working", {}).items()][:3]
-    if known.progress.get("left_s") is not None:
-        words.append(iface_("about {} min left").format(max(1, round(known.progress["left_s"] / 60))))
+             for name, each in view.progress.get("working", {}).items()][:3]
+    if view.progress.get("left_s") is not None:
+        words.append(iface_("about {} min left").format(max(1, round(view.progress["left_s"] / 60))))
     return ", ".join(words)
 
 
-def share(known: BatchView) -> float:
+def share(view: BatchView) -> float:
     """The part of a run's faces that have ended, in [0, 1]."""
-    return min(1.0, known.progress["ended"] / known.progress["of"]) if known.progress.get("of") else 0.0
+    return min(1.0, view.progress["ended"] / view.progress["of"]) if view.progress.get("of") else 0.0
 
 
 def _replace_watch(root: Path | None) -> None:
@@ -140,7 +140,7 @@ def _memory() -> Path:
 def _remember(roots: Iterable[Path]) -> None:
     # a folder that cannot be written: it is found no more when Blender was closed
     with contextlib.suppress(Problem, OSError, ValueError):
-        write_json(_memory(), [str(root) for root in roots][:MOST])
+        write_json(_memory(), [str(root) for root in roots][:MOST_ROWS])
 
 
 def register():

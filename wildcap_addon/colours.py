@@ -64,9 +64,9 @@ def missing_view(scene: bpy.types.Scene) -> str:
         settings.look = look
 
 
-def _choose(settings, name: str, values: tuple[str, ...]) -> str | None:
-    """Sets the first of the values that there is; None where there is none."""
-    for value in values:
+def _choose(settings, name: str, names: tuple[str, ...]) -> str | None:
+    """Sets the first of the names that there is; None where there is none."""
+    for value in names:
         try:
             setattr(settings, name, value)
             return value

@@ -52,9 +52,9 @@ def replace_data(obj: bpy.types.Object, data, kind) -> None:
         data.name = name
 
 
-def stop_animation(thing: bpy.types.ID) -> None:
+def stop_animation(data_block: bpy.types.ID) -> None:
     """Takes a data-block's animation away, and its action, where nothing else has it."""
-    action = thing.animation_data.action if thing.animation_data else None
-    thing.animation_data_clear()
+    action = data_block.animation_data.action if data_block.animation_data else None
+    data_block.animation_data_clear()
     if action is not None and action.users == 0:
         bpy.data.actions.remove(action)

@@ -80,19 +80,23 @@ def _in_place(head, mesh) -> bpy.types.Mesh:
     return mesh
 
 
-def _take_shape(old: bpy.types.Mesh, new: bpy.types.Mesh) -> bool:
-    """Whether a mesh has the topology of a new one and took its coordinates: weights, UV maps, attributes and shape
-    keys that the artist made on it stay."""
-    corners = [data_blocks.read_field(mesh.loops, "vertex_index", kind=np.int32) for mesh in (old, new)]
-    if len(old.vertices) != len(new.vertices) or not np.array_equal(*corners) or old.has_custom_normals:
+def _take_shape(kept_mesh: bpy.types.Mesh, new_mesh: bpy.types.Mesh) -> bool:
+    """Whether `kept_mesh` has the topology of `new_mesh` and took its coordinates: weights, UV maps, attributes and
+    shape keys that the artist made on it stay."""
+    corners = [data_blocks.read_field(mesh.loops, "vertex_index", kind=np.int32) for mesh in (kept_mesh, new_mesh)]
+    if (
+        len(kept_mesh.vertices) != len(new_mesh.vertices)
+        or not np.array_equal(*corners)
+        or kept_mesh.has_custom_normals
+    ):
         return False
-    places = data_blocks.read_field(new.vertices, "co", 3)
-    keys = old.shape_keys.key_blocks if old.shape_keys else ()
-    moved = places - data_blocks.read_field(keys[0].data if keys else old.vertices, "co", 3)
+    places = data_blocks.read_field(new_mesh.vertices, "co", 3)
+    keys = kept_mesh.shape_keys.key_blocks if kept_mesh.shape_keys else ()
+    moved = places - data_blocks.read_field(keys[0].data if keys else kept_mesh.vertices, "co", 3)
     for key in keys:
         key.data.foreach_set("co", (data_blocks.read_field(key.data, "co", 3) + moved).ravel())
-    old.vertices.foreach_set("co", places.ravel())
-    old.update()
+    kept_mesh.vertices.foreach_set("co", places.ravel())
+    kept_mesh.update()
     return True
 
 

@@ -14,10 +14,10 @@ from . import captures, status
 @dataclass(frozen=True)
 class Results:
     """take(context, list item) is called in Object Mode when nobody is in the middle of a move, for as long as
-    wanted(its folder) says that something waits."""
+    waits(its folder) says that something waits."""
 
     take: Callable
-    wanted: Callable[[str], bool]
+    waits: Callable[[str], bool]
 
 
 on_results: list[Results] = []
@@ -27,7 +27,7 @@ on_results: list[Results] = []
 def waits() -> bool:
     """Whether a room has something of the active capture to bring in."""
     root = captures.root(captures.active(bpy.context))
-    return any(results.wanted(root) for results in on_results)
+    return any(results.waits(root) for results in on_results)
 
 
 HEAD_GOALS = ("reconstruct", "make", "solve")

@@ -24,7 +24,7 @@ from ..core.worker.client import Worker
 from ..core.worker.job import read_job, write_job
 from . import batches, captures, incoming, preferences, problems, properties, status, timings
 
-INTERVAL_S = 0.2
+INTERVAL_S = 0.2  # between two looks at the workers' messages
 # the folder that holds core/, where the worker starts; nothing is written there
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -37,7 +37,7 @@ class NextStep:
     label: str
     operator: str
     icon: str
-    other: tuple[str, str, str] = ()
+    alternative: tuple[str, str, str] = ()
 
 
 BEFORE_MASK = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
@@ -98,7 +98,7 @@ def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> 
         by_hand = ("Continue Reconstruction" if begun else "Reconstruct", "wildcap.reconstruct", 'MESH_MONKEY')
         if not facts.has_python:
             return SET_UP
-        return NextStep(state, *by_hand, other=MAKE) if begun else NextStep(state, *MAKE, other=by_hand)
+        return NextStep(state, *by_hand, alternative=MAKE) if begun else NextStep(state, *MAKE, alternative=by_hand)
     if facts.head_time < status.head_time:
         return NextStep("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
     solved = status.has_maps and status.stages["solve"] in (*FINISHED, "absent")

@@ -35,8 +35,8 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
             row = layout.row()
             row.scale_y = 2.0
             row.operator(step.operator, text=step.label, icon=step.icon)
-        if step.other:
-            label, operator, icon = step.other
+        if step.alternative:
+            label, operator, icon = step.alternative
             layout.operator(operator, text=label, icon=icon)
         if step == next_step.SET_UP:
             layout.operator("wildcap.use_python", icon='FILE_FOLDER')
@@ -156,10 +156,10 @@ def draw_job(layout, job: jobs.Job, cancel: str = "") -> None:
             column.label(text=line[:1].upper() + line[1:], translate=False)
 
 
-def _words(state: str, found: status.Status | None, stage: str) -> str:
+def _words(state: str, capture_status: status.Status | None, stage: str) -> str:
     if state == "older":
-        return iface_("made by {}").format(found.versions[stage])
-    seconds = found.seconds.get(stage) if found else None
+        return iface_("made by {}").format(capture_status.versions[stage])
+    seconds = capture_status.seconds.get(stage) if capture_status else None
     if state in ("done", "stale") and seconds is not None:
         time = f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
         return (iface_("done, {}") if state == "done" else iface_("out of date, {}")).format(time)

@@ -18,7 +18,7 @@ from ..core.contract.capture import Capture
 from ..core.contract.messages import Problem
 from . import captures, properties
 
-INTERVAL_S = 1.0
+INTERVAL_S = 1.0  # between two looks at the capture's folder
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,9 @@ commands: list[Command] = []
 _handle = None
 
 
-def forget(gone: tuple[Command, ...]) -> None:
+def forget(leaving: tuple[Command, ...]) -> None:
     """A room leaves, and its words with it."""
-    commands[:] = [command for command in commands if command not in gone]
+    commands[:] = [command for command in commands if command not in leaving]
 
 
 def execute(words: list[str]) -> int:

@@ -67,8 +67,8 @@ def work(settings: Settings) -> float:
     return solve.size**2 / 1e6 * solve.steps * (2 if solve.guidance == "dps" else 1)
 
 
-def _spoken(value: float) -> str:
-    return iface_("under 1 min") if value < 1 else iface_("about {} min").format(f"{value:.0f}")
+def _spoken(minutes: float) -> str:
+    return iface_("under 1 min") if minutes < 1 else iface_("about {} min").format(f"{minutes:.0f}")
 
 
 def _file() -> Path:

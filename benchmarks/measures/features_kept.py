@@ -78,6 +78,9 @@ def _within(points: np.ndarray, outlines: tuple, shape: tuple[int, int], grown: 
     return (cv2.dilate(drawn, np.ones((2 * grown + 1,) * 2, np.uint8)) if grown else drawn) > 0
 
 
-def _contrast(value: np.ndarray, inside: np.ndarray, around: np.ndarray) -> float | None:
-    return (float(value[around].mean() - value[inside].mean()) if min(inside.sum(), around.sum()) > LEAST_PIXELS
-            else None)
+def _contrast(log_albedo: np.ndarray, inside: np.ndarray, around: np.ndarray) -> float | None:
+    return (
+        float(log_albedo[around].mean() - log_albedo[inside].mean())
+        if min(inside.sum(), around.sum()) > LEAST_PIXELS
+        else None
+    )

@@ -19,23 +19,23 @@ BLURRED = 0.02
 DARKEST = 1e-3
 
 
-def flat_colour(filmed: np.ndarray, where: np.ndarray) -> np.ndarray:
+def flat_colour(filmed: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """The filmed picture's mean over the pixels bool [H, W], everywhere; linear [H, W, 3]."""
-    return np.broadcast_to(filmed[where].mean(0), filmed.shape).astype(np.float32)
+    return np.broadcast_to(filmed[mask].mean(0), filmed.shape).astype(np.float32)
 
 
-def blur_divided_out(filmed: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """Linear [H, W, 3] over its own blur, each channel apart, times the mean; only the pixels `where` bool [H, W] enter
+def blur_divided_out(filmed: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Linear [H, W, 3] over its own blur, each channel apart, times the mean; only the pixels `mask` bool [H, W] enter
     the blur."""
-    deviation = BLURRED * face_height(where)
-    weight = where.astype(np.float32)
+    deviation = BLURRED * face_height(mask)
+    weight = mask.astype(np.float32)
     share = np.maximum(cv2.GaussianBlur(weight, (0, 0), deviation), 1e-4)[..., None]
     blurred = cv2.GaussianBlur((filmed * weight[..., None]).astype(np.float32), (0, 0), deviation) / share
-    return np.where(where[..., None], filmed / np.maximum(blurred, DARKEST) * filmed[where].mean(0),
+    return np.where(mask[..., None], filmed / np.maximum(blurred, DARKEST) * filmed[mask].mean(0),
                     filmed).astype(np.float32)
 
 
-def face_height(where: np.ndarray) -> float:
+def face_height(mask: np.ndarray) -> float:
     """Rows that a mask [H, W] spans."""
-    rows = np.flatnonzero(where.any(1))
+    rows = np.flatnonzero(mask.any(1))
     return float(rows[-1] - rows[0] + 1) if len(rows) else 1.0

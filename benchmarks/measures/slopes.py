@@ -15,19 +15,19 @@ DARKEST = 1e-3
 
 
 def slope(answers: tuple[np.ndarray, np.ndarray], causes: tuple[np.ndarray, np.ndarray],
-          where: np.ndarray) -> float | None:
+          mask: np.ndarray) -> float | None:
     """How far the change between two answers follows the change between their causes: least squares over the pixels
-    `where` bool [H, W], all channels.
+    `mask` bool [H, W], all channels.
 
     answers: two albedos; causes: the two true albedos, or the two pictures; linear [H, W, 3]. Changes are of
     logarithms, each channel about its mean, for a gain is not judged. None where the causes hardly differ (by less than
     1 % in deviation).
     """
-    moved, cause = (_change(pair, where) for pair in (answers, causes))
+    moved, cause = (_change(pair, mask) for pair in (answers, causes))
     return float((moved * cause).sum() / (cause * cause).sum()) if cause.std() > 0.01 else None
 
 
-def _change(pair: tuple[np.ndarray, np.ndarray], where: np.ndarray) -> np.ndarray:
-    one, other = (np.log(np.maximum(np.asarray(linear)[where], DARKEST)) for linear in pair)
+def _change(pair: tuple[np.ndarray, np.ndarray], mask: np.ndarray) -> np.ndarray:
+    one, other = (np.log(np.maximum(np.asarray(linear)[mask], DARKEST)) for linear in pair)
     change = (other - one).astype(np.float64)
     return change - change.mean(0)

@@ -66,28 +66,28 @@ def standard_error(differences: list[float]) -> float | None:
     return None if deviation is None else deviation / math.sqrt(len(differences))
 
 
-def to_markdown(found: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str,
+def to_markdown(summary: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str,
                 against: str | None = None) -> str:
     """A line per method: mean +- spread over people; with `against`, a second table of the paired differences +- their
     standard errors. A column that nobody has is left out."""
-    shown = {name: column for name, column in columns.items() if any(name in row for row in found.values())}
+    shown = {name: column for name, column in columns.items() if any(name in row for row in summary.values())}
     tables = [markdown([title, *(column.label for column in shown.values())],
                        [[method, *(_mean_text(row.get(name), column) for name, column in shown.items())]
-                        for method, row in found.items()])]
-    if against in found:
+                        for method, row in summary.items()])]
+    if against in summary:
         rows = [[method, *(_difference_text(row.get(name), column) for name, column in shown.items())]
-                for method, row in found.items() if method != against]
+                for method, row in summary.items() if method != against]
         if any(cell is not None for row in rows for cell in row[1:]):
             heads = [f"less *{against}*, person by person", *(column.label for column in shown.values())]
             tables.append(markdown(heads, rows))
     return "\n\n".join(tables)
 
 
-def to_record(found: dict[str, dict[str, Cell]], scores: Scores) -> dict:
+def to_record(summary: dict[str, dict[str, Cell]], scores: Scores) -> dict:
     """What figures.write takes: per method the cells, and every person's figures behind them."""
     return {"summary": {method: {name: {key: value for key, value in vars(cell).items() if value is not None}
                                  for name, cell in row.items()}
-                        for method, row in found.items()},
+                        for method, row in summary.items()},
             "people": {method: {person: {name: value for name, value in row.items() if _is_known(value)}
                                 for person, row in people.items()}
                        for method, people in scores.items()}}
@@ -112,9 +112,9 @@ def _difference_text(cell: Cell | None, column: Column) -> str | None:
     return f"**{text}**" if cell.difference * column.better > 0 else f"*{text}*"
 
 
-def _deviation(values: list[float]) -> float | None:
-    return float(np.std(values, ddof=1)) if len(values) > 1 else None
+def _deviation(scores: list[float]) -> float | None:
+    return float(np.std(scores, ddof=1)) if len(scores) > 1 else None
 
 
-def _is_known(value: float | None) -> bool:
-    return value is not None and math.isfinite(value)
+def _is_known(figure: float | None) -> bool:
+    return figure is not None and math.isfinite(figure)

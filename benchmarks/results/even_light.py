@@ -13,5 +13,5 @@ SAYS = "Cycles's two random walks, and the material that makes up for what is lo
 RECORDS = ("even_light",)
 
 
-def sections(found: Figures) -> Sections:
-    return [("", WORDS), ("", table(found))]
+def sections(record: Figures) -> Sections:
+    return [("", WORDS), ("", table(record))]

@@ -15,8 +15,8 @@ SAYS = "edges of the lids, eyeballs, gaze and irises, against people whose eyes 
 RECORDS = ("open_eyes",)
 
 
-def sections(found: Figures) -> Sections:
-    rows = found.rows
+def sections(record: Figures) -> Sections:
+    rows = record.rows
     filmed = {name: row for name, row in rows.items() if not name[0].isdigit()}
     fitted = {name: row for name, row in rows.items() if name[0].isdigit() and not name.endswith(ALONE)}
     still = {name: row for name, row in rows.items() if name.endswith(ALONE)}
@@ -44,5 +44,5 @@ def _means(rows: dict) -> list[str | None]:
     return told
 
 
-def _shown(value: float | None) -> str | None:
-    return None if value is None else f"{value:.2f}"
+def _shown(figure: float | None) -> str | None:
+    return None if figure is None else f"{figure:.2f}"

@@ -14,6 +14,6 @@ SAYS = "real people under many lights, beside answers that do nothing, give one 
 RECORDS = ("photographs",)
 
 
-def sections(found: Figures) -> Sections:
-    return [("", WORDS), *((title, to_markdown(summarise(found[name].people, COLUMNS), COLUMNS, "answer"))
-                           for name, title in TITLES.items() if name in found)]
+def sections(record: Figures) -> Sections:
+    return [("", WORDS), *((title, to_markdown(summarise(record[name].people, COLUMNS), COLUMNS, "answer"))
+                           for name, title in TITLES.items() if name in record)]

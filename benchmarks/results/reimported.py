@@ -13,7 +13,7 @@ SAYS = "each delivered file through Blender's own importer, rendered beside the 
 RECORDS = ("reimported",)
 
 
-def sections(found: Figures) -> Sections:
+def sections(record: Figures) -> Sections:
     return [("", prose("""
         The sample head in its material, and each file that Deliver makes of it as Blender's own importer reads it,
         under the same light before the same camera: PSNR over the pixels of the head, in sRGB. Wanted: 30 dB for glTF
@@ -23,5 +23,5 @@ def sections(found: Figures) -> Sections:
         OBJ's pictures are switched to Non-Color, as its hint says: left as Blender imports them the normals are taken
         for colours, and the head comes out dark.
         """)),
-        ("", table(found)),
+        ("", table(record)),
         ("", "![The original, without scattering, and back from glTF, USD, FBX and OBJ](../pictures/reimported.jpg)")]

@@ -49,5 +49,5 @@ def sections(albedo: Figures, chain: Figures, geometry: Figures) -> Sections:
         """))]
 
 
-def quality(found: Figures) -> str | None:
-    return None if found.psnr is None else f"{found.psnr:.2f} dB, {found.ssim:.3f}"
+def quality(record: Figures) -> str | None:
+    return None if record.psnr is None else f"{record.psnr:.2f} dB, {record.ssim:.3f}"

@@ -13,5 +13,5 @@ SAYS = "what telling them apart is worth, with one capture of a person and with 
 RECORDS = ("split",)
 
 
-def sections(found: Figures) -> Sections:
-    return split.sections(found)
+def sections(record: Figures) -> Sections:
+    return split.sections(record)

@@ -13,5 +13,5 @@ SAYS = "people like people, by the measures that tell light from skin, beside an
 RECORDS = ("state",)
 
 
-def sections(found: Figures) -> Sections:
-    return state.sections(found.people, found.captures)
+def sections(record: Figures) -> Sections:
+    return state.sections(record.people, record.captures)

@@ -55,6 +55,6 @@ def sections(upscale: Figures, training: Figures, costs: Figures) -> Sections:
         """))]
 
 
-def digits(key: str, value: float | None) -> str | None:
+def digits(key: str, figure: float | None) -> str | None:
     """As many decimals as the measure deserves."""
-    return None if value is None else f"{value:.{2 if key.endswith(('psnr', 'degrees')) else 3}f}"
+    return None if figure is None else f"{figure:.{2 if key.endswith(('psnr', 'degrees')) else 3}f}"

@@ -13,8 +13,8 @@ SAYS = "neck, ears and scalp that no camera saw; the masks of brows, lashes and 
 RECORDS = ("whole_head", "completing")
 
 
-def sections(found: Figures, cost: Figures) -> Sections:
-    people, sample, scan = found.synthetic, found.sample, found.scan
+def sections(record: Figures, cost: Figures) -> Sections:
+    people, sample, scan = record.synthetic, record.sample, record.scan
 
     def both(digits: int, *rows: Figures) -> list[str]:
         return [", ".join(f"{row[key]:.{digits}f}" for row in rows) for key in ("fill", "completed")]

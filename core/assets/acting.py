@@ -16,15 +16,15 @@ import scipy.sparse as sparse
 import torch
 from scipy.spatial import cKDTree
 
-from .makehuman import PUPIL_DISTANCE, Base, HeadBuilder, catmull_clark, edge_numbers
+from .makehuman import PUPIL_DISTANCE_M, Base, HeadBuilder, catmull_clark, edge_numbers
 
 SKIN, EYES, MOUTH, TEETH = range(4)
 """Material slots."""
 SOFT, LEFT_EYE, RIGHT_EYE, JAWS = range(4)
 """What an inner vertex moves with when the head takes another shape: the rim before it, a ball, the jaws."""
 SOCKET_RINGS = 3  # coarse rings of a socket that are kept: the rim of the lid and what goes round the ball
-ANCHORS = 6
-STRIP = 0.004  # UV: how far into the neighbouring skin a ring of the inner rim reaches for its colour
+ANCHORS = 6  # vertices of a rim that carry an inner vertex
+STRIP_M = 0.004  # UV: how far into the neighbouring skin a ring of the inner rim reaches for its colour
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def _lower(base: Base, builder: HeadBuilder, parent: np.ndarray) -> np.ndarray:
 
 def _scale(base: Base, body: np.ndarray) -> float:
     left, right = (body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr")
-    return PUPIL_DISTANCE / np.linalg.norm(left - right)
+    return PUPIL_DISTANCE_M / np.linalg.norm(left - right)
 
 
 def _placed(fine: np.ndarray, body: np.ndarray, base: Base) -> np.ndarray:
@@ -218,7 +218,7 @@ def _soft(placed: np.ndarray, strips: np.ndarray, copies: np.ndarray, welded: in
             root[strips[better, b]] = root[strips[better, a]]
     source = np.concatenate([np.arange(welded), copies])
     side = np.where(root[inner] >= welded, -1.0, 1.0)
-    uv = uvs[source[root[inner]]] + np.stack([0 * side, side * STRIP * np.minimum(ring[inner], 6)], 1)
+    uv = uvs[source[root[inner]]] + np.stack([0 * side, side * STRIP_M * np.minimum(ring[inner], 6)], 1)
     distance, nearest = cKDTree(placed[rim]).query(placed[inner], ANCHORS)
     weights = 1 / (distance**2 + 1e-8)
     depth = ring[strips].min(1)
@@ -283,6 +283,6 @@ def _jaws(base: Base) -> list[tuple]:
     return result
 
 
-def _seam(rest: np.ndarray, copies: np.ndarray) -> np.ndarray:
-    at = rest[copies]
+def _seam(vertices: np.ndarray, copies: np.ndarray) -> np.ndarray:
+    at = vertices[copies]
     return np.where(at[:, 2] < -0.02, 0, np.where(at[:, 0] > 0, 1, 2))

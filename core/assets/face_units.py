@@ -19,12 +19,12 @@ from ..contract.files import replacing
 from ..face.template import ASSETS, load
 from .acting import LEFT_EYE, RIGHT_EYE, ActingHead, open_head
 from .identities import SAMPLES, bodies
-from .makehuman import PUPIL_DISTANCE, Base, HeadBuilder, read_base
+from .makehuman import PUPIL_DISTANCE_M, Base, HeadBuilder, read_base
 
-STEP = 2e-5  # metres: one count of the stored displacements
-LEAST = 5e-5  # metres: what moves less stays
-REACH = 0.009  # metres: how far from a seam a displacement is bent so that its rims do not cross
-SOFT_WITHIN = 0.002  # metres: along a seam
+STEP_M = 2e-5  # metres: one count of the stored displacements
+LEAST_M = 5e-5  # metres: what moves less stays
+REACH_M = 0.009  # metres: how far from a seam a displacement is bent so that its rims do not cross
+SOFT_WITHIN_M = 0.002  # metres: along a seam
 THROUGH = ("mouthClose",)
 """Units that undo another one (the open jaw): alone they are no pose."""
 
@@ -49,7 +49,7 @@ def face_units(base: Base, head: ActingHead, body: np.ndarray) -> dict[str, np.n
     """Displacements [V + C + P, 3] in metres of each unit from the head at rest, by name; on eyes that are open where
     it is a unit of the eye."""
     pupils = [body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
-    scale = PUPIL_DISTANCE / np.linalg.norm(pupils[0] - pupils[1])
+    scale = PUPIL_DISTANCE_M / np.linalg.norm(pupils[0] - pupils[1])
     names = sorted(path.name.split(".")[0] for path in (base.folder / "faceunits01/targets/faceunits").glob("*.target"))
     opened = opening(base, head, body)
     result = {"eyesOpenLeft": opened * _side(head, 1)[:, None], "eyesOpenRight": opened * _side(head, -1)[:, None]}
@@ -69,7 +69,7 @@ def face_units(base: Base, head: ActingHead, body: np.ndarray) -> dict[str, np.n
 def opening(base: Base, head: ActingHead, body: np.ndarray) -> np.ndarray:
     """From the lids at rest to MakeHuman's open ones [V + C + P, 3], metres; zero away from the eyes."""
     pupils = [body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
-    scale = PUPIL_DISTANCE / np.linalg.norm(pupils[0] - pupils[1])
+    scale = PUPIL_DISTANCE_M / np.linalg.norm(pupils[0] - pupils[1])
     middle = np.mean(pupils, 0)
     wide = head.moved(body - middle) * scale
     shut = head.rest.copy()
@@ -99,9 +99,9 @@ def apart(head: ActingHead, moved: np.ndarray) -> np.ndarray:
                 continue
             anchors = np.append(rim[here], head.ends[k])  # in the corners nothing crosses
             gap = np.linalg.norm(head.rest[near, None] - head.rest[anchors][None], axis=2)
-            weight = np.exp((gap.min(1, keepdims=True) - gap) / SOFT_WITHIN)
+            weight = np.exp((gap.min(1, keepdims=True) - gap) / SOFT_WITHIN_M)
             value = (weight * np.append(amount[here], [0, 0])).sum(1) / weight.sum(1)
-            moved[near, 2] += value * np.clip(1 - gap.min(1) / REACH, 0, 1)
+            moved[near, 2] += value * np.clip(1 - gap.min(1) / REACH_M, 0, 1)
     middle = (moved[below, 2] + moved[head.copies, 2]) / 2
     crossed = moved[below, 2] > moved[head.copies, 2]
     moved[below[crossed], 2] = moved[head.copies[crossed], 2] = middle[crossed]
@@ -175,10 +175,10 @@ def on_template(head: ActingHead, vertices: np.ndarray) -> tuple[ActingHead, np.
 
 
 def stored(head: ActingHead, units: dict[str, np.ndarray], mirror: np.ndarray) -> dict[str, np.ndarray]:
-    """The arrays of the file: lengths in counts of STEP. Of two units that mirror each other the left one is kept, of a
-    symmetric one its half."""
+    """The arrays of the file: lengths in counts of STEP_M. Of two units that mirror each other the left one is kept, of
+    a symmetric one its half."""
     arrays = {
-        "step": np.float32(STEP), "head_vertices": np.int32(len(head.rest) - len(head.kind) - len(head.copies)),
+        "step": np.float32(STEP_M), "head_vertices": np.int32(len(head.rest) - len(head.kind) - len(head.copies)),
         "mirror": mirror.astype(np.int16),
         "copies": head.copies.astype(np.int16), "corners": head.corners.astype(np.int32),
         "seam": head.seam.astype(np.int8),
@@ -186,7 +186,7 @@ def stored(head: ActingHead, units: dict[str, np.ndarray], mirror: np.ndarray) -
         "kind": head.kind.astype(np.int8),
         "anchors": head.anchors.astype(np.int16), "weights": head.weights.astype(np.float16),
         "balls": head.balls.astype(np.float32),
-        "parts": np.round(head.rest[-len(head.kind):] / STEP).astype(np.int16), "names": np.array(list(units)),
+        "parts": np.round(head.rest[-len(head.kind):] / STEP_M).astype(np.int16), "names": np.array(list(units)),
     }
     half = np.arange(len(mirror)) <= mirror
     for name, moved in units.items():
@@ -194,9 +194,9 @@ def stored(head: ActingHead, units: dict[str, np.ndarray], mirror: np.ndarray) -
             continue
         if not name.endswith("Left"):
             moved = (moved + moved[mirror] * [-1, 1, 1]) / 2 * half[:, None]
-        rows = np.flatnonzero(np.linalg.norm(moved, axis=1) > LEAST)
+        rows = np.flatnonzero(np.linalg.norm(moved, axis=1) > LEAST_M)
         arrays[f"rows_{name}"] = np.diff(rows, prepend=0).astype(np.int16)
-        arrays[f"moves_{name}"] = np.round(moved[rows] / STEP).astype(np.int16).T.copy()
+        arrays[f"moves_{name}"] = np.round(moved[rows] / STEP_M).astype(np.int16).T.copy()
     return arrays
 
 

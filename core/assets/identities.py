@@ -11,8 +11,8 @@ import numpy as np
 
 from .makehuman import Base, HeadBuilder
 
-COMPONENTS = 40
-SAMPLES = 700
+COMPONENTS = 40  # principal directions that are kept
+SAMPLES = 700  # heads that they are told from
 _OPPOSITES = (("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"), ("compress", "uncompress"),
               ("concave", "convex"))
 _FOLDERS = {"head": 0.17, "forehead": 0.25, "eyebrows": 0.25, "eyes": 0.2, "nose": 0.28, "mouth": 0.23, "cheek": 0.3,
@@ -96,9 +96,9 @@ def _macro(macros: dict[str, np.ndarray], rng: np.random.Generator) -> np.ndarra
     return total
 
 
-def _aligned(head: np.ndarray, to: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """A head rotated and moved, never scaled, onto another: least squares over the vertices of `part`."""
-    a, b = head[part], to[part]
+def _aligned(head: np.ndarray, to: np.ndarray, region: np.ndarray) -> np.ndarray:
+    """A head rotated and moved, never scaled, onto another: least squares over the vertices of `region`."""
+    a, b = head[region], to[region]
     u, _, vt = np.linalg.svd((a - a.mean(0)).T @ (b - b.mean(0)))
     rotation = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
     return (head - a.mean(0)) @ rotation + b.mean(0)

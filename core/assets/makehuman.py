@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sparse
 import torch
 
-PUPIL_DISTANCE = 0.063  # metres
+PUPIL_DISTANCE_M = 0.063  # metres
 NECK_PLANE = (5.95, -0.45)  # the cut: y = offset + slope * z, decimetres in MakeHuman's world
 
 # Loops around the holes that the removed cavities leave. Left eye from the inner corner to the outer one; the right eye
@@ -139,7 +139,7 @@ class HeadBuilder:
         ring = self._boundary_y
         coarse[ring, 1] = offset + slope * coarse[ring, 2] + (pupils[0][1] - 7.28415)
         fine = self.subdivision @ (self._relax @ coarse)
-        fine = (fine - np.mean(pupils, 0)) * (PUPIL_DISTANCE / np.linalg.norm(pupils[0] - pupils[1]))
+        fine = (fine - np.mean(pupils, 0)) * (PUPIL_DISTANCE_M / np.linalg.norm(pupils[0] - pupils[1]))
         return np.stack([fine[:, 0], -fine[:, 2], fine[:, 1]], -1)
 
     def _open_polygons(self) -> list[tuple[int, ...]]:

@@ -16,7 +16,7 @@ from ..imaging import images
 
 OVAL = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149,
         150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109)
-YAWS = (-35, -18, 0, 18, 35)
+YAWS_DEG = (-35, -18, 0, 18, 35)  # turns of the head at which the net is asked
 
 
 def find_landmarks(mean: np.ndarray, components: np.ndarray, triangles: np.ndarray,
@@ -66,7 +66,7 @@ def _observe(shape, triangles, colours, mean):
     mesh = Mesh(shape, triangles)
     caster, normals = RayCaster(mesh), vertex_normals(mesh)
     views = []
-    for yaw in YAWS:
+    for yaw in YAWS_DEG:
         origin, direction_of = _camera(yaw)
         picture = _shaded(caster, normals, colours, origin, direction_of)
         face = faces.detect(picture)

@@ -13,7 +13,7 @@ from ..geometry.meshes import Mesh
 from ..geometry.raster import bleed, interpolate, rasterize_uv
 from .marks import OVAL
 
-MASK_SIZE = 1024
+MASK_SIZE = 1024  # texels along a side
 _NOSE = (168, 417, 465, 343, 437, 420, 279, 358, 327, 326, 2, 97, 98, 129, 49, 198, 217, 114, 245, 193)
 
 

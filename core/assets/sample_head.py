@@ -21,9 +21,9 @@ from ..face.template import ASSETS
 from ..imaging import images
 
 PICTURES = ("texture.png", "texture_filmed.png", "comparison/delit.png", "comparison/filmed.png")
-SIZE = 1024
+SIZE_TEXELS = 1024
 """Side of the maps: the delivered ones, whose neck, ears and scalp are completed, made smaller again."""
-SURE = 256
+CONFIDENCE_TEXELS = 256
 """Side of the confidence, which is only looked at."""
 
 
@@ -37,18 +37,26 @@ def main() -> None:
             images.write_srgb(folder / name, images.read_srgb(capture.root / name), small=True)
         images.write_data(folder / "shadow_mask_auto.png", images.read_data(capture.shadow_mask_auto), small=True)
         (folder / "maps").mkdir()
-        albedo = images.resize(images.read_linear(capture.maps_4k / "diffuse_albedo.exr"), SIZE, SIZE)
+        albedo = images.resize(images.read_linear(capture.maps_4k / "diffuse_albedo.exr"), SIZE_TEXELS, SIZE_TEXELS)
         images.write_srgb(folder / "maps/diffuse_albedo.png", images.linear_to_srgb(albedo), small=True)
-        below = images.resize(images.srgb_to_linear(images.read_srgb(capture.maps_4k / "clean_albedo.png")), SIZE, SIZE)
+        below = images.resize(
+            images.srgb_to_linear(images.read_srgb(capture.maps_4k / "clean_albedo.png")), SIZE_TEXELS, SIZE_TEXELS
+        )
         images.write_srgb(folder / "maps/clean_albedo.png", images.linear_to_srgb(below), small=True)
         shutil.copyfile(capture.maps_4k / STRANDS, folder / "maps" / STRANDS)
         for name in ("specular_albedo.png", "normal.png"):
-            images.write_data(folder / "maps" / name,
-                              images.resize(images.read_data(capture.maps_4k / name), SIZE, SIZE), small=True)
+            images.write_data(
+                folder / "maps" / name,
+                images.resize(images.read_data(capture.maps_4k / name), SIZE_TEXELS, SIZE_TEXELS),
+                small=True,
+            )
         images.write_linear(folder / "texture.exr", images.read_linear(capture.texture), small=True)
         images.write_data(folder / "texture_confidence.exr", images.read_data(capture.texture_confidence), small=True)
-        images.write_data(folder / "maps/confidence.png",
-                          images.resize(images.read_mask(capture.maps / "confidence.png"), SURE, SURE), small=True)
+        images.write_data(
+            folder / "maps/confidence.png",
+            images.resize(images.read_mask(capture.maps / "confidence.png"), CONFIDENCE_TEXELS, CONFIDENCE_TEXELS),
+            small=True,
+        )
 
 
 def _vertices(head: Path) -> str:

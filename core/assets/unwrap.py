@@ -119,10 +119,10 @@ def _rest_shapes(corners):
     return (u * sigma[:, None]) @ vt @ equilateral
 
 
-def _minimise(uv, faces, rest, fixed, twin, steps):
+def _minimise(uv, faces, flat_triangles, fixed, twin, steps):
     """SLIM: the energy's quadratic proxy at the present map (weights in closed form from its singular values), solved,
     then a line search."""
-    inverse, area = np.linalg.inv(rest), np.linalg.det(rest) / 2
+    inverse, area = np.linalg.inv(flat_triangles), np.linalg.det(flat_triangles) / 2
     # [F, 3, 2] gradients of the corners' hat functions
     hats = np.stack([-inverse.sum(1), inverse[:, 0], inverse[:, 1]], 1)
     products = np.einsum("fkb,flb->fkl", hats, hats) * area[:, None, None]

@@ -31,7 +31,7 @@ from .shots import HEADINGS, read_faces
 from .state import DONE, STOPPED, WAITING, derive_state
 from .task import ROOT, run_task
 
-CORES = 2
+CORES_PER_TASK = 2
 """That a task takes of a node of Ray's."""
 NONE = "none"
 
@@ -64,8 +64,8 @@ def add_commands(commands) -> None:
     task.add_argument("group", metavar="TASK", help=", ".join(group.name for group in GROUPS))
 
 
-def _add_plan(many) -> None:
-    plan = add_command(many, "plan", _plan,
+def _add_plan(subcommands) -> None:
+    plan = add_command(subcommands, "plan", _plan,
                        "make a batch of a table of videos, or of a folder of them; planned again, it takes in what is "
                        "new")
     plan.add_argument("shots", metavar="SHOTS", type=Path,
@@ -86,10 +86,10 @@ def _add_plan(many) -> None:
     command_settings.add_assignments(plan, "run")
 
 
-def _add_runs(many) -> None:
+def _add_runs(subcommands) -> None:
     for word, words in (("run", "do what is left; what has stopped with a problem stays"),
                         ("retry", "the same, and what has stopped is tried again")):
-        run = add_command(many, word, _run, words, "BATCH")
+        run = add_command(subcommands, word, _run, words, "BATCH")
         run.add_argument("names", metavar="NAME", nargs="*", help="faces; without one, all")
         run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
         run.add_argument("--address",
@@ -162,7 +162,7 @@ def _run(options: argparse.Namespace) -> int:
             from .ray_cluster import run_on_ray
 
             tally = run_on_ray(batch, faces, options.retry, _tell, options.until, options.address,
-                               options.cores or CORES)
+                               options.cores or CORES_PER_TASK)
         else:
             tally = run_local(batch, faces, options.at_once or 1, options.retry, _tell, options.until)
     return _sum_up(tally, len(faces))

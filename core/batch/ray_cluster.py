@@ -31,7 +31,7 @@ CODE = "WILDCAP_CODE"
 run from."""
 EXAMINE_S = 60.0
 """How long a node may take to start its first process: it imports Ray, maybe from a network's disk."""
-AHEAD = 2
+FACES_AHEAD = 2
 """Faces that are under way for each that could be worked on at once: enough that no core waits, and the first faces are
 done long before the last."""
 OUT_S = 1.6
@@ -82,7 +82,7 @@ class _Run:
         """Begins faces, takes outcomes and progress; lasts half a second at most where nothing happens."""
         slots = max(1, int(self._ray.cluster_resources().get("CPU", 0) / self._cores))
         under_way = {face.name for face, _, _ in self._tasks.values()}
-        while self._left and len(under_way) < AHEAD * slots:
+        while self._left and len(under_way) < FACES_AHEAD * slots:
             face = self._left.popleft()
             if self._begin(face):
                 under_way.add(face.name)

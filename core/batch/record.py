@@ -108,20 +108,27 @@ def read_batch(root: str | Path) -> Batch:
     return batch
 
 
-def _parse(root: Path, told: dict) -> Batch:
-    if told["gate"] not in GATES or not isinstance(told["blender"], str):
+def _parse(root: Path, record: dict) -> Batch:
+    if record["gate"] not in GATES or not isinstance(record["blender"], str):
         raise ValueError("its gate makes no sense")
-    deliver = told["deliver"]
+    deliver = record["deliver"]
     if deliver is not None:
         deliver = convert_settings({"deliver": deliver}, lambda path: str(read_portable(path, root)))["deliver"]
         known.from_json({"deliver": deliver})
-    return Batch(root, tuple(_parse_face(root, face) for face in told["faces"]), told["gate"], deliver, told["blender"])
+    return Batch(
+        root, tuple(_parse_face(root, face) for face in record["faces"]), record["gate"], deliver, record["blender"]
+    )
 
 
-def _parse_face(root: Path, told: dict) -> BatchFace:
-    if not plain_name(told["name"]):
+def _parse_face(root: Path, record: dict) -> BatchFace:
+    if not plain_name(record["name"]):
         raise ValueError("a face's name is none")
-    face = BatchFace(told["name"], read_portable(told["source"], root), read_portable(told["capture"], root),
-                     told["quality"], convert_settings(told["settings"], lambda path: str(read_portable(path, root))))
+    face = BatchFace(
+        record["name"],
+        read_portable(record["source"], root),
+        read_portable(record["capture"], root),
+        record["quality"],
+        convert_settings(record["settings"], lambda path: str(read_portable(path, root))),
+    )
     face.chosen()
     return face

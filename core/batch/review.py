@@ -157,12 +157,12 @@ def read_rows(batch: Batch) -> list[ReviewRow]:
             for face, (figures, seconds, findings), own in zip(batch.faces, told, ranks, strict=True)]
 
 
-def rank(values: list[dict[str, float]]) -> list[dict[str, float]]:
+def rank(measured: list[dict[str, float]]) -> list[dict[str, float]]:
     """For each face and measure the share of the other faces with that measure that are better, in [0, 1]."""
-    ranks: list[dict[str, float]] = [{} for _ in values]
+    ranks: list[dict[str, float]] = [{} for _ in measured]
     for measure in MEASURES:
-        known = [own[measure.label] * measure.worse for own in values if measure.label in own]
-        for own, shares in zip(values, ranks, strict=True):
+        known = [own[measure.label] * measure.worse for own in measured if measure.label in own]
+        for own, shares in zip(measured, ranks, strict=True):
             if measure.label in own:
                 mine = own[measure.label] * measure.worse
                 shares[measure.label] = sum(other < mine for other in known) / max(len(known) - 1, 1)
@@ -191,7 +191,7 @@ def _card(row: ReviewRow, batch: Batch) -> str:
     title = f'<a href="{link}">{name}</a>' if link else name
     left = [group.label for group in GROUPS[GROUPS.index(state.group):]] if state.group else []
     still = f"; still to do: {', '.join(left).lower()}" if left else ""
-    words = f"{_duration(row.seconds)} of work{still}" + (f"; on {state.who}" if state.who else "")
+    words = f"{_duration(row.seconds)} of work{still}" + (f"; on {state.machine}" if state.machine else "")
     problem = (f'<p class="problem">{html.escape(state.problem)} <b>{html.escape(state.remedy)}</b></p>'
                if state.state == STOPPED else "")
     bullets = "".join(f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>"

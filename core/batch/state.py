@@ -25,20 +25,20 @@ SHEET = "contact_sheet.png"
 @dataclass(frozen=True)
 class FaceState:
     """`state` is one of the five; `group` is the task that is next, or that works or has stopped, None where all are
-    done; `problem` and `remedy` say why it stopped; `who` names the machine that works on it."""
+    done; `problem` and `remedy` say why it stopped; `machine` names the machine that works on it."""
 
     state: str
     group: StageGroup | None = None
     problem: str = ""
     remedy: str = ""
-    who: str = ""
+    machine: str = ""
 
     def words(self) -> str:
         """For a line of a list."""
         if self.state == DONE:
             return "done"
         label = self.group.label.lower() if self.group else ""
-        return {TO_DO: f"{label} is next", WORKING: f"{label}: working on {self.who}",
+        return {TO_DO: f"{label} is next", WORKING: f"{label}: working on {self.machine}",
                 WAITING: "its shadow mask waits to be looked at",
                 STOPPED: f"{label} stopped: {self.problem} {self.remedy}"}[self.state]
 
@@ -51,7 +51,7 @@ def derive_state(batch: Batch, face: BatchFace) -> FaceState:
         holder = lease.holder(capture.lock) if capture.root.is_dir() else None
         if holder is not None:
             return FaceState(WORKING, group or GROUPS[-1],
-                             who=str(holder.get("host", "another machine")).partition("/")[0])
+                             machine=str(holder.get("host", "another machine")).partition("/")[0])
         if group is None:
             return FaceState(DONE)
         stopped = capture.read().get("stopped")

@@ -27,7 +27,7 @@ from .record import Batch, BatchFace
 from .state import deliver_settings, has_sheet, is_delivered, waits
 
 ROOT = Path(__file__).resolve().parents[2]
-POLL_S = 0.1
+POLL_S = 0.1  # between two looks at the worker
 
 
 def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[Message], None] = lambda message: None,

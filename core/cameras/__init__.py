@@ -133,12 +133,14 @@ def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarra
         report.finding("The head moved against its background during the capture; only what matches on the head itself "
                        "was used.",
                        "Let the person lean the head against a wall or a chair, look at one point, and keep still.")
-    changed = expression_changes(solved.found)
-    if len(changed) > 0.1 * len(solved.found):
-        report.finding(f"The expression changes: in {len(changed)} of {len(solved.found)} frames the mouth is opened "
-                       "or drawn otherwise than in the rest.",
-                       "Ask for a relaxed face with closed mouth, without talking, until the end.",
-                       [shown[name] for name in changed])
+    changed = expression_changes(solved.face_by_name)
+    if len(changed) > 0.1 * len(solved.face_by_name):
+        report.finding(
+            f"The expression changes: in {len(changed)} of {len(solved.face_by_name)} frames the mouth is opened "
+            "or drawn otherwise than in the rest.",
+            "Ask for a relaxed face with closed mouth, without talking, until the end.",
+            [shown[name] for name in changed],
+        )
     if solved.mirrored:
         report.finding(f"Mirrored pictures were left out: {', '.join(shown[name] for name in solved.mirrored)}.",
                        "Flip them back; on a phone, switch off the mirroring of the front camera.",
@@ -148,7 +150,7 @@ def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarra
         report.finding(problem, remedy)
 
 
-def _left_out(solved: Solved, records: Sequence[FrameRecord], shown: dict[str, str], report: Reporter) -> None:
+def _left_out(solved: Solved, records: Sequence[FrameRecord], shown_names: dict[str, str], report: Reporter) -> None:
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
     rest = [record for record in records if record.name not in fits and record.name not in solved.mirrored]
     if not rest:
@@ -167,4 +169,4 @@ def _left_out(solved: Solved, records: Sequence[FrameRecord], shown: dict[str, s
                   else "Move the camera slower past the places where frames were lost, and keep the whole head in the "
                        "picture.")
     report.finding(f"{len(rest)} of {len(records)} {'photographs' if photographs else 'frames'} did not fit the others "
-                   f"and were left out{why}.", remedy, [shown[record.name] for record in rest])
+                   f"and were left out{why}.", remedy, [shown_names[record.name] for record in rest])

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from .landmarks import INDEPENDENT, SIGMA_M, template_landmarks
+from .landmarks import INDEPENDENT_LANDMARKS, SIGMA_M, template_landmarks
 
 OFFSET_M = 0.002
 """How far a landmark of a person strays from the nearest head of the identity space."""
@@ -65,14 +65,14 @@ class Observations:
     pixel: np.ndarray
 
 
-def adjust(bundle: Bundle, seen: Observations, rounds: int = 15) -> Bundle:
+def adjust(bundle: Bundle, observations: Observations, rounds: int = 15) -> Bundle:
     """Levenberg-Marquardt with the weights of the last residuals (Geman-McClure)."""
     damping, cost = 1e-3, np.inf
     for _ in range(rounds):
-        weights = _weights(bundle, seen)
-        stepped = _step(bundle, seen, weights, damping)
-        now = _cost(stepped, seen, weights)
-        cost = _cost(bundle, seen, weights)
+        weights = _weights(bundle, observations)
+        stepped = _step(bundle, observations, weights, damping)
+        now = _cost(stepped, observations, weights)
+        cost = _cost(bundle, observations, weights)
         if not now < cost:
             damping *= 10
             if damping > 1e3:
@@ -84,24 +84,24 @@ def adjust(bundle: Bundle, seen: Observations, rounds: int = 15) -> Bundle:
     return bundle
 
 
-def _sigma_px(bundle: Bundle, seen: Observations) -> np.ndarray:
+def _sigma_px(bundle: Bundle, observations: Observations) -> np.ndarray:
     """Expected deviation of each observation [M] in pixels: a landmark's is a length on the head."""
-    depth = np.maximum(bundle.local(seen.camera, seen.point)[:, 2], 0.05)
-    return np.where(seen.point < len(template_landmarks().mean),
-                    SIGMA_M * bundle.focal[bundle.lens[seen.camera]] / depth, bundle.feature_px)
+    depth = np.maximum(bundle.local(observations.camera, observations.point)[:, 2], 0.05)
+    return np.where(observations.point < len(template_landmarks().mean),
+                    SIGMA_M * bundle.focal[bundle.lens[observations.camera]] / depth, bundle.feature_px)
 
 
-def _weights(bundle: Bundle, seen: Observations) -> np.ndarray:
+def _weights(bundle: Bundle, observations: Observations) -> np.ndarray:
     """1 / px^2 [M]."""
     model = template_landmarks()
-    sigma = _sigma_px(bundle, seen)
-    error = np.linalg.norm(bundle.project(seen.camera, seen.point) - seen.pixel, axis=1) / sigma
-    landmark = seen.point < len(model.mean)
+    sigma = _sigma_px(bundle, observations)
+    error = np.linalg.norm(bundle.project(observations.camera, observations.point) - observations.pixel, axis=1) / sigma
+    landmark = observations.point < len(model.mean)
     trust = np.ones(len(error))
-    trust[landmark] = model.trust[seen.point[landmark]] * INDEPENDENT / model.trust.sum()
+    trust[landmark] = model.trust[observations.point[landmark]] * INDEPENDENT_LANDMARKS / model.trust.sum()
     centres = -np.einsum("nij,ni->nj", bundle.rotations, bundle.translations)
-    towards = centres[seen.camera[landmark]] - bundle.points[seen.point[landmark]]
-    facing = (model.normals[seen.point[landmark]] * towards).sum(1) / np.linalg.norm(towards, axis=1)
+    towards = centres[observations.camera[landmark]] - bundle.points[observations.point[landmark]]
+    facing = (model.normals[observations.point[landmark]] * towards).sum(1) / np.linalg.norm(towards, axis=1)
     trust[landmark] *= np.clip((facing - LEAST_LANDMARK_COSINE) / 0.3, 0, 1)
     return trust / (1 + (error / 3) ** 2) ** 2 / sigma**2
 
@@ -114,47 +114,48 @@ def _priors(bundle: Bundle) -> tuple[np.ndarray, np.ndarray]:
     return offsets, np.log(bundle.focal / bundle.focal_prior) / bundle.focal_spread
 
 
-def _cost(bundle: Bundle, seen: Observations, weights: np.ndarray) -> float:
+def _cost(bundle: Bundle, observations: Observations, weights: np.ndarray) -> float:
     offset, focal = _priors(bundle)
-    error = ((bundle.project(seen.camera, seen.point) - seen.pixel) ** 2).sum(1)
+    error = ((bundle.project(observations.camera, observations.point) - observations.pixel) ** 2).sum(1)
     return float(weights @ error + (offset**2).sum() * _offset_weight() + (bundle.coefficients**2).sum()
                  + (focal**2).sum())
 
 
 def _offset_weight() -> float:
-    return INDEPENDENT / len(template_landmarks().mean)
+    return INDEPENDENT_LANDMARKS / len(template_landmarks().mean)
 
 
-def _step(bundle: Bundle, seen: Observations, weights: np.ndarray, damping: float) -> Bundle:
+def _step(bundle: Bundle, observations: Observations, weights: np.ndarray, damping: float) -> Bundle:
     model = template_landmarks()
     marks, count, views, groups = len(model.mean), len(bundle.points), len(bundle.rotations), len(bundle.focal)
     shared = 6 * views + groups + len(bundle.coefficients)
-    local = bundle.local(seen.camera, seen.point)
-    depth, focal = np.maximum(local[:, 2], 1e-3), bundle.focal[bundle.lens[seen.camera]]
-    residual = focal[:, None] * local[:, :2] / depth[:, None] + bundle.centre[seen.camera] - seen.pixel
+    local = bundle.local(observations.camera, observations.point)
+    depth, focal = np.maximum(local[:, 2], 1e-3), bundle.focal[bundle.lens[observations.camera]]
+    residual = focal[:, None] * local[:, :2] / depth[:, None] + bundle.centre[observations.camera] - observations.pixel
     by_local = np.zeros((len(local), 2, 3))  # d pixel / d local
     by_local[:, 0, 0] = by_local[:, 1, 1] = focal / depth
     by_local[:, :, 2] = -focal[:, None] * local[:, :2] / depth[:, None] ** 2
     by_camera = np.zeros((len(local), 2, 7))  # turn about the camera, translation, log focal
-    turned = local - bundle.translations[seen.camera]
+    turned = local - bundle.translations[observations.camera]
     for axis in range(3):
         by_camera[:, :, axis] = (by_local @ np.cross(np.eye(3)[axis], turned)[..., None])[..., 0]
     by_camera[:, :, 3:6] = by_local
     by_camera[:, :, 6] = focal[:, None] * local[:, :2] / depth[:, None]
-    by_point = by_local @ bundle.rotations[seen.camera]
+    by_point = by_local @ bundle.rotations[observations.camera]
 
     # [M, 7]
-    columns = np.concatenate([6 * seen.camera[:, None] + np.arange(6), 6 * views + bundle.lens[seen.camera][:, None]],
-                             1)
+    columns = np.concatenate(
+        [6 * observations.camera[:, None] + np.arange(6), 6 * views + bundle.lens[observations.camera][:, None]], 1
+    )
     heavy = weights[:, None, None]
     u, g = np.zeros((shared, shared)), np.zeros(shared)
     np.add.at(u, (columns[:, :, None], columns[:, None, :]), np.einsum("mia,mib->mab", by_camera * heavy, by_camera))
     np.add.at(g, columns, np.einsum("mia,mi->ma", by_camera * heavy, residual))
     v, h = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    np.add.at(v, seen.point, np.einsum("mia,mib->mab", by_point * heavy, by_point))
-    np.add.at(h, seen.point, np.einsum("mia,mi->ma", by_point * heavy, residual))
+    np.add.at(v, observations.point, np.einsum("mia,mib->mab", by_point * heavy, by_point))
+    np.add.at(h, observations.point, np.einsum("mia,mi->ma", by_point * heavy, residual))
     w = np.zeros((count, 3, shared))
-    np.add.at(w, (seen.point[:, None, None], np.arange(3)[None, :, None], columns[:, None, :]),
+    np.add.at(w, (observations.point[:, None, None], np.arange(3)[None, :, None], columns[:, None, :]),
               np.einsum("mia,mib->mab", by_point * heavy, by_camera))
 
     offset, focal_off = _priors(bundle)

@@ -58,12 +58,12 @@ class Calibrated:
         return pycolmap.Camera(camera_id=number, model=self.model, width=width, height=height, params=params)
 
 
-def rigid(matrix: np.ndarray, what: str) -> tuple[np.ndarray, np.ndarray]:
+def rigid(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Camera-to-world [4, 4], any uniform scale in its axes taken out -> rotation [3, 3] and translation [3] into the
     camera. Raises Problem."""
     size = np.linalg.norm(matrix[:3, :3], axis=0)
     if not (np.isfinite(matrix).all() and size.min() > 0 and size.max() / size.min() < 1.001):
-        raise Problem(f"The camera of {what} is stretched or has no rotation.",
+        raise Problem(f"The camera of {name} is stretched or has no rotation.",
                       "Export the cameras again from an object without scale.")
     rotation = (matrix[:3, :3] / size).T
     return rotation, -rotation @ matrix[:3, 3]

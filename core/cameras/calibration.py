@@ -27,8 +27,20 @@ by its export of cameras."""
 
 
 def import_cameras(path: Path, frames: Frames, folder: Path, report: Reporter) -> pycolmap.Reconstruction:
-    """A model, in the program's own world, of those of the `frames` that `path` (file or folder) has a camera for.
-    Raises Problem for what cannot be read, is no such file, or names fewer than three of the frames."""
+    """A model, in the program's own world, of those frames that a file has a camera for.
+
+    Parameters
+    ----------
+    path : file or folder
+    frames : of the capture
+    folder : that holds them
+    report : takes the findings
+
+    Raises
+    ------
+    Problem
+        For what cannot be read, is no such file, or names fewer than LEAST_CAMERAS of the frames.
+    """
     cameras = read_cameras(path)
     matched = _match(cameras, frames)
     if len(matched) < LEAST_CAMERAS:

@@ -22,8 +22,8 @@ from . import skeleton
 
 CHOSEN = "chosen.json"
 """Beside the database: the frames that carry a film of which matches are all that is wanted."""
-PHONE = 1.0
-FOCALS = (PHONE, 2.0, 3.5)
+PHONE_FOCAL_SHARE = 1.0
+FOCAL_SHARES = (PHONE_FOCAL_SHARE, 2.0, 3.5)
 """Focal lengths that photographs whose files tell none are tried with, as shares of the longer side: 53, 28 and 16
 degrees of view."""
 CHUNK_PICTURES = 24
@@ -72,12 +72,13 @@ def _extract_film(job: dict) -> list[str]:
         _extract(job, chosen, finer)
     chosen = skeleton.choose(film, skeleton.size(film, _features(job) / FILM_FEATURES))
     _extract(job, chosen, finer)
-    _extract(job, [name for name, _, _ in film], finer, part=2)
+    _extract(job, [name for name, _, _ in film], finer, reduction=2)
     return chosen
 
 
-def _extract(job: dict, names: list[str], finer: bool, part: int = 1) -> list[str]:
-    """Features of those pictures `names` that have none yet, looked for in 1/part of their size; gives `names` back."""
+def _extract(job: dict, names: list[str], finer: bool, reduction: int = 1) -> list[str]:
+    """Features of those pictures `names` that have none yet, looked for in 1/reduction of their size; gives `names`
+    back."""
     options = pycolmap.FeatureExtractionOptions()
     options.use_gpu = False
     options.sift.first_octave = -1 if finer else 0
@@ -87,7 +88,7 @@ def _extract(job: dict, names: list[str], finer: bool, part: int = 1) -> list[st
         options.sift.domain_size_pooling = True
         options.sift.peak_threshold = 0.002
         options.sift.max_num_features = 8000
-    options.sift.max_num_features //= part
+    options.sift.max_num_features //= reduction
     if not Path(job["database"]).exists():
         _enter(job)
     total = sum(len(group["names"]) for group in job["groups"])
@@ -96,7 +97,7 @@ def _extract(job: dict, names: list[str], finer: bool, part: int = 1) -> list[st
     for camera_id, group in enumerate(job["groups"], 1):
         reader = _reader(job, group)
         reader.existing_camera_id = camera_id
-        options.max_image_size = -1 if part == 1 else max(group["width"], group["height"]) // part
+        options.max_image_size = -1 if reduction == 1 else max(group["width"], group["height"]) // reduction
         these = [name for name in group["names"] if name in missing and name in wanted]
         for chunk in [these[start:start + CHUNK_PICTURES] for start in range(0, len(these), CHUNK_PICTURES)]:
             _aside(pycolmap.extract_features, job["database"], job["images"], chunk, pycolmap.CameraMode.SINGLE, reader,
@@ -118,7 +119,7 @@ def _enter(job: dict) -> None:
 def _reader(job: dict, group: dict) -> pycolmap.ImageReaderOptions:
     reader = pycolmap.ImageReaderOptions()
     reader.camera_model = "SIMPLE_RADIAL"
-    reader.default_focal_length_factor = PHONE  # between a phone's wide (0.8) and its portrait lens (1.4)
+    reader.default_focal_length_factor = PHONE_FOCAL_SHARE  # between a phone's wide (0.8) and its portrait lens (1.4)
     if group["focal_px"]:
         reader.camera_params = f"{group['focal_px']},{group['width'] / 2},{group['height'] / 2},0"
     if job["masks"]:
@@ -178,11 +179,11 @@ def _map_film(job: dict, chosen: list[str]) -> list[pycolmap.Reconstruction]:
 
 
 def _map_photographs(job: dict) -> list[pycolmap.Reconstruction]:
-    """The models from every focal length of FOCALS, where one is not told; what comes after the matches takes little
-    time."""
+    """The models from every focal length of FOCAL_SHARES, where one is not told; what comes after the matches takes
+    little time."""
     unknown = [(camera_id, group) for camera_id, group in enumerate(job["groups"], 1) if not group["focal_px"]]
     models = []
-    for factor in FOCALS if unknown else (PHONE,):
+    for factor in FOCAL_SHARES if unknown else (PHONE_FOCAL_SHARE,):
         with pycolmap.Database.open(job["database"]) as stored:
             for camera_id, group in unknown:
                 camera = stored.read_camera(camera_id)

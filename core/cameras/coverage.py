@@ -13,7 +13,7 @@ SIDE_DEG = 35.0
 WANTED_DEG = 60.0
 GAP_DEG = 30.0
 """Wider steps between neighbouring cameras than this leave holes and tear matching."""
-LEVEL_DEG = 5.0
+LEVEL_DEG = 5.0  # range of the cameras' heights below which all count as level
 
 
 def spread_evenly(members: Sequence, most: int) -> list:
@@ -63,8 +63,8 @@ def missing(centres: np.ndarray) -> list[tuple[str, str]]:
     return findings
 
 
-def _degrees(value: float) -> str:
-    return f"{value:.0f} degrees"
+def _degrees(angle: float) -> str:
+    return f"{angle:.0f} degrees"
 
 
 def _place(azimuth: float) -> str:

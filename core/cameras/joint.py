@@ -34,21 +34,39 @@ FEATURE_SIGMA_SHARE = 1 / 3000
 """Deviation of a match, as a share of a picture's longer side: features are looked for at 2,000 pixels."""
 FREE_SIGMA_LOG = 3.0
 """Spread of the logarithm of a focal length that no file told: what matches tells it."""
-FEWEST_TRACKS = 60
+FEWEST_TRACKS = 60  # below, what matches on the head says too little to refine by
 
 
-def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches: Matches, told: Mapping[str, float],
-           report: Reporter, missing: Sequence[dict] = (),
+def refine(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], matches: Matches,
+           told: Mapping[str, float], report: Reporter, missing: Sequence[dict] = (),
            agree: Sequence[float] = AGREE_WIDTH_SHARES) -> pycolmap.Reconstruction:
-    """The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one
-    explains less. found: name -> face. told: name -> focal length in pixels, of the frames whose file tells one.
-    missing: [{names, width, height, focal_px}] like camera groups, of frames that have no camera yet and may get one by
-    their matches; they share the lens of the frames of their size, unless another one was told of those. agree: as
-    AGREE_WIDTH_SHARES, wider first where the cameras may be off. Raises Problem where no face is found."""
-    head = find_head(model, found, PUPILS_M)
+    """The cameras refined by what matches on the head.
+
+    Parameters
+    ----------
+    model : cameras, of any world
+    face_by_name : the face in each frame that shows one
+    matches : between the frames
+    told : name -> focal length in pixels, of the frames whose file tells one
+    report : hears of progress
+    missing : [{names, width, height, focal_px}] like camera groups, of frames that have no camera yet and may get one
+        by their matches; they share the lens of the frames of their size, unless another one was told of those
+    agree : as AGREE_WIDTH_SHARES, wider first where the cameras may be off
+
+    Returns
+    -------
+    The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one
+    explains less.
+
+    Raises
+    ------
+    Problem
+        Where no face is found.
+    """
+    head = find_head(model, face_by_name, PUPILS_M)
     model = pycolmap.Reconstruction(model)
     model.transform(head.world_from_model)
-    seen_faces = agreeing_faces(model, found)
+    seen_faces = agreeing_faces(model, face_by_name)
     registered = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
     names = [image.name for image in registered]
     straight = straightened(model, registered, matches)
@@ -107,13 +125,13 @@ def as_bundle(model: pycolmap.Reconstruction, registered: list, told: Mapping[st
                   FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used))
 
 
-def _landmarks(model: pycolmap.Reconstruction, registered: list, found: dict[str, faces.Face]) -> Observations:
+def _landmarks(model: pycolmap.Reconstruction, registered: list, face_by_name: dict[str, faces.Face]) -> Observations:
     count, camera, pixel = len(template_landmarks().mean), [], []
     for i, image in enumerate(registered):
-        if image.name in found:
+        if image.name in face_by_name:
             camera.append(np.full(count, i))
             pixel.append(_straight(model.cameras[image.camera_id],
-                                   found[image.name].landmarks[:, :2].astype(np.float64)))
+                                   face_by_name[image.name].landmarks[:, :2].astype(np.float64)))
     return Observations(np.concatenate(camera), np.tile(np.arange(count), len(camera)), np.concatenate(pixel))
 
 
@@ -141,8 +159,18 @@ def _late(bundle: Bundle, model: pycolmap.Reconstruction, groups: list[dict], na
 
 def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tracks: list, matches: Matches,
             late: Mapping[str, tuple] = MappingProxyType({}), groups: Sequence[dict] = ()) -> pycolmap.Reconstruction:
-    """A model with the bundle's cameras and, as its points, the tracks; late: poses by name of frames of `groups` that
-    were placed afterwards."""
+    """A model with a bundle's cameras and, as its points, the tracks.
+
+    Parameters
+    ----------
+    model : whose lenses are kept but for their focal lengths
+    bundle : poses, focal lengths and points
+    registered : the model's images, in the bundle's order
+    tracks : of the bundle's points
+    matches : whose keypoints they join
+    late : rotation and translation by the name of frames that were placed afterwards
+    groups : camera groups, of these
+    """
     rebuilt, numbers = pycolmap.Reconstruction(), sorted(model.cameras)
     for number in numbers:
         camera = pycolmap.Camera(model.cameras[number].todict())

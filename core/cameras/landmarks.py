@@ -28,7 +28,7 @@ PUPILS_PER_LIDS = 63.0 / 62.156 / 1.019
 net's landmarks came out 1.9 % too large over six synthetic heads of known size (benchmarks/head_scale.py)."""
 SIGMA_M = 0.003
 """How far a landmark of the net lies from the same point of a person's head, roughly."""
-INDEPENDENT = 120
+INDEPENDENT_LANDMARKS = 120
 """How many of the landmarks count as independent: neighbours err together."""
 
 
@@ -51,8 +51,8 @@ class TemplateLandmarks:
 def template_landmarks() -> TemplateLandmarks:
     mesh, (face, bary) = template.load(), template.landmarks()
 
-    def at(values: np.ndarray) -> np.ndarray:
-        return (values[..., mesh.faces[face], :] * bary[..., None]).sum(-2)
+    def at(vertex_values: np.ndarray) -> np.ndarray:
+        return (vertex_values[..., mesh.faces[face], :] * bary[..., None]).sum(-2)
 
     normals = at(meshes.vertex_normals(mesh))
     return TemplateLandmarks(at(mesh.vertices), at(template.identity()).astype(np.float64),
@@ -61,8 +61,22 @@ def template_landmarks() -> TemplateLandmarks:
 
 def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporter,
                    text: str = "finding the face") -> dict[str, faces.Face]:
-    """Name -> face of each of `records` where one is found; a turned head is followed from the frame before and the one
-    after it, which are near in a film: in a photograph that is only done where no face is found otherwise."""
+    """The face in each frame where one is found.
+
+    A turned head is followed from the frame before and the one after it, which are near in a film: in a photograph that
+    is only done where no face is found otherwise.
+
+    Parameters
+    ----------
+    records : of the frames
+    folder : that holds them
+    report : hears of progress
+    text : for that
+
+    Returns
+    -------
+    Name -> face.
+    """
     face_by_name: dict[str, faces.Face] = {}
     last = None
     for done, record in enumerate(records):
@@ -85,13 +99,22 @@ def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporte
 
 def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray,
              rounds: int = 20) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-    """The template's head laid against landmarks seen along unit directions [N, 468, 3] from origins [N, 3]; points
-    [468, 3]: roughly where they lie.
+    """The template's head laid against landmarks seen along rays.
 
-    Gives scale, rotation [3, 3], translation [3] from the head's metres into the world of the rays, and identity
-    coefficients [K] with prior N(0, 1). Measured across the rays: a net's landmarks slide as the head turns, so that
-    the depths at which they intersect are exaggerated. Gauss-Newton; outliers are weighted down by their distance
-    (Geman-McClure).
+    Measured across the rays: a net's landmarks slide as the head turns, so that the depths at which they intersect are
+    exaggerated. Gauss-Newton; outliers are weighted down by their distance (Geman-McClure).
+
+    Parameters
+    ----------
+    origins : [N, 3], of the views
+    directions : [N, 468, 3], unit
+    points : [468, 3], roughly where the landmarks lie
+    rounds : of Gauss-Newton
+
+    Returns
+    -------
+    Scale, rotation [3, 3] and translation [3] from the head's metres into the world of the rays, and identity
+    coefficients [K] with prior N(0, 1).
     """
     model = template_landmarks()
     across = np.eye(3) - directions[..., :, None] * directions[..., None, :]  # [N, 468, 3, 3]
@@ -124,9 +147,10 @@ def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray,
 
 
 def robust_weights(miss_m: np.ndarray, trust: np.ndarray) -> np.ndarray:
-    """Weights [N, 468] of landmarks that miss by so much [N, 468], in 1 / m^2: INDEPENDENT of them in all count."""
+    """Weights [N, 468] of landmarks that miss by so much [N, 468], in 1 / m^2: INDEPENDENT_LANDMARKS of them in all
+    count."""
     weights = trust / (1 + (miss_m / (2.5 * np.maximum(np.median(miss_m, axis=1, keepdims=True), 1e-4))) ** 2) ** 2
-    return weights * INDEPENDENT / weights.sum() / SIGMA_M**2
+    return weights * INDEPENDENT_LANDMARKS / weights.sum() / SIGMA_M**2
 
 
 def pupils(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -29,12 +29,19 @@ MOST_PAIRS = 60
 
 
 def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report: Reporter,
-                  found: Mapping[str, faces.Face] = MappingProxyType({})) -> list[str]:
-    """Names among `suspects` that are mirrored with respect to `trusted` pictures, or, where there are none, to most of
-    themselves.
+                  face_by_name: Mapping[str, faces.Face] = MappingProxyType({})) -> list[str]:
+    """Those pictures that are mirrored with respect to others.
 
-    found: name -> face. Of two pictures that show a face from its two sides, one flipped looks like the other whatever
-    is true, for faces are symmetric: there only what lies beside the face counts.
+    Of two pictures that show a face from its two sides, one flipped looks like the other whatever is true, for faces
+    are symmetric: there only what lies beside the face counts.
+
+    Parameters
+    ----------
+    suspects : names of the pictures
+    trusted : names of pictures that are not; where there are none, most of the suspects
+    folder : that holds them
+    report : hears of progress
+    face_by_name : the face in each that shows one
     """
     among_suspects = [(a, b) for i, a in enumerate(suspects) for b in suspects[i + 1:]]
     pairs = [(a, b) for a in suspects for b in trusted] or among_suspects
@@ -53,11 +60,19 @@ def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report:
     relation: dict[tuple[str, str], int] = {}
     for done, (a, b) in enumerate(pairs):
         report.progress(done, len(pairs), "looking for mirrored pictures")
-        yaws = [found[name].yaw_deg for name in (a, b) if name in found]
+        yaws = [face_by_name[name].yaw_deg for name in (a, b) if name in face_by_name]
         opposite = len(yaws) == 2 and abs(yaws[0] + yaws[1]) < abs(yaws[0] - yaws[1])
-        plain, flipped = (_agreeing(*(_beside(features(name, turned), found[name], turned, sizes[name]) if opposite
-                                      else features(name, turned)
-                                      for name, turned in ((a, flip), (b, False)))) for flip in (False, True))
+        plain, flipped = (
+            _agreeing(
+                *(
+                    _beside(features(name, turned), face_by_name[name], turned, sizes[name])
+                    if opposite
+                    else features(name, turned)
+                    for name, turned in ((a, flip), (b, False))
+                )
+            )
+            for flip in (False, True)
+        )
         if max(plain, flipped) >= LEAST_MATCHES and max(plain, flipped) > 2 * min(plain, flipped):
             relation[a, b] = 1 if plain > flipped else -1
     return _minority(relation, suspects, trusted)

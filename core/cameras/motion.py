@@ -31,15 +31,19 @@ OPENED_SHARE, SMILED_SHARE = 0.12, 0.15
 does not make."""
 
 
-def camera_stood_still(matches: Matches, found: dict[str, faces.Face]) -> bool | None:
+def camera_stood_still(matches: Matches, face_by_name: dict[str, faces.Face]) -> bool | None:
     """True where the background stays put while the head turns, False where it does not; None where too few pairs
     tell."""
     stayed = []
     for (first, second), _ in matches.pairs.items():
-        if first not in found or second not in found or abs(found[first].yaw_deg - found[second].yaw_deg) < TURNED_DEG:
+        if (
+            first not in face_by_name
+            or second not in face_by_name
+            or abs(face_by_name[first].yaw_deg - face_by_name[second].yaw_deg) < TURNED_DEG
+        ):
             continue
         a, b = matches.between(first, second)
-        behind = in_background(a, found[first]) & in_background(b, found[second])
+        behind = in_background(a, face_by_name[first]) & in_background(b, face_by_name[second])
         if behind.sum() >= LEAST_MATCHES:
             reach = STILL_DIAGONAL_SHARE * np.linalg.norm(np.concatenate([a, b]).max(0))
             stayed.append(np.median(np.linalg.norm(a[behind] - b[behind], axis=1)) < reach)
@@ -53,16 +57,25 @@ def in_background(pixels: np.ndarray, face: faces.Face) -> np.ndarray:
     return (aside & (pixels[:, 1] < y1)) | (pixels[:, 1] < y0 - 0.7 * (y1 - y0))
 
 
-def head_masks(found: dict[str, faces.Face], records: Sequence[FrameRecord], folder: Path, out: Path,
+def head_masks(face_by_name: dict[str, faces.Face], records: Sequence[FrameRecord], folder: Path, out: Path,
                report: Reporter) -> None:
-    """out/NAME.png: white on the head, black elsewhere (all black without a face). A turning head leaves its shoulders
-    behind."""
+    """Writes NAME.png for each frame: white on the head, black elsewhere (all black without a face). A turning head
+    leaves its shoulders behind.
+
+    Parameters
+    ----------
+    face_by_name : the face in each frame that shows one
+    records : of the frames
+    folder : that holds them
+    out : that takes the masks
+    report : hears of progress
+    """
     for done, record in enumerate(records):
         report.progress(done, len(records), "masking the head")
         width, height = images.size(folder / record.name)
         mask = np.zeros((height, width), np.float32)
-        if record.name in found:
-            x0, y0, x1, y1 = found[record.name].box
+        if record.name in face_by_name:
+            x0, y0, x1, y1 = face_by_name[record.name].box
             w, h = x1 - x0, y1 - y0
             cv2.ellipse(mask, (round((x0 + x1) / 2), round((y0 + y1) / 2 - 0.2 * h)), (round(0.85 * w), round(0.8 * h)),
                         0, 0, 360, 1.0, -1)
@@ -73,12 +86,12 @@ def head_masks(found: dict[str, faces.Face], records: Sequence[FrameRecord], fol
         images.write_data(out / f"{record.name}.png", mask)
 
 
-def expression_changes(found: dict[str, faces.Face]) -> list[str]:
+def expression_changes(face_by_name: dict[str, faces.Face]) -> list[str]:
     """Names of the frames whose mouth is opened or widened unlike in most; profiles are not asked."""
-    names = [name for name, face in found.items() if abs(face.yaw_deg) < 30]
+    names = [name for name, face in face_by_name.items() if abs(face.yaw_deg) < 30]
     if len(names) < 3:
         return []
-    shape = np.array([[_apart(found[name], pair) / _apart(found[name], EYES) for pair in (MOUTH, CORNERS)]
+    shape = np.array([[_apart(face_by_name[name], pair) / _apart(face_by_name[name], EYES) for pair in (MOUTH, CORNERS)]
                       for name in names])
     off = np.abs(shape - np.median(shape, 0)) > (OPENED_SHARE, SMILED_SHARE)
     return [name for name, changed in zip(names, off.any(1), strict=True) if changed]

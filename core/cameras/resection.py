@@ -54,16 +54,29 @@ class Resection:
     coefficients: np.ndarray
 
 
-def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, report: Reporter) -> Resection | None:
-    """Cameras of the frames with a face, and of those that match them. groups: [{names, width, height, focal_px or
-    null}] of one camera each; `found`: name -> face. None where no frame shows a face, or one of several."""
+def resect(
+    groups: list[dict], face_by_name: dict[str, faces.Face], matches: Matches, report: Reporter
+) -> Resection | None:
+    """Cameras of the frames with a face, and of those that match them.
+
+    Parameters
+    ----------
+    groups : [{names, width, height, focal_px or null}], of one camera each
+    face_by_name : the face in each frame that shows one
+    matches : between the frames
+    report : hears of progress
+
+    Returns
+    -------
+    None where no frame shows a face, or one of several.
+    """
     group_of = {name: number for number, group in enumerate(groups) for name in group["names"]}
-    names = sorted(name for name in found if name in group_of)
+    names = sorted(name for name in face_by_name if name in group_of)
     if len(names) < min(2, len(group_of)):
         return None
     model = template_landmarks()
-    pixels = {name: found[name].landmarks[:, :2].astype(np.float64) for name in names}
-    width = float(np.median([found[name].box[2] - found[name].box[0] for name in names]))
+    pixels = {name: face_by_name[name].landmarks[:, :2].astype(np.float64) for name in names}
+    width = float(np.median([face_by_name[name].box[2] - face_by_name[name].box[0] for name in names]))
     report.progress(0, 5, "placing cameras by the face")
     bundle = _first(groups, group_of, names, pixels)
     count = len(model.mean)
@@ -128,8 +141,19 @@ def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -
 
 
 def agreeing(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -> tuple[tuple, list, Bundle]:
-    """Tracks whose triangulated point projects within `reach_px` in two frames or more: their observations, themselves,
-    and the bundle with the points."""
+    """Tracks whose triangulated point projects near its keypoints in two frames or more.
+
+    Parameters
+    ----------
+    bundle : of the frames
+    names : of the frames, in the bundle's order
+    matches : between them
+    reach_px : that a point may miss by
+
+    Returns
+    -------
+    Their observations, themselves, and the bundle with the points.
+    """
     number = {name: i for i, name in enumerate(names)}
     points, used, camera, point, pixel = [], [], [], [], []
     marks = len(template_landmarks().mean)
@@ -188,8 +212,21 @@ def _triangulate(bundle: Bundle, camera: np.ndarray, pixel: np.ndarray) -> np.nd
 
 def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], used: list,
                      matches: Matches) -> dict[str, tuple]:
-    """name -> rotation, translation of frames without a face, by PnP on the tracks' points that their keypoints
-    match."""
+    """Frames without a face, placed by PnP on the tracks' points that their keypoints match.
+
+    Parameters
+    ----------
+    bundle : of the frames with a face, and the tracks' points
+    groups : of one camera each
+    group_of : the group's number of each frame
+    names : of the frames with a face
+    used : the tracks, in the order of the bundle's points
+    matches : between all frames
+
+    Returns
+    -------
+    Name -> rotation, translation.
+    """
     marks = len(template_landmarks().mean)
     place = {member: bundle.points[marks + i] for i, track in enumerate(used) for member in track}
     poses = {}
@@ -216,7 +253,7 @@ def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: 
     return poses
 
 
-def _model(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], seen: Observations,
+def _model(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], observations: Observations,
            late: dict[str, tuple]) -> pycolmap.Reconstruction:
     """As COLMAP writes it: cameras, images, and as points the landmarks and tracks."""
     model = pycolmap.Reconstruction()
@@ -229,9 +266,11 @@ def _model(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str],
     members: list[list] = [[] for _ in bundle.points]
     for number, name in enumerate(sorted(poses), 1):
         rotation, translation = poses[name]
-        mine = np.flatnonzero(seen.camera == names.index(name)) if name in names else np.zeros(0, int)
-        image = pycolmap.Image(name=name, camera_id=group_of[name] + 1, image_id=number, keypoints=seen.pixel[mine])
-        for k, point in enumerate(seen.point[mine]):
+        mine = np.flatnonzero(observations.camera == names.index(name)) if name in names else np.zeros(0, int)
+        image = pycolmap.Image(
+            name=name, camera_id=group_of[name] + 1, image_id=number, keypoints=observations.pixel[mine]
+        )
+        for k, point in enumerate(observations.point[mine]):
             members[point].append(pycolmap.TrackElement(number, k))
         model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(np.concatenate([rotation, translation[:, None]], 1)))
     for place, elements in zip(bundle.points, members, strict=True):

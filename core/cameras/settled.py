@@ -55,10 +55,21 @@ class HeadCameras:
 
 def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter,
            by: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
-    """The model with its cameras placed with respect to the head, in the template's world, and the share of the
-    error that is left of the head's matches (see MOST_LEFT_SHARE); `model` itself where the head kept still, or where
-    too little matches on it to tell (None). `by`: the frames that tell, all if not given; each of the others is placed
-    by the points of those."""
+    """The model with its cameras placed with respect to the head, in the template's world.
+
+    Parameters
+    ----------
+    model : cameras, of any world
+    head : in that world
+    matches : between the frames
+    report : hears of progress
+    by : the frames that tell, all if not given; each of the others is placed by the points of those
+
+    Returns
+    -------
+    The model and the share of the error that is left of the head's matches (see MOST_LEFT_SHARE); `model` itself and
+    None where the head kept still, or where too little matches on it to tell.
+    """
     room = pycolmap.Reconstruction(model)
     room.transform(head.template_from_model)
     everything = sorted((image for image in room.images.values() if image.has_pose), key=lambda image: image.name)

@@ -19,7 +19,7 @@ import pycolmap
 
 CARRYING_FRAMES = 40
 """Frames that carry an arc around a face: some four degrees from one to the next."""
-ENOUGH = 0.5
+ENOUGH_SHARE = 0.5
 NEIGHBOURS = 6
 SAME_SIDE_DEG, SAME_SIDE = 8.0, 3
 """A film that comes back to a side of the face: how near the head's turn must be, and so many frames of that side are
@@ -33,9 +33,9 @@ Film = Sequence[tuple[str, float, float | None]]
 
 def size(film: Film, richness: float = 1.0) -> int:
     """How many frames carry a film: all of a short one, and of a long one twice as many, as often as needed, where each
-    shows little. richness: the median frame's features as a share of what a frame may have, of which ENOUGH will do. A
-    plain head's frames cost less, and it takes more of them."""
-    count = CARRYING_FRAMES * 2 ** max(0, math.ceil(math.log2(ENOUGH / max(richness, 1e-3))))
+    shows little. richness: the median frame's features as a share of what a frame may have, of which ENOUGH_SHARE will
+    do. A plain head's frames cost less, and it takes more of them."""
+    count = CARRYING_FRAMES * 2 ** max(0, math.ceil(math.log2(ENOUGH_SHARE / max(richness, 1e-3))))
     return min(len(film), count)
 
 
@@ -76,8 +76,17 @@ def pairs_between(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
 
 def place_others(model: pycolmap.Reconstruction, database: Path, names: Sequence[str], seed: int,
                  step: Callable[[int, int], None]) -> None:
-    """Adds those frames `names` to the model whose matches with its frames give a pose; their keypoints become
-    observations of its points."""
+    """Adds those frames to the model whose matches with its frames give a pose; their keypoints become observations of
+    its points.
+
+    Parameters
+    ----------
+    model : changes
+    database : COLMAP's, with keypoints and matches
+    names : of the frames
+    seed : of RANSAC
+    step : hears (done, of)
+    """
     options, refined = pycolmap.AbsolutePoseEstimationOptions(), pycolmap.AbsolutePoseRefinementOptions()
     options.ransac.max_error, options.ransac.random_seed = REACH_PX, seed
     mapped = {number: image for number, image in model.images.items() if image.has_pose}

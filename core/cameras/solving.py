@@ -56,7 +56,7 @@ class Solved:
     model: pycolmap.Reconstruction
     way: str
     head: HeadFrame
-    found: dict[str, faces.Face]
+    face_by_name: dict[str, faces.Face]
     head_moved: bool = False
     stood_still: bool = False
     mirrored: tuple[str, ...] = ()
@@ -69,7 +69,20 @@ class Solved:
 
 
 def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
-    """Raises Problem with what is wrong, as precisely as can be told."""
+    """The cameras of a capture.
+
+    Parameters
+    ----------
+    frames : of the capture
+    capture : that holds them
+    settings : of the cameras
+    report : hears of progress, takes the findings
+
+    Raises
+    ------
+    Problem
+        With what is wrong, as precisely as can be told.
+    """
     records = frames.records
     few = len(records) <= FEW_PHOTOGRAPHS
     face_by_name = find_landmarks(records if few else _spread(records), capture.frames, report)
@@ -83,7 +96,7 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
     return _solve(frames, face_by_name, capture, settings, report)
 
 
-def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, settings: Settings, report: Reporter,
+def _solve(frames: Frames, face_by_name: dict[str, faces.Face], capture: Capture, settings: Settings, report: Reporter,
            stood: bool = False) -> Solved:
     """`solve` with these frames alone and the faces in some of them; `stood`: it is known that the camera stood still
     while the head turned."""
@@ -96,26 +109,26 @@ def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, setti
     matches, faults, moved, partial = Matches(), [], stood, None
     for turn, way in enumerate(ways):
         if way == "face":
-            if len(found) < len(records) <= 5 * MOST_FACES and not few:
-                found = find_landmarks(records, capture.frames, report)
-            solved, fault = _by_face(records, capture, found, matches, settings, report)
+            if len(face_by_name) < len(records) <= 5 * MOST_FACES and not few:
+                face_by_name = find_landmarks(records, capture.frames, report)
+            solved, fault = _by_face(records, capture, face_by_name, matches, settings, report)
             if solved and few and not solved.refined and "skin" in ways[turn:]:
                 report.log("The face gives cameras, but too little else matches to refine them; features that hold on "
                            "skin are tried.")
                 continue
         else:
             skin, alone = way == "skin", stood
-            solved, matches, fault = _by_features(skin, frames, capture, found, settings, report, alone)
-            stood = stood or bool(camera_stood_still(matches, found))
+            solved, matches, fault = _by_features(skin, frames, capture, face_by_name, settings, report, alone)
+            stood = stood or bool(camera_stood_still(matches, face_by_name))
             if not alone and (stood or (fault and solved)):  # what matches is not one motion: the head's alone
                 moved = True
-                solved, matches, fault = _by_features(skin, frames, capture, found, settings, report, alone=True)
+                solved, matches, fault = _by_features(skin, frames, capture, face_by_name, settings, report, alone=True)
         if solved and not fault:
             if partial and worth(partial) > worth(solved):
                 solved, matches = partial, partial.matches
             rest = sorted({record.name for record in records}
                           - {image.name for image in solved.model.images.values() if image.has_pose})
-            mirrored = tuple(_mirrored(frames, rest, solved.model, found, capture, report) if way != "face"
+            mirrored = tuple(_mirrored(frames, rest, solved.model, face_by_name, capture, report) if way != "face"
                              else ()) or solved.mirrored
             solved = replace(solved, head_moved=moved, stood_still=stood, mirrored=mirrored)
             partial = replace(solved, matches=matches)
@@ -127,7 +140,7 @@ def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, setti
         report.log(f"By {way} features: {fault}" if way != "face" else f"By the face: {fault}")
     if partial:
         return _refined(partial, frames, capture, settings, report)
-    raise _explained(frames, faults, found, moved, stood, capture, report)
+    raise _explained(frames, faults, face_by_name, moved, stood, capture, report)
 
 
 def worth(solved: Solved) -> tuple[bool, int, bool]:
@@ -153,37 +166,39 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
             return solved
         report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % "
                    "less on its own; its cameras are taken.")
-        return replace(solved, model=model, head=find_head(model, solved.found, apart), swayed=1 - left)
+        return replace(solved, model=model, head=find_head(model, solved.face_by_name, apart), swayed=1 - left)
     by_faces_alone = solved.way == "face" and not solved.refined
     if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or by_faces_alone:
         return solved
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
     missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
     told = {record.name: record.focal_px for record in frames.records if record.focal_px}
-    model = refine(solved.model, solved.found, solved.matches, told, report, camera_groups(missing, capture.frames))
-    return replace(solved, model=model, head=find_head(model, solved.found, apart),
+    model = refine(
+        solved.model, solved.face_by_name, solved.matches, told, report, camera_groups(missing, capture.frames)
+    )
+    return replace(solved, model=model, head=find_head(model, solved.face_by_name, apart),
                    every_frame_held=holds_every_frame(model))
 
 
-def _by_features(skin: bool, frames: Frames, capture: Capture, found: dict, settings: Settings, report: Reporter,
+def _by_features(skin: bool, frames: Frames, capture: Capture, face_by_name: dict, settings: Settings, report: Reporter,
                  alone: bool = False) -> tuple[Solved | None, Matches, str | None]:
     """The model of one kind of features, the matches, and its shortcoming; `alone`: on the head only. A model whose
     head moved is given, with that fault."""
     with capture.workspace() as work:
         if alone:
-            found = (found if len(found) > len(frames.records) / 2
-                     else find_landmarks(frames.records, capture.frames, report))
-            head_masks(found, frames.records, capture.frames, work, report)
+            face_by_name = (face_by_name if len(face_by_name) > len(frames.records) / 2
+                            else find_landmarks(frames.records, capture.frames, report))
+            head_masks(face_by_name, frames.records, capture.frames, work, report)
         model, matches = solve_structure(frames, capture, skin, settings.cameras.matching, settings.seed, report,
                                          work if alone else None)
     fault = shortcoming(model, len(frames.records))
     if fault:
         return None, matches, fault
     try:
-        head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
+        head = find_head(model, face_by_name, settings.cameras.interpupillary_mm / 1000)
     except Problem as problem:
         return None, matches, problem.problem
-    solved = Solved(model, "skin" if skin else "plain", head, found)
+    solved = Solved(model, "skin" if skin else "plain", head, face_by_name)
     return solved, matches, None if head.still else "The face is not still with respect to its surroundings."
 
 
@@ -200,17 +215,20 @@ def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | Non
     return None
 
 
-def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matches: Matches, settings: Settings,
+def _by_face(records: Sequence[FrameRecord], capture: Capture, face_by_name: dict, matches: Matches, settings: Settings,
              report: Reporter) -> tuple[Solved | None, str | None]:
     shown = {record.name: record.shown for record in records}
-    mirrored = (find_mirrored(sorted(found), [], capture.frames, report, found) if len(records) <= FEW_PHOTOGRAPHS
-                else [])
+    mirrored = (
+        find_mirrored(sorted(face_by_name), [], capture.frames, report, face_by_name)
+        if len(records) <= FEW_PHOTOGRAPHS
+        else []
+    )
     result = resect(camera_groups(records, capture.frames),
-                    {name: face for name, face in found.items() if name not in mirrored}, matches, report)
+                    {name: face for name, face in face_by_name.items() if name not in mirrored}, matches, report)
     registered = result.model.num_reg_images() if result else 0
     if registered < min(LEAST_VIEWS, len(records)):
         but = f", and {', '.join(shown[name] for name in mirrored)} is mirrored" if mirrored else ""
-        without = f"A face is found in only {len(found)} of {len(records)} frames{but}"
+        without = f"A face is found in only {len(face_by_name)} of {len(records)} frames{but}"
         return None, f"{without}; the landmarks of three could have placed the cameras."
     if result.landmark_miss > MOST_LANDMARK_MISS_SHARE:
         return (
@@ -219,19 +237,19 @@ def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matc
             f"{100 * result.landmark_miss:.0f} % of its width.",
         )
     apart = settings.cameras.interpupillary_mm / 1000
-    head = (find_head(result.model, found, apart) if registered > 1
+    head = (find_head(result.model, face_by_name, apart) if registered > 1
             else head_of_one(result.coefficients, result.landmark_px, result.landmark_miss, apart))
-    return Solved(result.model, "face", head, found, mirrored=tuple(mirrored), tracks=result.tracks,
+    return Solved(result.model, "face", head, face_by_name, mirrored=tuple(mirrored), tracks=result.tracks,
                   refined=result.refined), None
 
 
-def _mirrored(frames: Frames, rest: list[str], model: pycolmap.Reconstruction, found: dict, capture: Capture,
+def _mirrored(frames: Frames, unplaced: list[str], model: pycolmap.Reconstruction, face_by_name: dict, capture: Capture,
               report: Reporter) -> list[str]:
     """Among photographs that did not fit, those that are mirrored."""
-    if not rest or frames.kind == VIDEO or len(rest) > 2 * FEW_PHOTOGRAPHS:
+    if not unplaced or frames.kind == VIDEO or len(unplaced) > 2 * FEW_PHOTOGRAPHS:
         return []
     trusted = sorted(image.name for image in model.images.values() if image.has_pose)
-    return find_mirrored(rest, spread_evenly(trusted, 8), capture.frames, report, found)
+    return find_mirrored(unplaced, spread_evenly(trusted, 8), capture.frames, report, face_by_name)
 
 
 def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
@@ -242,12 +260,12 @@ def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
     return spread_evenly(seen, MOST_FACES)
 
 
-def _explained(frames: Frames, faults: list[str], found: dict, moved: bool, stood: bool, capture: Capture,
+def _explained(frames: Frames, faults: list[str], face_by_name: dict, moved: bool, stood: bool, capture: Capture,
                report: Reporter) -> Problem:
     """The Problem that fits best what was tried."""
     records = frames.records
     names = {record.name: record.shown for record in records}
-    mirrored = (find_mirrored(sorted(names), [], capture.frames, report, found) if frames.kind != VIDEO
+    mirrored = (find_mirrored(sorted(names), [], capture.frames, report, face_by_name) if frames.kind != VIDEO
                 and len(names) <= FEW_PHOTOGRAPHS else [])
     if mirrored:
         they = "is mirrored: it fits" if len(mirrored) == 1 else "are mirrored: they fit"

@@ -35,9 +35,23 @@ NO_MODEL = 3
 
 def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str, seed: int, report: Reporter,
                     masks: Path | None = None) -> tuple[pycolmap.Reconstruction | None, Matches]:
-    """The largest model of the capture's `frames`, in COLMAP's own world (None where nothing fits together),
-    and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise. Photographs are looked at as
-    large as they were kept, though not with masks; pixels are the frames' in any case."""
+    """The largest model of the capture's frames, and all matches. Photographs are looked at as large as they were kept,
+    though not with masks; pixels are the frames' in any case.
+
+    Parameters
+    ----------
+    frames : of the capture
+    capture : that holds them
+    skin : whether features are looked for that hold on low-contrast skin
+    matching : "auto", "sequential" or "exhaustive"
+    seed : of COLMAP
+    report : hears of progress
+    masks : folder with NAME.png, where black hides what moves otherwise
+
+    Returns
+    -------
+    The model in COLMAP's own world (None where nothing fits together), and the matches.
+    """
     records, folder = frames.records, capture.frames
     is_film = frames.kind == VIDEO and len(records) > ALL_PAIRS_FRAMES
     sequential = matching == "sequential" or (matching == "auto" and is_film)
@@ -72,8 +86,20 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
 
 def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, capture: Capture, seed: int,
                 report: Reporter) -> tuple[Matches, list[str]]:
-    """Matches of fine features within a part of each frame of a film, in the frames' pixels, and the frames that carry
-    the film there. boxes: name -> left, top, right and bottom of that part."""
+    """Matches of fine features within a part of each frame of a film.
+
+    Parameters
+    ----------
+    boxes : name -> left, top, right and bottom of that part, in pixels
+    frames : of the capture
+    capture : that holds them
+    seed : of COLMAP
+    report : hears of progress
+
+    Returns
+    -------
+    The matches, in the frames' pixels, and the frames that carry the film there.
+    """
     with capture.workspace() as work:
         (work / "parts").mkdir()
         names = {}

@@ -27,15 +27,16 @@ MOST_FRAMES = 72
 motion, and every frame has the whole of it."""
 
 
-def surroundings_stay(found: dict[str, faces.Face], folder: Path) -> bool:
+def surroundings_stay(face_by_name: dict[str, faces.Face], folder: Path) -> bool:
     """Whether what is not the head (wall, shoulders, clothes) stays where it is between pictures in which the head has
     turned. False where a bare wall and what else there is do not tell."""
-    names, stayed = sorted(found), []
+    names, stayed = sorted(face_by_name), []
     small = {name: _read(folder / name) for name in names}
     for i, first in enumerate(names):
-        second = next((name for name in names[i + 1:] if abs(found[name].yaw_deg - found[first].yaw_deg) >= TURNED_DEG),
+        face = face_by_name[first]
+        second = next((name for name in names[i + 1:] if abs(face_by_name[name].yaw_deg - face.yaw_deg) >= TURNED_DEG),
                       None)
-        share = None if second is None else _share_that_stays(small[first], small[second], found[first], found[second])
+        share = None if second is None else _share_that_stays(small[first], small[second], face, face_by_name[second])
         stayed += [] if share is None else [share > 0.6]
     return len(stayed) >= 2 and bool(np.mean(stayed) > 0.6)
 
@@ -54,10 +55,10 @@ def _read(path: Path) -> tuple[np.ndarray, float]:
     return np.round(255 * np.clip(picture.mean(-1), 0, 1)).astype(np.uint8), scale
 
 
-def _share_that_stays(one: tuple, other: tuple, face: faces.Face, turned: faces.Face) -> float | None:
+def _share_that_stays(picture: tuple, turned_picture: tuple, face: faces.Face, turned: faces.Face) -> float | None:
     """Of the corners off both heads in one picture, how many are at the same place in the other; None where there are
     too few."""
-    (first, scale), (second, _) = one, other
+    (first, scale), (second, _) = picture, turned_picture
     corners = cv2.goodFeaturesToTrack(first, MOST_CORNERS, LEAST_QUALITY_SHARE, 4)
     if corners is None or first.shape != second.shape:
         return None

@@ -56,9 +56,11 @@ class HeadFrame:
         return self.miss <= MOVED_WIDTH_SHARE
 
 
-def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], interpupillary_m: float) -> HeadFrame:
-    """`found`: name -> face. Raises Problem where fewer than two registered frames show a face."""
-    seen = _registered_with_face(model, found)
+def find_head(
+    model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], interpupillary_m: float
+) -> HeadFrame:
+    """`face_by_name`: name -> face. Raises Problem where fewer than two registered frames show a face."""
+    seen = _registered_with_face(model, face_by_name)
     if len(seen) < 2:
         raise Problem("The face is seen in fewer than two of the frames whose cameras were found.",
                       "Film so that eyes, nose and mouth stay visible in most of the frames.")
@@ -88,7 +90,15 @@ def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], inte
 
 def head_of_one(coefficients: np.ndarray, error_px: float, miss: float, interpupillary_m: float) -> HeadFrame:
     """The head in the one camera that was placed by it, which is in the template's metres: no rays meet, and its
-    landmarks miss by what the fit says."""
+    landmarks miss by what the fit says.
+
+    Parameters
+    ----------
+    coefficients : [K], of the identity
+    error_px : by which the landmarks miss
+    miss : the same as a share of the face's width
+    interpupillary_m : how far the pupils lie apart
+    """
     right, left = pupils(coefficients)
     apart = float(np.linalg.norm(left - right))
     size = interpupillary_m / apart
@@ -96,9 +106,9 @@ def head_of_one(coefficients: np.ndarray, error_px: float, miss: float, interpup
                      apart, 0.0)
 
 
-def agreeing_faces(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> dict[str, faces.Face]:
+def agreeing_faces(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face]) -> dict[str, faces.Face]:
     """Those of the faces found in registered frames whose landmarks meet those of the other frames."""
-    seen = _sure(model, found)
+    seen = _sure(model, face_by_name)
     if len(seen) < 3:
         return {image.name: face for image, face in seen}
     origins, directions = zip(*(rays(image, model.cameras[image.camera_id], face) for image, face in seen), strict=True)
@@ -141,17 +151,17 @@ def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10
     return points, angle
 
 
-def _sure(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> list[tuple]:
+def _sure(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face]) -> list[tuple]:
     """Registered images with their faces, without those that the net hardly believes itself, where there are others: in
     a profile it sees a face from in front that is none."""
-    seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name)
-            if image.has_pose and image.name in found]
+    seen = [(image, face_by_name[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name)
+            if image.has_pose and image.name in face_by_name]
     sure = [pair for pair in seen if pair[1].score > SURE_SCORE]
     return sure if len(sure) >= 2 else seen
 
 
-def _registered_with_face(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> list[tuple]:
+def _registered_with_face(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face]) -> list[tuple]:
     """Registered images with their faces: those that face the camera most."""
-    seen = _sure(model, found)
+    seen = _sure(model, face_by_name)
     frontal = [pair for pair in seen if abs(pair[1].yaw_deg) < FRONTAL_DEG]
     return frontal if len(frontal) >= 4 else seen

@@ -58,24 +58,24 @@ def put(capture: Capture, points: Mapping) -> dict[int, tuple[float, float, floa
     return known
 
 
-def _checked(points: Mapping, whose: str) -> dict[int, tuple[float, float, float]]:
+def _checked(points: Mapping, owner: str) -> dict[int, tuple[float, float, float]]:
     landmarks = {}
     for key, point in points.items():
-        index = _index(key, whose)
+        index = _index(key, owner)
         try:
             x, y, z = (float(v) for v in point)
         except (TypeError, ValueError, OverflowError):
             x = y = z = math.nan
         if not all(abs(v) <= FARTHEST_M for v in (x, y, z)):  # false for nan, too
-            raise Problem(f"{whose}: landmark {index} is at {point!r:.60}, which is not on the head.",
+            raise Problem(f"{owner}: landmark {index} is at {point!r:.60}, which is not on the head.",
                           "Give x, y and z in metres; the origin lies between the eyes.")
         landmarks[index] = (x, y, z)
     return landmarks
 
 
-def _index(key, whose: str) -> int:
+def _index(key, owner: str) -> int:
     text = str(key)
     if not (text.isdecimal() and len(text) <= len(str(COUNT)) and int(text) < COUNT):
-        raise Problem(f"{whose}: there is no landmark {key!r:.60}.",
+        raise Problem(f"{owner}: there is no landmark {key!r:.60}.",
                       f"Landmarks are counted from 0 to {COUNT - 1}, as in landmarks.json.")
     return int(text)

@@ -44,27 +44,27 @@ def _is_stop(stopped) -> bool:
     return stopped is None or told and _are_findings(stopped.get("findings"))
 
 
-def _is_stamp(value) -> bool:
+def _is_stamp(stamp) -> bool:
     """Whether it is a source's stamp: [name, size, content hash, or time] of each file."""
-    return isinstance(value, list) and all(
+    return isinstance(stamp, list) and all(
         isinstance(file, list) and len(file) == 3 and _names_file(file[0]) and is_number(file[1], 0)
-        and (isinstance(file[2], str) or is_number(file[2])) for file in value)
+        and (isinstance(file[2], str) or is_number(file[2])) for file in stamp)
 
 
-def _names_file(value) -> bool:
+def _names_file(name) -> bool:
     """Whether it may be a file's name on some system: none has a slash in it, and what else one takes, as a colon or a
     backslash, another does not."""
-    return isinstance(value, str) and "/" not in value and value not in ("", ".", "..")
+    return isinstance(name, str) and "/" not in name and name not in ("", ".", "..")
 
 
-def _are_hashes(value) -> bool:
+def _are_hashes(hashes) -> bool:
     """Whether it tells what was slimmed away: name -> content hash, or {file: hash} of a folder."""
-    return isinstance(value, dict) and all(
+    return isinstance(hashes, dict) and all(
         isinstance(tree, str) or isinstance(tree, dict) and all(isinstance(each, str) for each in tree.values())
-        for tree in value.values())
+        for tree in hashes.values())
 
 
-def _are_findings(value) -> bool:
-    return isinstance(value, list) and all(
+def _are_findings(findings) -> bool:
+    return isinstance(findings, list) and all(
         isinstance(finding, dict) and isinstance(finding.get("problem"), str)
-        and isinstance(finding.get("remedy"), str) and isinstance(finding.get("frames"), list) for finding in value)
+        and isinstance(finding.get("remedy"), str) and isinstance(finding.get("frames"), list) for finding in findings)

@@ -136,10 +136,10 @@ def _file_of(core: Path, parts: list[str]) -> str:
     return ""
 
 
-def _merge_constants(values: list) -> list:
+def _merge_constants(pieces: list) -> list:
     """The parts of an f-string with neighbouring pieces of text made one, as some Pythons do."""
     merged: list = []
-    for value in values:
+    for value in pieces:
         if isinstance(value, ast.Constant) and merged and isinstance(merged[-1], ast.Constant):
             merged[-1] = ast.Constant(merged[-1].value + value.value)
         else:

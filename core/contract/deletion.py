@@ -128,20 +128,24 @@ def _require(capture: Capture) -> None:
                       "Check the name: a capture's folder holds capture.json.")
 
 
-def lines(found: Deletion, translated=lambda text: text) -> list[str]:
+def lines(deletion: Deletion, translated=lambda text: text) -> list[str]:
     """The list as sentences; `translated` gives a sentence in the reader's language."""
     words = translated("{} files of this face are deleted for good, {} in all:")
-    said = [words.format(len(found.going), megabytes(found.size))]
+    said = [words.format(len(deletion.going), megabytes(deletion.size))]
     said += [translated("{}: {} files, {}").format(translated(group.label), group.files, megabytes(group.size))
-             for group in found.groups]
-    if found.staying:
-        more = translated(" and {} more").format(len(found.staying) - SHOWN) if len(found.staying) > SHOWN else ""
+             for group in deletion.groups]
+    if deletion.staying:
+        more = (
+            translated(" and {} more").format(len(deletion.staying) - SHOWN_FILES)
+            if len(deletion.staying) > SHOWN_FILES
+            else ""
+        )
         said.append(translated("{} files stay, which WildCap did not write or somebody changed: {}").format(
-            len(found.staying), ", ".join(found.staying[:SHOWN]) + more))
+            len(deletion.staying), ", ".join(deletion.staying[:SHOWN_FILES]) + more))
     return [*said, translated("The video and what was delivered elsewhere stay.")]
 
 
-SHOWN = 5
+SHOWN_FILES = 5
 """Files that stay and are named; the others are counted."""
 
 

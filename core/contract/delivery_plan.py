@@ -101,15 +101,15 @@ def safe_name(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "_", plain).strip("_") or "head"
 
 
-def needs(capture: Capture, what: str) -> Path:
+def needs(capture: Capture, kind: str) -> Path:
     """The mesh that is delivered. Raises Problem where the capture does not have it."""
     mesh = {"head": capture.head, "own_mesh": capture.delivery / "own_head.obj",
-            "scan": capture.delivery / "scan.obj"}[what]
+            "scan": capture.delivery / "scan.obj"}[kind]
     if not mesh.is_file():
         remedy = {"head": "Click Reconstruct first.",
                   "own_mesh": "Choose your mesh under Reconstruction, Head Mesh, and run the stages to the end.",
-                  "scan": "Run the stage Delivery with its scan switched on."}[what]
-        words = {"head": "head", "own_mesh": "fitted mesh of yours", "scan": "scan with textures"}[what]
+                  "scan": "Run the stage Delivery with its scan switched on."}[kind]
+        words = {"head": "head", "own_mesh": "fitted mesh of yours", "scan": "scan with textures"}[kind]
         raise Problem(f"This capture has no {words} to deliver.", remedy)
     return mesh
 
@@ -169,17 +169,17 @@ def check_target(plan: DeliveryPlan) -> None:
                       "Move it to another folder, or deliver to another one.")
 
 
-def _recover(target: Path, old: Path) -> None:
-    """Ends what was begun when `old`, an older delivery, was put aside: what a delivery wrote goes, what others put
-    there moves back to where it was."""
-    if not old.exists():
+def _recover(target: Path, set_aside: Path) -> None:
+    """Ends what was begun when `set_aside`, an older delivery, was put aside: what a delivery wrote goes, what others
+    put there moves back to where it was."""
+    if not set_aside.exists():
         return
     if not target.exists():
-        os.replace(old, target)
+        os.replace(set_aside, target)
         return
-    delivered = read_delivered(old) or {}
-    for file in sorted(path for path in old.rglob("*") if path.is_file() or path.is_symlink()):
-        name = file.relative_to(old).as_posix()
+    delivered = read_delivered(set_aside) or {}
+    for file in sorted(path for path in set_aside.rglob("*") if path.is_file() or path.is_symlink()):
+        name = file.relative_to(set_aside).as_posix()
         if name == PROVENANCE:
             continue
         if name in delivered:
@@ -189,8 +189,8 @@ def _recover(target: Path, old: Path) -> None:
         free = free_place(place)
         free.parent.mkdir(parents=True, exist_ok=True)
         os.replace(file, free)
-    (old / PROVENANCE).unlink(missing_ok=True)  # last: it says which files are whose
-    remove_empty_folders(old)
+    (set_aside / PROVENANCE).unlink(missing_ok=True)  # last: it says which files are whose
+    remove_empty_folders(set_aside)
 
 
 def read_delivered(target: Path) -> dict[str, str] | None:

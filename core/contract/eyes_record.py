@@ -69,9 +69,15 @@ def read_irises(capture: Capture) -> tuple[Colour, Colour] | None:
         raise Problem(f"{capture.irises} cannot be read ({error}).", advise_again("solve")) from error
 
 
-def _eyeball(told: dict) -> Eyeball:
-    eye = Eyeball(_vector(told["centre"]), told["radius"], _vector(told["gaze"]), told["openness"], told["iris_radius"],
-                  told["views"])
+def _eyeball(record: dict) -> Eyeball:
+    eye = Eyeball(
+        _vector(record["centre"]),
+        record["radius"],
+        _vector(record["gaze"]),
+        record["openness"],
+        record["iris_radius"],
+        record["views"],
+    )
     counted = all(is_number(value, 0) for value in (eye.openness, eye.iris_radius, eye.views))
     if not counted or not is_number(eye.radius, 1e-4):
         raise ValueError("an eye has no size")
@@ -80,8 +86,8 @@ def _eyeball(told: dict) -> Eyeball:
     return eye
 
 
-def _vector(told: list) -> tuple[float, float, float]:
-    x, y, z = told
+def _vector(coordinates: list) -> tuple[float, float, float]:
+    x, y, z = coordinates
     if not all(is_number(value) for value in (x, y, z)):
         raise ValueError("an eye lies nowhere")
     return x, y, z

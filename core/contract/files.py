@@ -173,6 +173,6 @@ def final_name(path: Path) -> Path:
     return Path(*(re.sub(r"^\.(.+)\.\d+\.tmp", r"\1", part) for part in path.parts))
 
 
-def write_json(path: Path, value) -> None:
+def write_json(path: Path, content) -> None:
     with replacing(path) as temporary:
-        temporary.write_text(json.dumps(value, indent=1, ensure_ascii=False), encoding="utf-8")
+        temporary.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")

@@ -100,9 +100,9 @@ def tell_known(root: Path) -> list:
             for (kind, path, size, when), digest in list(_hashes.items()) if path.startswith(inside)]
 
 
-def take_known(root: Path, known: list) -> None:
+def take_known(root: Path, entries: list) -> None:
     """Takes in what `tell_known` told. Raises ValueError or TypeError for what it did not tell."""
-    told = [((kind, os.path.join(root, path), size, when), digest) for kind, path, size, when, digest in known]
+    told = [((kind, os.path.join(root, path), size, when), digest) for kind, path, size, when, digest in entries]
     if not all(isinstance(digest, str) for _, digest in told):
         raise ValueError("a hash is no text")
     for key, digest in told:

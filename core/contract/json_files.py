@@ -18,10 +18,10 @@ from .regular_files import require_regular
 MOST_BYTES = 64 << 20
 """As objects, JSON takes about twenty times its size: 1.3 GB of memory. The largest that a stage writes,
 landmarks.json, has half a megabyte."""
-DEEPEST = 32
+DEEPEST_LEVEL = 32
 """Objects within objects. The deepest that is written here has eight; json.dumps gives up somewhat before a
 thousand."""
-LONGEST_NUMBER = 40
+LONGEST_NUMBER_DIGITS = 40
 """Characters. A double needs 24; a whole number of hundreds of digits is one that no calculation takes."""
 
 
@@ -43,7 +43,7 @@ def parse_json(text: str):
         raise ValueError("it is nested too deeply") from None
     level, depth = [value], 0
     while level:
-        if depth > DEEPEST:
+        if depth > DEEPEST_LEVEL:
             raise ValueError("it is nested too deeply")
         for word in (word for each in level
                      for word in ([each] if isinstance(each, str) else each if isinstance(each, dict) else ())):
@@ -70,7 +70,7 @@ def plain_name(name) -> bool:
 
 
 def _whole(digits: str) -> int:
-    if len(digits) > LONGEST_NUMBER:
+    if len(digits) > LONGEST_NUMBER_DIGITS:
         raise ValueError(f"it holds a number of {len(digits)} digits")
     return int(digits)
 
@@ -78,5 +78,5 @@ def _whole(digits: str) -> int:
 def _real(digits: str) -> float:
     value = float(digits)
     if math.isinf(value):
-        raise ValueError(f"it holds the number {digits[:LONGEST_NUMBER]}, which is too large")
+        raise ValueError(f"it holds the number {digits[:LONGEST_NUMBER_DIGITS]}, which is too large")
     return value

@@ -70,13 +70,13 @@ def holder(path: Path) -> dict | None:
     return None if lease_holder is None or lease_holder and is_gone(lease_holder) else lease_holder
 
 
-def refuse(found: dict, path: Path, what: str = "capture") -> Problem:
+def refuse(holder: dict, path: Path, folder_kind: str = "capture") -> Problem:
     """The Problem of a capture, or a batch, that is worked on."""
-    if not found:
-        return Problem(f"Another worker is just beginning to work on this {what}.",
+    if not holder:
+        return Problem(f"Another worker is just beginning to work on this {folder_kind}.",
                        f"Wait a moment and try again; if nobody works on it, delete {path}.")
-    return Problem(f"Another worker (process {found['pid']} on {str(found['host']).partition('/')[0]}, since "
-                   f"{found['since']}) is working on this {what}.",
+    return Problem(f"Another worker (process {holder['pid']} on {str(holder['host']).partition('/')[0]}, since "
+                   f"{holder['since']}) is working on this {folder_kind}.",
                    f"Wait for it or cancel it there; if it is gone, delete {path}.")
 
 
@@ -88,7 +88,7 @@ def _refuse_stranger(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def hold(root: Path, tell: Callable[[str], None] = lambda text: None, what: str = "capture",
+def hold(root: Path, tell: Callable[[str], None] = lambda text: None, folder_kind: str = "capture",
          cancelled: Callable[[], bool] = lambda: False) -> Iterator[Lease]:
     """Holds the lease of a capture's folder, or a batch's, which must be there. Raises Problem naming who works there.
 
@@ -98,7 +98,7 @@ def hold(root: Path, tell: Callable[[str], None] = lambda text: None, what: str 
     """
     lease = Lease(root / "lock", secrets.token_hex(8))
     while not _make(lease):
-        expired = _wait_out(lease.path, tell, what, cancelled)
+        expired = _wait_out(lease.path, tell, folder_kind, cancelled)
         if expired is not None:
             _take_over(lease, *expired)
     _held[_key(root)] = lease
@@ -130,7 +130,7 @@ def _make(lease: Lease) -> bool:
     return True
 
 
-def _wait_out(path: Path, tell: Callable[[str], None], what: str,
+def _wait_out(path: Path, tell: Callable[[str], None], folder_kind: str,
               cancelled: Callable[[], bool]) -> tuple[dict, tuple | None] | None:
     """What the lease says that can be taken over, and its stamp: its holder has ended, or a term went by without a
     refresh. None where it was given back. Raises Problem when it is held, and CancelledError."""
@@ -141,12 +141,12 @@ def _wait_out(path: Path, tell: Callable[[str], None], what: str,
         if lease_holder is None or lease_holder and is_gone(lease_holder):
             return None if lease_holder is None else (lease_holder, first)
         if _stamp(path) != first or lease_holder and is_at_work(lease_holder):
-            raise refuse(_read(path) or lease_holder, path, what)
+            raise refuse(_read(path) or lease_holder, path, folder_kind)
         waited = time.monotonic() - began
         if waited > TERM_S:
             return lease_holder, first
         if waited > 1 and not told:
-            tell(f"Looking whether the worker that holds this {what} is still at work ...")
+            tell(f"Looking whether the worker that holds this {folder_kind} is still at work ...")
             told = True
         if cancelled():
             raise CancelledError(str(path))

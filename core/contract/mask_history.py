@@ -17,7 +17,7 @@ from . import ownership
 from .capture import Capture
 from .files import replacing
 
-KEPT = 10
+KEPT_MASKS = 10  # older ones go
 
 
 def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | None:
@@ -35,7 +35,7 @@ def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | N
     copy = _place(capture, mask, max(time.time_ns() // 1_000_000, latest + 1))
     with replacing(copy) as temporary:
         shutil.copyfile(mask, temporary) if content is None else temporary.write_bytes(content)
-    for old in [*copies, copy][:-KEPT]:
+    for old in [*copies, copy][:-KEPT_MASKS]:
         if ownership.is_ours(capture.root, old):
             old.unlink(missing_ok=True)
     return copy

@@ -101,11 +101,11 @@ def free_place(place: Path) -> Path:
     return next(free for free in (place, *numbered) if not os.path.lexists(free))
 
 
-def clear_replaced(root: Path, old: Path, path: Path) -> None:
-    """Empties `old`, the folder that was at `path` before a new one took its name. What is ours goes, what somebody
-    changed is kept aside, and a file that others put there moves back to where it was."""
-    for file in files_in(old):
-        was = path / file.relative_to(old)
+def clear_replaced(root: Path, replaced: Path, path: Path) -> None:
+    """Empties `replaced`, the folder that was at `path` before a new one took its name. What is ours goes, what
+    somebody changed is kept aside, and a file that others put there moves back to where it was."""
+    for file in files_in(replaced):
+        was = path / file.relative_to(replaced)
         inside = path_inside(root, was)
         if _is_as_written(root, file, inside):
             file.unlink()
@@ -114,7 +114,7 @@ def clear_replaced(root: Path, old: Path, path: Path) -> None:
         else:
             was.parent.mkdir(parents=True, exist_ok=True)
             os.replace(file, was)
-    remove_empty_folders(old)
+    remove_empty_folders(replaced)
 
 
 def remove_empty_folders(folder: Path) -> None:
@@ -158,13 +158,13 @@ def _shorten(root: Path) -> None:
     os.replace(short, record)
 
 
-def take_back(root: Path, old: Path) -> None:
+def take_back(root: Path, replaced: Path) -> None:
     """A folder that was put aside for a new one: finishes that, or undoes it where the new one never came."""
-    path = old.with_name(old.name[1:-len(".old")])
+    path = replaced.with_name(replaced.name[1:-len(".old")])
     if path.exists():
-        clear_replaced(root, old, path)
+        clear_replaced(root, replaced, path)
     else:
-        os.replace(old, path)
+        os.replace(replaced, path)
 
 
 def read_record(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:

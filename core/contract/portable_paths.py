@@ -39,12 +39,12 @@ def read_portable(text: str, root: Path) -> Path:
     return Path(os.path.abspath(os.path.join(root, text)))
 
 
-def convert_settings(values: dict, convert: Callable[[str], str]) -> dict:
+def convert_settings(by_stage: dict, convert: Callable[[str], str]) -> dict:
     """The settings of stages, {stage: {name: value}} among other things, with `convert` applied to every path that is
     given."""
-    kinds = {name: getattr(Settings(), name, None) for name in values}
+    kinds = {name: getattr(Settings(), name, None) for name in by_stage}
     paths = {name: {f.name for f in fields(kind) if "path" in f.metadata} if hasattr(kind, "__dataclass_fields__")
              else set() for name, kind in kinds.items()}
     return {stage: {name: convert(value) if name in paths[stage] and value else value for name, value in chosen.items()}
             if isinstance(chosen, dict) else chosen
-            for stage, chosen in values.items()}
+            for stage, chosen in by_stage.items()}

@@ -28,7 +28,7 @@ from .hashes import hash_source, same_source
 from .settings import Settings
 
 HERE = Path(__file__).parents[1]
-CHUNK = 1 << 22
+CHUNK_BYTES = 1 << 22  # read at once
 
 
 def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Callable[[], None]) -> dict:
@@ -78,7 +78,7 @@ def packages() -> dict[str, str]:
 def sha256(path: Path, tick: Callable[[], None]) -> str:
     digest = hashlib.sha256()
     with open(path, "rb") as file:
-        while piece := file.read(CHUNK):
+        while piece := file.read(CHUNK_BYTES):
             digest.update(piece)
             tick()
     return digest.hexdigest()

@@ -97,9 +97,9 @@ def _section(capture: Capture, stage: stages.Stage, finished: dict | None, setti
             + (f"<h3>Settings other than the defaults</h3>{changed}" if changed else "") + "</section>")
 
 
-def _changed(stage: str, values: dict) -> dict:
+def _changed(stage: str, options: dict) -> dict:
     defaults = asdict(getattr(Settings(), stage))
-    return {name: value for name, value in values.items() if defaults.get(name) != value}
+    return {name: value for name, value in options.items() if defaults.get(name) != value}
 
 
 def _pictures(paths: list[Path], label: str, cut: int = 0) -> str:
@@ -113,13 +113,13 @@ def _embedded(path: Path) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
-def _rows(values: dict, notes: dict | None = None) -> str:
-    if not values:
+def _rows(entries: dict, notes: dict | None = None) -> str:
+    if not entries:
         return ""
     rows = (
         f'<tr title="{html.escape((notes or {}).get(name, ""))}"><th>{html.escape(name.replace("_", " "))}</th>'
         f'<td>{_value(value)}</td></tr>'
-        for name, value in values.items()
+        for name, value in entries.items()
     )
     return f"<table>{''.join(rows)}</table>"
 

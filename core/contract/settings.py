@@ -114,15 +114,15 @@ def quality_settings(kind: type) -> list[str]:
     return [f.name for f in fields(kind) if not f.metadata.get("per_face") and "path" not in f.metadata]
 
 
-def from_json(values: dict, base: Settings | None = None) -> Settings:
-    """Settings with `values` (stage -> {name: value}, and seed, device) laid over `base` or the defaults.
+def from_json(by_stage: dict, base: Settings | None = None) -> Settings:
+    """Settings with `by_stage` (stage -> {name: value}, and seed, device) laid over `base` or the defaults.
 
     Raises Problem for what is no such object, an unknown name, a wrong type, or a value out of its range.
     """
     settings = base or Settings()
-    if not isinstance(values, dict):
-        raise Problem(f"The settings have to be a JSON object, not {values!r:.60}.", WRITTEN)
-    for name, value in values.items():
+    if not isinstance(by_stage, dict):
+        raise Problem(f"The settings have to be a JSON object, not {by_stage!r:.60}.", WRITTEN)
+    for name, value in by_stage.items():
         if "." in name:
             raise Problem(f"There is no key {name!r} in the settings: each stage has an object of its own.", WRITTEN)
         if name not in STAGE_KINDS:

@@ -107,17 +107,17 @@ def slim(capture: Capture, settings: Settings) -> Slimming:
     return removal
 
 
-def lines(found: Slimming, capture: Capture) -> list[str]:
+def lines(slimming: Slimming, capture: Capture) -> list[str]:
     """The list as sentences."""
     kinds: dict[str, list[int]] = {}
-    for inside, size in found.going.items():
+    for inside, size in slimming.going.items():
         kinds.setdefault(GROUPS[inside.partition("/")[0]], []).append(size)
     said = [f"{label}: {len(sizes)} files, {megabytes(sum(sizes))}"
             for label, sizes in kinds.items()] or ["Nothing is left that could go."]
-    if found.going:
+    if slimming.going:
         left = sum(path.lstat().st_size for path in ownership.files_in(capture.root)
-                   if ownership.path_inside(capture.root, path) not in found.going)
+                   if ownership.path_inside(capture.root, path) not in slimming.going)
         said.append(f"{megabytes(left)} stay: maps, masks, landmarks, head, renders, deliveries and the report among "
                     "them. What goes is made again from the "
                     "video when a stage needs it; keep the video.")
-    return [*said, *found.notes]
+    return [*said, *slimming.notes]

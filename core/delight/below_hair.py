@@ -36,9 +36,15 @@ def fill_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def fill_hair(look: ShadingEstimate, own: ShadingEstimate, fitted: np.ndarray, share: np.ndarray) -> ShadingEstimate:
-    """The look with the mean of the network's `own` answer and the fitted log-shading [h, h, 3] below hair, whose
-    `share` of the head is [h, h], the fitted one at the level at which it meets the skin around; and the shadow that is
-    seen there."""
+    """The look with the mean of both answers below hair, and the shadow that is seen around.
+
+    Parameters
+    ----------
+    look : what is mended
+    own : the network's answer
+    fitted : [h, h, 3], the fitted log-shading, taken at the level at which it meets the skin around
+    share : [h, h] in [0, 1], of hair
+    """
     here = look.face >= 0
     hairy, bare = _covered(share) & here, here & ~_covered(share)
     if not hairy.any() or not bare.any():
@@ -55,17 +61,17 @@ def _covered(share: np.ndarray) -> np.ndarray:
     return cv2.dilate((share > MIN_HAIR_SHARE).astype(np.uint8), np.ones((2 * REACH_CELLS + 1,) * 2, np.uint8)) > 0
 
 
-def complete_shading(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+def complete_shading(field: np.ndarray, unknown: np.ndarray) -> np.ndarray:
     """Values [H, W, C] with those where `unknown` bool [H, W] replaced by the smoothest surface that meets the others
     (a harmonic one)."""
     if not unknown.any() or unknown.all():
-        return values
+        return field
     height, width = unknown.shape
     number = np.full(unknown.shape, -1)
     number[unknown] = np.arange(unknown.sum())
     y, x = np.nonzero(unknown)
     rows, columns, degree = [], [], np.zeros(len(y))
-    fixed = np.zeros((len(y), values.shape[-1]))
+    fixed = np.zeros((len(y), field.shape[-1]))
     for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0)):
         ny, nx = y + dy, x + dx
         inside = (ny >= 0) & (ny < height) & (nx >= 0) & (nx < width)
@@ -75,9 +81,9 @@ def complete_shading(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
         rows.append(np.flatnonzero(free))
         columns.append(near[free])
         known = inside & (near < 0)
-        fixed[known] += values[ny[known], nx[known]]
+        fixed[known] += field[ny[known], nx[known]]
     rows, columns = np.concatenate(rows), np.concatenate(columns)
     laplacian = sparse.diags(degree) - sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), (len(y), len(y)))
-    out = values.copy()
+    out = field.copy()
     out[unknown] = np.stack([spsolve(laplacian.tocsc(), fixed[:, k]) for k in range(fixed.shape[1])], -1)
     return out

@@ -18,7 +18,7 @@ from ..geometry.raster import interpolate, sample, sample_uv, visible_from
 from ..geometry.views import View
 from .lit_head import LitHead
 
-UV_TEXELS = 256
+UV_TEXELS = 256  # side of the map in which the frames' answers are compared
 COARSE_CELLS = 3.0  # cells of the network's map below which nothing is moved
 MIN_WEIGHT = 0.05  # weight from which a texel is known
 HALF_WEIGHT_LOG = 0.12  # natural log units from the others' mean at which what a view says counts half
@@ -97,9 +97,9 @@ def _opinion(surface: Unfolded, view: View, look: ShadingEstimate) -> tuple[np.n
     return log_albedo, weight
 
 
-def _agreeing(head: LitHead, look: ShadingEstimate, albedo: np.ndarray, known: np.ndarray) -> ShadingEstimate:
+def _agreeing(head: LitHead, look: ShadingEstimate, albedo: np.ndarray, confidence: np.ndarray) -> ShadingEstimate:
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
-    weight = sample_uv(known, uv).reshape(look.face.shape) * (look.face >= 0)
+    weight = sample_uv(confidence, uv).reshape(look.face.shape) * (look.face >= 0)
     weight = np.where(weight > 0.99, weight, 0).astype(np.float32)
     off = (look.log - look.shading - sample_uv(albedo, uv).reshape(*look.face.shape, 3)) * weight[..., None]
     carried = cv2.GaussianBlur(weight, (0, 0), COARSE_CELLS)

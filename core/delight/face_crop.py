@@ -46,7 +46,19 @@ def cut_face(srgb: np.ndarray, to_crop: np.ndarray, size: int) -> np.ndarray:
 
 
 def face_mask(face: Face, to_crop: np.ndarray, size: int, growth: float = 1.0) -> np.ndarray:
-    """[size, size] in {0, 1}: the hull of the landmarks, carried on over the forehead and enlarged by a factor."""
+    """The hull of a face's landmarks, carried on over the forehead.
+
+    Parameters
+    ----------
+    face : in a frame
+    to_crop : [2, 3], from the frame's pixels to the crop's
+    size : of the crop, in pixels
+    growth : factor by which the hull is enlarged about its middle
+
+    Returns
+    -------
+    float32 [size, size], 0 or 1.
+    """
     points = face.landmarks[:, :2] @ to_crop[:, :2].T + to_crop[:, 2]
     brow = points[list(BROWS), 1].mean()
     points[:, 1] += FOREHEAD_RATIO * np.minimum(points[:, 1] - brow, 0)  # upright in the crop
@@ -59,11 +71,21 @@ def face_mask(face: Face, to_crop: np.ndarray, size: int, growth: float = 1.0) -
 
 def put_face_back(frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask: np.ndarray,
                   to_crop: np.ndarray) -> np.ndarray:
-    """The frame sRGB [H, W, 3] with what was made of its crop, `before` -> `after` sRGB, inside of the mask and
-    feathered; elsewhere it stays.
+    """The frame with what was made of its crop, inside of the mask and feathered; elsewhere it stays.
 
     What the way through the crop took of the frame's sharpness is given back, so that a crop that was not changed gives
     the frame itself.
+
+    Parameters
+    ----------
+    frame : [H, W, 3], sRGB in [0, 1]
+    before, after : [S, S, 3], sRGB in [0, 1], the crop as it was cut and what was made of it
+    mask : [S, S], 1 where the crop is taken
+    to_crop : [2, 3], from the frame's pixels to the crop's
+
+    Returns
+    -------
+    float32 [H, W, 3], sRGB.
     """
     height, width = frame.shape[:2]
     inverse = cv2.invertAffineTransform(_from_centres(to_crop))

@@ -43,13 +43,13 @@ def remove_pores(log: np.ndarray) -> np.ndarray:
     return np.stack([cv2.bilateralFilter(channel, -1, PORE_LOG, reach) for channel in channels], -1)
 
 
-def _affine(guide: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _affine(guide: np.ndarray, shading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Per channel the slope and offset [h, w, C] that carry guide to values in each window, averaged over the windows a
     cell is in."""
     def mean(x: np.ndarray) -> np.ndarray:
         return cv2.blur(np.ascontiguousarray(x, np.float32), (2 * WINDOW_CELLS + 1,) * 2).reshape(x.shape)
 
-    middle, level = mean(guide), mean(values)
-    variance, covariance = mean(guide * guide) - middle**2, mean(guide * values) - middle * level
+    middle, level = mean(guide), mean(shading)
+    variance, covariance = mean(guide * guide) - middle**2, mean(guide * shading) - middle * level
     slope = np.clip(covariance / (variance + EDGE_LOG**2), -0.2, 1.2)
     return mean(slope), mean(level - slope * middle)

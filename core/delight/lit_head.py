@@ -19,7 +19,7 @@ from ..light.sunlight import Light, fit_light
 from .surface import skin_weights, smooth_normals, vertex_colours
 
 MAX_ALBEDO = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed
-FIT_POINTS = 6000
+FIT_POINTS = 6000  # points of the skin that the light is fitted to
 
 
 @dataclass(frozen=True)

@@ -176,9 +176,9 @@ def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
     return ShadingEstimate(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, MIN_LINEAR)))
 
 
-def _seen(head: LitHead, values: np.ndarray, look: ShadingEstimate) -> np.ndarray:
+def _seen(head: LitHead, vertex_values: np.ndarray, look: ShadingEstimate) -> np.ndarray:
     """Values [V] of the head where a look shows it, [h, h]."""
-    return interpolate(values[:, None], head.mesh.faces, look.face, look.bary)[..., 0]
+    return interpolate(vertex_values[:, None], head.mesh.faces, look.face, look.bary)[..., 0]
 
 
 def _hull(points: np.ndarray, look: ShadingEstimate) -> np.ndarray:

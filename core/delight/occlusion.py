@@ -23,12 +23,20 @@ FINE_SHARE = 0.0025  # skin's detail below this scale is kept even there
 
 def estimate_sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, skin: np.ndarray,
                        head: np.ndarray, side: int) -> np.ndarray:
-    """[H, W] in [0, 1]: how much of the sun each pixel gets. `side`: the longer side in pixels of the frame this is a
-    part of.
+    """How much of the sun each pixel gets.
 
-    linear, ambient, direct [H, W, 3]: the frame, the skin's colour under the sky, and what the sun would add; free [H,
-    W]: 1 where the head itself leaves the sun visible; skin [H, W]: 0 on brows, lips and hair, whose darkness is their
-    own; head bool [H, W].
+    Parameters
+    ----------
+    linear : [H, W, 3], the frame, linear
+    ambient, direct : [H, W, 3], linear: the skin's colour under the sky, and what the sun would add
+    free : [H, W] in [0, 1], 1 where the head itself leaves the sun visible
+    skin : [H, W] in [0, 1], 0 on brows, lips and hair, whose darkness is their own
+    head : bool [H, W]
+    side : the longer side in pixels of the frame that this is a part of
+
+    Returns
+    -------
+    [H, W] in [0, 1].
     """
     log = np.log(np.maximum(linear, 1e-3)).astype(np.float32)
     shaded = np.log(np.maximum(ambient, 1e-4)).astype(np.float32)
@@ -51,11 +59,21 @@ def estimate_sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarr
 
 
 def remove_seams(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
-    """[H, W, 3]: what to take from a log albedo [H, W, 3] along the edges of `share` so that no outline of the shadow
-    stays.
+    """What to take from a log albedo along the edges of a shadow so that no outline of it stays.
 
     Bounces, subsurface light and the video's chroma make a penumbra that one share cannot explain. Near an edge the
     coarse part of the albedo is carried over from both sides; its fine part stays.
+
+    Parameters
+    ----------
+    log_albedo : [H, W, 3], natural log of linear values
+    share : [H, W] in [0, 1], of the sun
+    head : bool [H, W]
+    side : the longer side in pixels of the frame that this is a part of
+
+    Returns
+    -------
+    [H, W, 3], natural log.
     """
     lit = (share > 0.5).astype(np.uint8)
     distance = cv2.distanceTransform(lit, cv2.DIST_L2, 5) + cv2.distanceTransform(1 - lit, cv2.DIST_L2, 5)
@@ -80,22 +98,22 @@ def _soften(lit: np.ndarray, log, log_light, ambient, direct, head, band: float)
     return np.where(edge, np.clip(share, 0, 1), lit).astype(np.float32)
 
 
-def _mean_over(values: np.ndarray, where: np.ndarray, sigma: float) -> np.ndarray:
-    """Gaussian mean of [H, W(, C)] over the pixels `where`; a wide one at a quarter of the size."""
+def _mean_over(image: np.ndarray, mask: np.ndarray, sigma: float) -> np.ndarray:
+    """Gaussian mean of [H, W(, C)] over the pixels `mask`; a wide one at a quarter of the size."""
     if sigma > 12:
-        height, width = where.shape
+        height, width = mask.shape
         small = (max(width // 4, 1), max(height // 4, 1))
-        weight = cv2.resize(where.astype(np.float32), small, interpolation=cv2.INTER_AREA)
-        total = cv2.resize(np.asarray(values * (where if values.ndim == 2 else where[..., None]), np.float32), small,
+        weight = cv2.resize(mask.astype(np.float32), small, interpolation=cv2.INTER_AREA)
+        total = cv2.resize(np.asarray(image * (mask if image.ndim == 2 else mask[..., None]), np.float32), small,
                            interpolation=cv2.INTER_AREA)
         norm = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma / 4), 1e-4)
-        mean = cv2.GaussianBlur(total, (0, 0), sigma / 4) / (norm if values.ndim == 2 else norm[..., None])
+        mean = cv2.GaussianBlur(total, (0, 0), sigma / 4) / (norm if image.ndim == 2 else norm[..., None])
         return cv2.resize(mean, (width, height), interpolation=cv2.INTER_LINEAR)
-    weight = where.astype(np.float32)
-    total = cv2.GaussianBlur(np.asarray(values * (weight if values.ndim == 2 else weight[..., None]), np.float32),
+    weight = mask.astype(np.float32)
+    total = cv2.GaussianBlur(np.asarray(image * (weight if image.ndim == 2 else weight[..., None]), np.float32),
                              (0, 0), sigma)
     norm = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-4)
-    return total / (norm if values.ndim == 2 else norm[..., None])
+    return total / (norm if image.ndim == 2 else norm[..., None])
 
 
 def _log_odds(share: np.ndarray) -> np.ndarray:

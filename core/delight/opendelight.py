@@ -67,7 +67,20 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
 
 def delight_face(srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu",
                  step: Callable[[], None] = lambda: None) -> np.ndarray:
-    """A frame sRGB [H, W, 3] with the albedo of one face in it."""
+    """A frame with the albedo of one face in it.
+
+    Parameters
+    ----------
+    srgb : [H, W, 3] in [0, 1], the frame
+    face : in it
+    checkpoint : OpenDelight's
+    device : that torch computes on
+    step : is called between layers, and may raise to cancel
+
+    Returns
+    -------
+    [H, W, 3], sRGB.
+    """
     to_crop = ffhq_alignment(face, CROP_PX, FFHQ_MARGIN)
     crop = cut_face(srgb, to_crop, CROP_PX)
     mask = np.maximum(face_mask(face, to_crop, CROP_PX),

@@ -25,8 +25,18 @@ Step = Callable[[], None]
 
 @torch.inference_mode()
 def delight_crop(base: State, enhancer: State | None, picture: Tensor, step: Step = lambda: None) -> Tensor:
-    """Albedo sRGB [1, 3, S, S] of an aligned face sRGB [1, 3, S, S] in [0, 1], black off the face; `step` is called
-    between layers. S: a multiple of 16."""
+    """Albedo of an aligned face.
+
+    Parameters
+    ----------
+    base, enhancer : weights; without the enhancer the base's answer stays
+    picture : [1, 3, S, S], sRGB in [0, 1], black off the face; S a multiple of 16
+    step : is called between layers
+
+    Returns
+    -------
+    [1, 3, S, S], sRGB.
+    """
     albedo = _decoded(base, _encoded(base, picture, step), step)
     return albedo if enhancer is None else _enhanced(enhancer, torch.cat([albedo, picture], 1), step)
 

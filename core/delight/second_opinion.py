@@ -33,8 +33,16 @@ FITTED = Weighing(share=0.6, doubt=0.15)
 
 def weigh_in(looks: list[ShadingEstimate], answers: list[np.ndarray], skins: list[np.ndarray],
              weighing: Weighing = FITTED) -> list[ShadingEstimate]:
-    """The looks moved towards another answer, log-shading [h, h, 3] for each, brought to their level over bare skin
-    (skins [h, h], above 0.5 there); as they are where no skin tells the level."""
+    """The looks moved towards another answer, brought to their level over bare skin; as they are where no skin tells
+    the level.
+
+    Parameters
+    ----------
+    looks : one for each frame
+    answers : [h, h, 3] for each, log-shading
+    skins : [h, h] for each, in [0, 1], bare skin above 0.5
+    weighing : how far the other answer counts
+    """
     apart = np.concatenate([(answer - look.shading)[skin > 0.5]
                             for look, answer, skin in zip(looks, answers, skins, strict=True)])
     if not len(apart):
@@ -47,19 +55,33 @@ def weigh_in(looks: list[ShadingEstimate], answers: list[np.ndarray], skins: lis
             for look, answer in zip(looks, answers, strict=True)]
 
 
-def continue_beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice],
-                    light: np.ndarray, share: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A frame's log-shading [H, W, 3] and shadow [H, W], where known [H, W] in [0, 1] falls to 0 taken over by the
-    fitted light [h, w, 3] and its share [h, w] in the part `box` of the frame, at the level of the rest; here bool [h,
-    w]: the head. Scalp and neck lie beyond what the network sees."""
+def continue_beyond(shading: np.ndarray, shadow: np.ndarray, confidence: np.ndarray, box: tuple[slice, slice],
+                    light: np.ndarray, share: np.ndarray, on_head: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A frame's shading and shadow, carried on by the fitted light where confidence falls to 0: scalp and neck lie
+    beyond what the network sees.
+
+    Parameters
+    ----------
+    shading : [H, W, 3], log-shading of the frame
+    shadow : [H, W] in [0, 1]
+    confidence : [H, W] in [0, 1], how far the two hold
+    box : rows and columns [h, w] of the frame that hold the head
+    light : [h, w, 3], linear, the fitted light there; it is taken over at the level of the rest
+    share : [h, w] in [0, 1], of its sun
+    on_head : bool [h, w]
+
+    Returns
+    -------
+    Shading [H, W, 3] and shadow [H, W].
+    """
     log = np.log(np.maximum(light, 1e-4))
-    sure = here & (known[box] > 0.99)
+    sure = on_head & (confidence[box] > 0.99)
     if not sure.any():
         return shading, shadow
     level = np.median((log - shading[box])[sure], 0)
-    shading, shadow, weight = shading.copy(), shadow.copy(), known[box]
+    shading, shadow, weight = shading.copy(), shadow.copy(), confidence[box]
     shading[box] = weight[..., None] * shading[box] + (1 - weight[..., None]) * (log - level)
-    shadow[box] = weight * shadow[box] + (1 - weight) * (1 - share) * here
+    shadow[box] = weight * shadow[box] + (1 - weight) * (1 - share) * on_head
     return shading, shadow
 
 

@@ -58,9 +58,21 @@ def light_in_frame(view: View, head: LitHead,
 
 def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray,
                side: int) -> tuple[np.ndarray, np.ndarray]:
-    """The skin's expected linear colour [h, w, 3], carried on past the head's edge, and the share of the sun [h, w],
-    where a raster (face [h, w], bary [h, w, 3]) shows the head in a linear picture [h, w, 3]; `side`: the longer side
-    of the frame at the picture's scale."""
+    """The light that the head's fit expects in a picture.
+
+    Parameters
+    ----------
+    linear : [h, w, 3], the picture
+    head : with the fitted light
+    face : [h, w], the triangle that each pixel shows, -1 for none
+    bary : [h, w, 3], where in it
+    side : the longer side of the frame in pixels, at the picture's scale
+
+    Returns
+    -------
+    The skin's expected linear colour [h, w, 3], carried on past the head's edge, and the share of the sun [h, w] in [0,
+    1].
+    """
     here = face >= 0
     ambient, direct, free, _ = head.at(face, bary)
     share = np.ones(here.shape, np.float32)
@@ -73,7 +85,7 @@ def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.nda
     return lit, share
 
 
-def _box(where: np.ndarray, margin: int = 8) -> tuple[slice, slice]:
-    rows, columns = np.flatnonzero(where.any(1)), np.flatnonzero(where.any(0))
+def _box(mask: np.ndarray, margin: int = 8) -> tuple[slice, slice]:
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     return slice(max(rows[0] - margin, 0),
                  rows[-1] + margin + 1), slice(max(columns[0] - margin, 0), columns[-1] + margin + 1)

@@ -40,10 +40,24 @@ def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
 
 def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
                    report: Reporter) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move,
-    drop out), their number [V], and the shares [V] of HAIRY and of brows over the views that see it at all.
+    """What the views show of each vertex' colour.
 
-    Raises Problem when hardly any vertex is seen.
+    Parameters
+    ----------
+    head : as fitted, in metres
+    normals : [V, 3], unit, of its vertices
+    views : with their pictures
+    report : hears of progress
+
+    Returns
+    -------
+    Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move, drop
+    out); their number [V]; and the shares [V] in [0, 1] of HAIRY and of brows over the views that see it at all.
+
+    Raises
+    ------
+    Problem
+        When hardly any vertex is seen.
     """
     mesh = head.mesh
     seen_colours = np.full((len(views), len(mesh.vertices), 3), np.nan, np.float32)

@@ -57,10 +57,24 @@ class Account:
 
 def albedo(account: Account, data: bytes, suffix: str, preview: bool, silence_s: float, call_s: float,
            stopped: Callable[[], bool]) -> bytes:
-    """The whole PNG that answers a picture. Raises AgainError, or Problem for what no repetition mends.
+    """The whole PNG that answers a picture.
 
-    `silence_s` without a byte, or `call_s` for all of it, are too long. `stopped` is asked between the parts of the
-    answer.
+    Parameters
+    ----------
+    account : that pays
+    data : the picture's file
+    suffix : of its name
+    preview : whether the cheap answer is asked for
+    silence_s : without a byte that are too long
+    call_s : for all of it that are too long
+    stopped : is asked between the parts of the answer
+
+    Raises
+    ------
+    AgainError
+        For what may go well when it is asked again.
+    Problem
+        For what no repetition mends.
     """
     boundary = uuid.uuid4().hex
     request = _request(account, service.ALBEDO, _multipart(boundary, data, suffix, service.form(preview)))
@@ -205,13 +219,13 @@ def _said(body: bytes) -> str:
     return " ".join((text if isinstance(text, str) else json.dumps(text)).split())[:200].rstrip(".")
 
 
-def _after(value: str | None) -> float | None:
+def _after(header: str | None) -> float | None:
     """Seconds of a Retry-After header, which is a number of them or a date (RFC 9110, 10.2.3); None for none."""
-    if value is None:
+    if header is None:
         return None
-    if value.strip().isdigit():
-        return float(value)
+    if header.strip().isdigit():
+        return float(header)
     try:
-        return max(0.0, email.utils.parsedate_to_datetime(value).timestamp() - time.time())
+        return max(0.0, email.utils.parsedate_to_datetime(header).timestamp() - time.time())
     except (ValueError, TypeError):
         return None

@@ -47,9 +47,24 @@ class Parcel:
 
 
 def send(account: Account, parcels: list[Parcel], preview: bool, report: Reporter, patience: Patience) -> int:
-    """Obtains and keeps the answer to every parcel; the number of calls it took.
+    """Obtains and keeps the answer to every parcel.
 
-    Raises Problem, once the calls that are under way have ended, and CancelledError at once.
+    Parameters
+    ----------
+    account : that pays
+    parcels : what is sent
+    preview : whether the cheap answer is asked for
+    report : hears of progress
+    patience : how often and how long is tried
+
+    Returns
+    -------
+    The number of calls it took.
+
+    Raises
+    ------
+    Problem
+        Once the calls that are under way have ended; CancelledError at once.
     """
     line = _Line(account, parcels, preview, patience)
     threads = [threading.Thread(target=line.work, name=f"switchlight-{i}", daemon=True)

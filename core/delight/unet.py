@@ -17,7 +17,7 @@ from ..face.networks import Ladder
 from ..imaging import images
 
 SIDE_PX = 256  # of the picture it looks at
-CHANNELS = 16
+CHANNELS = 16  # layers that `network_input` makes
 FINE = 24  # features at half the picture's resolution
 MIN_LINEAR = 0.004  # linear; below is noise
 MULTIPLE_PX = 32  # of pixels, to be halved so often
@@ -25,11 +25,19 @@ MULTIPLE_PX = 32  # of pixels, to be halved so often
 
 def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: np.ndarray | None = None,
                   normal: np.ndarray | None = None, head: np.ndarray | None = None) -> tuple[np.ndarray, float]:
-    """[CHANNELS, S, S] and the middle of the picture's log, by which the log-shading that comes out is lower.
+    """What the network reads of a picture. Without the head's geometry its channels are 0, and so is the last, which
+    says so.
 
-    srgb [S, S, 3]. If the head's geometry is known: ambient and sunlit [S, S, 3], linear colour of its skin under the
-    fitted sky alone and with the fitted sun, normal [S, S, 3] in camera coordinates, head [S, S] where they hold.
-    Without it these channels are 0, and so is the last, which says so.
+    Parameters
+    ----------
+    srgb : [S, S, 3] in [0, 1]
+    ambient, sunlit : [S, S, 3], linear colour of the head's skin under the fitted sky alone, and with the fitted sun
+    normal : [S, S, 3], unit, in camera coordinates
+    head : [S, S] in [0, 1], where these three hold
+
+    Returns
+    -------
+    [CHANNELS, S, S] and the middle of the picture's natural log, by which the log-shading that comes out is lower.
     """
     log = np.log(np.maximum(images.srgb_to_linear(srgb), MIN_LINEAR))
     side = len(log)

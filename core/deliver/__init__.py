@@ -25,8 +25,8 @@ from ..geometry import meshes
 from ..imaging import images
 from . import checks, maps, wavefront
 
-HEAD_TILE = 1001
-METRES = {"m": 1.0, "cm": 0.01}
+HEAD_TILE = 1001  # UDIM
+UNIT_M = {"m": 1.0, "cm": 0.01}  # metres in a unit
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
@@ -54,7 +54,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         made, size = [], 0
         for i, (tile, paths) in enumerate(tiles.items()):
             sources = maps.Sources(paths, int(settings.deliver.size), settings.deliver.roughness / 100, mean,
-                                   METRES[plan.unit], regions)
+                                   UNIT_M[plan.unit], regions)
             wanted = [picture for picture in pictures if sources.has(picture)]
             for j, picture in enumerate(wanted):
                 number = f".{tile}" if plan.numbered or several else ""

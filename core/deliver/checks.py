@@ -16,12 +16,12 @@ LAST = {"head": "upscale", "own_mesh": "transfer", "scan": "transfer"}
 left out where there is none."""
 
 
-def check_stages(capture: Capture, what: str, settings: Settings, report: Reporter) -> None:
-    """Raises Problem naming a stage, of those that `what` comes from, whose inputs or settings have changed since. What
+def check_stages(capture: Capture, kind: str, settings: Settings, report: Reporter) -> None:
+    """Raises Problem naming a stage, of those that `kind` comes from, whose inputs or settings have changed since. What
     older code made is delivered, and named in the log."""
     older = []
-    last = stages.NAMES.index(LAST[what])
-    if what == "head" and (capture.delivery / "displacement.exr").is_file():
+    last = stages.NAMES.index(LAST[kind])
+    if kind == "head" and (capture.delivery / "displacement.exr").is_file():
         last = stages.NAMES.index("transfer")
     for stage in stages.STAGES[:last + 1]:
         verdict = capture.verdict(stage, settings)

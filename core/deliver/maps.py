@@ -26,7 +26,7 @@ F0 = 0.0278
 mean of facial skin."""
 UNREAL_F0 = 0.08
 """What Unreal's Specular of 1 reflects at normal incidence."""
-STRIP = 256
+STRIP_ROWS = 256
 """Rows that are worked on at once."""
 
 
@@ -95,8 +95,8 @@ def write(picture: MapPicture, sources: Sources, path: Path, plan: DeliveryPlan)
         images.write_data(path, pixels * 0.5 + 0.5, bits)
         return
     if picture.kind == COLOUR and plan.colour == "srgb":
-        for row in range(0, len(pixels), STRIP):
-            pixels[row:row + STRIP, :, :3] = images.linear_to_srgb(pixels[row:row + STRIP, :, :3])
+        for row in range(0, len(pixels), STRIP_ROWS):
+            pixels[row:row + STRIP_ROWS, :, :3] = images.linear_to_srgb(pixels[row:row + STRIP_ROWS, :, :3])
     if pixels.shape[2] == 4:
         images.write_packed(path, pixels, bits, srgb=picture.kind == COLOUR and plan.colour == "srgb")
     elif picture.kind == COLOUR:

@@ -16,50 +16,57 @@ from ..geometry import raster
 from ..imaging import images
 from . import template
 
-PLACES = (((132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361), 16.0),
+PLACES_MM = (((132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361), 16.0),
           ((92, 165, 167, 164, 393, 391, 322), 6.5),
           ((18, 200, 199, 201, 421, 204, 424, 202, 422, 212, 432, 57, 287), 9.0), ((127, 234, 93, 356, 454, 323), 8.0),
           ((214, 434, 192, 416, 213, 433, 147, 376, 135, 364, 169, 394, 210, 430, 138, 367), 10.0))
 """MediaPipe landmarks about which a beard grows, and how far in mm: jaw, upper lip, chin, before the ears, lower
 cheeks."""
-BELOW_JAW = (0.0, 14.0, -22.0), 18.0
+BELOW_JAW_MM = (0.0, 14.0, -22.0), 18.0
 """mm from the jaw to where the beard goes on below it, and how far it reaches there."""
-STEP = 4
+ZONE_STEP_TEXELS = 4
 """Every so many texels the beard's zone, which is soft, is worked out."""
-OUTSTANDING = 2.5
+OUTSTANDING_DEVIATIONS = 2.5
 """Deviations of the bare skin's grain above which a texel is a dark stroke."""
-AROUND = 0.5
+AROUND_MM = 0.5
 """mm about a stroke that count as stroked: many hairs tell a beard, not one long edge of a shadow."""
-STROKED = 0.10, 0.25
+STROKED_SHARES = 0.10, 0.25
 """Share of the skin that is stroked, beyond the bare skin's own, at which a beard begins, and from which on there is
 one."""
-LEAST = 0.10
+MIN_BEARD_SHARE = 0.10
 """Share of where a beard may grow that must have one: less is freckles, scars or the edges of shadows."""
-SIZE = 1024
+SIZE_TEXELS = 1024
 """Texels of a map that shows single strokes: a hair is about half of one wide."""
 
 
 def seen_in(texture: np.ndarray, confidence: np.ndarray) -> np.ndarray:
-    """How sure it is that a beard grows here, float32 [SIZE, SIZE] in [0, 1], from a texture of the built-in head.
+    """How sure it is that a beard grows here, float32 [SIZE_TEXELS, SIZE_TEXELS] in [0, 1], from a texture of the
+    built-in head.
 
     texture linear [S, S, 3]; confidence [S, S]: how well each texel was seen. Zero everywhere where the texture is too
     small to show strokes.
     """
-    if len(texture) < SIZE:
-        return np.zeros((SIZE, SIZE), np.float32)
-    light = np.log(np.maximum(images.resize(texture, SIZE, SIZE), 1e-3)).mean(-1).astype(np.float32)
+    if len(texture) < SIZE_TEXELS:
+        return np.zeros((SIZE_TEXELS, SIZE_TEXELS), np.float32)
+    light = np.log(np.maximum(images.resize(texture, SIZE_TEXELS, SIZE_TEXELS), 1e-3)).mean(-1).astype(np.float32)
     grows, texel = _on_template()
-    elsewhere = (grows < 0.05) & (template.mask("brows", SIZE) < 0.01)
-    bare = (template.mask("skin", SIZE) > 0.99) & elsewhere & (images.resize(confidence, SIZE, SIZE) > 0.5)
+    elsewhere = (grows < 0.05) & (template.mask("brows", SIZE_TEXELS) < 0.01)
+    bare = (
+        (template.mask("skin", SIZE_TEXELS) > 0.99)
+        & elsewhere
+        & (images.resize(confidence, SIZE_TEXELS, SIZE_TEXELS) > 0.5)
+    )
     small = fine(light, float(np.median(texel)))
     return presence(small, deviation(small[bare]), bare, grows, texel)
 
 
 def zone(landmarks: np.ndarray, position: np.ndarray) -> np.ndarray:
     """Where a beard may grow, float32 [S, S] in [0, 1]. landmarks [468, 3], position [S, S, 3] in mm."""
-    near = [(landmarks[list(which)], radius) for which, radius in PLACES]
-    near.append((landmarks[list(PLACES[0][0])] + BELOW_JAW[0], BELOW_JAW[1]))
-    coarse = np.ascontiguousarray(position[STEP // 2::STEP, STEP // 2::STEP])
+    near = [(landmarks[list(which)], radius) for which, radius in PLACES_MM]
+    near.append((landmarks[list(PLACES_MM[0][0])] + BELOW_JAW_MM[0], BELOW_JAW_MM[1]))
+    coarse = np.ascontiguousarray(
+        position[ZONE_STEP_TEXELS // 2 :: ZONE_STEP_TEXELS, ZONE_STEP_TEXELS // 2 :: ZONE_STEP_TEXELS]
+    )
     out, size = np.zeros(coarse.shape[:2], np.float32), len(position)
     for centres, radius in near:
         for centre in centres:
@@ -71,17 +78,26 @@ def zone(landmarks: np.ndarray, position: np.ndarray) -> np.ndarray:
 
 
 def presence(small: np.ndarray, usual: float, bare: np.ndarray, grows: np.ndarray, texel: np.ndarray) -> np.ndarray:
-    """How sure it is that a beard grows here, [S, S] in [0, 1]: from the share of dark strokes around.
+    """How sure it is that a beard grows here, from the share of dark strokes around.
 
-    small: `fine` of the log albedo, usual its `deviation` on skin that is `bare` (bool); grows: `zone`; texel: width of
-    each texel in mm; all [S, S].
+    Parameters
+    ----------
+    small : [S, S], `fine` of the log albedo
+    usual : its `deviation` on bare skin
+    bare : bool [S, S], skin without hair
+    grows : [S, S] in [0, 1], `zone`
+    texel : [S, S], width of each texel in mm
+
+    Returns
+    -------
+    float32 [S, S] in [0, 1].
     """
     width = float(np.median(texel))
-    stroked = cv2.dilate((small < -OUTSTANDING * usual).astype(np.float32), disc(AROUND / width))
+    stroked = cv2.dilate((small < -OUTSTANDING_DEVIATIONS * usual).astype(np.float32), disc(AROUND_MM / width))
     around = cv2.GaussianBlur(stroked, (0, 0), 4.0 / width)
     own = np.percentile(around[bare], 75) if bare.any() else 0.0
-    confidence = np.clip((around - own - STROKED[0]) / (STROKED[1] - STROKED[0]), 0, 1) * grows
-    if float((confidence * texel**2).sum()) < LEAST * float((grows * texel**2).sum()):
+    confidence = np.clip((around - own - STROKED_SHARES[0]) / (STROKED_SHARES[1] - STROKED_SHARES[0]), 0, 1) * grows
+    if float((confidence * texel**2).sum()) < MIN_BEARD_SHARE * float((grows * texel**2).sum()):
         return np.zeros_like(grows)
     return confidence.astype(np.float32)
 
@@ -91,9 +107,9 @@ def fine(light: np.ndarray, texel: float) -> np.ndarray:
     return light - cv2.GaussianBlur(light, (0, 0), 0.8 / texel)
 
 
-def deviation(values: np.ndarray) -> float:
-    """Of most values: what stands out does not count."""
-    return float(1.4826 * np.median(np.abs(values - np.median(values)))) if len(values) else 0.05
+def deviation(samples: np.ndarray) -> float:
+    """Of most samples [N]: what stands out does not count."""
+    return float(1.4826 * np.median(np.abs(samples - np.median(samples)))) if len(samples) else 0.05
 
 
 def disc(radius: float) -> np.ndarray:
@@ -102,9 +118,9 @@ def disc(radius: float) -> np.ndarray:
 
 @cache
 def _on_template() -> tuple[np.ndarray, np.ndarray]:
-    """`zone` and the width of each texel in mm [SIZE, SIZE] on the built-in head before it is fitted: near enough for
-    what is soft by millimetres."""
-    mesh, (face, bary) = template.load(), raster.rasterize_uv(template.load(), SIZE)
+    """`zone` and the width of each texel in mm [SIZE_TEXELS, SIZE_TEXELS] on the built-in head before it is fitted:
+    near enough for what is soft by millimetres."""
+    mesh, (face, bary) = template.load(), raster.rasterize_uv(template.load(), SIZE_TEXELS)
     at, weight = template.landmarks()
     landmarks = 1000 * (mesh.vertices[mesh.faces[at]] * weight[..., None]).sum(1)
     position = raster.bleed(raster.interpolate(1000 * mesh.vertices, mesh.faces, face, bary).astype(np.float32),

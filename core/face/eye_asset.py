@@ -80,7 +80,7 @@ def load() -> EyeAsset:
     )
 
 
-def _ball_mesh(z: dict, first: int, parts: np.ndarray, kind: int) -> Mesh:
+def _ball_mesh(z: dict, first: int, vertices: np.ndarray, kind: int) -> Mesh:
     """One eyeball as the asset has it, turned about its centre so that it looks straight ahead; the asset's look down
     by two degrees."""
     rows = np.flatnonzero(z["kind"] == kind)
@@ -91,8 +91,8 @@ def _ball_mesh(z: dict, first: int, parts: np.ndarray, kind: int) -> Mesh:
     quads = quads[(number[quads[:, :3]] >= 0).all(1)]
     triangles = number[np.concatenate([quads[:, :3], quads[quads[:, 3] >= 0][:, [0, 2, 3]]])]
     uvs, centre = z["uvs"][rows].astype(np.float64), z["balls"][kind - 1, :3].astype(np.float64)
-    pupil = parts[rows][np.linalg.norm(uvs - 0.5, axis=1).argmin()] - centre
-    straight = centre + (parts[rows] - centre) @ turn_towards(pupil / np.linalg.norm(pupil))
+    pupil = vertices[rows][np.linalg.norm(uvs - 0.5, axis=1).argmin()] - centre
+    straight = centre + (vertices[rows] - centre) @ turn_towards(pupil / np.linalg.norm(pupil))
     return Mesh(straight, triangles, uvs, triangles)
 
 

@@ -4,7 +4,7 @@
 upright crop of the eye.
 
     eye = read_eye(srgb, corners, left)
-    eye.ball, eye.iris                         float32 [SIDE, SIDE]: shares of the crop's pixels
+    eye.ball, eye.iris                         float32 [SIDE_PX, SIDE_PX]: shares of the crop's pixels
 
 `core train eyes` makes the weights, on synthetic people only. PyTorch is loaded when the first eye is read.
 """
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 CLASSES = ("other", "white", "iris")
 """What is told apart; the pupil belongs to the iris, lashes and lids are the other."""
-SIDE, SPAN = 96, 2.0
+SIDE_PX, SPAN_EYE_WIDTHS = 96, 2.0
 """Of the crop: its side in pixels, and in distances between the eye's corners."""
 DATA_FILES = ("weights/eyes.safetensors", "weights/eyes.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
@@ -33,8 +33,8 @@ WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 
 @dataclass(frozen=True)
 class EyeShares:
-    """ball, iris float32 [SIDE, SIDE]: how much of a pixel of the crop shows the eyeball, and of that the iris; move
-    [2, 3]: from the picture, in pixels, to the crop."""
+    """ball, iris float32 [SIDE_PX, SIDE_PX]: how much of a pixel of the crop shows the eyeball, and of that the iris;
+    move [2, 3]: from the picture, in pixels, to the crop."""
 
     ball: np.ndarray
     iris: np.ndarray
@@ -49,20 +49,32 @@ def to_eye_crop(corners: np.ndarray, left: bool) -> np.ndarray:
     width = max(float(np.linalg.norm(across)), 1e-6)
     x = across / width
     y = np.array([-x[1], x[0]]) * (-1 if left else 1)
-    turn = SIDE / (SPAN * width) * np.stack([x, y])
-    return np.concatenate([turn, (SIDE / 2 - turn @ ((outer + inner) / 2))[:, None]], 1)
+    turn = SIDE_PX / (SPAN_EYE_WIDTHS * width) * np.stack([x, y])
+    return np.concatenate([turn, (SIDE_PX / 2 - turn @ ((outer + inner) / 2))[:, None]], 1)
 
 
 def read_eye(srgb: np.ndarray, corners: np.ndarray, left: bool, network: ParseNet | None = None) -> EyeShares:
-    """The eye whose outer and inner corner [2, 2] lie about there in an sRGB picture [H, W, 3], in pixels; `network` in
-    place of the shipped one. Raises Problem where the weights are missing or damaged."""
+    """The eye in a picture.
+
+    Parameters
+    ----------
+    srgb : [H, W, 3] in [0, 1]
+    corners : [2, 2], about where its outer and inner corner lie, in pixels
+    left : whether it is the person's left one
+    network : in place of the shipped one
+
+    Raises
+    ------
+    Problem
+        Where the weights are missing or damaged.
+    """
     import torch
 
     from .parser_network import network_input
 
     network = network or load()
     move = to_eye_crop(corners, left)
-    layers = network_input(cut(srgb, move, SIDE), inside(srgb.shape, move, SIDE))
+    layers = network_input(cut(srgb, move, SIDE_PX), inside(srgb.shape, move, SIDE_PX))
     with torch.inference_mode():
         shares = network(torch.from_numpy(layers[None])).softmax(1)[0].numpy()
     return EyeShares(1 - shares[0], shares[2], move)

@@ -28,12 +28,12 @@ BROW_LINES = ((276, 283, 282, 295, 285, 336, 296, 334, 293, 300), (46, 53, 52, 6
 EYE_LINES = ((263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466),
              (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246))
 """Closed outlines in landmarks; of brows and lids the person's left and right."""
-EYE_CROP = 2.3
+EYE_CROP_EYE_WIDTHS = 2.3
 """Side of the square that the eye network is shown, in distances between the eye's corners."""
 NEAR_DEG, FAR_DEG = 50.0, 25.0
 """How far the head may be turned for the marks of the eye on the near side of the nose to hold, and of the one beyond
 it."""
-AS_OPEN = 0.3
+AS_OPEN_SHARE = 0.3
 """Share by which an eye's opening may differ from its usual one: a blink, or a look down, beyond."""
 DATA_FILES = ("weights/face_nets/face_detection_short_range.tflite", "weights/face_nets/face_landmark.tflite",
               "weights/face_nets/iris_landmark.tflite", "weights/face_nets/selfie_segmentation.tflite")
@@ -80,7 +80,7 @@ class Eye:
 
     def is_open_as(self, usual: float) -> bool:
         """Whether it is about as open as an eye of this `opening`."""
-        return abs(self.opening / usual - 1) < AS_OPEN
+        return abs(self.opening / usual - 1) < AS_OPEN_SHARE
 
     def scaled(self, scale: np.ndarray) -> Eye:
         """The same eye in the picture at another size; scale [2]: new over old width and height, nearly alike."""
@@ -149,7 +149,7 @@ def _find_eye(image: np.ndarray, face: Face, corners: tuple[int, int], mirrored:
     """`corners`: the landmarks at the outer and the inner one."""
     ends = face.landmarks[list(corners), :2].astype(np.float64)
     from_, to = ends[::-1] if mirrored else ends
-    side = EYE_CROP * max(float(np.linalg.norm(to - from_)), 1.0)
+    side = EYE_CROP_EYE_WIDTHS * max(float(np.linalg.norm(to - from_)), 1.0)
     crop, to_crop = _crop(image, (*((from_ + to) / 2), side, np.arctan2(*(to - from_)[::-1])), 64)
     # it knows right eyes
     outputs = {points.size: points.reshape(-1, 3)[:, :2] for points in _run(_EYE, crop[:, ::-1] if mirrored else crop)}

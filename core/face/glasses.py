@@ -22,16 +22,16 @@ from .parts import from_centres
 
 DATA_FILES = ("weights/glasses.npz",)
 WEIGHTS = Path(__file__).resolve().parents[1] / DATA_FILES[0]
-WIDTH, HEIGHT, CELL = 128, 64, 8
+WIDTH_PX, HEIGHT_PX, CELL_PX = 128, 64, 8
 """Of the band in pixels, and of a cell in which lines are counted."""
 THIN_PX, DIRECTIONS = 1.1, 6
 """Scale of the lines, 1.2 mm to a pixel, and how many directions are told apart."""
 GAMMA, DARK, FLAT = 2.2, 0.02, 0.15
 """Of the logarithm of light that lines are looked for in: what an sRGB value is raised to, what is added so that black
 is no line, and to its deviation so that an even picture is none either."""
-SPAN = 1.75
+SPAN_EYES = 1.75
 """Width of the band in distances between the outer corners of the eyes: from ear to ear, nearly."""
-BELOW = 0.08
+BELOW_WIDTH_SHARE = 0.08
 """How far the middle of the band lies below the eyes, in its width: the lower rims lie on the cheeks."""
 OUTER = (33, 263)
 MOST_YAW_DEG = 50.0
@@ -39,19 +39,23 @@ MOST_YAW_DEG = 50.0
 
 
 def band(srgb: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
-    """The upright band around the eyes, linear in the picture's values, float32 [HEIGHT, WIDTH], of landmarks [468, 3]
-    as faces.Face has them."""
+    """The upright band around the eyes, linear in the picture's values, float32 [HEIGHT_PX, WIDTH_PX], of landmarks
+    [468, 3] as faces.Face has them."""
     right, left = landmarks[list(OUTER)].astype(np.float64)
     across = left[:2] - right[:2]
     across /= max(np.linalg.norm(across), 1e-6)
-    scale = WIDTH / (SPAN * max(np.linalg.norm(left - right), 1e-6))  # in space, so that a turned head is no narrower
+    scale = WIDTH_PX / (
+        SPAN_EYES * max(np.linalg.norm(left - right), 1e-6)
+    )  # in space, so that a turned head is no narrower
     turn = scale * np.array([across, [-across[1], across[0]]])
     middle = turn @ ((left + right) / 2)[:2]
-    move = np.concatenate([turn, (np.array([WIDTH / 2, HEIGHT / 2 - BELOW * WIDTH]) - middle)[:, None]], 1)
+    move = np.concatenate(
+        [turn, (np.array([WIDTH_PX / 2, HEIGHT_PX / 2 - BELOW_WIDTH_SHARE * WIDTH_PX]) - middle)[:, None]], 1
+    )
     grey = np.ascontiguousarray(srgb @ np.float32([0.299, 0.587, 0.114]), np.float32)
     if scale < 0.8:  # what the warp would alias
         grey = cv2.GaussianBlur(grey, (0, 0), 0.4 * float(np.sqrt(1 / scale**2 - 1)))
-    return cv2.warpAffine(grey, from_centres(move), (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR,
+    return cv2.warpAffine(grey, from_centres(move), (WIDTH_PX, HEIGHT_PX), flags=cv2.INTER_LINEAR,
                           borderMode=cv2.BORDER_REPLICATE)
 
 
@@ -70,7 +74,7 @@ def describe(strip: np.ndarray) -> np.ndarray:
         for k in range(DIRECTIONS):
             off = np.abs((turn + quarter - k + DIRECTIONS / 2) % DIRECTIONS - DIRECTIONS / 2)
             layers.append(line * np.clip(1 - off, 0, 1))
-    cells = np.stack(layers).reshape(len(layers), HEIGHT // CELL, CELL, WIDTH // CELL, CELL)
+    cells = np.stack(layers).reshape(len(layers), HEIGHT_PX // CELL_PX, CELL_PX, WIDTH_PX // CELL_PX, CELL_PX)
     return np.sqrt(cells.mean((2, 4))).astype(np.float32).ravel()
 
 

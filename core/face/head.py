@@ -58,9 +58,9 @@ class Head:
             self._rasters[size] = _shared(face), _shared(bary)
         return self._rasters[size]
 
-    def interpolate(self, values: np.ndarray, size: int) -> np.ndarray:
+    def interpolate(self, vertex_values: np.ndarray, size: int) -> np.ndarray:
         """Values of the vertices [V, C] at a map's texels [S, S, C], zero off the head."""
-        return raster.interpolate(values, self.mesh.faces, *self.raster(size))
+        return raster.interpolate(vertex_values, self.mesh.faces, *self.raster(size))
 
     def unfold(self, size: int) -> Unfolded:
         face, bary = self.raster(size)
@@ -99,10 +99,10 @@ class Unfolded:
         """The same of a map of another size, bool [size, size]."""
         return self.covered if size == len(self.covered) else self.head.raster(size)[0] >= 0
 
-    def spread(self, values: np.ndarray) -> np.ndarray:
+    def spread(self, texel_values: np.ndarray) -> np.ndarray:
         """Per covered texel [N(, C)] -> float32 [S, S(, C)], zero elsewhere."""
-        out = np.zeros((*self.face.shape, *values.shape[1:]), np.float32)
-        out[self.covered] = values
+        out = np.zeros((*self.face.shape, *texel_values.shape[1:]), np.float32)
+        out[self.covered] = texel_values
         return out
 
 

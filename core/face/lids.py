@@ -18,11 +18,11 @@ from ..geometry.meshes import Mesh
 from . import eye_asset, template
 from .eye_asset import EyeAsset, turn_by, turn_towards
 
-CORNEA_BULGE, CORNEA_ANGLE = 0.06, 0.52  # of the asset's eyeballs: share of the radius, radians
+CORNEA_BULGE_SHARE, CORNEA_ANGLE_RAD = 0.06, 0.52  # of the asset's eyeballs: share of the radius, radians
 CLEAR_M = 0.0004  # between ball and lid
-SAME_M = 1e-5
+SAME_M = 1e-5  # what moved less stayed where it was
 DEEPEST_M = 0.003  # what lies deeper inside a ball is not before it
-FORWARD = np.array([0, -1.0, 0])
+FORWARD = np.array([0, -1.0, 0])  # where the face looks, in the head's axes
 REST_M = -0.003, 0.010  # how far an eyeball may lie behind the place that its surroundings give it
 
 
@@ -58,8 +58,15 @@ def open_lids(head: Mesh, openness: float, gaze: np.ndarray) -> OpenHead:
 
 def open_around(head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: tuple[float, float],
                 shift: np.ndarray | float = 0.0) -> OpenHead:
-    """The closed head with its lids open around given eyeballs; openness: of the left and of the right eye; shift [V +
-    C + P, 3] metres: what all vertices are moved by besides, before the lids are pushed out of the balls."""
+    """The closed head with its lids open around given eyeballs.
+
+    Parameters
+    ----------
+    head : with closed lids, in metres
+    balls : the left and the right eyeball
+    openness : of the left and of the right eye, of MakeHuman's opening
+    shift : [V + C + P, 3], metres: what all vertices are moved by besides, before the lids are pushed out of the balls
+    """
     unit = eye_asset.load()
     rest = np.concatenate([head.vertices, head.vertices[unit.copies], _carried(unit, head)]) + shift
     scale = _scale(unit, head)
@@ -94,7 +101,15 @@ def carry_ball(head: Mesh, side: int) -> tuple[np.ndarray, float]:
 
 
 def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -> PosedEyeball:
-    """The eyeball of a side (0: the left one) at a place, looking along the unit vector gaze [3]."""
+    """The eyeball of a side at a place.
+
+    Parameters
+    ----------
+    side : 0 for the left one, 1 for the right one
+    centre : [3], in metres
+    radius : in metres
+    gaze : [3], unit, where it looks
+    """
     unit = eye_asset.load()
     mesh, (x, y, z, size) = unit.ball_meshes[side], unit.balls[side]
     vertices = centre + (mesh.vertices - [x, y, z]) @ turn_towards(gaze).T * (radius / size)
@@ -126,8 +141,19 @@ def edges(vertices: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def closed_edge(vertices: np.ndarray, side: int, lid: int, off: float) -> np.ndarray:
-    """Where the closed lids of the left (0) or the right eye of a head's vertices meet, from the outer corner to the
-    inner one [N, 3], moved onto the upper (0) or the lower (1) lid by `off` metres."""
+    """Where the closed lids of an eye meet, moved onto one of them.
+
+    Parameters
+    ----------
+    vertices : [V, 3], of the head, in metres
+    side : 0 for the left eye, 1 for the right
+    lid : 0 for the upper lid, 1 for the lower
+    off : metres by which the line is moved
+
+    Returns
+    -------
+    [N, 3], from the outer corner to the inner one.
+    """
     edge = _edge(vertices, side, 0)  # its vertices are the head's own; the lower lid's are doubles of them
     rows = rows_of_lid(side, lid)
     skin = vertices[rows[(rows < len(vertices)) & ~np.isin(rows, eye_asset.load().rims[side][0])]]
@@ -194,7 +220,7 @@ def _scale(unit: EyeAsset, head: Mesh) -> float:
 def _surface(direction: np.ndarray, gaze: np.ndarray, radius: float) -> np.ndarray:
     """Distance of an eyeball's surface, cornea and all, from its centre along unit directions [N, 3]."""
     angle = np.arccos(np.clip(direction @ gaze, -1, 1))
-    return radius * (1 + CORNEA_BULGE * np.clip(1 - (angle / CORNEA_ANGLE) ** 2, 0, None))
+    return radius * (1 + CORNEA_BULGE_SHARE * np.clip(1 - (angle / CORNEA_ANGLE_RAD) ** 2, 0, None))
 
 
 def _skin(unit: EyeAsset, head: Mesh, vertices: np.ndarray) -> Mesh:

@@ -23,16 +23,16 @@ CHANNELS = 4  # sRGB in [-1, 1], 0 beyond the picture, and where the picture is
 FINE = 16  # features at half the crop's resolution
 
 
-def network_input(srgb: np.ndarray, known: np.ndarray) -> np.ndarray:
+def network_input(srgb: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """[CHANNELS, S, S] of a crop sRGB [S, S, 3] and of where it shows the picture [S, S].
 
     Stretched to the contrast that most pictures have, so that dark ones are not another world.
     """
-    there = known > 0.5
+    there = inside > 0.5
     level = srgb.mean(-1)[there]
     bright = float(np.quantile(level, 0.9)) if level.size else 1.0
     gain = np.clip(0.75 / max(bright, 1e-3), 0.8, 6.0)
-    layers = np.zeros((CHANNELS, *known.shape), np.float32)
+    layers = np.zeros((CHANNELS, *inside.shape), np.float32)
     layers[:3] = ((2 * np.clip(srgb * gain, 0, 1) - 1) * there[..., None]).transpose(2, 0, 1)
     layers[3] = there
     return layers

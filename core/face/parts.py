@@ -15,10 +15,10 @@ PARTS = ("skin", "lips", "brows", "beard", "hair", "eyes", "clothes", "backgroun
 eyes, teeth to the lips, hands to the background."""
 GROWTHS = ("brows", "beard", "hair")
 """The parts that are hair; "hair" is the head's."""
-SIDE = 192  # of the crop
-MARGIN = 1.9  # side of the square in heights of the face's landmarks: hair and neck are in it
+SIDE_PX = 192  # of the crop
+MARGIN_FACE_HEIGHTS = 1.9  # side of the square in heights of the face's landmarks: hair and neck are in it
 BRIDGE, CHIN = 9, 152
-PRESENT = 0.8
+PRESENT_SHARE = 0.8
 """Mean share of a part, where it has more than half, from which the person has it: over hard shadows on a bare jaw the
 parser is 0.62 sure of a beard (the sample), where a full beard is 0.92."""
 
@@ -26,10 +26,10 @@ parser is 0.62 sure of a beard (the sample), where a full beard is 0.92."""
 def keep_present(share: np.ndarray) -> np.ndarray:
     """The shares [...] of a part all over a head; zeros where the person has none of it: the parser's doubts."""
     there = share > 0.5
-    return share if there.any() and share[there].mean() > PRESENT else np.zeros_like(share)
+    return share if there.any() and share[there].mean() > PRESENT_SHARE else np.zeros_like(share)
 
 
-def to_crop(landmarks: np.ndarray, side: int = SIDE, margin: float = MARGIN) -> np.ndarray:
+def to_crop(landmarks: np.ndarray, side: int = SIDE_PX, margin: float = MARGIN_FACE_HEIGHTS) -> np.ndarray:
     """The map [2, 3] of a similarity that puts a face of landmarks [468, 2 or 3] in pixels upright into the middle of a
     square.
 
@@ -47,7 +47,7 @@ def to_crop(landmarks: np.ndarray, side: int = SIDE, margin: float = MARGIN) -> 
     return np.concatenate([turn, (side / 2 - scale * (low + high) / 2)[:, None]], 1)
 
 
-def cut(picture: np.ndarray, move: np.ndarray, side: int = SIDE) -> np.ndarray:
+def cut(picture: np.ndarray, move: np.ndarray, side: int = SIDE_PX) -> np.ndarray:
     """The crop float32 [side, side(, C)] of a picture [H, W(, C)] by a map [2, 3]; 0 where the picture ends."""
     shrinks = 1 / np.hypot(*move[:, 0])
     source = np.ascontiguousarray(picture, np.float32)
@@ -56,17 +56,28 @@ def cut(picture: np.ndarray, move: np.ndarray, side: int = SIDE) -> np.ndarray:
     return cv2.warpAffine(source, from_centres(move), (side, side), flags=cv2.INTER_LINEAR)
 
 
-def inside(shape: tuple[int, ...], move: np.ndarray, side: int = SIDE) -> np.ndarray:
+def inside(shape: tuple[int, ...], move: np.ndarray, side: int = SIDE_PX) -> np.ndarray:
     """Where a crop shows the picture of shape (H, W, ...): float32 [side, side] in {0, 1}."""
     y, x = np.mgrid[0:side, 0:side] + 0.5
     at = (np.stack([x, y], -1) - move[:, 2]) @ np.linalg.inv(move[:, :2]).T
     return ((at >= 0) & (at <= [shape[1], shape[0]])).all(-1).astype(np.float32)
 
 
-def put_back(values: np.ndarray, move: np.ndarray, shape: tuple[int, ...], beyond: float) -> np.ndarray:
-    """Values [side, side] of a crop at the pixels of the picture of shape (H, W, ...), float32 [H, W]; `beyond` outside
-    the crop."""
-    return cv2.warpAffine(np.ascontiguousarray(values, np.float32), from_centres(move), (shape[1], shape[0]),
+def put_back(crop: np.ndarray, move: np.ndarray, shape: tuple[int, ...], beyond: float) -> np.ndarray:
+    """A crop at the pixels of its picture.
+
+    Parameters
+    ----------
+    crop : [side, side]
+    move : [2, 3], from the picture's pixels to the crop's
+    shape : of the picture, (H, W, ...)
+    beyond : the value outside of the crop
+
+    Returns
+    -------
+    float32 [H, W].
+    """
+    return cv2.warpAffine(np.ascontiguousarray(crop, np.float32), from_centres(move), (shape[1], shape[0]),
                           borderMode=cv2.BORDER_CONSTANT,
                           flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderValue=beyond)
 

@@ -39,8 +39,8 @@ class Roots:
     direction: np.ndarray
     at: np.ndarray
 
-    def of(self, kept: np.ndarray) -> Roots:
-        return Roots(self.position[kept], self.normal[kept], self.direction[kept], self.at[kept])
+    def of(self, chosen: np.ndarray) -> Roots:
+        return Roots(self.position[chosen], self.normal[chosen], self.direction[chosen], self.at[chosen])
 
 
 class SkinSurface:
@@ -63,9 +63,22 @@ class SkinSurface:
 
 def grow(roots: Roots, length: np.ndarray, lift: np.ndarray, skin: SkinSurface, pull: np.ndarray, clearance: np.ndarray,
          steps: int) -> np.ndarray:
-    """Points float32 [M, steps, 3]: each hair of `length` [M] metres leaves the skin at angle `lift` [M] radians along
-    its root's direction, is bent by `pull` [M, 3] or [3] (per length of the hair), and stays `clearance` [M] metres
-    above the skin, less near its root."""
+    """Hairs that leave the skin along their roots' directions and bend on the way.
+
+    Parameters
+    ----------
+    roots : of M hairs
+    length : [M], metres
+    lift : [M], radians between the skin and the hair at its root
+    skin : from which they keep
+    pull : [M, 3] or [3], what bends a hair, per its length
+    clearance : [M], metres that a hair keeps from the skin, less near its root
+    steps : points of a hair
+
+    Returns
+    -------
+    Points float32 [M, steps, 3], in metres, from root to tip.
+    """
     lift = lift[:, None]
     way = np.cos(lift) * roots.direction + np.sin(lift) * roots.normal
     step = length[:, None] / (steps - 1)
@@ -83,11 +96,19 @@ def grow(roots: Roots, length: np.ndarray, lift: np.ndarray, skin: SkinSurface, 
     return np.stack(points, 1).astype(np.float32)
 
 
-def clumped(points: np.ndarray, each: int, strength: float, rng: np.random.Generator) -> np.ndarray:
-    """Hairs [M, K, 3] drawn towards one in `each` of them, the more the nearer to the tip; `strength` in [0, 1]."""
-    if len(points) < 2 * each:
+def clumped(points: np.ndarray, group_size: int, strength: float, rng: np.random.Generator) -> np.ndarray:
+    """Hairs drawn towards one in `group_size` of them, more towards the tip.
+
+    Parameters
+    ----------
+    points : [M, K, 3], in metres, from root to tip
+    group_size : hairs that one leads
+    strength : in [0, 1]
+    rng : chooses the leaders
+    """
+    if len(points) < 2 * group_size:
         return points
-    leaders = rng.choice(len(points), len(points) // each, replace=False)
+    leaders = rng.choice(len(points), len(points) // group_size, replace=False)
     leader = leaders[cKDTree(points[leaders, 0]).query(points[:, 0])[1]]
     along = np.linspace(0, 1, points.shape[1], dtype=np.float32)[None, :, None]
     share = strength * rng.uniform(0.4, 1.0, (len(points), 1, 1)).astype(np.float32) * along**1.3
@@ -96,8 +117,21 @@ def clumped(points: np.ndarray, each: int, strength: float, rng: np.random.Gener
 
 def waved(points: np.ndarray, at: np.ndarray, amplitude: float, wavelength_mm: float, rng: np.random.Generator,
           alone: float = 0.35) -> np.ndarray:
-    """Hairs [M, K, 3] rooted `at` [M, 3] mm that bend aside by `amplitude` metres at their tips: neighbours alike, each
-    `alone` of it in its own way."""
+    """Hairs that bend aside, neighbours alike.
+
+    Parameters
+    ----------
+    points : [M, K, 3], in metres, from root to tip
+    at : [M, 3], roots in mm
+    amplitude : metres aside at the tip
+    wavelength_mm : within which neighbours are alike
+    rng : of the noise
+    alone : share by which each goes its own way
+
+    Returns
+    -------
+    float32 [M, K, 3].
+    """
     along = np.linspace(0, 1, points.shape[1], dtype=np.float32)[None, :, None]
     length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)[:, None, None]
     out = points
@@ -111,7 +145,19 @@ def waved(points: np.ndarray, at: np.ndarray, amplitude: float, wavelength_mm: f
 
 
 def coloured(count: int, colour: np.ndarray, grey: float, rng: np.random.Generator) -> np.ndarray:
-    """Albedos float32 [count, 3] about `colour` [3] linear, a share `grey` of the hairs without pigment."""
+    """Albedos of hairs about one colour.
+
+    Parameters
+    ----------
+    count : of hairs
+    colour : [3], linear
+    grey : share of the hairs without pigment, in [0, 1]
+    rng : draws them
+
+    Returns
+    -------
+    float32 [count, 3], linear.
+    """
     shade = np.exp(rng.normal(0, 0.22, (count, 1)) + rng.normal(0, 0.05, (count, 3)))
     white = np.array([0.42, 0.40, 0.37]) * np.exp(rng.normal(0, 0.15, (count, 1)))
     return np.where(rng.random((count, 1)) < grey, white, np.clip(colour * shade, 0.003, 0.8)).astype(np.float32)

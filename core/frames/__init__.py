@@ -23,7 +23,7 @@ from ..contract.settings import Settings
 from ..face import faces
 from ..face.glasses import sureness
 from ..imaging import images
-from .doctor import FEW, FIND_FACE, blurred, diagnose, examine
+from .doctor import FEW_FRAMES, FIND_FACE, blurred, diagnose, examine
 from .drift import content_of, gains_of
 from .eyes import blinks
 from .glasses import judge
@@ -32,14 +32,14 @@ from .select import select_views, sharpness, turns
 from .source import Picture
 from .video import read_video
 
-FEWEST = 3
+FEWEST_FRAMES = 3
 """Of a video, frames that a head can be built from; of photographs one will do, for a draft."""
-STILL = 0.004
+STILL_DIFFERENCE = 0.004
 """Mean difference of two small frames, in [0, 1], below which the camera has not moved: above compression noise, far
 below a step aside."""
-RIVAL = 1.5
+RIVAL_RATIO = 1.5
 """A face this much more prominent than the one that was followed takes its place."""
-READING = 0.9
+READING_SHARE = 0.9
 """Share of the stage's time that reading takes, for the progress."""
 
 
@@ -85,7 +85,7 @@ def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameR
         thumbnails.append(images.resize(picture.srgb.mean(-1), 32, 32))
         contents.append(content_of(picture.srgb))
         glasses.append(sureness(picture.srgb, face) if face else float("nan"))
-        report.progress(READING * picture.done, picture.of,
+        report.progress(READING_SHARE * picture.done, picture.of,
                         f"frame {len(records)}, {'face found' if face else 'no face'}")
     return records, np.array(thumbnails), contents, glasses
 
@@ -105,7 +105,7 @@ def _subject(srgb: np.ndarray, last: faces.Face | None) -> tuple[faces.Face | No
         return face, 0.0
     weight = faces.prominence(face, srgb.shape[1], srgb.shape[0])
     second, rival = max(weighed, key=lambda pair: pair[0])
-    return (rival, weight / second) if second > RIVAL * weight else (face, second / weight)
+    return (rival, weight / second) if second > RIVAL_RATIO * weight else (face, second / weight)
 
 
 def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Face | None, rival: float) -> FrameRecord:
@@ -154,7 +154,9 @@ def _even_out(records: list[FrameRecord], contents: list, folder: Path, report: 
         if np.abs(np.log(gain)).max() < 0.005:
             evened.append(record)
             continue
-        report.progress(READING * len(records) + (1 - READING) * done, len(records), "evening out the exposure")
+        report.progress(
+            READING_SHARE * len(records) + (1 - READING_SHARE) * done, len(records), "evening out the exposure"
+        )
         path = folder / record.name
         images.write_srgb(path, images.linear_to_srgb(images.read_linear(path) * gain.astype(np.float32)), quality=95)
         evened.append(replace(record, gain=tuple(round(float(g), 4) for g in gain)))
@@ -166,21 +168,21 @@ def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
     from."""
     turn = turns(records)
     open_ = np.array([not r.blink for r in records])
-    if (np.isfinite(turn) & open_).sum() >= min(count, FEWEST):
+    if (np.isfinite(turn) & open_).sum() >= min(count, FEWEST_FRAMES):
         turn = np.where(open_, turn, np.nan)
     chosen = set(select_views(np.array([r.sharpness for r in records]), turn, count))
     return [replace(r, selected=i in chosen) for i, r in enumerate(records)]
 
 
 def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photographs: bool) -> None:
-    if len(records) < FEWEST and not photographs:
+    if len(records) < FEWEST_FRAMES and not photographs:
         raise Problem(f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be "
                       "built from.",
                       "Film the face for 5 to 30 seconds while you walk half around it; if the file may be damaged, "
                       "copy it again.")
     if not any(r.face_box for r in records):
         raise Problem("No face was found in any frame.", FIND_FACE)
-    if len(records) > 1 and np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL:
+    if len(records) > 1 and np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL_DIFFERENCE:
         raise Problem("All frames show the same picture: the camera did not move.",
                       "Let the person sit still and move the camera from one ear around the face to the other.")
 
@@ -200,7 +202,7 @@ def _report(capture: Capture, records: list[FrameRecord], dropped: list[str], re
     report.figure("exposure_drift_percent", round(100 * float((gains.max(0) / gains.min(0)).max() - 1), 1))
     report.figure("yaw_from_deg", min(yaws))
     report.figure("yaw_to_deg", max(yaws))
-    if len(records) < FEW:
+    if len(records) < FEW_FRAMES:
         report.figure("expected_quality", "rough: few frames")
     chosen = [images.read_srgb(capture.frames / r.name) for r in records if r.selected]
     images.write_srgb(capture.picture("frames", "selected"), _contact_sheet(chosen))

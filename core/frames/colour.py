@@ -21,10 +21,10 @@ REC709, REC2020, P3 = 1, 9, 12
 COMPACT_SRGB = ("c2", "c2ci")
 """What small profiles of sRGB call themselves, as social networks write them."""
 WHITE_NITS, PEAK_NITS = 203.0, 1000.0
-KNEE = 0.8
+KNEE_LINEAR = 0.8
 """Linear light below which the tone curve changes nothing: all of a face but its highlights."""
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-LUMINANCE_2020 = np.array([0.2627, 0.6780, 0.0593], np.float32)
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear Rec. 709 (ITU-R BT.709)
+LUMINANCE_2020 = np.array([0.2627, 0.6780, 0.0593], np.float32)  # of linear Rec. 2020 (ITU-R BT.2020)
 TO_REC709 = {
     REC2020: np.array([[1.660491, -0.587641, -0.072850], [-0.124550, 1.132900, -0.008349],
                        [-0.018151, -0.100579, 1.118730]], np.float32),
@@ -91,12 +91,12 @@ def into_gamut(light: np.ndarray) -> np.ndarray:
 
 
 def tone_curve(light: np.ndarray) -> np.ndarray:
-    """Display light [..., 3] from 0 up -> [0, 1): the identity up to KNEE, then a hyperbola of the same slope towards
-    1.
+    """Display light [..., 3] from 0 up -> [0, 1): the identity up to KNEE_LINEAR, then a hyperbola of the same slope
+    towards 1.
 
     It works on the largest channel and scales the others with it, so hues stay. Reference white becomes 0.9, 1000 nits
     0.99.
     """
     peak = light.max(-1, keepdims=True)
-    over = np.maximum(peak - KNEE, 0) / (1 - KNEE)
-    return light * np.where(over > 0, (KNEE + (1 - KNEE) * over / (1 + over)) / np.maximum(peak, 1e-9), 1)
+    over = np.maximum(peak - KNEE_LINEAR, 0) / (1 - KNEE_LINEAR)
+    return light * np.where(over > 0, (KNEE_LINEAR + (1 - KNEE_LINEAR) * over / (1 + over)) / np.maximum(peak, 1e-9), 1)

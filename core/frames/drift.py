@@ -18,19 +18,19 @@ import numpy as np
 from ..face import faces
 from ..imaging import images
 
-WIDTH = 480
+WIDTH_PX = 480
 """Longer side at which colours are compared, in pixels: fine detail and noise are gone, motion blur hardly matters."""
-SPOT = 9
+SPOT_PX = 9
 """Side of the square a spot's colour is averaged over, at that size."""
-STEPS = (1, 2, 5, 12)
+STEPS_FRAMES = (1, 2, 5, 12)
 """How far apart frames are compared: neighbours are surest, far ones keep small errors from adding up."""
 LEAST_SPOTS, LEAST_SHARE = 16, 0.5
 """Spots that must follow a gain, and the share of all: fewer explain no picture."""
-TOLERANCE = 0.08
+TOLERANCE_LOG = 0.08
 """How far a spot may be from the common gain to follow it, in natural logarithms (8 %)."""
-DOUBT = 0.2
+DOUBT_WEIGHT = 0.2
 """Weight of a comparison that may be shading: it stands for no change, unless another one knows better."""
-STEADY = 0.08
+STEADY_LOG = 0.08
 """Whole range of the gains, in natural logarithms, up to which the light counts as constant and no picture is touched:
 what a steady video of 100 frames, blurred ones too, is measured to have. The texture evens out what is smaller."""
 
@@ -48,7 +48,7 @@ class Content:
 
 def content_of(srgb: np.ndarray) -> Content:
     """The spots of a frame, sRGB [H, W, 3], that are neither clipped nor black."""
-    scale = WIDTH / max(srgb.shape[:2])
+    scale = WIDTH_PX / max(srgb.shape[:2])
     small = images.resize(srgb, round(srgb.shape[1] * scale), round(srgb.shape[0] * scale))
     grey = np.clip(small @ np.array([0.299, 0.587, 0.114], np.float32) * 255, 0, 255).astype(np.uint8)
     points, descriptors = _sift().detectAndCompute(grey, None)
@@ -57,8 +57,8 @@ def content_of(srgb: np.ndarray) -> Content:
                        np.zeros(0, bool))
     x, y = np.array([p.pt for p in points]).round().astype(int).T
     x, y = np.clip(x, 0, small.shape[1] - 1), np.clip(y, 0, small.shape[0] - 1)
-    mean = cv2.blur(images.srgb_to_linear(small), (SPOT, SPOT))[y, x]
-    whole = np.ones((SPOT, SPOT), np.uint8)
+    mean = cv2.blur(images.srgb_to_linear(small), (SPOT_PX, SPOT_PX))[y, x]
+    whole = np.ones((SPOT_PX, SPOT_PX), np.uint8)
     fair = (cv2.dilate(small.max(-1), whole)[y, x] < 0.97) & (mean.min(-1) > 0.004)
     person = faces.segment_person(small)[y, x] > 0.5
     return Content(descriptors.astype(np.uint8)[fair], np.log(np.maximum(mean, 1e-5))[fair],
@@ -86,7 +86,7 @@ def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
     turning = np.zeros(count, bool)
     pairs, links = [], []
     # far ones first: what is shading shows over a wide turn, from one frame to the next it does not
-    for step in sorted(STEPS, reverse=True):
+    for step in sorted(STEPS_FRAMES, reverse=True):
         for i in range(count - step):
             check()
             link = compare(contents[i], contents[i + step])
@@ -94,7 +94,7 @@ def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
                 continue
             turning[i:i + step] |= link.shading
             if link.shading or (link.person and turning[i:i + step].any()):
-                link = Link(np.zeros(3), DOUBT * link.weight)
+                link = Link(np.zeros(3), DOUBT_WEIGHT * link.weight)
             pairs.append((i, i + step))
             links.append(link)
     if not links:
@@ -102,7 +102,7 @@ def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
     levels = _levels(count, np.array(pairs), np.array([link.gain for link in links]),
                      np.array([link.weight for link in links]))
     levels -= np.median(levels, axis=0)
-    return np.exp(-levels) if np.ptp(levels, axis=0).max() > STEADY else np.ones((count, 3))
+    return np.exp(-levels) if np.ptp(levels, axis=0).max() > STEADY_LOG else np.ones((count, 3))
 
 
 def compare(a: Content, b: Content) -> Link | None:
@@ -143,7 +143,7 @@ def _common(ratio: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, float, bo
     cell = (place // 60).astype(int) @ [1, 64]
     voice = 1 / np.bincount(cell)[cell] ** 0.5
     centre = np.array([_weighted_median(channel, voice) for channel in ratio.T])
-    follows = np.abs(ratio - centre).max(1) < TOLERANCE
+    follows = np.abs(ratio - centre).max(1) < TOLERANCE_LOG
     if follows.sum() < LEAST_SPOTS or voice[follows].sum() < LEAST_SHARE * voice.sum():
         return None
     ratio, place, voice = ratio[follows], place[follows], voice[follows]
@@ -168,10 +168,10 @@ def _slanted(ratio: np.ndarray, place: np.ndarray) -> bool:
     return bool(np.median(np.abs(left)) < 0.6 * before)
 
 
-def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
-    order = np.argsort(values)
+def _weighted_median(samples: np.ndarray, weights: np.ndarray) -> float:
+    order = np.argsort(samples)
     total = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(total, total[-1] / 2)])
+    return float(samples[order][np.searchsorted(total, total[-1] / 2)])
 
 
 def _levels(count: int, pairs: np.ndarray, ratios: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-OPEN = 0.2
+OPEN_RATIO = 0.2
 """Height over width of an opening that both eyes usually exceed where a blink can be told."""
-SHUT = 0.55
+SHUT_SHARE = 0.55
 """In a blink both eyes are below this share of what they usually are."""
 AROUND_S = 0.6
 """How far around a frame its eyes are compared, in seconds: longer than a blink, shorter than a turn of the head."""
@@ -27,5 +27,5 @@ def blinks(openings: list[tuple[float, float] | None], times: list[float | None]
     for i in np.flatnonzero(seen):
         # above the middle: a blink may take a third of them
         usual = np.percentile(opening[seen & (np.abs(time - time[i]) <= AROUND_S)], 70, axis=0)
-        blinking[i] = (usual > OPEN).all() and (opening[i] < SHUT * usual).all()
+        blinking[i] = (usual > OPEN_RATIO).all() and (opening[i] < SHUT_SHARE * usual).all()
     return blinking

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..contract.frame_records import FrameRecord
 
-REACH = 0.1
+REACH_SHARE = 0.1
 """A frame without a face may be chosen if one with a face is nearer than this share of the sequence: a profile, where
 detectors fail."""
 
@@ -49,7 +49,7 @@ def turns(records: list[FrameRecord]) -> np.ndarray:
         if known.sum() >= 5 and beyond.any():
             speed = np.polyfit(order[known][inner], yaw[known][inner], 1)[0]
             turn[beyond] = yaw[end] + np.clip(speed * (order[beyond] - end), -40, 40)
-    far = np.abs(order[:, None] - order[known][None]).min(1) > REACH * len(records)
+    far = np.abs(order[:, None] - order[known][None]).min(1) > REACH_SHARE * len(records)
     return np.where(far & (len(records) > 12), np.nan, turn)
 
 

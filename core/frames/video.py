@@ -34,7 +34,7 @@ WHITE_16 = 255 << 8
 """What swscale makes of the narrow range's white in 16 bits."""
 STARTS = 3
 """Key frames that are tried to come before a wanted frame."""
-LARGE = 2560 * 1440
+LARGE_PX = 2560 * 1440
 """Pixels above which the decoder works on few frames at a time: each of its threads keeps one, of 100 MB in 8K."""
 
 
@@ -46,7 +46,7 @@ def read_video(path: Path, most: int, long_side: int, report: Reporter) -> Itera
     given, corrupt = 0, 0
     with _open(path) as container:
         stream = container.streams.video[0]
-        large = stream.codec_context.width * stream.codec_context.height > LARGE
+        large = stream.codec_context.width * stream.codec_context.height > LARGE_PX
         stream.thread_type, stream.thread_count = "AUTO", 2 if large else 0
         for number, frame in _frames(container, stream, index, wanted, report):
             if frame.is_corrupt:
@@ -139,10 +139,10 @@ def _index(path: Path, report: Reporter) -> _Index:
     return _Index(np.array(sorted(times)), np.array(sorted(keys), int))
 
 
-def _frames(container, stream, index: _Index, wanted: np.ndarray,
+def _frames(container, stream, index: _Index, frame_numbers: np.ndarray,
             report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
     """The frames of these numbers, or where one is lost the next that can be decoded, with their numbers."""
-    for starts, numbers in _stretches(index, wanted):
+    for starts, numbers in _stretches(index, frame_numbers):
         targets = list(numbers)
         for number, frame in _from(container, stream, index, starts, targets[0], report):
             if number < targets[0]:
@@ -177,12 +177,12 @@ def _numbered(container, stream, index: _Index, report: Reporter) -> Iterator[tu
                else count), frame
 
 
-def _stretches(index: _Index, wanted: np.ndarray) -> list[tuple[list[int], list[int]]]:
+def _stretches(index: _Index, frame_numbers: np.ndarray) -> list[tuple[list[int], list[int]]]:
     """Wanted numbers in stretches that are decoded in one go, each with the time stamps to jump to, the nearest first
     (none: read on from the start)."""
-    begin = np.searchsorted(index.keys, index.times[wanted], side="right") - 1  # the key frame each needs
+    begin = np.searchsorted(index.keys, index.times[frame_numbers], side="right") - 1  # the key frame each needs
     stretches: list[tuple[list[int], list[int]]] = []
-    for i, number in enumerate(wanted.tolist()):
+    for i, number in enumerate(frame_numbers.tolist()):
         if i and begin[i] <= begin[i - 1] + 1:
             stretches[-1][1].append(number)
         else:

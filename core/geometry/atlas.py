@@ -62,9 +62,9 @@ def udim(tile) -> int:
     return 1001 + u + 10 * v
 
 
-def in_tile(mesh: Mesh, tile, where: np.ndarray) -> Mesh:
+def in_tile(mesh: Mesh, tile, chosen: np.ndarray) -> Mesh:
     """The triangles of bool [F] with their UVs moved from `tile` to the unit square."""
-    return replace(mesh, faces=mesh.faces[where], uvs=mesh.uvs - np.asarray(tile), face_uvs=mesh.face_uvs[where])
+    return replace(mesh, faces=mesh.faces[chosen], uvs=mesh.uvs - np.asarray(tile), face_uvs=mesh.face_uvs[chosen])
 
 
 def faults(mesh: Mesh) -> list[str]:

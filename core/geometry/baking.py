@@ -54,9 +54,17 @@ class Source:
 
 def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick: Callable[[float], None],
            painted: np.ndarray | None = None) -> TexelPartners:
-    """Partners, up to `farthest` metres away, of the texels of a tile (u, v) of the target's UVs, in a map of `size`.
+    """Partners of the texels of a tile of the target's UVs.
 
-    painted bool [F]: the triangles that count (all by default). `tick` is called with the share done, per strip.
+    Parameters
+    ----------
+    target : the mesh whose map it is
+    tile : (u, v)
+    source : the mesh on which partners lie
+    size : of the map, in texels along a side
+    farthest : metres
+    tick : is called with the share done, per strip
+    painted : bool [F], the triangles that count; all by default
     """
     whole = surfaces.welded(target)[0]
     where = (atlas.tiles(whole) == np.asarray(tile)).all(1) & (True if painted is None else painted)

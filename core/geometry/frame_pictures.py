@@ -26,13 +26,13 @@ MOST_REDUCTION = 8
 texture, enough for its tones."""
 
 
-def pictures_of(capture: Capture, folder: str, what: str) -> list[tuple[View, Path]]:
-    """Each registered view with its picture in `folder`, in frame order; `what`: a word for these pictures, "delit".
+def pictures_of(capture: Capture, folder: str, kind: str) -> list[tuple[View, Path]]:
+    """Each registered view with its picture in `folder`, in frame order; `kind`: a word for these pictures, "delit".
 
     Raises Problem where none belongs to a registered frame.
     """
     return match(read_views(capture), {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()},
-                 Path(folder), what, bool(folder))
+                 Path(folder), kind, bool(folder))
 
 
 def delit_views(capture: Capture) -> list[tuple[View, Path]]:
@@ -41,29 +41,29 @@ def delit_views(capture: Capture) -> list[tuple[View, Path]]:
             if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
 
 
-def read_picture(path: Path, view: View, what: str) -> np.ndarray:
+def read_picture(path: Path, view: View, kind: str) -> np.ndarray:
     """sRGB [H, W, 3] at the frame's size. Raises Problem where the picture has another shape than its frame."""
     image = images.read_srgb(path)
-    check_shape(path, image, view, what)
+    check_shape(path, image, view, kind)
     return image if image.shape[:2] == (view.height, view.width) else images.resize(image, view.width, view.height)
 
 
-def check_shape(path: Path, image: np.ndarray, view: View, what: str) -> None:
+def check_shape(path: Path, image: np.ndarray, view: View, kind: str) -> None:
     """Raises Problem where a picture [H, W, ...] has another shape than its frame, or is too small to show the same."""
     height, width = image.shape[:2]
     if abs(width / height - view.width / view.height) > 0.01 or width * MOST_REDUCTION < view.width:
         raise Problem(f"{path} is {width} x {height}, but its frame is {view.width} x {view.height}.",
-                      f"{what.title()} pictures are made from the frames in the capture's frames folder, without "
+                      f"{kind.title()} pictures are made from the frames in the capture's frames folder, without "
                       "cropping or turning them.")
 
 
-def match(views: list[View], video_frames: dict[str, int], path: Path, what: str = "delit",
-          given: bool = True) -> list[tuple[View, Path]]:
+def match(views: list[View], video_frames: dict[str, int], path: Path, kind: str = "delit",
+          folder_chosen: bool = True) -> list[tuple[View, Path]]:
     """Each registered view with its picture in the folder `path`, in frame order; `video_frames`: frame name -> number
     in the video."""
-    if not given or not path.is_dir():
-        raise Problem(f"There is no folder {str(path)!r} with {what} pictures." if given
-                      else f"No folder of {what} pictures was chosen.",
+    if not folder_chosen or not path.is_dir():
+        raise Problem(f"There is no folder {str(path)!r} with {kind} pictures." if folder_chosen
+                      else f"No folder of {kind} pictures was chosen.",
                       "Choose the folder that holds them, named like the frames of the capture.")
     pictures = sorted(p for p in path.iterdir() if p.suffix.lower() in KINDS and not p.name.startswith("."))
     by_stem = {p.stem: p for p in pictures}

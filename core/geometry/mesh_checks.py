@@ -41,12 +41,24 @@ def open_mesh(path: Path, most: int) -> bytes:
     return content
 
 
-def damaged(path: Path, what: str) -> Problem:
-    return Problem(f"{path} is damaged: {what}.", advise_remaking(path, EXPORT_AGAIN))
+def damaged(path: Path, fault: str) -> Problem:
+    return Problem(f"{path} is damaged: {fault}.", advise_remaking(path, EXPORT_AGAIN))
 
 
 def find_fault(vertices: np.ndarray, faces: np.ndarray, uvs: np.ndarray | None, face_uvs: np.ndarray | None) -> str:
-    """What is wrong with the arrays of a Mesh, in a few words; '' where nothing is."""
+    """What is wrong with the arrays of a Mesh.
+
+    Parameters
+    ----------
+    vertices : [V, 3]
+    faces : [F, 3], rows of `vertices`
+    uvs : [U, 2], or None
+    face_uvs : [F, 3], rows of `uvs`, or None
+
+    Returns
+    -------
+    A few words; '' where nothing is.
+    """
     for coordinates, width, what in ((vertices, 3, "vertex"), (uvs, 2, "UV")):
         if coordinates is not None and (coordinates.ndim != 2 or coordinates.shape[1] != width):
             return f"not every {what} has {width} numbers"

@@ -213,7 +213,7 @@ def _read_own(text: str) -> Mesh | None:
     return Mesh(vertices, faces, uvs, face_uvs)
 
 
-def _corner(word: str, vertices: int, uvs: int, known: dict[str, tuple[int, int]]) -> tuple[int, int]:
+def _corner(word: str, vertices: int, uvs: int, corner_of: dict[str, tuple[int, int]]) -> tuple[int, int]:
     """A corner of an OBJ's face, "3/7/1" or "-1//-1", as indices from zero of its vertex and UV (-1: it has none);
     `vertices` and `uvs` have been read so far, from which negative numbers count back. Raises ValueError for what is
     none."""
@@ -223,7 +223,7 @@ def _corner(word: str, vertices: int, uvs: int, known: dict[str, tuple[int, int]
     if indices[0] < 0 or uv and indices[1] < 0:
         raise ValueError(word)
     if "-" not in word:
-        known[word] = indices[0], indices[1]
+        corner_of[word] = indices[0], indices[1]
     return indices[0], indices[1]
 
 

@@ -13,10 +13,19 @@ LATTICE_NODES = 48  # nodes per side; the noise repeats after so many wavelength
 
 
 def noise(points: np.ndarray, wavelength: float, rng: np.random.Generator, smooth: bool = False) -> np.ndarray:
-    """float32 [N] of mean 0 and deviation 1 at points [N, 3] in mm; features are about `wavelength` mm large.
+    """Noise of mean 0 and deviation 1.
 
-    `smooth` takes cubic B-splines (for few points or large features), otherwise faded linear interpolation (eight times
-    faster).
+    Parameters
+    ----------
+    points : [N, 3], in mm
+    wavelength : mm; features are about that large
+    rng : of the lattice
+    smooth : takes cubic B-splines (for few points or large features), otherwise faded linear interpolation (eight times
+        faster)
+
+    Returns
+    -------
+    float32 [N].
     """
     lattice = rng.standard_normal((LATTICE_NODES,) * 3).astype(np.float32)
     turn = Rotation.random(random_state=rng).as_matrix().astype(np.float32)  # hides the lattice's axes
@@ -32,6 +41,17 @@ def noise(points: np.ndarray, wavelength: float, rng: np.random.Generator, smoot
 
 
 def octaves(points: np.ndarray, wavelengths: list[float], rng: np.random.Generator, smooth: bool = False) -> np.ndarray:
-    """The sum of `noise` over wavelengths, again of deviation 1."""
+    """The sum of `noise` over wavelengths, again of deviation 1.
+
+    Parameters
+    ----------
+    points : [N, 3], in mm
+    wavelengths : in mm
+    rng, smooth : as in `noise`
+
+    Returns
+    -------
+    float32 [N].
+    """
     total = sum(noise(points, wavelength, rng, smooth) for wavelength in wavelengths)
     return total / np.float32(np.sqrt(len(wavelengths)))

@@ -20,7 +20,7 @@ from .views import View
 
 BENT_SIDE_SHARE = 0.01
 """Share of a picture's sides by which a lens may bend a mesh's edge out of the box of its vertices."""
-AT_ONCE = 60_000
+TEXELS_AT_ONCE = 60_000
 """Texels that are rasterised in one go: in a small map those of many triangles, and one triangle after the other would
 take up to a hundred times as long; more than the processor's cache holds is no faster."""
 
@@ -56,12 +56,12 @@ def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> 
 def _texels(triangles: np.ndarray, low: np.ndarray, high: np.ndarray
             ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """All texels of the boxes [N, 2] of triangles [N], one box after the other: triangle, column and row of each, some
-    AT_ONCE at a time."""
+    TEXELS_AT_ONCE at a time."""
     sides = high - low + 1
     ends = np.cumsum(sides.prod(1))
     first, before = 0, 0
     while first < len(triangles):
-        end = max(first + 1, int(np.searchsorted(ends, before + AT_ONCE, "right")))
+        end = max(first + 1, int(np.searchsorted(ends, before + TEXELS_AT_ONCE, "right")))
         count = np.diff(ends[first:end], prepend=before)
         box = np.repeat(np.arange(first, end), count)
         within = np.arange(before, ends[end - 1]) - np.repeat(ends[first:end] - count, count)
@@ -70,24 +70,35 @@ def _texels(triangles: np.ndarray, low: np.ndarray, high: np.ndarray
         first, before = end, ends[end - 1]
 
 
-def interpolate(values: np.ndarray, corners: np.ndarray, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
-    """Per-vertex values [V, C] at raster samples: corners [F, 3] index them, face [...] and bary [..., 3] say where.
-    Zero where face < 0."""
+def interpolate(vertex_values: np.ndarray, corners: np.ndarray, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
+    """Values of a mesh's vertices at raster samples.
+
+    Parameters
+    ----------
+    vertex_values : [V, C]
+    corners : [F, 3], the rows of each triangle
+    face : [...], the triangle at each sample, -1 for none
+    bary : [..., 3], where in it
+
+    Returns
+    -------
+    [..., C], zero where face < 0.
+    """
     of = corners[np.maximum(face, 0)]
     # a sum over an axis of three takes several times as long
-    first, second, third = (values[of[..., k]] * bary[..., k, None] for k in range(3))
+    first, second, third = (vertex_values[of[..., k]] * bary[..., k, None] for k in range(3))
     return (first + second + third) * (face >= 0)[..., None]
 
 
-def bleed(image: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """[H, W(, C)] with every unknown texel given its nearest known one's value, so that filtering meets no black
-    seam."""
-    if known.all() or not known.any():
+def bleed(image: np.ndarray, valid: np.ndarray) -> np.ndarray:
+    """[H, W(, C)] with every texel that is not `valid` [H, W] given the value of the nearest that is, so that filtering
+    meets no black seam."""
+    if valid.all() or not valid.any():
         return image
-    _, labels = cv2.distanceTransformWithLabels((~known).astype(np.uint8), cv2.DIST_L2, 5,
+    _, labels = cv2.distanceTransformWithLabels((~valid).astype(np.uint8), cv2.DIST_L2, 5,
                                                 labelType=cv2.DIST_LABEL_PIXEL)
     nearest = np.zeros(labels.max() + 1, np.int64)
-    nearest[labels[known]] = np.flatnonzero(known)
+    nearest[labels[valid]] = np.flatnonzero(valid)
     return image.reshape(-1, *image.shape[2:])[nearest[labels]]
 
 
@@ -118,8 +129,20 @@ class RayCaster:
 
 def visible_from(caster: RayCaster, points: np.ndarray, normals: np.ndarray, centre: np.ndarray,
                  offset: float = 5e-4) -> np.ndarray:
-    """bool [N]: whether surface points [N, 3] with unit normals face `centre` [3] and nothing lies between. `offset` in
-    metres lifts them off."""
+    """Whether surface points face a place and nothing lies between.
+
+    Parameters
+    ----------
+    caster : of the surface
+    points : [N, 3] on it, in metres
+    normals : [N, 3], unit
+    centre : [3], the place
+    offset : metres by which rays start off the surface
+
+    Returns
+    -------
+    bool [N].
+    """
     towards = centre - points
     directions = towards / np.linalg.norm(towards, axis=1, keepdims=True)
     facing = (directions * normals).sum(1) > 0

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from .meshes import Mesh, unit, vertex_normals
 from .raster import RayCaster, interpolate
 
-CANDIDATES = (8, 64)
+CANDIDATE_COUNTS = (8, 64)
 """How many samples near a point are looked at: at first, and where none of these will do."""
 NEAR_SHARE = 0.25
 """The first rays start this share of `farthest` off the surface: most partners lie within, and farther ones cost a
@@ -60,9 +60,11 @@ class Surface:
     def nearest(self, points: np.ndarray, normals: np.ndarray, farthest: float,
                 cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
         """As `partners`, by distance alone."""
-        face, bary = self._nearest_of(CANDIDATES[0], points, normals, farthest, cosine)
+        face, bary = self._nearest_of(CANDIDATE_COUNTS[0], points, normals, farthest, cosine)
         missed = np.flatnonzero(face < 0)  # another sheet lies before the one that faces the same way
-        face[missed], bary[missed] = self._nearest_of(CANDIDATES[1], points[missed], normals[missed], farthest, cosine)
+        face[missed], bary[missed] = self._nearest_of(
+            CANDIDATE_COUNTS[1], points[missed], normals[missed], farthest, cosine
+        )
         return face, bary
 
     def _nearest_of(self, count: int, points, normals, farthest: float, cosine: float) -> tuple[np.ndarray, np.ndarray]:
@@ -183,8 +185,20 @@ def tangents(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 def frames(normals: np.ndarray, faces: np.ndarray, tangent: np.ndarray, hand: np.ndarray, face: np.ndarray,
            bary: np.ndarray):
-    """Tangent, bitangent and normal, unit and square to each other, [N, 3] each, at samples face [N] (all >= 0), bary
-    [N, 3]; normals [V, 3] and faces [F, 3] of the mesh, tangent and hand from `tangents`."""
+    """Tangent, bitangent and normal at samples of a mesh.
+
+    Parameters
+    ----------
+    normals : [V, 3], unit
+    faces : [F, 3]
+    tangent, hand : from `tangents`
+    face : [N], the triangle of each sample, all >= 0
+    bary : [N, 3], where in it
+
+    Returns
+    -------
+    [N, 3] each, unit and square to each other.
+    """
     n = unit((normals[faces[face]] * bary[..., None]).sum(1))
     t = (tangent[face] * bary[..., None]).sum(1)
     t = unit(t - (t * n).sum(1, keepdims=True) * n)

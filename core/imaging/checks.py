@@ -75,14 +75,14 @@ def check_written(path: Path, pixels: np.ndarray, half: bool) -> None:
                                       "stages are kept."))
 
 
-def find_fault(values: np.ndarray, most: float) -> str:
+def find_fault(pixels: np.ndarray, most: float) -> str:
     """What is wrong with numbers of any shape, whose size may be `most`: "values that are no numbers" or the like; ''
     where nothing is."""
-    if not values.size:
+    if not pixels.size:
         return "no pixels"
-    if values.dtype.kind != "f":
+    if pixels.dtype.kind != "f":
         return ""
-    low, high = float(values.min()), float(values.max())  # of NaN, both are NaN
+    low, high = float(pixels.min()), float(pixels.max())  # of NaN, both are NaN
     if np.isnan(low) or np.isnan(high):
         return "values that are no numbers (NaN)"
     return f"values as large as {max(high, -low):g}" if max(high, -low) > most else ""

@@ -149,32 +149,61 @@ def read_profile(path: Path) -> str:
 
 
 def write_packed(path: Path, channels: np.ndarray, bits: int = 8, srgb: bool = False) -> None:
-    """Four channels [H, W, 4] in [0, 1] that have nothing to do with each other, to PNG or EXR, atomically: no colour
-    is multiplied or divided by the fourth, as happens to what is written as a picture with alpha. `srgb`: the first
-    three are colours encoded so."""
+    """Channels that have nothing to do with each other, to PNG or EXR, atomically: no colour is multiplied or divided
+    by the fourth, as happens to what is written as a picture with alpha.
+
+    Parameters
+    ----------
+    path : its ending says which
+    channels : [H, W, 4] in [0, 1]
+    bits : of a PNG
+    srgb : whether the first three are colours encoded so
+    """
     _write(path, channels,
            _Encoding("half" if _is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True))
 
 
 def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, small: bool = False,
                check: Callable[[], None] = _never) -> None:
-    """sRGB [H, W, 3 or 4] (alpha stays as it is) to PNG (8 or 16 bit) or JPEG (8 bit, of that quality), atomically.
+    """A picture to PNG (8 or 16 bit) or JPEG (8 bit), atomically.
 
-    `small`, here and below: what is shipped is packed as tightly as it goes, at ten times the time; an EXR loses what
-    the eye does not see (DWAA). `check` may raise to cancel, every few rows; then nothing is written.
+    Parameters
+    ----------
+    path : its ending says which
+    srgb : [H, W, 3 or 4] in [0, 1] (alpha stays as it is)
+    bits : of a PNG
+    quality : of a JPEG
+    small : here and below: what is shipped is packed as tightly as it goes, at ten times the time; an EXR loses what
+        the eye does not see (DWAA)
+    check : may raise to cancel, every few rows; then nothing is written
     """
     check_written(Path(path), np.asarray(srgb), half=False)  # clipped, infinity would be white
     _write(path, np.clip(srgb, 0, 1), _Encoding(f"uint{bits}", "sRGB", quality, small=small), check)
 
 
 def write_linear(path: Path, linear: np.ndarray, small: bool = False, check: Callable[[], None] = _never) -> None:
-    """Linear [H, W, C] to a half-float ZIP EXR, or in [0, 1] to a 16 bit PNG, atomically."""
+    """A linear picture to a half-float ZIP EXR, or to a 16 bit PNG, atomically.
+
+    Parameters
+    ----------
+    path : its ending says which
+    linear : [H, W, C]; of a PNG in [0, 1]
+    small, check : as in `write_srgb`
+    """
     _write(path, linear, _Encoding("half" if _is_linear(path) else "uint16", "lin_srgb", small=small), check)
 
 
 def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False,
                check: Callable[[], None] = _never) -> None:
-    """Data [H, W] or [H, W, C] in [0, 1] to PNG (8 or 16 bit), or to a half-float EXR, atomically; no colour space."""
+    """Data to PNG, or to a half-float EXR, atomically; no colour space.
+
+    Parameters
+    ----------
+    path : its ending says which
+    data : [H, W] or [H, W, C] in [0, 1]
+    bits : of a PNG, 8 or 16
+    small, check : as in `write_srgb`
+    """
     _write(path, data, _Encoding("half" if _is_linear(path) else f"uint{bits}", "raw", small=small), check)
 
 

@@ -18,49 +18,53 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-INWARD, OUTWARD = 24.0, 6.0  # how far inside and outside the painted contour the edge is looked for
-BAND = 12.0  # half width of the band about the edge that is found
-WINDOW = 11.0  # deviation of the windows in which sides are averaged and profiles fitted
-ALONG = 6.0  # deviation over which place and width of the penumbra vary along the edge
-PLACES = (-6.0, -4.0, -2.5, -1.25, 0.0, 1.25, 2.5, 4.0, 6.0)
-WIDTHS = (0.0, 2.0, 4.0, 7.0, 10.0, 14.0, 19.0, 25.0)
-STEP = 0.06, 0.16  # shares of the light: a smaller step is no edge, a larger one is for certain
+INWARD_TEXELS, OUTWARD_TEXELS = 24.0, 6.0  # how far inside and outside the painted contour the edge is looked for
+BAND_TEXELS = 12.0  # half width of the band about the edge that is found
+WINDOW_TEXELS = 11.0  # deviation of the windows in which sides are averaged and profiles fitted
+ALONG_TEXELS = 6.0  # deviation over which place and width of the penumbra vary along the edge
+SHIFTS_TEXELS = (-6.0, -4.0, -2.5, -1.25, 0.0, 1.25, 2.5, 4.0, 6.0)  # of the edge's middle that are tried
+WIDTHS_TEXELS = (0.0, 2.0, 4.0, 7.0, 10.0, 14.0, 19.0, 25.0)  # of the penumbra that are tried
+STEP_SHARES = 0.06, 0.16  # shares of the light: a smaller step is no edge, a larger one is for certain
 # distance of a step's colour (its three shares over their mean) from the shadow's: below it is shadow, above it is not
-COLOUR = 0.12, 0.30
+COLOUR_DISTANCES = 0.12, 0.30
 ROUNDS = 8  # of the segmentation
 
 
 @dataclass(frozen=True)
 class Edge:
-    """alpha [S, S] in [0, 1]: M; found [S, S] in [0, 1]: how far it lies on an edge seen in the texture, along a band
-    of BAND about it; colour [3]: what the shadow takes of the light, over its mean (zeros where no edge was found)."""
+    """alpha [S, S] in [0, 1]: M; on_edge [S, S] in [0, 1]: how far it lies on an edge seen in the texture, along a band
+    of BAND_TEXELS about it; colour [3]: what the shadow takes of the light, over its mean (zeros where no edge was
+    found)."""
 
     alpha: np.ndarray
-    found: np.ndarray
+    on_edge: np.ndarray
     colour: np.ndarray
 
 
 def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float,
           check: Callable[[], None] = lambda: None) -> Edge:
-    """The edge of the shadow under a rough mask.
+    """The edge of the shadow under a rough mask. Deeper than INWARD_TEXELS inside the mask alpha is never lowered.
 
-    light [S, S, 3]: texture over (reference albedo x global shading), linear, about 1 where lit; painted [S, S]: the
-    mask in [0, 1], as soft as it shall stay where no edge is found; weight [S, S] in [0, 1]: how far a texel tells of
-    light (0: unseen, or a brow); `texel` is the side of one in texels of a 1024 map. Deeper than INWARD inside the mask
-    alpha is never lowered. `check` may raise to cancel.
+    Parameters
+    ----------
+    light : [S, S, 3], texture over (reference albedo x global shading), linear, about 1 where lit
+    painted : [S, S] in [0, 1], the mask, as soft as it shall stay where no edge is found
+    weight : [S, S] in [0, 1], how far a texel tells of light (0: unseen, or a brow)
+    texel : side of a texel in texels of a 1024 map
+    check : may raise to cancel
     """
     nothing = Edge(painted, np.zeros_like(painted), np.zeros(3))
     inside = painted > 0.5
     if not inside.any() or inside.all():
         return nothing
-    box = _box(inside, (OUTWARD + 3 * WINDOW) / texel)
+    box = _box(inside, (OUTWARD_TEXELS + 3 * WINDOW_TEXELS) / texel)
     edge = _place(np.clip(light[box], 0, 4).astype(np.float32), painted[box], weight[box].astype(np.float32), texel,
                   check)
     if edge is None:
         return nothing
     alpha, sure, colour = edge
     whole = Edge(painted.copy(), np.zeros_like(painted), colour)
-    whole.alpha[box], whole.found[box] = alpha, sure
+    whole.alpha[box], whole.on_edge[box] = alpha, sure
     return whole
 
 
@@ -71,17 +75,17 @@ def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: fl
     if not dark.any() or dark.all():
         return None
     distance = cv2.GaussianBlur(signed_distance(dark), (0, 0), max(1.5 / texel, 0.5)) * texel
-    near = weight * (np.abs(distance) < 2.5 * BAND)
+    near = weight * (np.abs(distance) < 2.5 * BAND_TEXELS)
     shift, width, step = _profile(light, distance, near, texel, check)
-    sure, colour = _sureness(step, near * (np.abs(distance) < BAND))
+    sure, colour = _sureness(step, near * (np.abs(distance) < BAND_TEXELS))
     if sure is None:
         return None
     # what is far from the contour is not ours to move
-    sure = sure * np.clip((INWARD + BAND - np.abs(depth + INWARD / 2)) / BAND, 0, 1)
+    sure = sure * np.clip((INWARD_TEXELS + BAND_TEXELS - np.abs(depth + INWARD_TEXELS / 2)) / BAND_TEXELS, 0, 1)
     fitted = penumbra(distance - shift, np.maximum(width, 0.7 * texel))
     alpha = painted + sure * (fitted - painted)
-    alpha = np.where(depth < -INWARD - BAND, painted, alpha)
-    return alpha.astype(np.float32), (sure * (np.abs(distance) < BAND)).astype(np.float32), colour
+    alpha = np.where(depth < -INWARD_TEXELS - BAND_TEXELS, painted, alpha)
+    return alpha.astype(np.float32), (sure * (np.abs(distance) < BAND_TEXELS)).astype(np.float32), colour
 
 
 def penumbra(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
@@ -91,21 +95,21 @@ def penumbra(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
     return t * t * (3 - 2 * t)
 
 
-def _segmented(value: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight: np.ndarray,
+def _segmented(light: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight: np.ndarray,
                texel: float) -> np.ndarray:
     """bool [h, w]: the dark side. Both sides' local means and the sides themselves follow each other; deep inside the
     mask all is dark."""
-    sigma, smooth = WINDOW / texel, max(2.0 / texel, 0.6)
-    free = (depth > -INWARD) & (depth < OUTWARD)
+    sigma, smooth = WINDOW_TEXELS / texel, max(2.0 / texel, 0.6)
+    free = (depth > -INWARD_TEXELS) & (depth < OUTWARD_TEXELS)
     dark = inside.astype(np.float32)
     for _ in range(ROUNDS):
         means = []
         for side in (1 - dark, dark):
             share = side * weight
-            means.append(_blur(value * share, sigma) / np.maximum(_blur(share, sigma), 1e-4))
+            means.append(_blur(light * share, sigma) / np.maximum(_blur(share, sigma), 1e-4))
         lit, shaded = means
         gap = lit - shaded
-        odds = np.where(gap > 0.02, ((lit + shaded) / 2 - value) / np.maximum(gap, 0.05),
+        odds = np.where(gap > 0.02, ((lit + shaded) / 2 - light) / np.maximum(gap, 0.05),
                         np.where(dark > 0.5, 0.5, -0.5))
         known = np.maximum(weight, 0.02)
         odds = _blur(np.clip(odds, -0.5, 0.5) * known, smooth) / np.maximum(_blur(known, smooth), 1e-4)
@@ -121,14 +125,14 @@ def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray, texel:
     In a window light = lit - step * penumbra(distance - place, width): linear in lit and step, so each candidate's
     residual is closed form.
     """
-    sigma = WINDOW / texel
+    sigma = WINDOW_TEXELS / texel
     value = light.mean(-1)
     total = np.maximum(_blur(weight, sigma), 1e-4)
     mean, square = _blur(weight * value, sigma) / total, _blur(weight * value**2, sigma) / total
     variance = np.maximum(square - mean**2, 1e-8)
     best, shift, width = np.full(value.shape, np.inf, np.float32), np.zeros_like(value), np.zeros_like(value)
-    for w in WIDTHS:
-        for p in PLACES:
+    for w in WIDTHS_TEXELS:
+        for p in SHIFTS_TEXELS:
             check()
             shape = penumbra(distance - p, np.float32(max(w, 0.7 * texel))).astype(np.float32)
             m = _blur(weight * shape, sigma) / total
@@ -137,9 +141,12 @@ def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray, texel:
             rest = 1 - np.minimum(covariance, 0) ** 2 / (spread * variance)
             better = rest < best
             best, shift, width = np.where(better, rest, best), np.where(better, p, shift), np.where(better, w, width)
-    share = weight * (np.abs(distance) < BAND) * np.clip(1 - best, 0.01, 1)
-    along = np.maximum(_blur(share, ALONG / texel), 1e-5)
-    shift, width = _blur(shift * share, ALONG / texel) / along, _blur(width * share, ALONG / texel) / along
+    share = weight * (np.abs(distance) < BAND_TEXELS) * np.clip(1 - best, 0.01, 1)
+    along = np.maximum(_blur(share, ALONG_TEXELS / texel), 1e-5)
+    shift, width = (
+        _blur(shift * share, ALONG_TEXELS / texel) / along,
+        _blur(width * share, ALONG_TEXELS / texel) / along,
+    )
     shape = penumbra(distance - shift, np.maximum(width, 0.7 * texel)).astype(np.float32)
     m = _blur(weight * shape, sigma) / total
     spread = np.maximum(_blur(weight * shape**2, sigma) / total - m**2, 1e-3)
@@ -152,17 +159,17 @@ def _sureness(step: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray | None, 
     """How far [h, w] the step [h, w, 3] is one, and of the colour that most of the edge has; that colour [3]. None
     where nothing is."""
     height = step.mean(-1)
-    good = (weight > 0.5) & (height > STEP[1])
+    good = (weight > 0.5) & (height > STEP_SHARES[1])
     if good.sum() < 8:
         return None, np.zeros(3)
     colour = np.median(step[good] / height[good][:, None], axis=0)
     unlike = np.abs(step / np.maximum(height, 0.05)[..., None] - colour).max(-1)
-    sure = _ramp(height, *STEP) * (1 - _ramp(unlike, *COLOUR))
+    sure = _ramp(height, *STEP_SHARES) * (1 - _ramp(unlike, *COLOUR_DISTANCES))
     return sure.astype(np.float32), colour
 
 
-def _ramp(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    return np.clip((values - low) / (high - low), 0, 1)
+def _ramp(x: np.ndarray, low: float, high: float) -> np.ndarray:
+    return np.clip((x - low) / (high - low), 0, 1)
 
 
 def signed_distance(inside: np.ndarray) -> np.ndarray:

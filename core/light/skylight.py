@@ -22,8 +22,21 @@ def ambient_occlusion(transfer: np.ndarray) -> np.ndarray:
 
 def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,
                       step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
-    """[N, 9]: irradiance / pi at surface points from the radiance of each orthonormal harmonic
-    (spherical_harmonics.py), occluded by the mesh."""
+    """Irradiance / pi at surface points from the radiance of each orthonormal harmonic (spherical_harmonics.py),
+    occluded by the mesh.
+
+    Parameters
+    ----------
+    caster : of the mesh
+    points : [N, 3] on it, in metres
+    normals : [N, 3], unit
+    rays : directions that are cast
+    step : hears (done, of)
+
+    Returns
+    -------
+    [N, 9].
+    """
     transfer = np.zeros((len(points), 9))
     directions = fibonacci_sphere(rays)
     basis = sh_basis(directions)

@@ -17,18 +17,18 @@ import numpy as np
 from .skylight import fibonacci_sphere
 from .spherical_harmonics import ORTHONORMAL, per_function
 
-SIGMA_LUMINANCE = 0.2  # spread of skin about its tone, in log units: common to the three channels ...
-SIGMA_CHROMA = 0.08  # ... and of the differences between channels
-OUTLIER = 0.05  # share of points that are neither (hair, highlights, misregistration)
-BOX = 3.0  # log units over which an outlier may lie, per channel
+LUMINANCE_SIGMA_LOG = 0.2  # spread of skin about its tone, in log units: common to the three channels ...
+CHROMA_SIGMA_LOG = 0.08  # ... and of the differences between channels
+OUTLIER_SHARE = 0.05  # share of points that are neither (hair, highlights, misregistration)
+OUTLIER_RANGE_LOG = 3.0  # log units over which an outlier may lie, per channel
 TABLED = np.array([0.282095, *[0.488603] * 3, 1.092548, 1.092548, 2 * 3**0.5 * 0.315392, 1.092548, 2 * 0.546274])
-# The harmonics' band factors with the six digits that tables print: RIDGE was chosen for coefficients of these, and a
-# delit frame shows any other ridge
-RIDGE = np.array([0, *[0.5] * 3, *[2.0] * 5]) * (per_function(ORTHONORMAL) / TABLED) ** 2
+# The harmonics' band factors with the six digits that tables print: SH_RIDGE was chosen for coefficients of these, and
+# a delit frame shows any other ridge
+SH_RIDGE = np.array([0, *[0.5] * 3, *[2.0] * 5]) * (per_function(ORTHONORMAL) / TABLED) ** 2
 # Skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their
 # mean
-SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
-FLOOR = 0.15  # the environment's shading never falls below this share of its median
+MIN_SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
+AMBIENT_FLOOR_SHARE = 0.15  # the environment's shading never falls below this share of its median
 
 
 @dataclass(frozen=True)
@@ -71,12 +71,20 @@ class _SkinPoints:
 def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
               reaches: Callable[[np.ndarray], np.ndarray], weights: np.ndarray,
               step: Callable[[int, int], None] = lambda done, of: None) -> tuple[Light, np.ndarray, np.ndarray]:
-    """The light that explains linear skin colours [N, 3] at points with unit normals [N, 3], transfer [N, 9] and
-    weights [N].
+    """The light that explains the colours of skin.
 
-    `reaches(direction)` -> [N] in [0, 1]: whether the head itself lets light from there through. `step` hears of
-    progress. Returns the light, the posterior [N] that the sun reaches a point, and that a point is explained at all
-    (an inlier) [N].
+    Parameters
+    ----------
+    colours : [N, 3], linear
+    normals : [N, 3], unit
+    transfer : [N, 9], `radiance_transfer` of the points
+    reaches : direction [3] -> [N] in [0, 1], whether the head itself lets light from there through
+    weights : [N]
+    step : hears (done, of)
+
+    Returns
+    -------
+    The light; the posterior [N] that the sun reaches a point; and that a point is explained at all (an inlier) [N].
     """
     skin = _SkinPoints(colours, np.log(np.maximum(colours, 1e-4)), transfer, weights)
     best = _expectation_maximisation(skin, np.zeros(len(colours)), np.zeros(len(colours)))
@@ -93,13 +101,13 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
             fitted = _expectation_maximisation(skin, cosine, reaches(direction), best[5] if spread else None)
             if fitted[0] > best[0]:
                 best, best_direction = fitted, direction
-    if best[0] - none[0] <= SUN_GAIN * weights.sum():
+    if best[0] - none[0] <= MIN_SUN_GAIN * weights.sum():
         best, best_direction = none, np.array([0.0, 0.0, 1.0])
     cosine, visible = ((np.maximum(normals @ best_direction, 0), reaches(best_direction)) if best is not none
                        else (np.zeros(len(colours)),) * 2)
     _, environment, sun, reached, inlier, _ = _expectation_maximisation(skin, cosine, visible, best[5], iterations=30)
     ambient = transfer @ environment
-    return Light(environment, best_direction, sun, FLOOR * np.median(ambient, 0)), reached, inlier
+    return Light(environment, best_direction, sun, AMBIENT_FLOOR_SHARE * np.median(ambient, 0)), reached, inlier
 
 
 def log_likelihood(residual: np.ndarray) -> np.ndarray:
@@ -107,8 +115,8 @@ def log_likelihood(residual: np.ndarray) -> np.ndarray:
     red, green, blue = (residual[..., k] for k in range(3))  # a mean over an axis of three takes several times as long
     common = (red + green + blue) / 3
     chroma = (red - common) ** 2 + (green - common) ** 2 + (blue - common) ** 2
-    return (-0.5 * (3 * common ** 2 / SIGMA_LUMINANCE ** 2 + chroma / SIGMA_CHROMA ** 2)
-            - np.log(SIGMA_LUMINANCE * SIGMA_CHROMA ** 2 * (2 * np.pi) ** 1.5))
+    return (-0.5 * (3 * common ** 2 / LUMINANCE_SIGMA_LOG ** 2 + chroma / CHROMA_SIGMA_LOG ** 2)
+            - np.log(LUMINANCE_SIGMA_LOG * CHROMA_SIGMA_LOG ** 2 * (2 * np.pi) ** 1.5))
 
 
 def _around(direction: np.ndarray, spread: float) -> np.ndarray:
@@ -136,7 +144,7 @@ def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np
     inlier = np.ones(count) if start is None else start[1]
     scale = np.average(colours, axis=0, weights=weights)
     has_sun = bool(cosine.any())
-    spread = SIGMA_LUMINANCE**2 if start is None else start[2]
+    spread = LUMINANCE_SIGMA_LOG**2 if start is None else start[2]
     for _ in range(iterations):
         environment, sun = np.zeros((9, 3)), np.zeros(3)
         for k in range(3):
@@ -144,12 +152,17 @@ def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np
                                                       has_sun, spread)
         environment, sun = environment * scale, sun * scale
         ambient = transfer @ environment
-        ambient = np.maximum(ambient, FLOOR * np.median(ambient, 0))
+        ambient = np.maximum(ambient, AMBIENT_FLOOR_SHARE * np.median(ambient, 0))
         in_shade = log - np.log(np.maximum(ambient, 1e-4))
         in_sun = log - np.log(np.maximum(ambient + cosine[:, None] * sun, 1e-4))
         shaded, sunlit = log_likelihood(in_shade), log_likelihood(in_sun)
-        terms = np.stack([np.log(prior * (1 - OUTLIER)) + sunlit, np.log((1 - prior) * (1 - OUTLIER)) + shaded,
-                          np.full(count, np.log(OUTLIER) - 3 * np.log(BOX))])  # [3, N]
+        terms = np.stack(
+            [
+                np.log(prior * (1 - OUTLIER_SHARE)) + sunlit,
+                np.log((1 - prior) * (1 - OUTLIER_SHARE)) + shaded,
+                np.full(count, np.log(OUTLIER_SHARE) - 3 * np.log(OUTLIER_RANGE_LOG)),
+            ]
+        )  # [3, N]
         peak = terms.max(0)
         shares = np.exp(terms - peak)
         total = shares.sum(0)
@@ -159,21 +172,21 @@ def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np
     return float(((peak + np.log(total)) * weights).sum()), environment, sun, lit, inlier, (lit, inlier, spread)
 
 
-def _weighted_fit(transfer, cosine, values, lit, weights, has_sun, spread) -> tuple[np.ndarray, float]:
-    """Relative least squares of values [N] ~ transfer @ e + lit * cosine * sun, each point once as sunlit and once as
+def _weighted_fit(transfer, cosine, colour, lit, weights, has_sun, spread) -> tuple[np.ndarray, float]:
+    """Relative least squares of colour [N] ~ transfer @ e + lit * cosine * sun, each point once as sunlit and once as
     shaded.
 
     The higher bands have a prior (a ridge) whose weight grows with the `spread` of the skin about its tone, a variance
     in log units: freckled, flushed or bearded skin must not be told as light.
     """
-    relative = 1 / np.maximum(values, 0.1)
+    relative = 1 / np.maximum(colour, 0.1)
     a_lit = np.concatenate([transfer, cosine[:, None]], 1) * relative[:, None]
-    a_shade = np.concatenate([transfer, np.zeros((len(values), 1))], 1) * relative[:, None]
-    target = values * relative
+    a_shade = np.concatenate([transfer, np.zeros((len(colour), 1))], 1) * relative[:, None]
+    target = colour * relative
     w1, w0 = weights * lit, weights * (1 - lit)
     normal = a_lit.T @ (a_lit * w1[:, None]) + a_shade.T @ (a_shade * w0[:, None])
     right = a_lit.T @ (target * w1) + a_shade.T @ (target * w0)
-    ridge = np.diag([*RIDGE, 0.0]) * weights.sum() * spread
+    ridge = np.diag([*SH_RIDGE, 0.0]) * weights.sum() * spread
     if not has_sun:
         ridge[9, 9] = 1.0
     solution = np.linalg.solve(normal + ridge + 1e-9 * np.eye(10), right)

@@ -44,9 +44,9 @@ STEPS = 100.0
 FOLLOWED = "face"
 """UV mask of the template whose region is drawn to the scan; ears, scalp and neck come by identity and stiffness
 alone."""
-SHAPED = {"face": 1.0, "neck": 0.3, "scalp": 0.15}
+IDENTITY_WEIGHTS = {"face": 1.0, "neck": 0.3, "scalp": 0.15}
 """UV masks of what says which identity it is, and how loudly: hair and collars speak there, too."""
-SEEN = {"ears": 0.5, "neck": 0.3}
+VIEW_WEIGHTS = {"ears": 0.5, "neck": 0.3}
 """Further UV masks that matched points and outlines speak of where there is no scan, and how loudly: collars and hair
 are there, too."""
 HELD = ("lips", "eyes", "brows")
@@ -86,7 +86,7 @@ class Subject:
     """What is known of a person before the fit: landmarks, with the artist's; the model that trusts those; weights of
     the vertices and landmarks as `weights_of` gives them, without the lids where the eyes are open; trust [468]."""
 
-    found: landmarks.Landmarks
+    landmarks: landmarks.Landmarks
     model: alignment.HeadModel
     follow: np.ndarray
     shaped: np.ndarray
@@ -94,20 +94,20 @@ class Subject:
     trust: np.ndarray
 
 
-def _subject(found: landmarks.Landmarks, report: Reporter) -> Subject:
-    model = trusting(load_model(), found.put)
+def _subject(face_marks: landmarks.Landmarks, report: Reporter) -> Subject:
+    model = trusting(load_model(), face_marks.by_artist)
     follow, shaped, hold = weights_of(model)
-    trust = found.trust
-    if eyes.are_open(found.opening):
+    trust = face_marks.trust
+    if eyes.are_open(face_marks.opening):
         lids = _per_vertex(model.mesh, template.mask("eyes", 512))
         report.log("The eyes are open: the lids follow the face around them, not the eyeballs.")
         (follow, trust), shaped = eyes.spared(follow, trust, lids), eyes.spared(shaped, trust, lids)[0]
-        trust = np.where(found.put, found.trust, trust)
-    return Subject(found, model, follow, shaped, hold, trust)
+        trust = np.where(face_marks.by_artist, face_marks.trust, trust)
+    return Subject(face_marks, model, follow, shaped, hold, trust)
 
 
 def _by_views(capture: Capture, settings: Settings, views: list[View], subject: Subject, report: Reporter) -> None:
-    model, face_marks = subject.model, subject.found
+    model, face_marks = subject.model, subject.landmarks
     chosen = landmarks.spread(views, landmarks.MOST_VIEWS)
     fitted = unscanned.fit(model, _shown(capture, chosen, subject, report), report, 10, 0.9 * STEPS)
     placed = _as_bust(model.mesh, fitted.pose.apply(model.mesh.vertices))
@@ -124,16 +124,16 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
 def _shown(capture: Capture, views: list[View], subject: Subject, report: Reporter) -> unscanned.ShownByViews:
     """What these views show of a head that no scan tells of."""
     seen = np.max([subject.follow, *(strength * _per_vertex(subject.model.mesh, template.mask(name, 512))
-                                     for name, strength in SEEN.items())], axis=0)
+                                     for name, strength in VIEW_WEIGHTS.items())], axis=0)
     points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)
-    return unscanned.ShownByViews(views, subject.found, subject.trust, points, seen)
+    return unscanned.ShownByViews(views, subject.landmarks, subject.trust, points, seen)
 
 
 def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, report: Reporter) -> unscanned.Points:
     """The matched points that most views show as skin, or do not show."""
     if not len(points.places):
         return points
-    pose, coefficients = alignment.fit_landmarks(subject.model, subject.found.points, subject.trust)
+    pose, coefficients = alignment.fit_landmarks(subject.model, subject.landmarks.points, subject.trust)
     head = subject.model.mesh.moved(pose.apply(subject.model.shape(coefficients)))
     share = np.nan_to_num(hair.hidden_share(points.places, points.towards, views, head, report))
     return unscanned.Points(points.places[share <= hair.HAIR_SHARE], points.towards[share <= hair.HAIR_SHARE])
@@ -141,7 +141,7 @@ def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, repo
 
 def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject,
              least_share: float, report: Reporter) -> meshes.Mesh:
-    face_marks, model = subject.found, subject.model
+    face_marks, model = subject.landmarks, subject.model
     follow, shaped, trust = subject.follow, subject.shaped, subject.trust
     report.progress(10, STEPS, "placing the head")
     pose, coefficients = alignment.fit_landmarks(model, face_marks.points, trust)
@@ -150,7 +150,7 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     report.progress(15, STEPS, "finding the nearest head")
     pose, coefficients = alignment.fit_scan(model, pose, coefficients, face_marks.points, trust, scan, shaped)
     start = pose.apply(model.shape(coefficients))
-    targets = nonrigid.LandmarkTargets(face_marks.points, trust, subject.hold, face_marks.put)
+    targets = nonrigid.LandmarkTargets(face_marks.points, trust, subject.hold, face_marks.by_artist)
 
     def tell(share: float) -> None:
         report.progress(20 + (0.6 * STEPS - 20) * share, STEPS, "fitting the head to the scan")
@@ -190,7 +190,7 @@ def _finished(placed: meshes.Mesh, aligned: meshes.Mesh, vertices: np.ndarray, r
 
 def _finish(capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject,
             report: Reporter) -> None:
-    face_marks = subject.found
+    face_marks = subject.landmarks
     remove_file(capture.head_open)
     remove_file(capture.eyes)
     if eyes.are_open(face_marks.opening):
@@ -216,17 +216,19 @@ def load_model() -> alignment.HeadModel:
     return alignment.HeadModel(template.load(), template.identity(), face, bary, template.landmark_weights())
 
 
-def trusting(model: alignment.HeadModel, put: np.ndarray) -> alignment.HeadModel:
+def trusting(model: alignment.HeadModel, by_artist: np.ndarray) -> alignment.HeadModel:
     """The model with full weight on the landmarks [468] that the artist has put, the net's worst among them."""
-    return replace(model, landmark_weight=np.where(put, 1.0, model.landmark_weight))
+    return replace(model, landmark_weight=np.where(by_artist, 1.0, model.landmark_weight))
 
 
 def weights_of(model: alignment.HeadModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """follow [V] and shaped [V] in [0, 1]: how far the scan is believed at a vertex, by the last fit and by the
     identity's; hold [468]: how much longer a landmark counts than the others."""
     follow = _per_vertex(model.mesh, template.mask(FOLLOWED, 512))
-    shaped = np.max([strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SHAPED.items()],
-                    axis=0)
+    shaped = np.max(
+        [strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in IDENTITY_WEIGHTS.items()],
+        axis=0,
+    )
     hold_mask = np.max([_per_vertex(model.mesh, template.mask(name, 512)) for name in HELD], axis=0)
     return follow, shaped, 1 + 9 * (model.at_landmarks(hold_mask[:, None])[:, 0] > 0.3)
 

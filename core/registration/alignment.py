@@ -20,7 +20,7 @@ SCAN_SIGMA_M = 0.002
 """No scan is that bad: this is how near the identity space comes to a person."""
 SCAN_ROUNDS = 15
 """Gauss-Newton steps towards the scan; the reach shrinks over them."""
-INDEPENDENT = {"landmarks": 120, "scan": 100}
+INDEPENDENT_COUNTS = {"landmarks": 120, "scan": 100}
 """How many of each count as independent; neighbours err together, and a brow must not slide up a smooth forehead."""
 
 
@@ -67,7 +67,19 @@ def similarity(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> S
 
 def fit_landmarks(model: HeadModel, points: np.ndarray, trust: np.ndarray,
                   rounds: int = 12) -> tuple[Similarity, np.ndarray]:
-    """Similarity and coefficients [K] that lay the model's landmarks over points [468, 3] (nan: unknown)."""
+    """Lays the model's landmarks over points.
+
+    Parameters
+    ----------
+    model : the template with its identity space
+    points : [468, 3], in metres (nan: unknown)
+    trust : [468] in [0, 1]
+    rounds : of Gauss-Newton
+
+    Returns
+    -------
+    The similarity and the identity's coefficients [K].
+    """
     known, weights = _usable(model, points, trust)
     coefficients = np.zeros(len(model.identity))
     rest = model.at_landmarks(model.mesh.vertices)[known]
@@ -82,7 +94,20 @@ def fit_landmarks(model: HeadModel, points: np.ndarray, trust: np.ndarray,
 
 def fit_scan(model: HeadModel, pose: Similarity, coefficients: np.ndarray, points: np.ndarray, trust: np.ndarray,
              scan: Scan, shaped: np.ndarray) -> tuple[Similarity, np.ndarray]:
-    """As fit_landmarks, with point-to-plane distances of the vertices (weights shaped [V] in [0, 1]) to the scan."""
+    """As `fit_landmarks`, with point-to-plane distances of the vertices to a scan.
+
+    Parameters
+    ----------
+    model : the template with its identity space
+    pose, coefficients : where the fit begins, [K]
+    points, trust : [468, 3] in metres and [468] in [0, 1]: the landmarks
+    scan : in metres
+    shaped : [V] in [0, 1], how far each vertex counts
+
+    Returns
+    -------
+    The similarity and the identity's coefficients [K].
+    """
     index = np.flatnonzero(shaped > 0.05)
     index = index[:: max(1, len(index) // 4000)]
     for step in range(SCAN_ROUNDS):
@@ -92,7 +117,7 @@ def fit_scan(model: HeadModel, pose: Similarity, coefficients: np.ndarray, point
         reach = np.interp(step, [0, SCAN_ROUNDS - 1], [0.030, 0.010])
         signed, scan_normals = scan.match(vertices[index], normals, 1.5 * reach)
         weight = trimmed(signed, reach) * shaped[index]
-        weight *= min(1.0, INDEPENDENT["scan"] / max(weight.sum(), 1)) / SCAN_SIGMA_M ** 2
+        weight *= min(1.0, INDEPENDENT_COUNTS["scan"] / max(weight.sum(), 1)) / SCAN_SIGMA_M ** 2
         pose, coefficients = _step(model, pose, coefficients, points, trust,
                                    (index, np.nan_to_num(signed), scan_normals, weight))
     return pose, coefficients
@@ -111,7 +136,7 @@ def _step(model, pose, coefficients, points, trust, planes=None) -> tuple[Simila
     residual = points[known] - at
     error = np.linalg.norm(residual, axis=1)
     weights = weights / (1 + (error / (2.5 * LANDMARK_SIGMA_M)) ** 2) / LANDMARK_SIGMA_M ** 2
-    weights = weights * min(1.0, INDEPENDENT["landmarks"] / len(weights))
+    weights = weights * min(1.0, INDEPENDENT_COUNTS["landmarks"] / len(weights))
     basis = model.at_landmarks(model.identity)[:, known] @ turn  # [K, N, 3]
     jacobian = _jacobian(at, pose.translation, basis).reshape(-1, 7 + len(coefficients))
     rows = [(jacobian, residual.reshape(-1), np.repeat(weights, 3))]

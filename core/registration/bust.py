@@ -16,7 +16,7 @@ NEIGHBOURS = 6
 """Vertices of the edge whose shifts a vertex above it follows, the nearer the more."""
 HARMONICS = 4
 """Of the outline's radius around the neck: it is an oval with a flat back."""
-LEAST_STEP = 0.3
+LEAST_STEP_SHARE = 0.3
 """Of the mean angle between neighbours on the edge, which keeps their order."""
 
 
@@ -58,7 +58,7 @@ def _smooth(border: np.ndarray) -> np.ndarray:
     radius, angle = np.hypot(x, y), np.arctan2(y, x)
     steps = np.angle(np.exp(1j * (np.roll(angle, -1) - angle)))
     way = np.sign(steps.sum())
-    increments = np.maximum(way * steps, LEAST_STEP * 2 * np.pi / len(border))
+    increments = np.maximum(way * steps, LEAST_STEP_SHARE * 2 * np.pi / len(border))
     increments *= 2 * np.pi / increments.sum()
     placed = way * np.append(0, np.cumsum(increments[:-1]))
     placed += np.angle(np.exp(1j * (angle - placed)).mean())

@@ -23,8 +23,20 @@ ROUND_RADIUS_SHARE = 0.06
 
 
 def along(start: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray, report: Reporter) -> np.ndarray:
-    """Final vertices [V, 3]. start [V, 3]: all as placed by the similarity; label [V]: connected part of each; skin
-    [S]: indices of the fitted ones, fitted [S, 3]: where they went."""
+    """The final vertices of a mesh whose skin was fitted: eyes, teeth and other parts go along.
+
+    Parameters
+    ----------
+    start : [V, 3], in metres, all as placed by the similarity
+    label : [V], the connected part that each belongs to
+    skin : [S], indices of the fitted ones
+    fitted : [S, 3], where they went
+    report : hears of progress
+
+    Returns
+    -------
+    [V, 3].
+    """
     final = start.copy()
     final[skin] = fitted
     others = np.setdiff1d(np.arange(len(start)), skin)
@@ -43,8 +55,19 @@ def along(start: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.nda
 
 
 def field(places: np.ndarray, shift: np.ndarray, at: np.ndarray, report: Reporter) -> np.ndarray:
-    """A displacement known at places [N, 3] (shift [N, 3]), smoothly continued to `at` [M, 3]; of many places an even
-    choice counts."""
+    """A displacement, smoothly continued from the places where it is known.
+
+    Parameters
+    ----------
+    places : [N, 3]; of many an even choice counts
+    shift : [N, 3], the displacement there
+    at : [M, 3], where it is asked
+    report : hears of progress
+
+    Returns
+    -------
+    [M, 3].
+    """
     chosen = np.linspace(0, len(places) - 1, min(len(places), MOST_CENTRES)).astype(int)
     # two centres at one place have no solution
     _, first = np.unique(np.round(places[chosen] * 1e5), axis=0, return_index=True)
@@ -57,9 +80,9 @@ def field(places: np.ndarray, shift: np.ndarray, at: np.ndarray, report: Reporte
     return out
 
 
-def _centres(start: np.ndarray, skin: np.ndarray, others: np.ndarray) -> np.ndarray:
+def _centres(start: np.ndarray, skin: np.ndarray, other_parts: np.ndarray) -> np.ndarray:
     """Vertices of the skin that carry the rest: those nearest to the other parts, and an even choice of all."""
-    distance, _ = cKDTree(start[others]).query(start[skin])
+    distance, _ = cKDTree(start[other_parts]).query(start[skin])
     near = skin[np.argsort(distance, kind="stable")[:MOST_CENTRES // 2]]
     even = skin[np.linspace(0, len(skin) - 1, MOST_CENTRES // 2).astype(int)]
     return np.union1d(near, even)

@@ -44,29 +44,38 @@ class Constraints:
     def __len__(self) -> int:
         return len(self.distance)
 
-    def at(self, values: np.ndarray) -> np.ndarray:
-        """Per-vertex values [..., V, C] at the points [..., M, C]."""
-        return (values[..., self.corners, :] * self.bary[..., None]).sum(-2)
+    def at(self, vertex_values: np.ndarray) -> np.ndarray:
+        """Values of the vertices [..., V, C] at the points [..., M, C]."""
+        return (vertex_values[..., self.corners, :] * self.bary[..., None]).sum(-2)
 
 
-def joined(parts: list[Constraints]) -> Constraints:
-    return Constraints(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Constraints)))
+def joined(constraints: list[Constraints]) -> Constraints:
+    return Constraints(*(np.concatenate([getattr(part, f.name) for part in constraints]) for f in fields(Constraints)))
 
 
-def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], found: Landmarks, trust: np.ndarray,
+def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], landmarks: Landmarks, trust: np.ndarray,
                    reach: float) -> Constraints:
-    """Two constraints per view and landmark that is seen squarely enough; trust [468]. What misses by much more than
-    `reach` metres counts for little. A single view does not tell depths, so there each landmark is also held, loosely,
-    to the depth that it was lifted to."""
+    """Two constraints per view and landmark that is seen squarely enough. A single view does not tell depths, so there
+    each landmark is also held, loosely, to the depth that it was lifted to.
+
+    Parameters
+    ----------
+    model : the template
+    vertices : [V, 3], in metres, as the head lies now
+    views : cameras, in the same world
+    landmarks : with their pixels in the views
+    trust : [468] in [0, 1]
+    reach : metres; what misses by much more counts for little
+    """
     at = model.at_landmarks(vertices)
     normals = model.at_landmarks(vertex_normals(model.mesh.moved(vertices)))
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     corners = model.mesh.faces[model.landmark_face]
     parts = [none()]
     for view in views:
-        if view.name not in found.images:
+        if view.name not in landmarks.images:
             continue
-        pixels, used = found.images[view.name]
+        pixels, used = landmarks.images[view.name]
         rays = view.rays(pixels)
         towards = view.centre - at
         towards /= np.linalg.norm(towards, axis=1, keepdims=True)
@@ -81,17 +90,25 @@ def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], fo
         for direction in (side, np.cross(rays[index], side)):
             parts.append(Constraints(corners[index], model.landmark_bary[index], direction, (miss * direction).sum(1),
                                      robust))
-        if len(found.images) == 1:
-            deeper = ((found.points[index] - at[index]) * rays[index]).sum(1)
+        if len(landmarks.images) == 1:
+            deeper = ((landmarks.points[index] - at[index]) * rays[index]).sum(1)
             parts.append(Constraints(corners[index], model.landmark_bary[index], rays[index], deeper,
                                      DEPTH_SHARE * robust))
     return joined(parts)
 
 
 def from_points(mesh: Mesh, follow: np.ndarray, points: np.ndarray, towards: np.ndarray, reach: float) -> Constraints:
-    """One constraint per matched point [N, 3] that lies within `reach` metres of the part of the mesh that follows
-    (follow [V] > 0.5), on the side that the views it was seen in look at; towards [N, 3]: unit mean direction to
-    those."""
+    """One constraint per matched point that lies near the part of the mesh that follows, on the side that the views it
+    was seen in look at.
+
+    Parameters
+    ----------
+    mesh : in metres
+    follow : [V] in [0, 1], above 0.5 the part that follows
+    points : [N, 3], in metres
+    towards : [N, 3], unit, mean direction to the views that a point was seen in
+    reach : metres
+    """
     if not len(points):
         return none()
     normals, index = vertex_normals(mesh), np.flatnonzero(follow > 0.02)

@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 
 from ..geometry.meshes import Mesh, vertex_normals
 
-NEIGHBOURS = 8
-MOST_ANGLE_DEG = 45.0
+NEIGHBOURS = 8  # nearest samples of the scan that are looked at
+MOST_ANGLE_DEG = 45.0  # between the normals of partners
 
 
 class Scan:

@@ -28,18 +28,18 @@ class EyeLook:
     shares: EyeShares
 
 
-def usable(seen: list[tuple[float, Eye]], side: int) -> list[int]:
+def usable(sights: list[tuple[float, Eye]], side: int) -> list[int]:
     """Which sights (yaw of the head in degrees, eye) of the left (0) or right (1) eye hold: it is not beyond the nose,
     and as open as it usually is."""
-    there = [i for i, (yaw, _) in enumerate(seen) if shows_eye(yaw, side)]
-    usual = float(np.median([seen[i][1].opening for i in there])) if there else 0.0
-    return [i for i in there if seen[i][1].is_open_as(usual)]
+    there = [i for i, (yaw, _) in enumerate(sights) if shows_eye(yaw, side)]
+    usual = float(np.median([sights[i][1].opening for i in there])) if there else 0.0
+    return [i for i in there if sights[i][1].is_open_as(usual)]
 
 
-def look(views: list[View], found: Landmarks, report: Reporter) -> tuple[list[EyeLook], list[EyeLook]]:
+def look(views: list[View], landmarks: Landmarks, report: Reporter) -> tuple[list[EyeLook], list[EyeLook]]:
     """The left and the right eye as the reader sees them in the views that show them well, and in which the eye's
     landmarks were not thrown out."""
-    use = [_names_of(views, found, side) for side in (0, 1)]
+    use = [_names_of(views, landmarks, side) for side in (0, 1)]
     looks: tuple[list[EyeLook], list[EyeLook]] = [], []
     for view in views:
         if view.name not in use[0] | use[1]:
@@ -47,7 +47,7 @@ def look(views: list[View], found: Landmarks, report: Reporter) -> tuple[list[Ey
         report.check()
         srgb = images.read_srgb(view.path)
         shrink = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
-        pixels = found.images[view.name][0]
+        pixels = landmarks.images[view.name][0]
         for side, corners in enumerate(CORNERS):
             if view.name in use[side]:
                 eye = read_eye(srgb, pixels[list(corners)] * shrink, side == 0)

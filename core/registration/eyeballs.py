@@ -18,18 +18,18 @@ from ..contract.messages import Reporter
 from ..face import lids
 from ..geometry.meshes import Mesh
 from .eye_looks import EyeLook
-from .irises import CENTRE_SIGMA_M, GAZE_SIGMA
+from .irises import CENTRE_SIGMA_M, GAZE_SIGMA_RAD
 from .lid_marks import LidMarks, mark
 
 RIM_SIGMA_M, IRIS_SIGMA_M = 0.0006, 0.0010
 """How well an edge's mark tells where the eyeball ends, and the iris where it lies before it."""
-RADIUS_SIGMA = 0.06
+RADIUS_SIGMA_SHARE = 0.06
 """How well the head around tells how large an eyeball is, as a share: MakeHuman's eyes over its own heads."""
 ROUNDS = 12
 CORNER_REACH_M, RIM_REACH_M = 0.008, 0.006
 """How far around the eye's corners the face follows them, and around a lid's edge the lid: some centimetre, and half of
 one."""
-USUAL, OPENEST = 0.8, 1.4
+USUAL_OPENING, WIDEST_OPENING = 0.8, 1.4
 """Of MakeHuman's own opening."""
 
 
@@ -57,7 +57,15 @@ class OpenEyes:
 
 def mark_rims(looks: tuple[list[EyeLook], list[EyeLook]], head: Mesh, opening: float,
               report: Reporter) -> tuple[LidMarks | None, LidMarks | None]:
-    """The edges of the left and the right lids of a closed head, as far as the views tell of them."""
+    """The edges of the left and the right lids, as far as the views tell of them.
+
+    Parameters
+    ----------
+    looks : at the left and at the right eye
+    head : with closed lids, in metres
+    opening : height over width between the lids, as seen
+    report : hears whether it is cancelled
+    """
     begun = fit(head, (None, None), opening).opened
     return mark(looks[0], begun, 0, report), mark(looks[1], begun, 1, report)
 
@@ -104,43 +112,45 @@ def _with_corners(head: Mesh, rims: tuple) -> Mesh:
     return replace(head, vertices=vertices)
 
 
-def _place(head: Mesh, side: int, found: LidMarks | None) -> lids.PosedEyeball:
+def _place(head: Mesh, side: int, lid_marks: LidMarks | None) -> lids.PosedEyeball:
     """The eyeball whose surface the edges of the lids and of the iris lie on; by least squares, under what the head
     around tells."""
     centre, radius = lids.carry_ball(head, side)
-    if found is None:
+    if lid_marks is None:
         return lids.place_ball(side, centre, radius, lids.FORWARD)
-    edge = np.concatenate([found.upper[2:-2], found.lower[2:-2]])  # near the corners the lids leave the ball
-    off = _clearance(head, side, lids.place_ball(side, centre, radius, lids.FORWARD), found)
+    edge = np.concatenate([lid_marks.upper[2:-2], lid_marks.lower[2:-2]])  # near the corners the lids leave the ball
+    off = _clearance(head, side, lids.place_ball(side, centre, radius, lids.FORWARD), lid_marks)
     start, size = centre, radius
     for _ in range(ROUNDS):
-        out, ahead = edge - centre, found.iris - centre
+        out, ahead = edge - centre, lid_marks.iris - centre
         far, front_far = np.linalg.norm(out, axis=1), np.linalg.norm(ahead)
         # where a ring of the iris' radius lies on the ball
-        front = np.sqrt(max(radius**2 - found.iris_radius**2, 1e-9))
+        front = np.sqrt(max(radius**2 - lid_marks.iris_radius**2, 1e-9))
         rows = np.concatenate([
             np.column_stack([-out / far[:, None], -np.ones(len(out))]) / RIM_SIGMA_M,
             np.append(-ahead / front_far, -radius / front)[None] / IRIS_SIGMA_M,
-            np.column_stack([-np.eye(3)[[0, 2]] / front_far, [0, 0]]) / GAZE_SIGMA,
+            np.column_stack([-np.eye(3)[[0, 2]] / front_far, [0, 0]]) / GAZE_SIGMA_RAD,
             np.column_stack([np.diag(1 / CENTRE_SIGMA_M), np.zeros(3)]),
-            np.array([[0, 0, 0, 1 / (RADIUS_SIGMA * size)]]),
+            np.array([[0, 0, 0, 1 / (RADIUS_SIGMA_SHARE * size)]]),
         ])
         left = np.concatenate([(radius + off - far) / RIM_SIGMA_M, [(front - front_far) / IRIS_SIGMA_M],
-                               -ahead[[0, 2]] / front_far / GAZE_SIGMA, (start - centre) / CENTRE_SIGMA_M,
-                               [(size - radius) / (RADIUS_SIGMA * size)]])
+                               -ahead[[0, 2]] / front_far / GAZE_SIGMA_RAD, (start - centre) / CENTRE_SIGMA_M,
+                               [(size - radius) / (RADIUS_SIGMA_SHARE * size)]])
         step = np.linalg.lstsq(rows, left, rcond=None)[0]
         centre, radius = centre + step[:3], radius + step[3]
-    ahead = found.iris - centre
+    ahead = lid_marks.iris - centre
     return lids.place_ball(side, centre, float(radius), ahead / np.linalg.norm(ahead))
 
 
-def _clearance(head: Mesh, side: int, ball: lids.PosedEyeball, found: LidMarks) -> np.ndarray:
-    """How far the lids' edges lie before the eyeball of this head, metres, where the marks of `found` are, but for two
-    at either end."""
-    opened = lids.open_around(head, (ball, ball), (USUAL, USUAL))  # the other side's lids are not looked at
+def _clearance(head: Mesh, side: int, ball: lids.PosedEyeball, lid_marks: LidMarks) -> np.ndarray:
+    """How far the lids' edges lie before the eyeball of this head, metres, where `lid_marks` are, but for two at
+    either end."""
+    opened = lids.open_around(
+        head, (ball, ball), (USUAL_OPENING, USUAL_OPENING)
+    )  # the other side's lids are not looked at
     outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
     off = []
-    for rim, marks in zip(opened.rims[side], (found.upper, found.lower), strict=True):
+    for rim, marks in zip(opened.rims[side], (lid_marks.upper, lid_marks.lower), strict=True):
         points = opened.skin.vertices[rim][::-1]  # as the marks: from the outer corner on
         clear = np.linalg.norm(points - ball.centre, axis=1) - ball.radius
         off.append(np.interp(_along(marks[2:-2], marks[0], marks[-1]), _along(points, outer, inner), clear))
@@ -152,40 +162,40 @@ def _along(points: np.ndarray, outer: np.ndarray, inner: np.ndarray) -> np.ndarr
     return (points - outer) @ (inner - outer) / ((inner - outer) ** 2).sum()
 
 
-def _openness(head: Mesh, balls: tuple, side: int, found: LidMarks | None, opening: float) -> float:
+def _openness(head: Mesh, balls: tuple, side: int, lid_marks: LidMarks | None, opening: float) -> float:
     """How far an eye is open, of MakeHuman's opening: that which brings the upper lid's edge nearest to the one seen,
     or the height between the lids to `opening` times the width."""
-    steps = np.linspace(0.0, OPENEST, 29)
+    steps = np.linspace(0.0, WIDEST_OPENING, 29)
     miss = []
     for step in steps:
         opened = lids.open_around(head, balls, (step, step))
         upper, lower = (opened.skin.vertices[rim] for rim in opened.rims[side])
-        if found is None:
+        if lid_marks is None:
             outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
             height = np.sort(np.linalg.norm(upper - lower, axis=1))[-len(upper) // 3:].mean()
             miss.append(abs(height / np.linalg.norm(outer - inner) - opening))
         else:
-            miss.append(np.abs((_aims(opened, side, 0, found) - upper)[:, 2]).mean())
+            miss.append(np.abs((_aims(opened, side, 0, lid_marks) - upper)[:, 2]).mean())
     return float(steps[np.argmin(miss)])
 
 
-def _aims(opened: lids.OpenHead, side: int, lid: int, found: LidMarks) -> np.ndarray:
+def _aims(opened: lids.OpenHead, side: int, lid: int, lid_marks: LidMarks) -> np.ndarray:
     """Where the vertices of an edge belong [N, 3]: on the curve through its marks, as far between the corners as they
     are on the head."""
     outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
     share = np.clip(_along(opened.skin.vertices[opened.rims[side][lid]], outer, inner), 0, 1)
-    marks = (found.upper, found.lower)[lid]
+    marks = (lid_marks.upper, lid_marks.lower)[lid]
     place = np.maximum.accumulate(_along(marks, marks[0], marks[-1]) + 1e-6 * np.arange(len(marks)))
     return PchipInterpolator(place, marks)(share)
 
 
-def _towards_rims(opened: lids.OpenHead, side: int, found: LidMarks) -> np.ndarray:
+def _towards_rims(opened: lids.OpenHead, side: int, lid_marks: LidMarks) -> np.ndarray:
     """What is left to the edges seen, on the edges and, fading, on the lids beside them [V + C + P, 3]; each lid
     follows its own edge."""
     vertices = opened.skin.vertices
     shift = np.zeros_like(vertices)
     for lid, rim in enumerate(opened.rims[side]):
-        off = _aims(opened, side, lid, found) - vertices[rim]
+        off = _aims(opened, side, lid, lid_marks) - vertices[rim]
         members = lids.rows_of_lid(side, lid)
         gap = np.linalg.norm(vertices[members, None] - vertices[rim][None], axis=2)
         weight = np.exp(-0.5 * (gap / RIM_REACH_M) ** 2)

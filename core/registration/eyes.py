@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 FRONTAL_DEG = 25.0
-OPEN = 0.22
+OPEN_RATIO = 0.22
 """Height over width of the opening beyond which an eye counts as open, by the narrower one of a frame: 0.07 to 0.2
 closed, 0.3 to 0.4 open."""
 LID_MARKS = (246, 161, 160, 159, 158, 157, 173, 7, 163, 144, 145, 153, 154, 155, 466, 388, 387, 386, 385, 384, 398, 249,
@@ -20,15 +20,15 @@ LID_MARKS = (246, 161, 160, 159, 158, 157, 173, 7, 163, 144, 145, 153, 154, 155,
 """MediaPipe's landmarks on the rims of the lids, corners left out: those stay put when an eye closes."""
 
 
-def opening(seen: list[tuple[float, tuple[float, float]]]) -> float:
+def opening(sights: list[tuple[float, tuple[float, float]]]) -> float:
     """The usual opening of the narrower eye over frames (yaw in degrees, openings of the right and left eye), those
     that look straight; nan if none."""
-    straight = [min(pair) for yaw, pair in seen if abs(yaw) < FRONTAL_DEG]
+    straight = [min(pair) for yaw, pair in sights if abs(yaw) < FRONTAL_DEG]
     return float(np.median(straight)) if straight else float("nan")
 
 
 def are_open(usual: float) -> bool:
-    return usual > OPEN  # false for nan: closed is what the template is
+    return usual > OPEN_RATIO  # false for nan: closed is what the template is
 
 
 def spared(follow: np.ndarray, trust: np.ndarray, lids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

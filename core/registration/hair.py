@@ -25,8 +25,15 @@ LEAST_LEFT_SHARE = 0.2
 
 
 def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) -> Mesh:
-    """The scan without the triangles of hair and cloth; head: the template, placed roughly, by which the pictures are
-    cut."""
+    """The scan without the triangles of hair and cloth.
+
+    Parameters
+    ----------
+    scan : in metres
+    views : with their pictures
+    head : the template, placed roughly, by which the pictures are cut
+    report : takes the share that goes
+    """
     normals, caster = vertex_normals(scan), raster.RayCaster(scan)
     share = hidden_share(scan.vertices, normals, views, head, report,
                          lambda view: raster.visible_from(caster, scan.vertices, normals, view.centre, offset=0.002))
@@ -38,8 +45,21 @@ def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) ->
 
 def hidden_share(points: np.ndarray, normals: np.ndarray, views: list[View], head: Mesh, report: Reporter,
                  visible=None) -> np.ndarray:
-    """Of points [N, 3] with unit normals: the mean share of hair and cloth over the views that face them and, by
-    visible(view) [N], see them; nan else."""
+    """The mean share of hair and cloth before points, over the views that face them.
+
+    Parameters
+    ----------
+    points : [N, 3], in metres
+    normals : [N, 3], unit
+    views : with their pictures
+    head : whose landmarks frame the parser's crop
+    report : hears whether it is cancelled
+    visible : view -> bool [N], whether it sees the points; None: all that face it
+
+    Returns
+    -------
+    [N] in [0, 1]; nan where no view tells.
+    """
     marks = template.landmark_points(head)
     total, votes = np.zeros(len(points)), np.zeros(len(points))
     for view in spread(views, MOST_VIEWS):

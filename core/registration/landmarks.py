@@ -29,15 +29,15 @@ BEHIND_FACE_M = 0.06
 class Landmarks:
     """points [468, 3] in metres (nan: not lifted), trust [468] in [0, 1], error_px the median reprojection error;
     images maps a frame's name to what was found in it: pixels [468, 2], and used bool [468]; opening of the eyes,
-    height over width; put bool [468]: which points the artist has given; eyes: by the name of a frame whose landmarks
-    were used the yaw of the head in degrees and the right and the left eye, in its pixels."""
+    height over width; by_artist bool [468]: which points the artist has given; eyes: by the name of a frame whose
+    landmarks were used the yaw of the head in degrees and the right and the left eye, in its pixels."""
 
     points: np.ndarray
     trust: np.ndarray
     error_px: float
     images: dict[str, tuple[np.ndarray, np.ndarray]]
     opening: float = float("nan")
-    put: np.ndarray = field(default_factory=lambda: np.zeros(468, bool))
+    by_artist: np.ndarray = field(default_factory=lambda: np.zeros(468, bool))
     eyes: Mapping[str, tuple[float, faces.Eye, faces.Eye]] = field(default_factory=dict)
 
 
@@ -128,48 +128,54 @@ def lift_alone(view: View, pixels: np.ndarray) -> Landmarks:
     return Landmarks(points, np.where(used, 0.25, 0.0), 0.0, {view.name: (pixels, used)})
 
 
-def onto_surface(found: Landmarks, views: list[View], mesh: Mesh, farthest: float = 0.02) -> Landmarks:
+def onto_surface(landmarks: Landmarks, views: list[View], mesh: Mesh, farthest: float = 0.02) -> Landmarks:
     """The same landmarks where their rays meet the scan, averaged over the views that see that side squarely.
 
     The net moves its marks over the skin as a head turns, so rays cross behind the skin; the template's marks were
-    found on its surface in this way, too. A landmark whose rays miss the scan, or meet it `farthest` metres away, stays
-    where it was.
+    found on its surface in this way, too.
+
+    Parameters
+    ----------
+    landmarks : as lifted, in metres
+    views : cameras, in the same world
+    mesh : the scan
+    farthest : metres; a landmark whose rays miss the scan, or meet it farther away, stays where it was
     """
-    caster, seen = RayCaster(mesh), [view for view in views if view.name in found.images]
+    caster, seen = RayCaster(mesh), [view for view in views if view.name in landmarks.images]
     hits, weights = [], []
     for view in seen:
-        pixels, used = found.images[view.name]
+        pixels, used = landmarks.images[view.name]
         origins = np.repeat(view.centre[None], len(pixels), 0)
         rays = view.rays(pixels)
         _, _, distance = caster.first_hits(origins, rays)
         hit = origins + rays * np.where(np.isfinite(distance), distance, 0)[:, None]
-        near = np.isfinite(distance) & (np.linalg.norm(hit - found.points, axis=1) < farthest)
+        near = np.isfinite(distance) & (np.linalg.norm(hit - landmarks.points, axis=1) < farthest)
         hits.append(hit)
-        weights.append(used * near * _facing(found.points, origins[:, None])[:, 0] ** 2)
+        weights.append(used * near * _facing(landmarks.points, origins[:, None])[:, 0] ** 2)
     hits, weights = np.stack(hits, 1), np.stack(weights, 1)  # [468, V, 3], [468, V]
     total = weights.sum(1)
     points = np.where((total > 0)[:, None], (hits * weights[..., None]).sum(1) / np.maximum(total, 1e-9)[:, None],
-                      found.points)
+                      landmarks.points)
     for _ in range(8):  # towards the geometric median: one view's slip does not count
         robust = weights / np.maximum(np.linalg.norm(hits - points[:, None], axis=-1), 5e-4)
         mean = (hits * robust[..., None]).sum(1) / np.maximum(robust.sum(1), 1e-9)[:, None]
-        points = np.where((total > 0)[:, None], mean, found.points)
-    return replace(found, points=points)
+        points = np.where((total > 0)[:, None], mean, landmarks.points)
+    return replace(landmarks, points=points)
 
 
-def with_artists(found: Landmarks, given: Mapping[int, tuple]) -> Landmarks:
+def with_artists(landmarks: Landmarks, placed: Mapping[int, tuple]) -> Landmarks:
     """The same landmarks with the artist's in their places, fully trusted."""
-    points, trust, put = found.points.copy(), found.trust.copy(), np.zeros(len(found.points), bool)
-    for index, point in given.items():
+    points, trust, put = landmarks.points.copy(), landmarks.trust.copy(), np.zeros(len(landmarks.points), bool)
+    for index, point in placed.items():
         points[index], trust[index], put[index] = point, 1.0, True
-    return replace(found, points=points, trust=trust, put=put)
+    return replace(landmarks, points=points, trust=trust, by_artist=put)
 
 
-def to_json(found: Landmarks) -> dict:
+def to_json(landmarks: Landmarks) -> dict:
     """What landmarks.json holds: points by index in metres, and by frame the pixels they were lifted from."""
-    points = {str(i): [round(float(x), 6) for x in p] for i, p in enumerate(found.points) if np.isfinite(p).all()}
+    points = {str(i): [round(float(x), 6) for x in p] for i, p in enumerate(landmarks.points) if np.isfinite(p).all()}
     seen = {name: {str(i): [round(float(x), 2) for x in pixels[i]] for i in np.flatnonzero(used)}
-            for name, (pixels, used) in found.images.items()}
+            for name, (pixels, used) in landmarks.images.items()}
     return {"points": points, "images": seen}
 
 

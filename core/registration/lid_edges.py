@@ -20,10 +20,10 @@ STAY_SIGMA_M = 0.006
 REACH_M, SLIP_M = 0.006, 0.0015
 """How far from the curve an edge is looked for, and a miss that counts half."""
 ROUNDS = 10
-LEVEL = 0.5
+EDGE_BALL_SHARE = 0.5
 """Share of the ball in a pixel at its edge."""
 STEP_PX = 0.2
-SPARED = 2
+SPARED_POINTS = 2
 """Points at either end of an edge that do not look for it: towards the corners the opening gets thinner than a
 pixel."""
 
@@ -52,7 +52,7 @@ def fit_edges(looks: list[EyeLook], expected: list[np.ndarray], upper: np.ndarra
     stiff = np.kron(bend.T @ bend, np.eye(3)) * (SMOOTH_M / spacing) ** 4 / SEEN_SIGMA_M**2
     place = np.arange(count)
     off_corner = np.minimum(np.minimum(place, count - place), np.abs(place - corner))
-    asks = off_corner > SPARED
+    asks = off_corner > SPARED_POINTS
     depth = np.linalg.norm(start - centre, axis=1)
     points, told = start.copy(), np.zeros(count, bool)
     beside = [_borders(one, share, start)[1] for one, share in zip(looks, expected, strict=True)]
@@ -82,10 +82,10 @@ def fit_edges(looks: list[EyeLook], expected: list[np.ndarray], upper: np.ndarra
     return points[:corner + 1], closed[corner:][::-1], float(told[asks].mean())
 
 
-def _borders(one: EyeLook, ball: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _borders(look: EyeLook, ball: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit directions [N, 3] across the curve `points` [N, 3] and out of the eye, as a view sees it, and how far along
     them [N] in metres the ball, by its share [SIDE, SIDE] of the crop, ends there, nan where it does not."""
-    view, move = one.view, one.shares.move
+    view, move = look.view, look.shares.move
     pixels, depth = view.project(points)
     at = pixels @ move[:, :2].T + move[:, 2]
     along = np.roll(at, -1, 0) - np.roll(at, 1, 0)
@@ -101,8 +101,8 @@ def _borders(one: EyeLook, ball: np.ndarray, points: np.ndarray) -> tuple[np.nda
     where = (at[:, None] + normal[:, None] * steps[:, None] - 0.5).astype(np.float32)
     share = cv2.remap(ball, where[..., 0], where[..., 1], cv2.INTER_LINEAR)
     before, after = share[:, :-1], share[:, 1:]
-    ends = steps[:-1] + STEP_PX * (before - LEVEL) / np.maximum(before - after, 1e-6)
-    ends = np.where((before >= LEVEL) & (after < LEVEL), ends, np.inf)
+    ends = steps[:-1] + STEP_PX * (before - EDGE_BALL_SHARE) / np.maximum(before - after, 1e-6)
+    ends = np.where((before >= EDGE_BALL_SHARE) & (after < EDGE_BALL_SHARE), ends, np.inf)
     nearest = ends[np.arange(len(at)), np.abs(ends).argmin(1)]
     across = normal @ np.linalg.inv(move[:, :2]).T
     direction = across[:, :1] * view.rotation[0] + across[:, 1:] * view.rotation[1]

@@ -11,18 +11,18 @@ import numpy as np
 
 from ..contract.messages import Reporter
 from ..face import lids
-from ..face.eye_reader import SIDE
+from ..face.eye_reader import SIDE_PX
 from ..geometry import raster
 from ..geometry.meshes import joined
 from .eye_looks import EyeLook
 from .irises import fit_iris
 from .lid_edges import SEEN_SIGMA_M, fit_edges
 
-MARKS = 9
+MARKS_PER_EDGE = 9
 """On each edge, from corner to corner."""
-LEAST_TOLD = 0.5
+LEAST_TOLD_SHARE = 0.5
 """Share of the edges' points that a view must tell of."""
-OVER = 2
+RAYS_PER_SIDE = 2
 """Rays along the side of a pixel of the crop."""
 LEAST_SEEN_PX = 30
 """Pixels of the crop that a ball must cover for its middle to be told."""
@@ -34,8 +34,9 @@ SLIP_M, ROUNDS = 0.0015, 8
 
 @dataclass(frozen=True)
 class LidMarks:
-    """Of one eye, metres: upper and lower edge of the lids [MARKS, 3], from the outer corner to the inner one, the ends
-    shared; iris [3]: the middle of the disc within the iris' edge, and its radius; views: how many told of them."""
+    """Of one eye, metres: upper and lower edge of the lids [MARKS_PER_EDGE, 3], from the outer corner to the inner one,
+    the ends shared; iris [3]: the middle of the disc within the iris' edge, and its radius; views: how many told of
+    them."""
 
     upper: np.ndarray
     lower: np.ndarray
@@ -45,8 +46,19 @@ class LidMarks:
 
 
 def mark(looks: list[EyeLook], opened: lids.OpenHead, side: int, report: Reporter) -> LidMarks | None:
-    """The marks of the left (0) or the right eye that fit what was seen of it, beginning with a head whose lids are
-    open about as wide; None where nothing was seen."""
+    """The marks of an eye's lids and iris that fit what was seen of it.
+
+    Parameters
+    ----------
+    looks : at this eye
+    opened : a head whose lids are open about as wide, where the fit begins
+    side : 0 for the left eye, 1 for the right
+    report : hears whether it is cancelled
+
+    Returns
+    -------
+    None where nothing was seen.
+    """
     if not looks:
         return None
     ball = opened.balls[side]
@@ -56,7 +68,7 @@ def mark(looks: list[EyeLook], opened: lids.OpenHead, side: int, report: Reporte
     begun = (edge + shift for edge in lids.edges(opened.skin.vertices, side))
     expected = _all_expected(looks, opened, side, shift, report)
     upper, lower, told = fit_edges(looks, expected, *begun, ball.centre + shift)
-    if told < LEAST_TOLD:
+    if told < LEAST_TOLD_SHARE:
         return None
     return LidMarks(_spread(upper), _spread(lower), iris, radius, len(looks))
 
@@ -67,21 +79,23 @@ def _all_expected(looks: list[EyeLook], opened: lids.OpenHead, side: int, shift:
     [3]."""
     parts = [mesh.moved(mesh.vertices + shift) for mesh in (opened.skin, opened.balls[side].mesh)]
     caster, first = raster.RayCaster(joined(parts)), len(opened.skin.faces)
-    y, x = (np.mgrid[0:SIDE * OVER, 0:SIDE * OVER] + 0.5) / OVER
+    y, x = (np.mgrid[0:SIDE_PX * RAYS_PER_SIDE, 0:SIDE_PX * RAYS_PER_SIDE] + 0.5) / RAYS_PER_SIDE
     expected = []
     for one in looks:
         report.check()
         move = one.shares.move
         rays = one.view.rays((np.stack([x.ravel(), y.ravel()], 1) - move[:, 2]) @ np.linalg.inv(move[:, :2]).T)
         face, _, _ = caster.first_hits(np.repeat(one.view.centre[None], len(rays), 0), rays)
-        expected.append((face >= first).reshape(SIDE, OVER, SIDE, OVER).mean((1, 3), dtype=np.float32))
+        expected.append(
+            (face >= first).reshape(SIDE_PX, RAYS_PER_SIDE, SIDE_PX, RAYS_PER_SIDE).mean((1, 3), dtype=np.float32)
+        )
     return expected
 
 
 def _offset(looks: list[EyeLook], expected: list[np.ndarray], centre: np.ndarray) -> np.ndarray:
     """How far an eyeball expected at `centre` [3] lies from there [3], metres, by the middles of what is seen of it: an
     edge tells little of a shift along it, and a head's lids may lie millimetres beside."""
-    y, x = np.mgrid[0:SIDE, 0:SIDE] + 0.5
+    y, x = np.mgrid[0:SIDE_PX, 0:SIDE_PX] + 0.5
     axes, misses = [], []
     for one, share in zip(looks, expected, strict=True):
         seen, move = one.shares.ball, one.shares.move
@@ -101,7 +115,7 @@ def _offset(looks: list[EyeLook], expected: list[np.ndarray], centre: np.ndarray
 
 
 def _spread(edge: np.ndarray) -> np.ndarray:
-    """MARKS points, evenly spread along an edge [N, 3]."""
+    """MARKS_PER_EDGE points, evenly spread along an edge [N, 3]."""
     along = np.append(0, np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1)))
-    at = np.linspace(0, along[-1], MARKS)
+    at = np.linspace(0, along[-1], MARKS_PER_EDGE)
     return np.stack([np.interp(at, along, edge[:, axis]) for axis in range(3)], 1)

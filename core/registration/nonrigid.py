@@ -40,13 +40,13 @@ PUT_AREA_M2 = 1e-3
 @dataclass(frozen=True)
 class LandmarkTargets:
     """Where landmarks should come to lie: points [468, 3] and trust [468] as in Landmarks; hold [468]: how much longer
-    one counts than the others (lips and lids); put bool [468]: those that are where they are said to be, whatever the
+    one counts than the others (lips and lids); fixed bool [468]: those that are where they are said to be, whatever the
     scan says (None: none)."""
 
     points: np.ndarray
     trust: np.ndarray
     hold: np.ndarray
-    put: np.ndarray | None = None
+    fixed: np.ndarray | None = None
 
 
 def fit(model: HeadModel, start: np.ndarray, scan: Scan, follow: np.ndarray, targets: LandmarkTargets, iterations: int,
@@ -67,7 +67,7 @@ def fit(model: HeadModel, start: np.ndarray, scan: Scan, follow: np.ndarray, tar
     -------
     Vertices [V, 3] in metres.
     """
-    points, trust, hold, put = targets.points, targets.trust, targets.hold, targets.put
+    points, trust, hold, put = targets.points, targets.trust, targets.hold, targets.fixed
     area, laplacian = operators(model.mesh.moved(start))
     marks = anchors(model)
     known = np.isfinite(points).all(1) & (trust * model.landmark_weight > 0)

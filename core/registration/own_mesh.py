@@ -58,10 +58,19 @@ def read(chosen: str, report: Reporter) -> OwnMesh:
 
 
 def with_usable_uvs(own: OwnMesh, skin: np.ndarray, allowed: bool, size: int) -> tuple[OwnMesh, str]:
-    """The mesh with UVs that a map can be painted in, and what was done to it. skin bool [F]: the triangles that will
-    be painted.
+    """The mesh with UVs that a map can be painted in, and what was done to it.
 
-    Raises Problem, saying what is wrong with its UVs, unless a new atlas is `allowed`.
+    Parameters
+    ----------
+    own : the artist's mesh
+    skin : bool [F], the triangles that will be painted
+    allowed : whether it may get a new atlas
+    size : of the map, in texels along a side
+
+    Raises
+    ------
+    Problem
+        Saying what is wrong with its UVs, unless a new atlas is allowed.
     """
     skin_mesh = replace(own.mesh, faces=own.mesh.faces[skin],
                         face_uvs=None if own.mesh.face_uvs is None else own.mesh.face_uvs[skin])

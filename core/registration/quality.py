@@ -45,20 +45,29 @@ class HeadFit:
     distances: np.ndarray
 
 
-def figures(report: Reporter, model: HeadModel, fit: HeadFit, found: Landmarks, follow: np.ndarray) -> None:
-    """Reports a fit's figures. follow [V]: the vertices above 0.5 are drawn to the scan, where there is one."""
+def figures(report: Reporter, model: HeadModel, fit: HeadFit, landmarks: Landmarks, follow: np.ndarray) -> None:
+    """Reports a fit's figures.
+
+    Parameters
+    ----------
+    report : takes them
+    model : the template
+    fit : to the scan or the views
+    landmarks : that were fitted
+    follow : [V] in [0, 1]; vertices above 0.5 are drawn to the scan, where there is one
+    """
     head, distances = fit.head, fit.distances
-    known = np.isfinite(found.points).all(1)
-    miss = np.linalg.norm(model.at_landmarks(head.vertices) - found.points, axis=1)
+    known = np.isfinite(landmarks.points).all(1)
+    miss = np.linalg.norm(model.at_landmarks(head.vertices) - landmarks.points, axis=1)
     face = (follow > 0.5)[head.faces].all(1)
     stretched = atlas.stretch(replace(head, faces=head.faces[face], face_uvs=head.face_uvs[face]))
-    report.figure("landmark_frames", len(found.images))
-    report.figure("landmark_reprojection_px", round(found.error_px, 2))
+    report.figure("landmark_frames", len(landmarks.images))
+    report.figure("landmark_reprojection_px", round(landmarks.error_px, 2))
     report.figure("landmark_residual_mm", round(1e3 * float(np.median(miss[known])), 2))
-    report.figure("landmarks_put_by_hand", int(found.put.sum()))
-    if found.put.any():
-        report.figure("put_landmark_residual_mm", round(1e3 * float(miss[found.put].max()), 2))
-    report.figure("eye_opening", round(found.opening, 2) if np.isfinite(found.opening) else None)
+    report.figure("landmarks_put_by_hand", int(landmarks.by_artist.sum()))
+    if landmarks.by_artist.any():
+        report.figure("put_landmark_residual_mm", round(1e3 * float(miss[landmarks.by_artist].max()), 2))
+    report.figure("eye_opening", round(landmarks.opening, 2) if np.isfinite(landmarks.opening) else None)
     report.figure("identity_norm", round(float(np.linalg.norm(fit.coefficients)), 2))
     report.figure("head_to_scan_median_mm", round(1e3 * float(np.median(distances)), 3) if len(distances) else None)
     report.figure("head_to_scan_p90_mm",
@@ -71,7 +80,22 @@ def figures(report: Reporter, model: HeadModel, fit: HeadFit, found: Landmarks, 
 
 def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follow: np.ndarray,
           least_share: float = LEAST_FOLLOWED_SHARE) -> None:
-    """Raises Problem where the fit does not hold; tells which side of the face the scan does not show."""
+    """Whether the fit holds; the report is told which side of the face the scan does not show.
+
+    Parameters
+    ----------
+    report : takes the findings
+    head : as fitted, in metres
+    scan : that it was fitted to
+    distances : [N], metres from the scan, of the vertices that have it in reach
+    follow : [V] in [0, 1], above 0.5 the face
+    least_share : of the face that must have the scan in reach
+
+    Raises
+    ------
+    Unlike
+        Where the fit does not hold.
+    """
     wanted = follow > 0.5
     if len(distances) < least_share * wanted.sum():
         raise Unlike(f"The head could not be laid over the scan of the face: only "
@@ -138,10 +162,10 @@ def views_apart(views: list[View], head: Mesh) -> int:
     return best
 
 
-def _sides(head: Mesh, wanted: np.ndarray) -> dict[str, np.ndarray]:
+def _sides(head: Mesh, face_vertices: np.ndarray) -> dict[str, np.ndarray]:
     """Parts of the face as the person has them: bool [V] each."""
     x, _, z = head.vertices.T
-    middle, low, high = np.median(x[wanted]), *np.percentile(z[wanted], [15, 85])
-    return {"the right side of the face": wanted & (x < middle - 0.02),
-            "the left side of the face": wanted & (x > middle + 0.02),
-            "the chin": wanted & (z < low), "the forehead": wanted & (z > high)}
+    middle, low, high = np.median(x[face_vertices]), *np.percentile(z[face_vertices], [15, 85])
+    return {"the right side of the face": face_vertices & (x < middle - 0.02),
+            "the left side of the face": face_vertices & (x > middle + 0.02),
+            "the chin": face_vertices & (z < low), "the forehead": face_vertices & (z > high)}

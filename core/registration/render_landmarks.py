@@ -169,7 +169,14 @@ def _turns() -> list[np.ndarray]:
 
 
 def view_from(yaw: float, pitch: float, size: int, extent: float) -> View:
-    """A camera that sees a square of side `extent` around the origin, from `yaw` and `pitch` degrees off the front."""
+    """A camera that sees a square around the origin.
+
+    Parameters
+    ----------
+    yaw, pitch : degrees off the front
+    size : of its picture, in pixels
+    extent : side of the square, in the mesh's units
+    """
     yaw, pitch = np.radians(yaw), np.radians(pitch)
     towards = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
     right = np.array([np.cos(yaw), np.sin(yaw), 0])
@@ -180,7 +187,19 @@ def view_from(yaw: float, pitch: float, size: int, extent: float) -> View:
 
 
 def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, view: View) -> np.ndarray:
-    """A Lambert picture, sRGB [S, S, 3], lit from above the camera; surfaces are lit on the side that is seen."""
+    """A Lambert picture, lit from above the camera; surfaces are lit on the side that is seen.
+
+    Parameters
+    ----------
+    caster : of the mesh
+    normals : [V, 3], unit
+    colours : [V, 3], linear albedo
+    view : the camera
+
+    Returns
+    -------
+    [S, S, 3], sRGB.
+    """
     face, bary, _ = raster.render_view(caster, view)
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)

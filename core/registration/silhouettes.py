@@ -43,8 +43,16 @@ class Outline:
 
 
 def prepare(view: View, mesh: Mesh, follow: np.ndarray, scale: float = 1.0) -> Outline:
-    """Skin and person in a view's picture; skin is what looks like the pixels that the followed part of the mesh [V]
-    covers."""
+    """Skin and person in a view's picture; skin is what looks like the pixels that the followed part of the mesh
+    covers.
+
+    Parameters
+    ----------
+    view : with its picture
+    mesh : in metres, about where it lies
+    follow : [V] in [0, 1], above 0.5 the followed part
+    scale : of the picture that is worked on
+    """
     picture = images.read_srgb(view.path)
     height, width = round(view.height * scale), round(view.width * scale)
     picture = images.resize(picture, width, height) if (height, width) != picture.shape[:2] else picture
@@ -63,8 +71,16 @@ def prepare(view: View, mesh: Mesh, follow: np.ndarray, scale: float = 1.0) -> O
 
 
 def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray, reach_m: float) -> Constraints:
-    """One constraint per vertex of the mesh's outline in this view that lies on the followed part (follow [V]), where
-    skin meets background within `reach_m` metres; edges: `edges_of` the mesh."""
+    """One constraint per vertex of the mesh's outline in this view, where skin meets background.
+
+    Parameters
+    ----------
+    outline : of the view's picture
+    mesh : in metres
+    edges : `edges_of` the mesh
+    follow : [V] in [0, 1], the part whose outline counts
+    reach_m : metres within which the border is looked for
+    """
     view, scale = outline.view, outline.scale
     pixels, depth = view.project(mesh.vertices)
     normals = vertex_normals(mesh)

@@ -26,7 +26,7 @@ from .landmarks import Landmarks
 SIGMA_M = {"landmarks": 0.0025, "points": 0.0015, "outlines": 0.0015}
 """How far each kind lies from the nearest head of the identity space, roughly: a net's marks err by themselves, the
 others by what that space lacks."""
-INDEPENDENT = {"landmarks": 120, "points": 200, "outlines": 100}
+INDEPENDENT_COUNTS = {"landmarks": 120, "points": 200, "outlines": 100}
 """How many of each kind count as independent; neighbours err together."""
 ROUNDS = 10
 OUTLINE_PX = 960
@@ -43,9 +43,9 @@ MOST_AREA_M2 = 4e-5
 """That a single one counts for."""
 PULL = 0.02
 """Weight of staying where the identity fit is, against data of weight one."""
-HELD = 10.0
+HELD_PULL = 10.0
 """The same for what lies on a scan."""
-STEPS = 8
+STEPS = 8  # of the relaxation, from STIFF_M to SOFT_M
 
 
 @dataclass(frozen=True)
@@ -86,13 +86,13 @@ class _ViewConstraints:
     """What draws a head towards what its views show: with the outlines in them, and the mesh's edges."""
 
     model: HeadModel
-    shown: ShownByViews
+    evidence: ShownByViews
     outlines: list
     edges: np.ndarray
 
     def of(self, mesh: Mesh, reach: float) -> dict[str, Constraints]:
         """By kind, for a head as it lies now. reach: metres by which a point or outline may lie off."""
-        shown = self.shown
+        shown = self.evidence
         return {"landmarks": from_landmarks(self.model, mesh.vertices, shown.views, shown.landmarks, shown.trust,
                                             max(reach, 0.006)),
                 "points": from_points(mesh, shown.follow, shown.points.places, shown.points.towards, reach),
@@ -100,13 +100,13 @@ class _ViewConstraints:
                                     for outline in self.outlines])}
 
 
-def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, steps: float) -> FittedHead:
+def fit(model: HeadModel, evidence: ShownByViews, report: Reporter, first: float, steps: float) -> FittedHead:
     """The head that the views show.
 
     Parameters
     ----------
     model : the template with its identity space
-    shown : what is to be explained, in metres
+    evidence : what is to be explained, in metres
     report : hears of progress, from `first` to `steps`
     first, steps : where the progress of this part of the stage begins, and where it ends
 
@@ -114,10 +114,10 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
     -------
     The fit, in the world of the views, metres.
     """
-    landmarks = shown.landmarks
-    pose, coefficients = fit_landmarks(model, landmarks.points, shown.trust)
+    landmarks = evidence.landmarks
+    pose, coefficients = fit_landmarks(model, landmarks.points, evidence.trust)
     start = model.mesh.moved(pose.apply(model.shape(coefficients)))
-    constraints = _view_constraints(model, start, shown, lambda share, what: report.progress(
+    constraints = _view_constraints(model, start, evidence, lambda share, what: report.progress(
         first + 0.4 * (steps - first) * share, steps, what))
     parts: dict[str, Constraints] = {}
     for step in range(ROUNDS):
@@ -127,7 +127,7 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
         rows = []
         for name, ties in parts.items():
             basis = ties.at(model.identity)  # [K, M, 3]
-            weight = ties.weight * min(1.0, INDEPENDENT[name] / max(ties.weight.sum(), 1)) / SIGMA_M[name] ** 2
+            weight = ties.weight * min(1.0, INDEPENDENT_COUNTS[name] / max(ties.weight.sum(), 1)) / SIGMA_M[name] ** 2
             rows.append((ties.at(mesh.vertices), basis, ties.direction, ties.distance, weight))
         pose, coefficients = stepped(pose, coefficients, rows)
     vertices = pose.apply(model.shape(coefficients))
@@ -142,7 +142,7 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
                        for name, ties in parts.items()})
 
 
-def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, shown: ShownByViews, report: Reporter,
+def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, evidence: ShownByViews, report: Reporter,
                 first: float, steps: float) -> np.ndarray:
     """A head that lies on a scan, where the scan ends drawn towards what the views show: jaw, temples and ears are seen
     as outlines and matched points long before a dense surface of them can be measured.
@@ -152,7 +152,7 @@ def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, sho
     model : the template
     vertices : [V, 3] in metres, as the scan's fit left them
     on_scan : bool [V]: they lie on the scan, and stay
-    shown : what is to be explained, in the same world
+    evidence : what is to be explained, in the same world
     report : hears of progress, from `first` to `steps`
     first, steps : where the progress of this part of the stage begins, and where it ends
 
@@ -160,9 +160,9 @@ def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, sho
     -------
     Vertices [V, 3].
     """
-    all_of_it = _view_constraints(model, model.mesh.moved(vertices), shown, lambda share, what: report.progress(
+    all_of_it = _view_constraints(model, model.mesh.moved(vertices), evidence, lambda share, what: report.progress(
         first + 0.8 * (steps - first) * share, steps, what))
-    constraints = replace(all_of_it, shown=replace(shown, follow=np.where(on_scan, 0, shown.follow)))
+    constraints = replace(all_of_it, evidence=replace(evidence, follow=np.where(on_scan, 0, evidence.follow)))
 
     def tell(step: int) -> None:
         report.progress(first + (steps - first) * (0.8 + 0.2 * step / STEPS), steps, "fitting the head beyond the scan")
@@ -170,21 +170,21 @@ def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, sho
     def told(mesh: Mesh) -> dict[str, Constraints]:
         return {name: ties for name, ties in constraints.of(mesh, REACH_M[0]).items() if name != "landmarks"}
 
-    return _relaxed(model, vertices, told, shown.landmarks, tell, np.where(on_scan, HELD, PULL))
+    return _relaxed(model, vertices, told, evidence.landmarks, tell, np.where(on_scan, HELD_PULL, PULL))
 
 
-def _view_constraints(model: HeadModel, start: Mesh, shown: ShownByViews,
+def _view_constraints(model: HeadModel, start: Mesh, evidence: ShownByViews,
                       tell: Callable[[float, str], None]) -> _ViewConstraints:
     """With the outlines of the views' pictures, which are found about the head `start`; tell(share done, what)."""
-    outlines, views = [], shown.views
+    outlines, views = [], evidence.views
     for i, view in enumerate(views):
         tell(i / len(views), f"looking for the outline of the face in {view.name}")
         scale = min(1.0, OUTLINE_PX / max(view.width, view.height))
-        outlines.append(silhouettes.prepare(view, start, shown.follow, scale))
-    return _ViewConstraints(model, shown, outlines, silhouettes.edges_of(model.mesh))
+        outlines.append(silhouettes.prepare(view, start, evidence.follow, scale))
+    return _ViewConstraints(model, evidence, outlines, silhouettes.edges_of(model.mesh))
 
 
-def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks, tick,
+def _relaxed(model: HeadModel, start: np.ndarray, constraints, landmarks: Landmarks, tick,
              pull: np.ndarray | float = PULL) -> np.ndarray:
     """Vertices [V, 3]: thin-plate displacements of `start`, stiff to soft; constraints(mesh) -> {kind: Constraints}."""
     area, laplacian = nonrigid.operators(model.mesh.moved(start))
@@ -204,10 +204,10 @@ def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks,
             matrix = matrix + picked.T @ sparse.diags(weight) @ picked
             aim = picked @ (vertices - start) + ties.direction * ties.distance[:, None]
             right += picked.T @ (weight[:, None] * aim)
-        if found.put.any():
-            pins = sparse.diags(np.where(found.put, nonrigid.PUT_AREA_M2, 0.0))
+        if landmarks.by_artist.any():
+            pins = sparse.diags(np.where(landmarks.by_artist, nonrigid.PUT_AREA_M2, 0.0))
             matrix = matrix + anchors.T @ pins @ anchors
-            right += anchors.T @ (pins @ (np.nan_to_num(found.points) - anchors @ start))
+            right += anchors.T @ (pins @ (np.nan_to_num(landmarks.points) - anchors @ start))
         solver = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                       options={"SymmetricMode": True})
         vertices = start + solver.solve(right)

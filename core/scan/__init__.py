@@ -23,9 +23,9 @@ from ..geometry.views import View, read_points, read_views
 from ..imaging import images
 from . import rounds, splats
 
-HEAD_BOX = np.array([[-0.13, -0.08, -0.21], [0.13, 0.21, 0.19]])
+HEAD_BOX_M = np.array([[-0.13, -0.08, -0.21], [0.13, 0.21, 0.19]])
 """Where a head lies in its world, in metres: the origin is midway between the eyes, the face looks along -Y."""
-MOST_DISAGREEING = 0.03
+MOST_DISAGREEING_SHARE = 0.03
 """Share of the surface that hair and highlights may take; more is a subject that moved."""
 
 
@@ -37,9 +37,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     frames = read_frames(capture).by_name
     sharpness = np.array([frames[view.name].sharpness for view in views])
     by_splats = splats.use_splats(settings.scan.method, settings.compute_device)
-    fused, maps = rounds.measure(views, sharpness, settings.scan.pairs, settings.scan.voxel_mm / 1000, HEAD_BOX, report)
+    fused, maps = rounds.measure(
+        views, sharpness, settings.scan.pairs, settings.scan.voxel_mm / 1000, HEAD_BOX_M, report
+    )
     if fused is not None and by_splats:
-        fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX,
+        fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX_M,
                                      settings.compute_device, report)
     if fused is None or len(fused.mesh.faces) < 1000:
         _without_surface(capture, report)
@@ -56,7 +58,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if not by_splats:
         report.figure("left_right_disagreement_px", round(float(np.nanmedian([seen.disagreement for seen in maps])), 3))
     report.figure("seconds", round(time.monotonic() - started, 1))
-    if fused.disagreeing > MOST_DISAGREEING:
+    if fused.disagreeing > MOST_DISAGREEING_SHARE:
         report.finding(f"The frames disagree about {100 * fused.disagreeing:.0f} % of the surface; it was left out of "
                        "the scan.",
                        "Film again with the head kept still, the hair tied back and nothing shiny on the skin.")
@@ -65,7 +67,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 def _without_surface(capture: Capture, report: Reporter) -> None:
     points = read_points(capture)[0]
-    points = points[((points > HEAD_BOX[0]) & (points < HEAD_BOX[1])).all(1)]
+    points = points[((points > HEAD_BOX_M[0]) & (points < HEAD_BOX_M[1])).all(1)]
     meshes.write_points(capture.scan, points)
     remove_file(capture.picture("scan", "surface"))
     report.figure("method", "none")

@@ -17,9 +17,16 @@ sees little but the same picture larger."""
 
 def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int,
                  baselines: tuple = BASELINES_DEG) -> list[tuple[int, int]]:
-    """At most `count` pairs of cameras at centres [N, 3] (the head at the origin), spread over the directions they look
-    from; the sharper [N], and those that lie side by side, preferred. Wider or narrower baselines are taken only where
-    the best range leaves a direction without a pair."""
+    """Pairs of cameras, spread over the directions they look from. Wider or narrower baselines are taken only where the
+    best range leaves a direction without a pair.
+
+    Parameters
+    ----------
+    centres : [N, 3], of the cameras; the head lies at the origin
+    sharpness : [N]; the sharper, and those that lie side by side, are preferred
+    count : of pairs, at most
+    baselines : ranges of degrees between two cameras as the head sees them, the best first
+    """
     directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
     first, second = np.triu_indices(len(centres), 1)
     angle = np.degrees(np.arccos(np.clip((directions[first] * directions[second]).sum(1), -1, 1)))

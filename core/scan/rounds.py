@@ -26,7 +26,7 @@ from .stereo import DepthMap, match_pair
 
 HEAD_WIDTH_M, HEAD_WIDTH_PX = 0.15, 310
 """A head is matched at about this width in pixels: finer pictures cost time without gain; nothing is enlarged."""
-MARGIN_M = 0.005
+MARGIN_M = 0.005  # around a round's surface, in which the next one measures
 
 
 @dataclass(frozen=True)
@@ -39,15 +39,28 @@ class Round:
     voxels: float
 
 
-NEAR, WIDE = ((6.0, 12.0), (2.5, 14.0), (1.5, 30.0)), ((13.0, 24.0), (9.0, 30.0))
-ROUNDS = (Round(((0.6, BASELINES_DEG),), 0.5, 2.0), Round(((0.6, NEAR),), 0.7, 1.4),
-          Round(((0.4, NEAR), (0.6, WIDE)), 1.0, 1.0))
+NEAR_DEG, WIDE_DEG = ((6.0, 12.0), (2.5, 14.0), (1.5, 30.0)), ((13.0, 24.0), (9.0, 30.0))
+ROUNDS = (Round(((0.6, BASELINES_DEG),), 0.5, 2.0), Round(((0.6, NEAR_DEG),), 0.7, 1.4),
+          Round(((0.4, NEAR_DEG), (0.6, WIDE_DEG)), 1.0, 1.0))
 
 
 def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, box: np.ndarray,
             report: Reporter) -> tuple[Fused | None, list[DepthMap]]:
-    """The surface within the box [2, 3] from at most `pairs` pairs a round, and the last round's depth maps; sharpness
-    [V]; voxel in metres."""
+    """The surface by stereo, coarse to fine.
+
+    Parameters
+    ----------
+    views : with their pictures
+    sharpness : [N], of the views
+    pairs : at most, in a round
+    voxel : side, in metres
+    box : [2, 3], low and high corner, in metres
+    report : hears of progress
+
+    Returns
+    -------
+    The surface, None where there is none, and the last round's depth maps.
+    """
     centres = np.array([view.centre for view in views])
     plans = [[pair for share, baselines in now.sorts
               for pair in choose_pairs(centres, sharpness, max(2, round(share * pairs)), baselines)] for now in ROUNDS]
@@ -55,8 +68,8 @@ def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, 
     done, guide, fused, maps = 0.0, None, None, []
     mask = _remembering()
     for plan, now in zip(plans, ROUNDS, strict=True):
-        def tick(part: float, text: str, start: float = done, unit: float = now.scale**2) -> None:
-            report.progress(start + unit * part, steps, text)
+        def tick(share: float, text: str, start: float = done, unit: float = now.scale**2) -> None:
+            report.progress(start + unit * share, steps, text)
 
         seen = _match(views, plan, now.scale, box, guide, mask, tick)
         if guide:  # the nearer pairs of the round before fill what the wide ones cannot match; they weigh little

@@ -28,17 +28,17 @@ from .fusion import Fused, fuse
 from .stereo import DepthMap, warp
 
 STEPS = 6000
-RATES = {"means": 3e-4, "log_scales": 5e-3, "quats": 2e-3, "logits": 2e-2, "colours": 1e-2}
+LEARNING_RATES = {"means": 3e-4, "log_scales": 5e-3, "quats": 2e-3, "logits": 2e-2, "colours": 1e-2}
 """Adam's step sizes; that of the means is in metres and falls to a tenth."""
-SSIM, NORMAL, DISTORTION, OUTSIDE = 0.2, 0.02, 10.0, 0.1
+SSIM_WEIGHT, NORMAL_WEIGHT, DISTORTION_WEIGHT, OUTSIDE_WEIGHT = 0.2, 0.02, 10.0, 0.1
 """Weights beside L1: structure, normals that agree with the depth, surfels of a ray close together, nothing outside the
 person."""
-WARM_UP = 0.5
+WARM_UP_SHARE = 0.5
 """Share of the steps before normals and distortion count."""
-WIDTH = 0.35
+WIDTH_SPACINGS = 0.35
 """A surfel's deviation when training begins, in spacings: wide ones overlap, the nearer hides the farther, and the
 surface is pushed away from all cameras."""
-LEAST_ALPHA = 0.5
+LEAST_ALPHA = 0.5  # below, a pixel has no depth
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,21 @@ def gsplats() -> Callable:
 
 def measure(start: Mesh, views: list[View], voxel: float, box: np.ndarray, device: str,
             report: Reporter) -> tuple[Fused | None, list[DepthMap]]:
-    """The surface within the box [2, 3] that surfels trained on all views show, and its depth maps; `start` as in
-    train, voxel in metres."""
+    """The surface that surfels trained on all views show.
+
+    Parameters
+    ----------
+    start : as in `train`
+    views : with their pictures
+    voxel : side, in metres
+    box : [2, 3], low and high corner, in metres
+    device : that torch computes on
+    report : hears of progress
+
+    Returns
+    -------
+    The surface, None where there is none, and its depth maps.
+    """
     photographs = [_photograph(view) for view in views]
 
     def tell(step: int, loss: float) -> None:
@@ -90,13 +103,15 @@ def train(start: Mesh, photographs: list[UndistortedFrame], rasterize: Callable,
     """Depth maps of the trained surfels, one per photograph. `start`: a surface that is nearly right, its vertices as
     dense as the surfels shall be."""
     surfels = _surfels(start, photographs, device)
-    optimiser = torch.optim.Adam([{"params": [surfels[name]], "lr": rate} for name, rate in RATES.items()], eps=1e-15)
+    optimiser = torch.optim.Adam(
+        [{"params": [surfels[name]], "lr": rate} for name, rate in LEARNING_RATES.items()], eps=1e-15
+    )
     order = np.random.default_rng(0).permutation(max(steps, len(photographs))) % len(photographs)
     for step in range(steps):
-        optimiser.param_groups[0]["lr"] = RATES["means"] * 0.1 ** (step / steps)
+        optimiser.param_groups[0]["lr"] = LEARNING_RATES["means"] * 0.1 ** (step / steps)
         photograph = photographs[order[step]]
         rendered = _render(surfels, photograph, rasterize, device)
-        loss = _loss(rendered, photograph, device, geometry=step >= WARM_UP * steps)
+        loss = _loss(rendered, photograph, device, geometry=step >= WARM_UP_SHARE * steps)
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
@@ -115,14 +130,14 @@ def _photograph(view: View) -> UndistortedFrame:
 
 
 def _surfels(mesh: Mesh, photographs: list[UndistortedFrame], device: str) -> dict[str, Tensor]:
-    """Discs on the mesh's vertices, WIDTH of how far the vertices lie apart in deviation, with the mean colour of the
-    frames that look at them."""
+    """Discs on the mesh's vertices, WIDTH_SPACINGS of how far the vertices lie apart in deviation, with the mean colour
+    of the frames that look at them."""
     normals = vertex_normals(mesh)
     spacing = cKDTree(mesh.vertices).query(mesh.vertices, 4)[0][:, 1:].mean(1)
     # turns +z to the normal
     half = np.concatenate([1 + normals[:, 2:], -normals[:, 1:2], normals[:, :1], np.zeros((len(normals), 1))], 1)
     half[normals[:, 2] < -0.9999] = (0, 1, 0, 0)
-    scales = np.stack([WIDTH * spacing, WIDTH * spacing, np.full_like(spacing, 1e-5)], 1)
+    scales = np.stack([WIDTH_SPACINGS * spacing, WIDTH_SPACINGS * spacing, np.full_like(spacing, 1e-5)], 1)
     start = {"means": mesh.vertices, "quats": half / np.linalg.norm(half, axis=1, keepdims=True),
              "log_scales": np.log(np.maximum(scales, 1e-6)),
              "logits": np.full(len(normals), 3.0),
@@ -167,11 +182,15 @@ def _loss(rendered: tuple, p: UndistortedFrame, device: str, geometry: bool) -> 
     mask = torch.tensor(p.mask, dtype=torch.float32, device=device)[..., None]
     target = torch.tensor(p.picture, dtype=torch.float32, device=device) * mask
     shown = colour * mask  # black behind; what surfels show outside the person is held down by their alpha
-    loss = (1 - SSIM) * (shown - target).abs().mean() + SSIM * (1 - _ssim(shown, target))
-    loss = loss + OUTSIDE * (alpha * (1 - mask)).mean()
+    loss = (1 - SSIM_WEIGHT) * (shown - target).abs().mean() + SSIM_WEIGHT * (1 - _ssim(shown, target))
+    loss = loss + OUTSIDE_WEIGHT * (alpha * (1 - mask)).mean()
     if geometry:
         agree = (normals * depth_normals).sum(-1, keepdim=True) * alpha.detach()
-        loss = loss + NORMAL * ((alpha.detach() - agree) * mask).mean() + DISTORTION * (distortion * mask).mean()
+        loss = (
+            loss
+            + NORMAL_WEIGHT * ((alpha.detach() - agree) * mask).mean()
+            + DISTORTION_WEIGHT * (distortion * mask).mean()
+        )
     return loss
 
 

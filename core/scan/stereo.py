@@ -19,15 +19,15 @@ import numpy as np
 from ..geometry.raster import RayCaster, bleed
 from ..geometry.views import View
 
-BLOCK = 5
+BLOCK_PX = 5
 EASY_DEG = 8.0
 """Up to this baseline neighbouring frames look alike; beyond, matching leans more on smoothness, with the square of the
 angle up to four times."""
 AGREE_PX = 1.0
 """Most a pixel's disparity may differ between the matches from left to right and from right to left."""
-GUIDED = 32
+GUIDED_PX = 32
 """Disparities that are looked at around a guide's, in pixels."""
-GUIDE_STEP = 3
+GUIDE_STEP_PX = 3
 """Every how many pixels a ray asks for the guide, which is coarse."""
 HIDDEN_PX, RIM_PX = 6.0, 4
 """A spot whose disparity the second view's guide contradicts by more is hidden from it; how far beyond its rim a guide
@@ -51,11 +51,20 @@ class DepthMap:
 
 def match_pair(first: View, second: View, pictures: tuple, masks: tuple, box: np.ndarray, scale: float = 1.0,
                guide: RayCaster | None = None) -> DepthMap | None:
-    """Depth seen from one of two views within the box [2, 3] (low and high corner, world metres); None where they share
-    nothing.
+    """Depth seen from one of two views. The baseline may have any direction in the picture.
 
-    pictures: sRGB [H, W, 3]; masks: bool [H, W] of what may be matched. The baseline may have any direction in the
-    picture.
+    Parameters
+    ----------
+    first, second : the views
+    pictures : [H, W, 3] each, sRGB
+    masks : bool [H, W] each, what may be matched
+    box : [2, 3], low and high corner, in metres
+    scale : of the pictures that are matched
+    guide : a coarser surface, around which depths are looked for
+
+    Returns
+    -------
+    None where the views share nothing.
     """
     baseline = second.centre - first.centre
     if baseline @ first.rotation[0] < 0:  # so that the rectified pictures stay within 90 degrees of upright
@@ -69,7 +78,7 @@ def match_pair(first: View, second: View, pictures: tuple, masks: tuple, box: np
     low, high = (focal * left[:, :2] / left[:, 2:]).min(0), (focal * left[:, :2] / left[:, 2:]).max(0)
     length = np.linalg.norm(baseline)
     nearest, farthest = focal * length / left[:, 2].min(), focal * length / left[:, 2].max()
-    count = GUIDED if guide else int(np.ceil((nearest - farthest) / 16 + 0.5)) * 16
+    count = GUIDED_PX if guide else int(np.ceil((nearest - farthest) / 16 + 0.5)) * 16
     # the right picture reaches `count` pixels further left
     width, height = np.ceil(high - low).astype(int) + (count, 0)
     origin = np.floor(low) - (count, 0)
@@ -116,13 +125,13 @@ def _disparities(guide: RayCaster, centre: np.ndarray, rotation: np.ndarray, foc
                  shape: tuple, length: float) -> tuple:
     """The guide's disparities float32 [H, W], each pixel off it given its nearest one's, and bool [H, W] where it
     is."""
-    y, x = np.mgrid[0:shape[0]:GUIDE_STEP, 0:shape[1]:GUIDE_STEP]
+    y, x = np.mgrid[0:shape[0]:GUIDE_STEP_PX, 0:shape[1]:GUIDE_STEP_PX]
     rays = np.stack([(x.ravel() + 0.5 + origin[0]) / focal, (y.ravel() + 0.5 + origin[1]) / focal, np.ones(x.size)], -1)
     norms = np.linalg.norm(rays, axis=1)
     _, _, distance = guide.first_hits(np.repeat(centre[None], len(rays), 0), (rays / norms[:, None]) @ rotation)
     known = np.isfinite(distance).reshape(x.shape)
     disparity = bleed((focal * length / (distance / norms)).reshape(x.shape).astype(np.float32), known)
-    fy, fx = np.mgrid[0:shape[0], 0:shape[1]].astype(np.float32) / GUIDE_STEP
+    fy, fx = np.mgrid[0:shape[0], 0:shape[1]].astype(np.float32) / GUIDE_STEP_PX
     return (cv2.remap(disparity, fx, fy, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
             cv2.remap(known.astype(np.uint8), fx, fy, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0)
 
@@ -137,8 +146,22 @@ def _rectify(baseline: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 def warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarray, focal: float, origin: np.ndarray,
          move: np.ndarray) -> tuple:
-    """The view through the rectified camera, each pixel read `move` [H, W] further left: uint8 [H, W, 3] and bool [H,
-    W]. Lens distortion is taken out on the way."""
+    """A view through the rectified camera. Lens distortion is taken out on the way.
+
+    Parameters
+    ----------
+    view : the camera
+    picture : [H, W, 3], sRGB
+    mask : bool [H, W], what may be matched
+    rotation : [3, 3], of the rectified camera
+    focal : of it, in pixels
+    origin : [2], its principal point is at minus this, in pixels
+    move : [h, w], pixels further left at which each pixel is read
+
+    Returns
+    -------
+    uint8 [h, w, 3] and bool [h, w].
+    """
     step = 4  # the lens's map is smooth: computed on a grid, then interpolated
     height, width = move.shape
     first, last = int(np.floor(min(0, -move.max()))), int(np.ceil(width + max(0, -move.min())))
@@ -158,8 +181,8 @@ def warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarray
 def _match(a: np.ndarray, b: np.ndarray, mask_a: np.ndarray, mask_b: np.ndarray, count: int,
            stiffness: float) -> tuple[np.ndarray, float]:
     """Disparities float32 [H, W] of `a` into `b` (0: unknown) and the median disagreement of the two directions."""
-    penalty = round(2 * 3 * BLOCK**2 * stiffness)  # a quarter of what is usual: stronger ones flatten the nose
-    matcher = cv2.StereoSGBM_create(0, count, BLOCK, P1=penalty, P2=4 * penalty, disp12MaxDiff=-1, preFilterCap=31,
+    penalty = round(2 * 3 * BLOCK_PX**2 * stiffness)  # a quarter of what is usual: stronger ones flatten the nose
+    matcher = cv2.StereoSGBM_create(0, count, BLOCK_PX, P1=penalty, P2=4 * penalty, disp12MaxDiff=-1, preFilterCap=31,
                                     uniquenessRatio=0, speckleWindowSize=0, speckleRange=0,
                                     mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY)
     back = cv2.ximgproc.createRightMatcher(matcher)

@@ -29,9 +29,9 @@ from .snap import snapped
 from .sunless import out_of_sun
 from .tidy import cohere, over_brows, tidy
 
-WORKING_SIZE = 512
-SEEN = 0.05  # least confidence of a texel that is judged
-SKY_RAYS = 64
+WORKING_SIZE = 512  # texels along a side; smaller textures are judged as they are
+MIN_CONFIDENCE = 0.05  # least confidence of a texel that is judged
+SKY_RAYS = 64  # of each vertex, for how much of the sky it sees
 UNLIKE_SKIN = ("lips", "brows", "eyes", "nostrils", "scalp")  # their darkness is their own
 
 
@@ -89,27 +89,47 @@ class Proposal:
     edges: np.ndarray
 
 
-def propose(evidence: ShadowEvidence, seen: np.ndarray, sensitivity: float, dilate_px: float) -> Proposal:
-    """The proposal from the evidence and where the frames or the filmed texture show a shadow, bool [S, S]. dilate_px:
-    at 1024 texels.
+def propose(evidence: ShadowEvidence, in_frames: np.ndarray, sensitivity: float, dilate_px: float) -> Proposal:
+    """The proposal from the evidence and the shadow that was seen.
 
     Frames tell of neck and ears as well, but not of the scalp, where hair passes for shadow; what a texture alone says
     is asked on the face, whose colours are known.
+
+    Parameters
+    ----------
+    evidence : of the capture
+    in_frames : bool [S, S], where the frames or the filmed texture show a shadow
+    sensitivity : in [0, 1]
+    dilate_px : texels by which the mask is grown, at 1024 texels
     """
     bare, judged, skin = evidence.bare, evidence.judged, evidence.skin
     texture = still_dark(evidence.texture, evidence.normals, judged, skin > 0.5, sensitivity)
-    mask = tidy((seen & bare) | texture, bare, dilate_px * len(bare) / 1024)
+    mask = tidy((in_frames & bare) | texture, bare, dilate_px * len(bare) / 1024)
     mask, edges = snapped(mask, evidence.filmed, evidence.normals,
                           np.where(bare, 0.2 + 0.8 * skin, 0).astype(np.float32))
     luminance = np.log(np.maximum(evidence.texture.mean(-1), 2e-3))
     occlusion = baked_occlusion(luminance, evidence.visible, np.where(judged, skin, 0) * (1 - mask))
-    return Proposal((np.maximum(mask, occlusion) * bare).astype(np.float32), seen & bare, texture, occlusion, edges)
+    return Proposal(
+        (np.maximum(mask, occlusion) * bare).astype(np.float32), in_frames & bare, texture, occlusion, edges
+    )
 
 
 def still_dark(texture: np.ndarray, normals: np.ndarray, judged: np.ndarray, skin: np.ndarray,
                sensitivity: float) -> np.ndarray:
-    """bool [S, S]: shadow in a linear texture [S, S, 3] with unit normals [S, S, 3]; judged, skin bool [S, S]: what is
-    looked at, and plain skin."""
+    """Shadow that stayed in a delit texture.
+
+    Parameters
+    ----------
+    texture : [S, S, 3], linear
+    normals : [S, S, 3], unit
+    judged : bool [S, S], what is looked at
+    skin : bool [S, S], plain skin
+    sensitivity : in [0, 1]
+
+    Returns
+    -------
+    bool [S, S].
+    """
     odds = np.full(judged.shape, -12.0)
     log_odds, _, step = find_shadow(texture[judged], normals[judged], skin[judged])
     if not step.any():
@@ -136,28 +156,39 @@ def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> ShadowEv
         skin = skin * (1 - template.mask(name, size))
     visible = interpolate(visible[:, None], head.mesh.faces, head.face, head.bary)[..., 0]
     # the texture has no confidence where it shows a cloth
-    bare = head.covered & (confidence > SEEN) & (scalp < 0.5) & (read_hidden_skin(capture, size) < 0.5)
-    return ShadowEvidence(texture, filmed, bleed(head.spread(head.normals), head.covered),
-                          bleed(visible, head.covered).astype(np.float32), bare, bare & (face > 0.5), skin, brows)
+    bare = head.covered & (confidence > MIN_CONFIDENCE) & (scalp < 0.5) & (read_hidden_skin(capture, size) < 0.5)
+    return ShadowEvidence(
+        texture,
+        filmed,
+        bleed(head.spread(head.normals), head.covered),
+        bleed(visible, head.covered).astype(np.float32),
+        bare,
+        bare & (face > 0.5),
+        skin,
+        brows,
+    )
 
 
-def _leave_figures(capture: Capture, report: Reporter, source: str, evidence: ShadowEvidence, found: Proposal) -> None:
-    def percent(part: np.ndarray) -> float:
-        return round(100 * float(part[evidence.judged].mean()) if evidence.judged.any() else 0.0, 1)
+def _leave_figures(
+    capture: Capture, report: Reporter, source: str, evidence: ShadowEvidence, proposal: Proposal
+) -> None:
+    def percent(mask: np.ndarray) -> float:
+        return round(100 * float(mask[evidence.judged].mean()) if evidence.judged.any() else 0.0, 1)
 
-    report.figure("masked_percent", percent(found.mask))
+    report.figure("masked_percent", percent(proposal.mask))
     report.figure("frames_judged_by", source)
-    report.figure("seen_in_frames_percent", percent(found.frames))
-    report.figure("left_in_texture_percent", percent(found.texture))
-    report.figure("occlusion_percent", percent(found.occlusion > 0.1))
-    report.figure("laid_on_edges_percent", round(100 * share_on_edges(found.mask, found.edges), 1))
+    report.figure("seen_in_frames_percent", percent(proposal.frames))
+    report.figure("left_in_texture_percent", percent(proposal.texture))
+    report.figure("occlusion_percent", percent(proposal.occlusion > 0.1))
+    report.figure("laid_on_edges_percent", round(100 * share_on_edges(proposal.mask, proposal.edges), 1))
     filmed = images.linear_to_srgb(evidence.filmed)
     # red, green, blue
-    shown = np.stack([found.frames, found.texture, found.occlusion / max(float(found.occlusion.max()), 0.25)],
-                     -1).astype(np.float32)
+    shown = np.stack(
+        [proposal.frames, proposal.texture, proposal.occlusion / max(float(proposal.occlusion.max()), 0.25)], -1
+    ).astype(np.float32)
     tinted = 0.55 * filmed + 0.45 * shown
     images.write_srgb(capture.picture("shadow_mask", "filmed__red_in_frames_green_in_texture_blue_occlusion__proposal"),
-                      np.hstack([filmed, tinted, np.repeat(found.mask[..., None], 3, -1)]))
+                      np.hstack([filmed, tinted, np.repeat(proposal.mask[..., None], 3, -1)]))
 
 
 def share_on_edges(mask: np.ndarray, edges: np.ndarray) -> float:

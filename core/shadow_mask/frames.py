@@ -24,13 +24,13 @@ from .tidy import without_small
 
 THRESHOLD = 0.5  # shadow alpha from which a pixel is in shadow at a sensitivity of 0.5
 # natural log units by which softening lightens: less is no shadow, more is one for certain
-LEAST_STEP, SURE_STEP = 0.10, 0.40
+LEAST_STEP_LOG, SURE_STEP_LOG = 0.10, 0.40
 # share of the pixels that softening has lightened least: they are lit, and tell the two pictures' gain
-UNTOUCHED = 0.25
+UNTOUCHED_SHARE = 0.25
 # deviation over which a difference is averaged, of the frame's longer side: a tool's pictures may lack the pores
-BLUR = 0.003
-MEDIAN = 0.008  # window of the median filter, of the longer side
-SMALLEST = 2e-4  # share of the frame below which a region is dropped
+BLUR_SIDE_SHARE = 0.003
+MEDIAN_SIDE_SHARE = 0.008  # window of the median filter, of the longer side
+SMALLEST_AREA_SHARE = 2e-4  # share of the frame below which a region is dropped
 
 
 def source_of(capture: Capture, settings: Settings) -> str:
@@ -70,16 +70,16 @@ def softening(raw: np.ndarray, soft: np.ndarray) -> np.ndarray:
     """Shadow alpha [H, W] in [0, 1] of a frame from the same frame with softened shadows, both sRGB [H, W, 3]: how much
     that has lightened it."""
     lighter = np.log((images.srgb_to_linear(soft).mean(-1) + 0.01) / (images.srgb_to_linear(raw).mean(-1) + 0.01))
-    lighter = cv2.GaussianBlur(lighter.astype(np.float32), (0, 0), max(BLUR * max(lighter.shape), 0.8))
+    lighter = cv2.GaussianBlur(lighter.astype(np.float32), (0, 0), max(BLUR_SIDE_SHARE * max(lighter.shape), 0.8))
     seen = raw.max(-1) < 0.99  # what is burnt out has lost its light
-    gain = np.quantile(lighter[seen], UNTOUCHED) if seen.any() else 0.0
-    return np.clip((lighter - gain - LEAST_STEP) / (SURE_STEP - LEAST_STEP), 0, 1)
+    gain = np.quantile(lighter[seen], UNTOUCHED_SHARE) if seen.any() else 0.0
+    return np.clip((lighter - gain - LEAST_STEP_LOG) / (SURE_STEP_LOG - LEAST_STEP_LOG), 0, 1)
 
 
 def filtered(alpha: np.ndarray, threshold: float) -> np.ndarray:
     """A shadow alpha [H, W] as a mask without noise, specks and pinholes; its borders are a pixel wide."""
     mask = (alpha > threshold).astype(np.uint8)
-    mask = cv2.medianBlur(mask, max(3, round(MEDIAN * max(mask.shape)) | 1))
-    mask = without_small(mask, SMALLEST * mask.size)
-    mask = 1 - without_small(1 - mask, SMALLEST * mask.size)
+    mask = cv2.medianBlur(mask, max(3, round(MEDIAN_SIDE_SHARE * max(mask.shape)) | 1))
+    mask = without_small(mask, SMALLEST_AREA_SHARE * mask.size)
+    mask = 1 - without_small(1 - mask, SMALLEST_AREA_SHARE * mask.size)
     return cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 0.7)

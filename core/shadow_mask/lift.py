@@ -15,14 +15,25 @@ from ..face.head import Unfolded
 from ..geometry.raster import RayCaster, render_view, sample, visible_from
 from ..geometry.views import View
 
-GRAZING = 0.2  # cosine of the steepest angle under which a texel is judged
-EDGE_PX = 0.012  # of the frame's longer side: so near a silhouette a small error of the head shows what lies behind
+GRAZING_COSINE = 0.2  # cosine of the steepest angle under which a texel is judged
+# of the frame's longer side: so near a silhouette a small error of the head shows what lies behind
+EDGE_SIDE_SHARE = 0.012
 
 
 def lift_shadows(head: Unfolded, count: int, masks: Iterable[tuple[View, np.ndarray]], report: Reporter) -> np.ndarray:
-    """Of `count` views' shadow masks [H, W] in [0, 1]: the share [S, S] of the votes for shadow, 0 where nobody votes.
+    """The views' shadow masks on the head. A view's vote counts less where it sees the surface at a glancing angle or
+    near a silhouette.
 
-    A view's vote counts less where it sees the surface at a glancing angle or near a silhouette.
+    Parameters
+    ----------
+    head : unfolded
+    count : of the views
+    masks : each view with its mask [H, W] in [0, 1]
+    report : hears of progress
+
+    Returns
+    -------
+    [S, S] in [0, 1]: the share of the votes for shadow, 0 where nobody votes.
     """
     total, weight = np.zeros(len(head.points)), np.zeros(len(head.points))
     for i, (view, mask) in enumerate(masks):
@@ -30,10 +41,12 @@ def lift_shadows(head: Unfolded, count: int, masks: Iterable[tuple[View, np.ndar
         towards = view.centre - head.points
         cosine = (towards * head.normals).sum(1) / np.linalg.norm(towards, axis=1)
         pixels, _ = view.project(head.points)
-        seen = np.flatnonzero((cosine > GRAZING) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1))
+        seen = np.flatnonzero(
+            (cosine > GRAZING_COSINE) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
+        )
         seen = seen[visible_from(head.caster, head.points[seen], head.normals[seen], view.centre)]
         inner = np.clip(sample(_silhouette_distance(head.caster, view), pixels[seen])
-                        / (EDGE_PX * max(view.width, view.height)), 0.02, 1)
+                        / (EDGE_SIDE_SHARE * max(view.width, view.height)), 0.02, 1)
         trust = cosine[seen] ** 2 * inner
         total[seen] += trust * sample(mask, pixels[seen])
         weight[seen] += trust

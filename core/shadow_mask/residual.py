@@ -13,13 +13,13 @@ import numpy as np
 
 from ..light.spherical_harmonics import sh_polynomials
 
-SIGMA_LUMINANCE = 0.15  # spread of lit skin about its smooth expectation, natural log units ...
-SIGMA_CHROMA = 0.06  # ... and of the differences between channels
-OUTLIER = 0.05
-BOX = 3.0  # log units over which an outlier may lie, per channel
-LEAST_STEP = 0.3  # a shadow takes a quarter of the light or more; flushed noses and beards take less
-LEAST_GAIN = 0.08  # of log likelihood per texel over a texture without shadow
-STARTS = (-0.4, -0.8, -1.3)
+LUMINANCE_SIGMA_LOG = 0.15  # spread of lit skin about its smooth expectation, natural log units ...
+CHROMA_SIGMA_LOG = 0.06  # ... and of the differences between channels
+OUTLIER_SHARE = 0.05  # of the texels that are neither lit nor shaded skin
+OUTLIER_RANGE_LOG = 3.0  # log units over which an outlier may lie, per channel
+LEAST_STEP_LOG = 0.3  # a shadow takes a quarter of the light or more; flushed noses and beards take less
+LEAST_LIKELIHOOD_GAIN = 0.08  # of log likelihood per texel over a texture without shadow
+FIRST_STEPS_LOG = (-0.4, -0.8, -1.3)  # darkenings that the fit starts from, natural log units
 LIKELIEST_SHARE = 0.35
 
 
@@ -38,9 +38,16 @@ def find_shadow(colours: np.ndarray, normals: np.ndarray,
     if len(drawn) < 200:
         return none
     plain = _expectation_maximisation(log[drawn], basis[drawn], np.zeros(3), iterations=15, fixed=True)
-    fits = [_expectation_maximisation(log[drawn], basis[drawn], np.full(3, start), iterations=40) for start in STARTS]
+    fits = [
+        _expectation_maximisation(log[drawn], basis[drawn], np.full(3, start), iterations=40)
+        for start in FIRST_STEPS_LOG
+    ]
     likelihood, smooth, step = max(fits, key=lambda fit: fit[0])
-    if step.mean() > -LEAST_STEP or step.max() > -0.05 or likelihood - plain[0] < LEAST_GAIN * len(drawn):
+    if (
+        step.mean() > -LEAST_STEP_LOG
+        or step.max() > -0.05
+        or likelihood - plain[0] < LEAST_LIKELIHOOD_GAIN * len(drawn)
+    ):
         return none[0], log - basis @ plain[1], none[2]
     residual = log - basis @ smooth
     odds = _log_likelihood(residual - step) - _log_likelihood(residual)
@@ -61,10 +68,10 @@ def _expectation_maximisation(log, basis, step, iterations, fixed=False):
         residual = log - basis @ smooth
         if not fixed:
             step = (residual * (dark * inlier)[:, None]).sum(0) / max((dark * inlier).sum(), 1e-6)
-        terms = np.stack([np.log(share) + np.log1p(-OUTLIER) + _log_likelihood(residual - step),
+        terms = np.stack([np.log(share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual - step),
                           # [3, N]
-                          np.log1p(-share) + np.log1p(-OUTLIER) + _log_likelihood(residual),
-                          np.full(count, np.log(OUTLIER) - 3 * np.log(BOX))])
+                          np.log1p(-share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual),
+                          np.full(count, np.log(OUTLIER_SHARE) - 3 * np.log(OUTLIER_RANGE_LOG))])
         peak = terms.max(0)
         shares = np.exp(terms - peak)
         dark = np.zeros(count) if fixed else shares[0] / np.maximum(shares[0] + shares[1], 1e-30)
@@ -76,8 +83,8 @@ def _expectation_maximisation(log, basis, step, iterations, fixed=False):
 def _log_likelihood(residual: np.ndarray) -> np.ndarray:
     common = residual.mean(-1)
     chroma = residual - common[..., None]
-    squares = 3 * common**2 / SIGMA_LUMINANCE**2 + (chroma**2).sum(-1) / SIGMA_CHROMA**2
-    return -0.5 * squares - np.log(SIGMA_LUMINANCE * SIGMA_CHROMA**2 * (2 * np.pi) ** 1.5)
+    squares = 3 * common**2 / LUMINANCE_SIGMA_LOG**2 + (chroma**2).sum(-1) / CHROMA_SIGMA_LOG**2
+    return -0.5 * squares - np.log(LUMINANCE_SIGMA_LOG * CHROMA_SIGMA_LOG**2 * (2 * np.pi) ** 1.5)
 
 
 def smooth_basis(normals: np.ndarray) -> np.ndarray:

@@ -12,17 +12,37 @@ from .residual import smooth_basis
 
 def snapped(mask: np.ndarray, filmed: np.ndarray, normals: np.ndarray,
             weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A mask [S, S] in [0, 1] laid on the shadow's edges, and how far [S, S] each texel lies at one that was found.
+    """A mask laid on the shadow's edges.
 
-    filmed [S, S, 3] linear; normals [S, S, 3]; weight [S, S] in [0, 1]: how far a texel tells of light.
+    Parameters
+    ----------
+    mask : [S, S] in [0, 1]
+    filmed : [S, S, 3], linear
+    normals : [S, S, 3], unit
+    weight : [S, S] in [0, 1], how far a texel tells of light
+
+    Returns
+    -------
+    The mask, and how far [S, S] in [0, 1] each texel lies at an edge that was found.
     """
     edge = place(flattened(filmed, normals, mask, weight), mask, weight, 1024 / len(mask))
-    return np.clip(edge.alpha, 0, 1), edge.found
+    return np.clip(edge.alpha, 0, 1), edge.on_edge
 
 
 def flattened(filmed: np.ndarray, normals: np.ndarray, mask: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """[S, S, 3]: the texture over its smooth light, about 1 where it is lit; what the shadow under the mask takes is
-    not told as smooth."""
+    """The texture over its smooth light; what the shadow under the mask takes is not told as smooth.
+
+    Parameters
+    ----------
+    filmed : [S, S, 3], linear
+    normals : [S, S, 3], unit
+    mask : [S, S] in [0, 1]
+    weight : [S, S] in [0, 1], how far a texel tells of light
+
+    Returns
+    -------
+    [S, S, 3], about 1 where it is lit.
+    """
     log = np.log(np.maximum(filmed, 2e-3))
     known = np.flatnonzero(weight.ravel() > 0.5)
     known = known[:: max(1, len(known) // 20000)]

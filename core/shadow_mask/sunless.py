@@ -17,20 +17,35 @@ from ..geometry.raster import interpolate
 from ..light.sunlight import fit_light, log_likelihood
 from .tidy import cohere
 
-FIT_TEXELS = 1200
-FEWEST = 200  # texels of skin under which nothing is fitted
+FIT_TEXELS = 1200  # of skin that the light is fitted to
+FEWEST_TEXELS = 200  # texels of skin under which nothing is fitted
 OFF_M = 1e-3  # how far rays start off the surface
-OFTEN = 0.05, 0.65  # how often a texel is sunlit that the head itself hides from the sun, and that it does not
+# how often a texel is sunlit that the head itself hides from the sun, and that it does not
+SUNLIT_PROBABILITIES = 0.05, 0.65
 
 
 def out_of_sun(filmed: np.ndarray, transfer: np.ndarray, head: Unfolded, judged: np.ndarray, skin: np.ndarray,
                sensitivity: float, report: Reporter) -> np.ndarray:
-    """bool [S, S]: in shadow; nowhere where no sun shows. filmed [S, S, 3] linear; transfer [V, 9] of the head's
-    vertices; judged, skin bool [S, S]: what is looked at, and plain skin."""
+    """Texels that the sun does not reach.
+
+    Parameters
+    ----------
+    filmed : [S, S, 3], linear
+    transfer : [V, 9], `radiance_transfer` of the head's vertices
+    head : unfolded
+    judged : bool [S, S], what is looked at
+    skin : bool [S, S], plain skin
+    sensitivity : in [0, 1]
+    report : hears of progress
+
+    Returns
+    -------
+    bool [S, S]; nowhere where no sun shows.
+    """
     colours = filmed[head.covered].astype(float)
     at = interpolate(transfer, head.mesh.faces, head.face[head.covered], head.bary[head.covered])
     drawn = np.flatnonzero((judged & skin)[head.covered] & (colours.min(1) > 1e-3))
-    if len(drawn) < FEWEST:
+    if len(drawn) < FEWEST_TEXELS:
         return np.zeros_like(judged)
     drawn = drawn[:: max(1, len(drawn) // FIT_TEXELS)]
     light, _, _ = fit_light(colours[drawn], head.normals[drawn], at[drawn], lambda sun: _sees(head, drawn, sun),
@@ -40,7 +55,9 @@ def out_of_sun(filmed: np.ndarray, transfer: np.ndarray, head: Unfolded, judged:
         return np.zeros_like(judged)
     log, ambient = np.log(np.maximum(colours, 1e-4)), light.ambient(at)
     likely = log_likelihood(log - np.log(ambient)) - log_likelihood(log - np.log(ambient + light.direct(head.normals)))
-    sunlit = OFTEN[0] + (OFTEN[1] - OFTEN[0]) * _sees(head, np.arange(len(head.points)), light.sun)
+    sunlit = SUNLIT_PROBABILITIES[0] + (SUNLIT_PROBABILITIES[1] - SUNLIT_PROBABILITIES[0]) * _sees(
+        head, np.arange(len(head.points)), light.sun
+    )
     odds = head.spread(np.clip(likely + 6 * (sensitivity - 0.5), -12, 12) - np.log(sunlit / (1 - sunlit)))
     return cohere(np.where(skin, odds, 0), judged)  # what is not skin follows its neighbours
 

@@ -172,7 +172,7 @@ def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
     """Stands for everything a run's bytes depend on."""
     digest, o = hashlib.blake2b(digest_size=16), start.observations[1]
     for values in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, start.tone.tensor,
-                   start.state.lights.glob, start.local, start.reference, start.alpha, o.texture, o.trust, o.held,
+                   start.state.lights.glob, start.local, start.reference, start.alpha, o.texture, o.trust, o.restraint,
                    o.missing):
         digest.update(torch.as_tensor(values).numpy().tobytes())
     digest.update(repr(start.recipe).encode())
@@ -183,9 +183,11 @@ def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
     return digest.hexdigest()
 
 
-def _leave_figures(capture: Capture, evidence: Evidence, result: maps.Maps, tone: SkinTone, report: Reporter) -> None:
+def _leave_figures(
+    capture: Capture, evidence: Evidence, solved_maps: maps.Maps, tone: SkinTone, report: Reporter
+) -> None:
     texture, weight = evidence.texture.numpy(), evidence.weight.numpy()
-    explained = (result.diffuse * result.shading).transpose(2, 0, 1)
+    explained = (solved_maps.diffuse * solved_maps.shading).transpose(2, 0, 1)
     error = images.linear_to_srgb(explained) - images.linear_to_srgb(texture)
     mean_square = float((error**2 * weight).sum() / max(3 * weight.sum(), 1e-6))
     report.figure("residual_psnr_db", round(-10 * np.log10(max(mean_square, 1e-10)), 1))
@@ -193,10 +195,17 @@ def _leave_figures(capture: Capture, evidence: Evidence, result: maps.Maps, tone
                   round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1))
     report.figure("skin_tone_srgb", [round(float(v), 3) for v in tone.srgb])
     side = min(evidence.size, REFERENCE_TEXELS // 2)
-    small = [images.resize(image, side, side) for image in (texture.transpose(1, 2, 0), result.diffuse, result.shading)]
+    small = [
+        images.resize(image, side, side)
+        for image in (texture.transpose(1, 2, 0), solved_maps.diffuse, solved_maps.shading)
+    ]
     small[0] = small[0] * (small[1].mean() / max(small[0].mean(), 1e-6))
     small[2] = small[2] * (0.6 / max(np.percentile(small[2], 95), 1e-6))
     images.write_srgb(capture.picture("solve", "texture_albedo_shading"), images.linear_to_srgb(np.hstack(small)))
-    aux = [result.normal, np.repeat(result.specular[..., None], 3, 2), np.repeat(result.confidence[..., None], 3, 2)]
+    aux = [
+        solved_maps.normal,
+        np.repeat(solved_maps.specular[..., None], 3, 2),
+        np.repeat(solved_maps.confidence[..., None], 3, 2),
+    ]
     images.write_srgb(capture.picture("solve", "normal_specular_confidence"),
                       np.hstack([images.resize(image, side, side) for image in aux]))

@@ -36,12 +36,19 @@ LEFT_LOG = 0.14
 
 
 def measure_missing_light(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texel: float) -> torch.Tensor:
-    """The share [S, S] in [0, MAX_MISSING_SHARE] of the light that is missing under M = 1, by the steps along M's
-    border; 0 where no border is near.
+    """The share of the light that is missing under M = 1, by the steps along M's border.
 
-    light [3, S, S]: texture over (reference albedo x global shading), linear, about 1 where lit; alpha [S, S]: M;
-    weight [S, S]: how far a texel tells of light, 0 off the facial skin, so that the outline of the face is no border;
-    `texel` is the side of one in texels of a 1024 map.
+    Parameters
+    ----------
+    light : [3, S, S], texture over (reference albedo x global shading), linear, about 1 where lit
+    alpha : [S, S] in [0, 1], M
+    weight : [S, S] in [0, 1], how far a texel tells of light; 0 off the facial skin, so that the outline of the face is
+        no border
+    texel : side of a texel in texels of a 1024 map
+
+    Returns
+    -------
+    [S, S] in [0, MAX_MISSING_SHARE]; 0 where no border is near.
     """
     value = np.log(np.clip(light.numpy(), 0.05, 4)).mean(0).astype(np.float32)
     steps, sure = measure_border_steps(value, alpha.numpy(), weight.numpy(), texel)
@@ -53,19 +60,28 @@ def measure_missing_light(light: torch.Tensor, alpha: torch.Tensor, weight: torc
     return torch.from_numpy(share.clip(0, MAX_MISSING_SHARE).astype(np.float32))
 
 
-def measure_border_steps(value: np.ndarray, alpha: np.ndarray, weight: np.ndarray,
+def measure_border_steps(log_light: np.ndarray, alpha: np.ndarray, weight: np.ndarray,
                          texel: float) -> tuple[np.ndarray, np.ndarray]:
-    """By how much values [S, S] are larger inside of M than outside, at the places of its border [S, S], and how surely
-    that is known [S, S] in [0, 1], 0 away from the border; alpha, weight and texel as in `measure_missing_light`."""
+    """By how much the light's logarithm is larger inside of M than outside, at the places of M's border.
+
+    Parameters
+    ----------
+    log_light : [S, S], natural log, mean of the channels
+    alpha, weight, texel : as in `measure_missing_light`
+
+    Returns
+    -------
+    The steps [S, S] and how surely each is known [S, S] in [0, 1], 0 away from the border.
+    """
     inside = alpha > 0.5
     if not inside.any() or inside.all():
-        return np.zeros_like(value), np.zeros_like(value)
+        return np.zeros_like(log_light), np.zeros_like(log_light)
     depth = signed_distance(inside) * texel  # negative inside
     near = weight * np.clip(1.5 - np.abs(np.abs(depth) - SIDE_TEXELS) / BAND_TEXELS, 0, 1) * (np.abs(depth) > 2)
     sides, known = [], []
     for side in (depth < 0, depth > 0):
         share = _blurred(near * side, WINDOW_TEXELS / texel)
-        sides.append(_blurred(near * side * value, WINDOW_TEXELS / texel) / np.maximum(share, 1e-4))
+        sides.append(_blurred(near * side * log_light, WINDOW_TEXELS / texel) / np.maximum(share, 1e-4))
         known.append(share)
     sure = np.minimum(*known) * (np.abs(depth) < REACH_TEXELS)
     return sides[0] - sides[1], np.where(sure > 0.02, sure / max(float(sure.max()), 1e-6), 0)
@@ -76,11 +92,11 @@ def estimate_light_share(steps: np.ndarray, sure: np.ndarray) -> float:
     return LEFT_LOG**2 / max(mean_and_deviation(steps, sure)[1] ** 2, LEFT_LOG**2)
 
 
-def mean_and_deviation(values: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
-    """Mean and deviation of values [S, S] under a weight [S, S]; zeros without any."""
+def mean_and_deviation(samples: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
+    """Mean and deviation of samples [S, S] under a weight [S, S]; zeros without any."""
     total = max(float(weight.sum()), 1e-6)
-    mean = float((weight * values).sum()) / total
-    return mean, (float((weight * (values - mean) ** 2).sum()) / total) ** 0.5
+    mean = float((weight * samples).sum()) / total
+    return mean, (float((weight * (samples - mean) ** 2).sum()) / total) ** 0.5
 
 
 def _blurred(image: np.ndarray, sigma: float) -> np.ndarray:

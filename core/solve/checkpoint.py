@@ -45,14 +45,14 @@ class Solution:
     settled: bool
 
 
-def write_solution(path: Path, found: Solution, conditions: dict[str, str]) -> None:
+def write_solution(path: Path, solution: Solution, conditions: dict[str, str]) -> None:
     """`conditions` are mask_edit's: under others this state is of no use."""
-    lights = {"glob": found.lights.glob, "grid": found.lights.grid, "chroma": found.lights.chroma}
-    tensors = {name: getattr(found, name)
+    lights = {"glob": solution.lights.glob, "grid": solution.lights.grid, "chroma": solution.lights.chroma}
+    tensors = {name: getattr(solution, name)
                for name in ("denoised", "painted", "alpha", "spread", "gain", "local")} | lights
-    tensors["tone"] = found.tone.tensor
-    tensors["settled"] = torch.tensor(found.settled)
-    tensors["exposure"] = torch.tensor(found.exposure, dtype=torch.float64)
+    tensors["tone"] = solution.tone.tensor
+    tensors["settled"] = torch.tensor(solution.settled)
+    tensors["exposure"] = torch.tensor(solution.exposure, dtype=torch.float64)
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
     _save(path, tensors, {FIELD: json.dumps(conditions)})
 

@@ -30,25 +30,48 @@ SHORT_RUNS, SHORT_RUN_STEPS = 3, 8
 """Short runs, and the steps of each: closed form, on a map of a quarter of the size."""
 
 
-def estimate_confidence(seen: torch.Tensor, explained: torch.Tensor, found: torch.Tensor, reference: torch.Tensor,
+def estimate_confidence(observed: torch.Tensor, explained: torch.Tensor, albedo: torch.Tensor, reference: torch.Tensor,
                         spread: torch.Tensor | None) -> torch.Tensor:
-    """[S, S] in [0, 1]: 1 for a texel that was well seen and where no error is expected, a half where
-    HALF_CONFIDENCE_ERROR is.
+    """How far a texel of the albedo can be believed.
 
-    seen [S, S]: how far a texel's observation counts; explained [S, S]: the share of light that the grid took away;
-    found, reference [3, S, S]: the albedo as delivered and the mean face of the tone, linear; spread:
-    `sample_spread`'s, of any size, or None.
+    Parameters
+    ----------
+    observed : [S, S] in [0, 1], how far a texel's observation counts
+    explained : [S, S] in [0, 1], the share of light that the grid took away
+    albedo : [3, S, S], linear, as delivered
+    reference : [3, S, S], linear, the mean face of the tone
+    spread : `sample_spread`'s, of any size, or None
+
+    Returns
+    -------
+    [S, S] in [0, 1]: 1 for a texel that was well seen and where no error is expected, a half where
+    HALF_CONFIDENCE_ERROR is.
     """
-    unlike = (to_display(found) - to_display(reference)).abs().mean(0)
-    varied = 0.0 if spread is None else enlarge_map(spread, seen.shape)
+    unlike = (to_display(albedo) - to_display(reference)).abs().mean(0)
+    varied = 0.0 if spread is None else enlarge_map(spread, observed.shape)
     expected = ERROR_PER_SHARE * explained + ERROR_PER_DIFFERENCE * unlike + ERROR_PER_SPREAD * varied
-    return (seen / (1 + expected / HALF_CONFIDENCE_ERROR)).clamp(0, 1)
+    return (observed / (1 + expected / HALF_CONFIDENCE_ERROR)).clamp(0, 1)
 
 
 def sample_spread(prior: ConditionedPrior, o: Observation, reference: torch.Tensor, lights: Lights, recipe: Recipe,
                   seed: int, check: Callable[[], None] = lambda: None) -> torch.Tensor:
-    """Deviation [H, W] of the albedo's lightness over short runs on a coarse map `o`, which begin at the reference face
-    [1, 7, H, W], each with a seed of its own, under the light that was solved. `check` may raise to cancel."""
+    """Deviation of the albedo's lightness over short runs on a coarse map, each with a seed of its own, under the light
+    that was solved.
+
+    Parameters
+    ----------
+    prior : of the skin tone
+    o : the coarse map [H, W]
+    reference : [1, 7, H, W] in the network's range, the reference face at which the runs begin
+    lights : that were solved
+    recipe : of the solve; steps, guidance and phases are the short runs' own
+    seed : of the noise
+    check : may raise to cancel
+
+    Returns
+    -------
+    [H, W], in encoded sRGB.
+    """
     short = replace(recipe, steps=SHORT_RUN_STEPS, guidance="proximal", coarse=(), candidates=1, phases=())
     device, runs = prior.device, []
     for run in range(SHORT_RUNS):

@@ -14,9 +14,21 @@ WHOLE_MAP = slice(None), slice(None)
 
 
 def restore_maps(prior: ConditionedPrior, denoised: torch.Tensor, coords: torch.Tensor, seed: int,
-                 part: tuple[slice, slice] = WHOLE_MAP) -> torch.Tensor:
-    """The map [1, 7, S, S], or those rows and columns of it, with the normals and specular that are expected of its
-    albedo. coords [1, 2, S, S] are the whole map's; a part gets the noise that it would get in the whole map."""
+                 region: tuple[slice, slice] = WHOLE_MAP) -> torch.Tensor:
+    """The map with the normals and specular that are expected of its albedo.
+
+    Parameters
+    ----------
+    prior : of the skin tone
+    denoised : [1, 7, S, S] in the network's range, or only the rows and columns `region` of it
+    coords : [1, 2, S, S] in [-1, 1], of the whole map
+    seed : of the noise
+    region : rows and columns; they get the noise that they would get in the whole map
+
+    Returns
+    -------
+    As `denoised`.
+    """
     noise = torch.randn(1, denoised.shape[1], *coords.shape[-2:],
                         generator=torch.Generator().manual_seed(seed)).to(denoised.device)
-    return prior.respond(denoised, coords[(..., *part)], noise[(..., *part)])
+    return prior.respond(denoised, coords[(..., *region)], noise[(..., *region)])

@@ -14,7 +14,7 @@ from .evidence import REFERENCE_TEXELS, Evidence
 from .marks import Mark
 
 CURVE_PX = 192, 256  # rows and columns of the loss curve
-PAINTED_RGB, LAID_RGB, MARK_RGB = (1.0, 1.0, 1.0), (1.0, 0.45, 0.0), (0.1, 0.9, 0.2)
+PAINTED_RGB, LAID_RGB, MARK_RGB = (1.0, 1.0, 1.0), (1.0, 0.45, 0.0), (0.1, 0.9, 0.2)  # sRGB
 
 
 def draw_edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, ...]) -> np.ndarray:

@@ -21,4 +21,6 @@ def snap_to_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor,
     edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), (weight * evidence.covered).numpy(),
                  evidence.texel, check)
     alpha = torch.from_numpy(edge.alpha) * (1 - evidence.protected) * evidence.covered
-    return replace(evidence, alpha=alpha, edge=torch.from_numpy(edge.found), taken=tuple(edge.colour.tolist()))
+    return replace(
+        evidence, alpha=alpha, edge=torch.from_numpy(edge.on_edge), shadow_colour=tuple(edge.colour.tolist())
+    )

@@ -29,10 +29,20 @@ from .witnesses import confirm_marks
 
 def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence,
                  report: Reporter) -> tuple[maps.Maps, SkinTone] | None:
-    """The maps with the edited part new, as they are now in maps/, and the skin tone; None, and the reason in the log,
-    where the whole map is to be solved.
+    """The maps with the edited part new, as they are now in maps/, and the skin tone. Without an edit the maps stay as
+    they are.
 
-    Without an edit the maps stay as they are.
+    Parameters
+    ----------
+    capture : that was solved before
+    head : in the capture
+    settings : of the solve
+    recipe, prior, evidence : as for a whole solve
+    report : hears of progress
+
+    Returns
+    -------
+    None, and the reason in the log, where the whole map is to be solved.
     """
     cell = evidence.cell_side(settings.solve.grid_cells)
     conditions, obstacle = mask_edit.conditions(capture, settings), mask_edit.obstacle(capture, settings)
@@ -65,17 +75,17 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
 
 
 def _sampled(settings: Settings, prior: ConditionedPrior, evidence: Evidence, earlier: Solution, start: initial.Start,
-             part: Window, report: Reporter) -> Solution:
-    denoised, lights = solve_inside(prior, start.observations, earlier, part, start.recipe, settings.seed, report)
+             window: Window, report: Reporter) -> Solution:
+    denoised, lights = solve_inside(prior, start.observations, earlier, window, start.recipe, settings.seed, report)
     factor = max(start.observations)
-    here = Lights(lights.glob, lights.grid[(..., *part.cells)], lights.chroma)
-    reference = average_down(start.reference[(..., *part.seen)], factor)
-    patch = sample_spread(prior, crop_observation(start.observations[factor], part, factor), reference, here,
+    here = Lights(lights.glob, lights.grid[(..., *window.cells)], lights.chroma)
+    reference = average_down(start.reference[(..., *window.context)], factor)
+    patch = sample_spread(prior, crop_observation(start.observations[factor], window, factor), reference, here,
                           start.recipe, settings.seed, report.check)
-    rows, columns = (slice(a.start // factor, a.stop // factor) for a in part.inside)
+    rows, columns = (slice(a.start // factor, a.stop // factor) for a in window.inside)
     whole = earlier.spread.clone()
     rest = tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor)
-                 for a, b in zip(part.inside, part.seen, strict=True))
+                 for a, b in zip(window.inside, window.context, strict=True))
     whole[rows, columns] = patch[rest]
     return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure,
                     earlier.local, earlier.settled)

@@ -53,9 +53,10 @@ class Evidence:
     mask M; normal [3, S, S], unit, world space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin
     without lips, brows, eyes and hair; bare [S, S]: that of neck and ears as well; trust [S, S]: 1, less where a
     texel's colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's
-    border lies on a shadow's edge that is seen; taken [3]: the colour of what shadows take of the light, over its mean,
-    zeros where that is not known; asked [S, S]: how far the artist added to the proposal for M, None where the maps are
-    in other UVs; missing [S, S]: the share of the light that M's border says is missing, None where nobody asked it."""
+    border lies on a shadow's edge that is seen; shadow_colour [3]: the colour of what shadows take of the light, over
+    its mean, zeros where that is not known; added [S, S]: how far the artist added to the proposal for M, None where
+    the maps are in other UVs; missing [S, S]: the share of the light that M's border says is missing, None where nobody
+    asked it."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -67,9 +68,9 @@ class Evidence:
     trust: torch.Tensor
     protected: torch.Tensor
     edge: torch.Tensor
-    taken: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    shadow_colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
     extent: Extent = Extent()
-    asked: torch.Tensor | None = None
+    added: torch.Tensor | None = None
     missing: torch.Tensor | None = None
 
     @property
@@ -126,7 +127,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     trust = np.minimum(1 - (1 - FEATURE_TRUST) * unlike_skin, 1 - (1 - BEARD_TRUST) * bearded)
     parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32))
              for a in (skin, bare, trust, protected, np.zeros_like(alpha))]
-    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, asked=torch.from_numpy(added))
+    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, added=torch.from_numpy(added))
 
 
 def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -147,10 +148,16 @@ def soften_mask(mask: np.ndarray) -> np.ndarray:
 
 def make_observations(evidence: Evidence, exposure: float, cell: float, multiple: int,
                       recipe: Recipe) -> dict[int, Observation]:
-    """The evidence as the sampler takes it, per coarsening factor. The texture is multiplied by `exposure`; `cell` is a
-    grid cell where the map has REFERENCE_TEXELS texels.
+    """The evidence as the sampler takes it, per coarsening factor. Maps coarser than a quarter of REFERENCE_TEXELS are
+    left out: the prior has not seen them.
 
-    Maps coarser than a quarter of REFERENCE_TEXELS are left out: the prior has not seen them.
+    Parameters
+    ----------
+    evidence : of the capture
+    exposure : factor that the texture is multiplied by
+    cell : side of a grid cell where the map has REFERENCE_TEXELS texels
+    multiple : of which the network takes sides, in texels
+    recipe : of the solve
     """
     cells, extent = grid_cells(cell), evidence.extent
     levels = {}
@@ -173,7 +180,7 @@ def make_observations(evidence: Evidence, exposure: float, cell: float, multiple
         top, left = (start * whole // REFERENCE_TEXELS for start in (extent.top, extent.left))
         coords = coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
-        restraint = 1.0 if evidence.asked is None else 1 - torch.from_numpy(_sized(evidence.asked.numpy(), size))
+        restraint = 1.0 if evidence.added is None else 1 - torch.from_numpy(_sized(evidence.added.numpy(), size))
         missing = 0.0 if evidence.missing is None else torch.from_numpy(_sized(evidence.missing.numpy(), size))
         levels[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size,
                                      restraint, missing)

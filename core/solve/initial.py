@@ -45,12 +45,25 @@ class Start:
 
 
 def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe: Recipe,
-                witness: Callable[[list[Mark]], list[Mark]] = list, others: Sequence[Evidence] = (),
+                witness: Callable[[list[Mark]], list[Mark]] = list, other_captures: Sequence[Evidence] = (),
                 check: Callable[[], None] = lambda: None) -> Start:
-    """All that a run begins with. `cell` is a cell of V in texels of a 1024 map; `witness` leaves those marks that the
-    views confirm; `others` are what is known of other captures of the same person; `check` may raise to cancel.
+    """All that a run begins with.
 
-    Raises Problem where no facial skin was seen.
+    Parameters
+    ----------
+    prior : of albedo, normals and specular
+    evidence : of the capture
+    tone : of the skin
+    cell : side of a cell of V in texels of a 1024 map
+    recipe : of the solve
+    witness : leaves those marks that the views confirm
+    other_captures : what is known of other captures of the same person
+    check : may raise to cancel
+
+    Raises
+    ------
+    Problem
+        Where no facial skin was seen.
     """
     lit = weigh_lit_skin(evidence)
     x_ref = make_reference(prior, tone, evidence, recipe.reference)
@@ -62,11 +75,11 @@ def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, r
     local = torch.zeros(3, 1, 1)
     if recipe.linear:
         told = split_captures([make_shapes(each, albedo_of(make_reference(prior, tone, each, recipe.reference)))
-                               for each in (evidence, *others)], check=check)
+                               for each in (evidence, *other_captures)], check=check)
         light = told.light(evidence.normal)
         if weighted_deviation(light.log(), lit) < recipe.linear:
             recipe = settle_recipe(recipe)
-            if others:  # one capture alone cannot tell a light of this form from a trait
+            if other_captures:  # one capture alone cannot tell a light of this form from a trait
                 local = torch.from_numpy(told.local)
             # to the split the light's level and the traits' mean look alike; but the tone is the mean of the skin
             beneath = evidence.texture * exposure / (light * enlarge_field(local, evidence.size).exp())
@@ -81,8 +94,20 @@ def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, r
 
 def start_again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, recipe: Recipe, near: torch.Tensor,
                 witness: Callable[[list[Mark]], list[Mark]] = list, check: Callable[[], None] = lambda: None) -> Start:
-    """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and where `near` [S, S] is 0
-    its mask too."""
+    """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and its mask but for the
+    edit's surroundings.
+
+    Parameters
+    ----------
+    prior : of albedo, normals and specular
+    evidence : of the capture, as it is now
+    earlier : that solve
+    cell : side of a cell of V in texels of a 1024 map
+    recipe : of the solve
+    near : [S, S] in [0, 1]; where it is 0 the earlier mask stays
+    witness : leaves those marks that the views confirm
+    check : may raise to cancel
+    """
     x_ref = make_reference(prior, earlier.tone, evidence, recipe.reference)
     recipe = settle_recipe(recipe) if earlier.settled else free_recipe(recipe)
     begun = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {},
@@ -155,8 +180,20 @@ def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
 
 
 def make_reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) -> torch.Tensor:
-    """x_0^ref [1, 7, S, S] of the tone: the prior's mean face; the one of its reference skins that explains the texture
-    best ("nearest"); or the tone everywhere ("uniform", and where the prior has neither)."""
+    """x_0^ref of a tone.
+
+    Parameters
+    ----------
+    prior : with its mean face and reference skins
+    tone : of the skin
+    evidence : of the capture
+    kind : "mean", the prior's mean face; "nearest", the one of its reference skins that explains the texture best;
+        "uniform", the tone everywhere, as where the prior has neither
+
+    Returns
+    -------
+    [1, 7, S, S] in the network's range.
+    """
     if prior.mean_face is None or kind == "uniform":
         return make_uniform_skin(tone.tensor, evidence.size)
     if kind == "mean" or prior.references is None:
@@ -190,11 +227,16 @@ def make_uniform_skin(tone: torch.Tensor, size: int) -> torch.Tensor:
 
 def fit_first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor,
                      cells: tuple[int, int], recipe: Recipe) -> Lights:
-    """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light)
-    or the constant light, V zero.
+    """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light),
+    or the constant light; V zero.
 
-    texture, albedo, normal [3, H, W]; weight [H, W], zero inside M. One chroma for all local light is the global
-    light's at first.
+    Parameters
+    ----------
+    texture, albedo : [3, H, W], linear
+    normal : [3, H, W], unit, world space
+    weight : [H, W] in [0, 1], zero inside M
+    cells : rows and columns of V
+    recipe : says which light is fitted, and whether all local light has one chroma, at first the global light's
     """
     shade = mean_tone(texture, weight) / mean_tone(albedo, weight).clamp_min(1e-4)
     glob = constant_light(shade)

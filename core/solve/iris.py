@@ -38,14 +38,23 @@ REACH_RADII = 2.6
 MIN_SKIN_COSINE = 0.5
 """Least cosine between the normals of such skin and the gaze."""
 MIN_POINTS = 12  # points of skin, or pixels of the iris, that a frame must show
-MAX_VIEWS = 10
+MAX_VIEWS = 10  # those that face the eye most
 
 
 def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) -> None:
-    """maps/irises.json from the frames and a linear albedo [S, S, 3] of the head's UVs; none where the eyes were closed
-    or no frame shows them well.
+    """Writes maps/irises.json; none where the eyes were closed or no frame shows them well.
 
-    Raises Problem for damaged records.
+    Parameters
+    ----------
+    capture : with its frames
+    head : in the capture
+    albedo : [S, S, 3], linear, in the head's UVs
+    report : takes the colours
+
+    Raises
+    ------
+    Problem
+        For damaged records.
     """
     remove_file(capture.irises)
     if not (head.built_in and capture.eyes.is_file() and capture.frames_json.is_file() and capture.cameras.is_dir()):
@@ -64,8 +73,21 @@ def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Rep
 
 def measure_iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray,
                         report: Reporter) -> Colour | None:
-    """Linear albedo of the left (0) or the right iris, by the median over it and the frames that face it most; None
-    where none shows it."""
+    """The albedo of an iris, by the median over it and the frames that face it most.
+
+    Parameters
+    ----------
+    views : with their pictures
+    head : as fitted, in metres
+    side : 0 for the left eye, 1 for the right
+    eye : of that side
+    albedo : [S, S, 3], linear, of the head: what the skin around tells the frame's light by
+    report : hears whether it is cancelled
+
+    Returns
+    -------
+    Linear [3] in [0.001, 1]; None where no frame shows it.
+    """
     skin, known = _skin_around(head, eye, albedo)
     if len(skin) < MIN_POINTS or not eye.iris_radius:
         return None
@@ -81,10 +103,21 @@ def measure_iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, 
     return tuple(round(float(v), 4) for v in np.clip(np.median(colours, 0), 0.001, 1)) if colours else None
 
 
-def find_iris_pixels(view: View, eye: Eyeball, seen: EyeShares,
+def find_iris_pixels(view: View, eye: Eyeball, shares: EyeShares,
                      shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns [N] of the pixels of a view's picture of that shape that show the iris between pupil and rim:
-    where an eyeball has it, and the reader saw it, in the picture's pixels."""
+    """The pixels that show the iris between pupil and rim: where an eyeball has it, and the reader saw it.
+
+    Parameters
+    ----------
+    view : the camera
+    eye : in metres
+    shares : what the reader saw, in the picture's pixels
+    shape : of the view's picture
+
+    Returns
+    -------
+    Rows and columns [N].
+    """
     shrink = np.array([shape[1] / view.width, shape[0] / view.height])
     (middle,), (depth,) = view.project(np.array(eye.centre)[None])
     reach = 1.5 * eye.radius * view.camera.mean_focal_length() / depth
@@ -95,7 +128,7 @@ def find_iris_pixels(view: View, eye: Eyeball, seen: EyeShares,
     disc = np.array(eye.centre) + np.sqrt(max(eye.radius**2 - eye.iris_radius**2, 0.0)) * gaze
     along = (disc - view.centre) @ gaze / (rays @ gaze)
     away = np.linalg.norm(view.centre + along[:, None] * rays - disc, axis=1) / max(eye.iris_radius, 1e-6)
-    share = raster.sample(seen.iris, pixels @ seen.move[:, :2].T + seen.move[:, 2])
+    share = raster.sample(shares.iris, pixels @ shares.move[:, :2].T + shares.move[:, 2])
     ring = (away > RING_SHARES[0]) & (away < RING_SHARES[1]) & (share > MIN_IRIS_SHARE)
     return rows[ring], columns[ring]
 
@@ -110,7 +143,7 @@ def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarr
 
 
 def _in_frame(view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray,
-              known: np.ndarray) -> np.ndarray | None:
+              skin_albedo: np.ndarray) -> np.ndarray | None:
     """The iris' albedo [3] by one frame; None where that does not show it, or not enough of the skin around."""
     frame = images.read_srgb(view.path)
     linear, whole = images.srgb_to_linear(frame), frame.max(-1)
@@ -124,5 +157,5 @@ def _in_frame(view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray,
     kept = raster.sample(whole, pixels) < BURNT_SRGB
     if kept.sum() < MIN_POINTS:
         return None
-    light = np.median(raster.sample(linear, pixels[kept]) / known[at][kept], axis=0)
+    light = np.median(raster.sample(linear, pixels[kept]) / skin_albedo[at][kept], axis=0)
     return np.median(linear[rows, columns], axis=0) / np.maximum(light, 1e-6)

@@ -74,8 +74,16 @@ class Layout:
 
     def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: float, tone: SkinTone) -> Maps:
         """The window's maps in the built-in UVs. Beyond the window the albedo is the texture under the solved global
-        light, or our mean face of that tone where nobody looked, without confidence. e: the evidence in the built-in
-        UVs."""
+        light, or our mean face of that tone where nobody looked, without confidence.
+
+        Parameters
+        ----------
+        solved : the window's maps
+        e : the evidence in the built-in UVs
+        lights : that were solved
+        exposure : factor that the texture was multiplied by
+        tone : of the skin
+        """
         inside = self._inside()
         side = 2 * (torch.arange(e.size) + 0.5) / e.size - 1
         mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone.tensor[None])[0]
@@ -123,17 +131,30 @@ class Layout:
         return torch.from_numpy(baked) if texels.ndim == 2 else _planes(baked)
 
 
-def round_size(asked: int, multiple: int) -> int:
-    """The largest size up to `asked` (but one step at least) of which the window is a whole number of the network's
+def round_size(size: int, multiple: int) -> int:
+    """The largest size up to `size` (but one step at least) of which the window is a whole number of the network's
     `multiple` of texels."""
     step = 16 * multiple // math.gcd(12, multiple)
-    return max(asked // step, 1) * step
+    return max(size // step, 1) * step
 
 
 def fit_layout(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Reporter) -> tuple[Layout, Prior]:
-    """The layout of the own head that lies in the capture, at the evidence's size, and a released prior with what it
-    lacks to start from: the mean face of ours, and the tones of skins. Raises Problem where there is no own head, or
-    its UVs are not the prior's."""
+    """The layout of the own head that lies in the capture, and a released prior with what it lacks to start from: the
+    mean face of ours, and the tones of skins.
+
+    Parameters
+    ----------
+    capture : with the own head
+    head : the built-in one, fitted
+    e : the evidence, at whose size the layout is
+    prior : the released one
+    report : hears of progress
+
+    Raises
+    ------
+    Problem
+        Where there is no own head, or its UVs are not the prior's.
+    """
     if not (capture.own_head.is_file() and capture.own_head_skin.is_file()):
         raise Problem("The authors' prior works in the UVs of another head, and none was fitted to this face.", REMEDY)
     own = meshes.read_obj(capture.own_head)
@@ -155,8 +176,17 @@ def fit_layout(capture: Capture, head: Head, e: Evidence, prior: Prior, report: 
 
 def make_layout(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor,
                 tick: Callable[[float], None]) -> Layout:
-    """The layout of `own`, which lies on `head`, for maps of size x size. skin bool [F]: its triangles that count;
-    face: Layout's."""
+    """The layout of a mesh that lies on the head, for maps of size x size.
+
+    Parameters
+    ----------
+    head : the built-in one, fitted
+    own : the artist's mesh, which lies on it
+    skin : bool [F], the triangles of `own` that count
+    size : texels along a side
+    face : the mean face of our prior, in the built-in UVs
+    tick : hears the share done, in [0, 1]
+    """
     there = baking.places(own, (0, 0), baking.Source(head), size, MAX_DISTANCE_M, tick, skin)
     top, left, side = (v * size // REFERENCE_TEXELS for v in (WINDOW.top, WINDOW.left, WINDOW.side))
     window = np.s_[top:top + side, left:left + side]

@@ -20,9 +20,18 @@ PHASE_PARAMETERS = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1
 def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, step: int, steps: int,
                   loss: Callable | None = None) -> None:
     """The light updates that belong to one sampling step, in place: none, one or several of the phase that this step is
-    in; by `loss` instead of `light_loss` where given.
+    in.
 
     How many there were before follows from the step's number, so a stored state continues exactly.
+
+    Parameters
+    ----------
+    state : whose lights change
+    denoised : [1, 7, H, W] in the network's range, \\hat x_0 of this step
+    o : what is observed of the map at that size
+    recipe : of the solve
+    step, steps : the step, from 0, and how many there are
+    loss : in place of `light_loss`
     """
     if step < recipe.refit * steps:
         _refit(state, denoised, o, recipe)
@@ -44,7 +53,15 @@ def _refit(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe)
 
 
 def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
-    """L_pho + L_neg + 0.1 L_TV of theta, and what our recipe adds. L_TV makes M's border seamless."""
+    """L_pho + L_neg + 0.1 L_TV of theta, and what our recipe adds. L_TV makes M's border seamless.
+
+    Parameters
+    ----------
+    lights : theta
+    denoised : [1, 7, H, W] in the network's range; its albedo is explained
+    o : what is observed of the map at that size
+    recipe : weighs the terms
+    """
     shading = o.shader.total(lights)
     loss = photometric_loss(denoised, shading, o, o.weight if recipe.trusting else o.weight * o.trust, recipe.blur)
     # the mean squared albedo of what was seen: L_pho is larger on light skin
@@ -63,7 +80,7 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
         loss = loss + recipe.seam * brightness / o.texel * seam
     if recipe.faint:
         restraint, missing = (value[o.shader.box] if isinstance(value, torch.Tensor) else value
-                              for value in (o.held, o.missing))
+                              for value in (o.restraint, o.missing))
         gone = missing * o.shader.box_alpha * o.shader.main(lights)[(slice(None), *o.shader.box)].detach()
         loss = loss + recipe.faint * brightness * (restraint * (local + gone) ** 2).sum()
     if recipe.smooth:

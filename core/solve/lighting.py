@@ -39,9 +39,9 @@ class Lights:
     def parameters(self) -> list[torch.Tensor]:
         return [self.glob, self.grid, self.chroma]
 
-    def requires_grad_(self, wanted: bool) -> Lights:
+    def requires_grad_(self, requires_grad: bool) -> Lights:
         for parameter in self.parameters():
-            parameter.requires_grad_(wanted)
+            parameter.requires_grad_(requires_grad)
         return self
 
     def to(self, device: torch.device | str) -> Lights:
@@ -134,10 +134,18 @@ def interpolation_matrix(cells: int, texels: int, bilinear: bool = False) -> tor
 
 def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor,
                ridge: float = 1e-3) -> torch.Tensor:
-    """gamma^g [3, 9] that minimises sum weight^2 (texture - albedo * shading)^2 in closed form.
+    """gamma^g that minimises sum weight^2 (texture - albedo * shading)^2 in closed form.
 
-    texture, albedo linear [3, H, W]; basis [9, H, W]; weight [H, W]. `ridge` times the mean diagonal keeps coefficients
-    that no normal sees at zero.
+    Parameters
+    ----------
+    texture, albedo : [3, H, W], linear
+    basis : [9, H, W], `shading_basis` of the normals
+    weight : [H, W] in [0, 1]
+    ridge : times the mean diagonal, keeps coefficients that no normal sees at zero
+
+    Returns
+    -------
+    [3, 9], float32.
     """
     exact = torch.float32 if basis.device.type == "mps" else torch.float64  # Apple's GPUs have no float64
     columns = basis.reshape(9, -1).to(exact)
@@ -155,7 +163,16 @@ def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor,
 def fit_around_constant(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor,
                         ridge: float) -> torch.Tensor:
     """`fit_global`, but what no normal sees, and what `ridge` holds back, is drawn to the even light that gives the
-    texture's mean colour."""
+    texture's mean colour.
+
+    Parameters
+    ----------
+    texture, albedo, basis, weight, ridge : as in `fit_global`
+
+    Returns
+    -------
+    [3, 9], float32.
+    """
     total = weight.sum().clamp_min(1e-6)
     even = constant_light((texture * weight).sum((1, 2)) / (albedo * weight).sum((1, 2)).clamp_min(1e-4 * total))
     return even + fit_global(texture - albedo * torch.einsum("ck,khw->chw", even, basis), albedo, basis, weight, ridge)

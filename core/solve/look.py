@@ -25,7 +25,7 @@ from ..imaging import images
 from ..light.spherical_harmonics import sh_basis
 from .witnesses import find_visible
 
-FRONT = np.array([0.0, -1.0, 0.0])
+FRONT = np.array([0.0, -1.0, 0.0])  # unit normal of what faces the camera, in the head's axes
 VIEW_QUANTILE = 0.3  # over the views: below the median, as every highlight brightens and nothing but shadow darkens
 # quantiles of luminance between which skin is best lit; what is above is highlights that stood still
 BEST_LIT_QUANTILES = 0.75, 0.95
@@ -35,7 +35,7 @@ PERSON_SHARE = 0.2  # sureness from which a pixel may be the person
 MIN_SURROUNDINGS_SHARE = 0.05  # least share of the frame that is surroundings
 SMOOTHING_SHARE = 0.003  # of the frame's longer side: what noise and a head that is off by a pixel amount to
 LIKE_RATIOS = 0.75, 1.35  # brightness over that of evenly lit skin, beyond which a point is shadow, mark or highlight
-LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
+LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB (IEC 61966-2-1)
 SH_RIDGE = np.array([1e-6, *[0.03] * 3, 1.5, 1.5, 1.125, 1.5, 0.375]) / (4 * np.pi)
 # Per point, on the harmonics' coefficients: 1e-6, 0.01 and 0.1 on those of 1, of x, y, z and of xy, yz, z^2 - 1/3, xz,
 # x^2 - y^2
@@ -54,8 +54,15 @@ class Look:
 
 def summarise_look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray,
                    surroundings: np.ndarray | None = None) -> Look:
-    """From linear colours [N, 3] of facial skin with unit normals [N, 3] and weights [N] in [0, 1], 0 for what is
-    shadowed or no skin."""
+    """What points of facial skin show of its colour.
+
+    Parameters
+    ----------
+    colours : [N, 3], linear
+    normals : [N, 3], unit, in the head's axes
+    weight : [N] in [0, 1], 0 for what is shadowed or no skin
+    surroundings : [3], linear, the mean of what is around the head; None where it is not known
+    """
     brightness = colours @ LUMINANCE_WEIGHTS
     order = np.argsort(brightness)
     rank = np.cumsum(weight[order]) / weight.sum()
@@ -65,8 +72,19 @@ def summarise_look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray,
 
 
 def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter) -> Look | None:
-    """From the selected frames as they were filmed. `shadow` [S, S]: the soft mask in UV. None where the frames or
-    cameras are gone, or hardly any skin is seen."""
+    """What the selected frames, as they were filmed, show of the skin's colour.
+
+    Parameters
+    ----------
+    capture : with frames and cameras
+    head : in the capture
+    shadow : [S, S] in [0, 1], the soft mask in the head's UVs
+    report : hears whether it is cancelled
+
+    Returns
+    -------
+    None where the frames or cameras are gone, or hardly any skin is seen.
+    """
     if not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return None
     views = [view for view in read_views(capture, selected_only=True) if view.path.is_file()]
@@ -144,9 +162,9 @@ def _surroundings(frame: np.ndarray) -> np.ndarray | None:
     return images.srgb_to_linear(small)[away].mean(0) if away.mean() > MIN_SURROUNDINGS_SHARE else None
 
 
-def _low_quantile(seen: np.ndarray) -> np.ndarray:
+def _low_quantile(colours: np.ndarray) -> np.ndarray:
     """[N, 3]: the VIEW_QUANTILE over the views of [V, N, 3], whose nan do not count; each point has at least one
     value."""
-    count = np.isfinite(seen[..., 0]).sum(0)
+    count = np.isfinite(colours[..., 0]).sum(0)
     at = np.floor(VIEW_QUANTILE * (count - 1)).astype(int)
-    return np.take_along_axis(np.sort(seen, 0), at[None, :, None], 0)[0]  # sort puts nan last
+    return np.take_along_axis(np.sort(colours, 0), at[None, :, None], 0)[0]  # sort puts nan last

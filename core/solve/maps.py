@@ -41,11 +41,21 @@ class Maps:
 
 def finish_maps(state: State, evidence: Evidence, start: Start, spread: torch.Tensor | None = None,
                 gain: torch.Tensor | None = None) -> Maps:
-    """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the
-    skin tone (or by a `gain` [3] that was found before); the shading takes the inverse, so that their product stays.
-    What nobody saw is the mean face of that tone: a drawn sample would be as likely, but would look like something that
-    was measured. So is the specular albedo, of which no term of the likelihood knows. `spread` [H, W], of any size, is
-    confidence.py's; none by default."""
+    """Reads the maps out of \\hat x_0.
+
+    The albedo is rescaled once so that the mean of the confident facial skin is the skin tone; the shading takes the
+    inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn sample would be as
+    likely, but would look like something that was measured. So is the specular albedo, of which no term of the
+    likelihood knows.
+
+    Parameters
+    ----------
+    state : of the sampler, at its end
+    evidence : of the capture
+    start : what the run began with
+    spread : [H, W], of any size, confidence.py's; none by default
+    gain : [3], by which the albedo is rescaled if it was found before
+    """
     shader = start.observations[1].shader
     seen = evidence.weight.sqrt()
     x = torch.lerp(start.reference, state.denoised, seen)[0]
@@ -78,16 +88,24 @@ def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, resca
     return (tone ** (1 / gamma) / mean_tone(diffuse ** (1 / gamma), weight)).pow(gamma).clamp(0.2, 5.0)
 
 
-def write_maps(capture: Capture, maps: Maps, found: Solution, conditions: dict[str, str],
+def write_maps(capture: Capture, maps: Maps, solution: Solution, conditions: dict[str, str],
                only: tuple[slice, slice] | None = None) -> None:
-    """The folder maps/, whole or not at all, with what a later solve of a part goes on from. `only` those rows and
-    columns are new where given: the others keep the values that their files have."""
-    def put(write: Callable, name: str, values: np.ndarray, **options) -> None:
+    """The folder maps/, whole or not at all, with what a later solve of a part goes on from.
+
+    Parameters
+    ----------
+    capture : whose maps they are
+    maps : that were solved
+    solution : the state behind them
+    conditions : mask_edit's
+    only : rows and columns that are new; the others keep the values that their files have
+    """
+    def put(write: Callable, name: str, image: np.ndarray, **options) -> None:
         if only is not None:
             before = images.read_data(capture.maps / name)
-            before[only] = values.reshape(*values.shape[:2], -1)[only]
-            values = before
-        write(folder / name, values, **options)
+            before[only] = image.reshape(*image.shape[:2], -1)[only]
+            image = before
+        write(folder / name, image, **options)
 
     with replacing_folder(capture.maps) as folder:
         put(images.write_srgb, "diffuse_albedo.png", images.linear_to_srgb(maps.diffuse), bits=16)
@@ -96,12 +114,20 @@ def write_maps(capture: Capture, maps: Maps, found: Solution, conditions: dict[s
         put(images.write_data, "normal.png", maps.normal, bits=16)
         put(images.write_linear, "shading.exr", maps.shading)
         put(images.write_data, "confidence.png", maps.confidence)
-        write_solution(folder / capture.solved.name, found, conditions)
+        write_solution(folder / capture.solved.name, solution, conditions)
 
 
-def write_preview(capture: Capture, state: State, seen: dict[int, Observation], report: Reporter) -> None:
-    """preview/albedo.png and shading.png of a running solve, at the size it works at just now."""
-    o = next(o for o in seen.values() if o.weight.shape == state.denoised.shape[-2:])
+def write_preview(capture: Capture, state: State, observations: dict[int, Observation], report: Reporter) -> None:
+    """Writes preview/albedo.png and shading.png of a running solve, at the size it works at just now.
+
+    Parameters
+    ----------
+    capture : that is solved
+    state : of the sampler
+    observations : by coarsening factor
+    report : hears of the pictures
+    """
+    o = next(o for o in observations.values() if o.weight.shape == state.denoised.shape[-2:])
     with torch.no_grad():
         shading = o.shader.total(state.lights).clamp_min(0).cpu()
     scale = 0.6 / max(float(np.percentile(shading.numpy(), 95)), 1e-6)

@@ -20,7 +20,7 @@ import torch
 from ..geometry import raster
 from .evidence import Evidence
 
-RADII_TEXELS = tuple(np.geomspace(2.0, 8.0, 6))
+RADII_TEXELS = tuple(np.geomspace(2.0, 8.0, 6))  # of the blobs that are looked for
 DISC_RESPONSE = 2 / np.e  # of a disc's contrast, what the normalised Laplacian of deviation radius / sqrt 2 has amid it
 MIN_CONTRAST_LOG = 0.3  # contrast, natural log units: a fainter one is a freckle, or nothing
 # of the usual response of such a blob within that distance: in stubble and on rough skin more is asked for
@@ -30,7 +30,7 @@ MIN_SURROUNDED_SHARE = 0.45  # of the contrast that every direction must show
 # more others of that share of its contrast, within that distance, make it one of a crowd of freckles
 MAX_NEIGHBOURS, NEIGHBOUR_REACH_TEXELS, LIKE_SHARE = 2, 64.0, 0.4
 MIN_COLOUR_DISTANCE = 0.16  # distance of a mark's colour from the shadow's, in shares of its contrast
-SECTORS = 8
+SECTORS = 8  # around a mark in which its surroundings are compared
 FEATURE_MARGIN_TEXELS = 12.0  # distance to brows, lips, lids, nostrils and scalp
 
 
@@ -68,7 +68,7 @@ def protect_marks(evidence: Evidence,
         return evidence, []
     feature = cv2.blur(1 - evidence.trust.numpy(), (2 * round(FEATURE_MARGIN_TEXELS / evidence.texel) + 1,) * 2)
     where = (evidence.skin.numpy() > 0.5) & (evidence.weight.numpy() > 0.5) & (feature < 0.02)
-    alpha, taken = evidence.alpha.numpy(), np.array(evidence.taken)
+    alpha, taken = evidence.alpha.numpy(), np.array(evidence.shadow_colour)
     marks = [mark for mark in find_marks(evidence.texture.permute(1, 2, 0).numpy(), where, evidence.texel)
              if alpha[round(mark.row), round(mark.column)] > 0.05 and is_unlike_shadow(mark, taken)]
     marks = witness(marks)
@@ -76,14 +76,14 @@ def protect_marks(evidence: Evidence,
     return replace(evidence, trust=evidence.trust * (1 - cover)), marks
 
 
-def find_marks(texture: np.ndarray, where: np.ndarray, texel: float) -> list[Mark]:
-    """The marks of a linear texture [S, S, 3] on the texels `where` bool [S, S]: seen skin without lips, brows and
+def find_marks(texture: np.ndarray, skin: np.ndarray, texel: float) -> list[Mark]:
+    """The marks of a linear texture [S, S, 3] on the texels `skin` bool [S, S]: seen skin without lips, brows and
     lids. Darkest first."""
-    if not where.any():
+    if not skin.any():
         return []
     log = np.log(np.maximum(texture, 1e-3)).astype(np.float32)
-    log = raster.bleed(log, where)  # so that the border of what is not skin is no blob
-    candidates = _blobs(log.mean(-1), where, texel)
+    log = raster.bleed(log, skin)  # so that the border of what is not skin is no blob
+    candidates = _blobs(log.mean(-1), skin, texel)
     measured = [mark for blob in candidates if blob.stands_out
                 and (mark := _measured(log, blob.row, blob.column, blob.radius)) is not None]
     measured.sort(key=lambda mark: -mark.contrast)
@@ -94,13 +94,13 @@ def find_marks(texture: np.ndarray, where: np.ndarray, texel: float) -> list[Mar
     return [mark for mark in kept if _alone(mark, candidates, NEIGHBOUR_REACH_TEXELS / texel)]
 
 
-def is_unlike_shadow(mark: Mark, taken: np.ndarray) -> bool:
-    """Whether a mark has another colour than a shadow that dark; taken [3]: the light's share that shadows take, over
-    its mean (zeros: not known, grey)."""
-    taken = taken if np.any(taken) else np.ones(3)
+def is_unlike_shadow(mark: Mark, shadow_colour: np.ndarray) -> bool:
+    """Whether a mark has another colour than a shadow that dark; shadow_colour [3]: the light's share that shadows
+    take, over its mean (zeros: not known, grey)."""
+    shadow_colour = shadow_colour if np.any(shadow_colour) else np.ones(3)
     change = np.array(mark.change)
     share = 1 - np.exp(change.mean())
-    shadow = np.log(np.maximum(1 - taken * share, 0.02))
+    shadow = np.log(np.maximum(1 - shadow_colour * share, 0.02))
     distance = float(np.abs((change - change.mean()) - (shadow - shadow.mean())).max())
     return distance > MIN_COLOUR_DISTANCE * mark.contrast
 
@@ -116,16 +116,17 @@ def draw_cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
     return out
 
 
-def _blobs(value: np.ndarray, where: np.ndarray, texel: float) -> list[_Blob]:
-    """Dark blobs: maxima of the normalised Laplacian over place and scale with two like curvatures. value [S, S]."""
+def _blobs(log_luminance: np.ndarray, skin: np.ndarray, texel: float) -> list[_Blob]:
+    """Dark blobs: maxima of the normalised Laplacian over place and scale with two like curvatures. log_luminance
+    [S, S]."""
     radii = [r / texel for r in RADII_TEXELS if r / texel >= 0.9]
     responses, compact, usual = [], [], []
-    known = where.astype(np.float32)
+    known = skin.astype(np.float32)
     reach = STANDING_OUT_TEXELS / texel
     share = np.maximum(_usual(known, reach), 1e-3)
     for radius in radii:
         sigma = radius / 2**0.5
-        smooth = cv2.GaussianBlur(value, (0, 0), sigma)
+        smooth = cv2.GaussianBlur(log_luminance, (0, 0), sigma)
         xx, yy, xy = (cv2.filter2D(smooth, -1, kernel) for kernel in _CURVATURES)
         mean, spread = (xx + yy) / 2, np.sqrt(((xx - yy) / 2) ** 2 + xy**2)
         responses.append(sigma**2 * (xx + yy) / DISC_RESPONSE)
@@ -138,14 +139,14 @@ def _blobs(value: np.ndarray, where: np.ndarray, texel: float) -> list[_Blob]:
     around[:-1] = np.maximum(around[:-1], highest[1:])
     stands_out = (stack > 0.7 * MIN_CONTRAST_LOG) & (stack > STANDING_OUT_RATIO * np.stack(usual))
     is_blob = (stack >= around) & (stack > LIKE_SHARE * MIN_CONTRAST_LOG) & (np.stack(compact) > MIN_COMPACTNESS)
-    peaks = np.nonzero(is_blob & where[None])
+    peaks = np.nonzero(is_blob & skin[None])
     return [_Blob(r, c, radii[k], float(stack[k, r, c]), bool(stands_out[k, r, c]))
             for k, r, c in zip(*(i.tolist() for i in peaks), strict=True)]
 
 
-def _usual(values: np.ndarray, reach: float) -> np.ndarray:
+def _usual(image: np.ndarray, reach: float) -> np.ndarray:
     """The mean of [S, S] over a square window: fast at any size."""
-    return cv2.blur(values, (2 * round(reach) + 1,) * 2, borderType=cv2.BORDER_REPLICATE)
+    return cv2.blur(image, (2 * round(reach) + 1,) * 2, borderType=cv2.BORDER_REPLICATE)
 
 
 _CURVATURES = tuple(np.array(k, np.float32) for k in (

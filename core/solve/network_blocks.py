@@ -20,8 +20,19 @@ STRIP_ROWS = 64
 
 
 def run_layers(blocks: nn.ModuleList, x: torch.Tensor, mapped: torch.Tensor, low_memory: bool) -> torch.Tensor:
-    """The layers one after the other. In low memory only their inputs are kept for the gradient, and what is inside
-    them is computed a second time."""
+    """The layers one after the other.
+
+    Parameters
+    ----------
+    blocks : the layers
+    x : [N, C, H, W], what goes in
+    mapped : [N, M], the mapped noise level and conditions, which some layers take
+    low_memory : keeps only the layers' inputs for the gradient, and computes what is inside them a second time
+
+    Returns
+    -------
+    [N, C', H', W'].
+    """
     for layer in blocks:
         given = (x, mapped) if isinstance(layer, Residual | SelfAttention) else (x,)
         x = checkpoint(layer, *given, use_reentrant=False) if low_memory and x.requires_grad else layer(*given)
@@ -131,8 +142,8 @@ class Fourier(nn.Module):
         super().__init__()
         self.register_buffer("weight", torch.randn(features // 2, 1))
 
-    def forward(self, value: torch.Tensor) -> torch.Tensor:
-        phase = 2 * math.pi * value[:, None] @ self.weight.T
+    def forward(self, condition: torch.Tensor) -> torch.Tensor:
+        phase = 2 * math.pi * condition[:, None] @ self.weight.T
         return torch.cat([phase.cos(), phase.sin()], -1)
 
 

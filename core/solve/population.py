@@ -67,11 +67,12 @@ def estimate_skin_tone(look: Look, white: np.ndarray | None = None) -> SkinTone:
     return _posterior(BEST_ROWS + SURROUNDINGS_ROWS, shown, np.zeros(6), SCENE)
 
 
-def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray, source: str) -> SkinTone:
-    """The estimate from these rows of the model, as they are `shown`; `variance` is added to the model's own."""
+def _posterior(rows: list[int], coordinates: np.ndarray, variance: np.ndarray, source: str) -> SkinTone:
+    """The estimate from these rows of the model, whose `coordinates` [R] are seen; `variance` is added to the model's
+    own."""
     known = read_population()
     of_tones = to_coordinates(known.tones + SHEEN_REFLECTANCE)
-    away = shown - of_tones @ known.slope[rows].T - known.offset[rows]
+    away = coordinates - of_tones @ known.slope[rows].T - known.offset[rows]
     # [N, R]: on dark skin sheen is much of what is seen
     shiny = (to_coordinates(known.tones + SHEEN_REFLECTANCE * np.exp(SHEEN_SIGMA_LOG)) - of_tones) @ known.slope[rows].T
     covariance = (
@@ -98,9 +99,9 @@ def to_lab(linear: np.ndarray) -> np.ndarray:
     return color.rgb2lab(images.linear_to_srgb(linear))
 
 
-def from_lab(values: np.ndarray) -> np.ndarray:
+def from_lab(lab: np.ndarray) -> np.ndarray:
     """The inverse of `to_lab`; values outside of sRGB are brought to its border."""
-    return np.clip(images.srgb_to_linear(color.lab2rgb(values)), 1e-3, 1)
+    return np.clip(images.srgb_to_linear(color.lab2rgb(lab)), 1e-3, 1)
 
 
 def name_group(linear: np.ndarray) -> str:

@@ -20,9 +20,9 @@ class Observation:
     texture I_UV [3, H, W], scaled so that its shading is about one; weight [H, W] in [0, 1]: how far a texel's
     observation counts; trust [H, W] in [0, 1]: how far what is seen there may be explained as light (less for brows,
     lips and hair); coords [1, 2, H, W] for the prior; shader Gamma with N_c and M; ring [H, W]: where L_TV counts;
-    texel: side of a texel in texels of a 1024 map; held [H, W] in [0, 1], or one number: how far `Recipe.faint` holds
-    the local light back there; missing [H, W] in [0, 1), or one number: the share of the light that M's border says is
-    missing (border.py), which is what it is held to.
+    texel: side of a texel in texels of a 1024 map; restraint [H, W] in [0, 1], or one number: how far `Recipe.faint`
+    holds the local light back there; missing [H, W] in [0, 1), or one number: the share of the light that M's border
+    says is missing (border.py), which is what it is held to.
     """
 
     texture: torch.Tensor
@@ -32,7 +32,7 @@ class Observation:
     shader: Shader
     ring: torch.Tensor
     texel: float = 1.0
-    held: torch.Tensor | float = 1.0
+    restraint: torch.Tensor | float = 1.0
     missing: torch.Tensor | float = 0.0
 
     def to(self, device: torch.device | str) -> Observation:
@@ -67,8 +67,16 @@ def albedo(denoised: torch.Tensor) -> torch.Tensor:
 
 def photometric_loss(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, weight: torch.Tensor,
                      blur: bool = False) -> torch.Tensor:
-    """L_pho: the weighted sum of squares over the map (paper, equation 1); `blur` puts the rendering through a small
-    Gaussian."""
+    """L_pho: the weighted sum of squares over the map (paper, equation 1).
+
+    Parameters
+    ----------
+    denoised : [1, 7, H, W] in the network's range; its albedo is taken
+    shading : [3, H, W], linear
+    o : holds the texture [3, H, W], linear
+    weight : [H, W] in [0, 1]
+    blur : puts the rendering through a small Gaussian
+    """
     rendered = albedo(denoised) * shading
     return ((weight * ((blur_maps(rendered) if blur else rendered) - o.texture)) ** 2).sum()
 

@@ -37,15 +37,15 @@ def seed_noise(seed: int, device: torch.device | str = "cpu") -> Callable[[int],
 class Sampler:
     """How a map is sampled, whatever is observed of it.
 
-    denoiser(x, sigma, coords) is the prior; noise is `seed_noise`'s, of the observations' device; known(x, sigma, draw)
-    puts what is known of the map for sure into x_t (window.py); fit moves theta after each step
+    denoiser(x, sigma, coords) is the prior; noise is `seed_noise`'s, of the observations' device; impose_known(x,
+    sigma, draw) puts what is known of the map for sure into x_t (window.py); fit moves theta after each step
     (light_fit.update_lights, or another light model's).
     """
 
     denoiser: Callable
     recipe: Recipe
     noise: Callable[[int], Callable]
-    known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x
+    impose_known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x
     fit: Callable[..., None] = update_lights
 
     def sample(self, observations: dict[int, Observation], state: State,
@@ -88,7 +88,7 @@ class Sampler:
         draw : draw(*shape), the step's standard normal noise
         """
         (s, s_next), recipe = levels, self.recipe
-        x = self.known(state.x, s, draw).requires_grad_(recipe.guidance == "dps")
+        x = self.impose_known(state.x, s, draw).requires_grad_(recipe.guidance == "dps")
         denoised = self.denoiser(x, s, o.coords)  # equation 6
         with torch.no_grad():
             shading = o.shader.total(state.lights)
@@ -161,8 +161,20 @@ def clip_gradient(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
 
 def proximal_step(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, s: float,
                   residual: float) -> torch.Tensor:
-    """The map nearest to `denoised` (spread s) that explains the texture (spread `residual`): per texel, in closed form
-    (Zhu et al. 2023)."""
+    """The map nearest to `denoised` that explains the texture: per texel, in closed form (Zhu et al. 2023).
+
+    Parameters
+    ----------
+    denoised : [1, 7, H, W] in the network's range, of spread `s`
+    shading : [3, H, W], linear
+    o : holds the texture [3, H, W], linear, and its weight [H, W]
+    s : the noise level sigma of the step
+    residual : spread of the texture about its explanation, linear
+
+    Returns
+    -------
+    As `denoised`; normals and specular are its.
+    """
     half = shading / 2 * o.weight
     ratio = (residual / s) ** 2
     wanted = o.texture * o.weight - half

@@ -37,14 +37,14 @@ class SkinTone:
     group: str | None = None
 
     @classmethod
-    def from_linear(cls, linear: np.ndarray | torch.Tensor, source: str, **known) -> SkinTone:
-        """Of linear sRGB [3]; `known` are the other fields."""
-        return cls(tuple(float(value) for value in np.asarray(linear, np.float32)), source, **known)
+    def from_linear(cls, linear: np.ndarray | torch.Tensor, source: str, **other_fields) -> SkinTone:
+        """Of linear sRGB [3]; `other_fields` are the other fields."""
+        return cls(tuple(float(value) for value in np.asarray(linear, np.float32)), source, **other_fields)
 
     @classmethod
-    def from_srgb(cls, srgb: np.ndarray | list[float], source: str, **known) -> SkinTone:
+    def from_srgb(cls, srgb: np.ndarray | list[float], source: str, **other_fields) -> SkinTone:
         """Of encoded sRGB [3] in (0, 1]."""
-        return cls.from_linear(images.srgb_to_linear(np.asarray(srgb, np.float32)), source, **known)
+        return cls.from_linear(images.srgb_to_linear(np.asarray(srgb, np.float32)), source, **other_fields)
 
     @property
     def srgb(self) -> np.ndarray:

@@ -106,14 +106,14 @@ class Split:
 
 @dataclass(frozen=True)
 class Cells:
-    """places [N, 3] in metres on the built-in head and normal [N, 3] of all cells of a head; seen [K]: which of them
-    tell of the skin; values [K, 3] there: log(texture / reference) along COLOUR_AXES; covered [C, C]: where the N
-    lie."""
+    """places [N, 3] in metres on the built-in head and normal [N, 3] of all cells of a head; observed [K]: which of
+    them tell of the skin; log_ratio [K, 3] there: log(texture / reference) along COLOUR_AXES; covered [C, C]: where the
+    N lie."""
 
     places: np.ndarray
     normal: np.ndarray
-    seen: np.ndarray
-    values: np.ndarray
+    observed: np.ndarray
+    log_ratio: np.ndarray
     covered: np.ndarray
 
 
@@ -178,32 +178,32 @@ def place_cells(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def join_seen(captures: list[Cells]) -> tuple[Places, np.ndarray]:
-    """All cells that were seen, and their values [K, 3]."""
-    own = np.repeat(np.arange(len(captures)), [len(cells.seen) for cells in captures])
-    return Places(*(np.concatenate([getattr(cells, name)[cells.seen] for cells in captures])
+    """All cells that were observed, and their values [K, 3]."""
+    own = np.repeat(np.arange(len(captures)), [len(cells.observed) for cells in captures])
+    return Places(*(np.concatenate([getattr(cells, name)[cells.observed] for cells in captures])
                     for name in ("places", "normal")), own), \
-        np.concatenate([cells.values for cells in captures])
+        np.concatenate([cells.log_ratio for cells in captures])
 
 
-def model_covariances(these: Places, others: Places) -> Covariances:
+def model_covariances(rows: Places, columns: Places) -> Covariances:
     """The covariances of places with others; each capture has a light of its own."""
-    same = (these.own[:, None] == others.own[None]).astype(np.float64)
-    apart = np.linalg.norm(these.at[:, None] - others.at[None], axis=-1)
-    mirrored = np.linalg.norm(these.at[:, None] * [-1, 1, 1] - others.at[None], axis=-1)
+    same = (rows.own[:, None] == columns.own[None]).astype(np.float64)
+    apart = np.linalg.norm(rows.at[:, None] - columns.at[None], axis=-1)
+    mirrored = np.linalg.norm(rows.at[:, None] * [-1, 1, 1] - columns.at[None], axis=-1)
     # higher where a place is its own mirror image
     variances = [1 + MIRROR_CORRELATION * np.exp(-2 * np.abs(places.at[:, 0]) / TRAIT_REACH_M)
-                 for places in (these, others)]
+                 for places in (rows, columns)]
     traits = np.exp(-apart / TRAIT_REACH_M) + MIRROR_CORRELATION * np.exp(-mirrored / TRAIT_REACH_M)
     traits = traits / np.sqrt(np.multiply.outer(*variances))
-    light = (SH_SCALE**2 * sh_basis(these.normal) * ORDER_DEVIATIONS**2) @ sh_basis(others.normal).T
+    light = (SH_SCALE**2 * sh_basis(rows.normal) * ORDER_DEVIATIONS**2) @ sh_basis(columns.normal).T
     return Covariances(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same,
                        np.exp(-apart / NOISE_REACH_M) * same, same)
 
 
-def find_scales(together: Covariances, values: np.ndarray, typical: Scales = TYPICAL_SCALES,
+def find_scales(together: Covariances, log_ratio: np.ndarray, typical: Scales = TYPICAL_SCALES,
                 check: Callable[[], None] = lambda: None) -> Scales:
     """The most probable scales, by a search along one of them after the other."""
-    best, most = typical, log_probability(together, values, typical, typical)
+    best, most = typical, log_probability(together, log_ratio, typical, typical)
     for step in (2.0, 1.4, 1.2):
         moved = True
         while moved:
@@ -212,19 +212,27 @@ def find_scales(together: Covariances, values: np.ndarray, typical: Scales = TYP
                 for factor in (step, 1 / step):
                     check()
                     tried = replace(best, **{name: getattr(best, name) * factor})
-                    probable = log_probability(together, values, tried, typical)
+                    probable = log_probability(together, log_ratio, tried, typical)
                     if probable > most:
                         best, most, moved = tried, probable, True
     return best
 
 
-def log_probability(together: Covariances, values: np.ndarray, scales: Scales,
+def log_probability(together: Covariances, log_ratio: np.ndarray, scales: Scales,
                     typical: Scales = TYPICAL_SCALES) -> float:
-    """Of values [K, 3] under the scales, and of the scales themselves, but for a constant."""
+    """Of the observed ratios under the scales, and of the scales themselves, but for a constant.
+
+    Parameters
+    ----------
+    together : the covariances of the K places with each other
+    log_ratio : [K, 3], natural log of texture / reference along COLOUR_AXES
+    scales : that are judged
+    typical : about which scales are expected to lie
+    """
     total = -0.5 * sum((np.log(scale / usual) / SCALES_DEVIATION) ** 2
                        for scale, usual in zip(scales, typical, strict=True))
     for axis in range(3):
-        lower, column = cholesky(together.covariance(scales, axis), lower=True), values[:, axis]
+        lower, column = cholesky(together.covariance(scales, axis), lower=True), log_ratio[:, axis]
         white = solve_triangular(lower, column, lower=True)
         total -= 0.5 * float(np.square(white).sum()) + float(np.log(np.diag(lower)).sum())
     return total
@@ -235,7 +243,7 @@ def infer_split(captures: list[Cells], scales: Scales) -> Split:
     first, (seen, ratios) = captures[0], join_seen(captures)
     among = model_covariances(seen, seen)
     beyond = model_covariances(Places(first.places, first.normal, np.zeros(len(first.places), int)), seen)
-    basis = SH_SCALE * sh_basis(first.normal[first.seen])
+    basis = SH_SCALE * sh_basis(first.normal[first.observed])
     traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
     for axis, size in enumerate(AXIS_DEVIATIONS):
         told = cho_solve(cho_factor(among.covariance(scales, axis)), ratios[:, axis])
@@ -252,10 +260,10 @@ def enlarge_field(field: torch.Tensor, size: int) -> torch.Tensor:
     return torch.nn.functional.interpolate(field[None], (size, size), mode="bicubic", align_corners=False)[0]
 
 
-def _spread(values: np.ndarray, covered: np.ndarray) -> np.ndarray:
+def _spread(field: np.ndarray, covered: np.ndarray) -> np.ndarray:
     """[3, N] of the covered cells as maps [3, C, C]; what is off the head takes its neighbours' values."""
     maps = np.zeros((*covered.shape, 3), np.float32)
-    maps[covered] = values.T
+    maps[covered] = field.T
     return raster.bleed(maps, covered).transpose(2, 0, 1)
 
 

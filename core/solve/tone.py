@@ -45,11 +45,23 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 def resolve_skin_tone(capture: Capture, head: Head, settings: Settings, built_in: Evidence, evidence: Evidence,
                       tones: list, report: Reporter) -> SkinTone:
-    """The tone of a solve: the artist's, or the frames', or where these are gone the texture's.
+    """The tone of a solve: the artist's, or the frames', or where these are gone the texture's. The frames' leaves its
+    figures.
 
-    built_in: the evidence in the built-in UVs; evidence: in the prior's; tones [N, 3]: those that the prior was trained
-    on, linear. The frames' leaves its figures. Raises Problem for a setting that is no colour, and where no facial skin
-    was seen.
+    Parameters
+    ----------
+    capture : that is solved
+    head : in the capture
+    settings : of the solve
+    built_in : the evidence in the built-in UVs
+    evidence : in the prior's UVs
+    tones : [N, 3], linear: those that the prior was trained on
+    report : takes the figures
+
+    Raises
+    ------
+    Problem
+        For a setting that is no colour, and where no facial skin was seen.
     """
     given = parse_skin_tone(settings.solve.skin_tone)
     if given is not None:
@@ -63,8 +75,20 @@ def resolve_skin_tone(capture: Capture, head: Head, settings: Settings, built_in
 
 def estimate_from_frames(capture: Capture, head: Head, settings: Settings, evidence: Evidence,
                          report: Reporter) -> SkinTone | None:
-    """The tone that the frames tell under the measured white point, or the scene's; None where frames or cameras are
-    gone. `evidence` in the built-in UVs."""
+    """The tone that the frames tell under the measured white point, or the scene's.
+
+    Parameters
+    ----------
+    capture : with frames and cameras
+    head : in the capture
+    settings : with the white point
+    evidence : in the built-in UVs
+    report : hears whether it is cancelled
+
+    Returns
+    -------
+    None where frames or cameras are gone.
+    """
     white = parse_white(settings.solve.white_point)
     seen = read_look(capture, head, evidence.alpha.numpy(), report)
     return None if seen is None else estimate_skin_tone(seen, white)

@@ -68,8 +68,23 @@ def measure_chart_white(srgb: np.ndarray) -> np.ndarray | None:
 
 
 def measure_card_white(srgb: np.ndarray, column: float, row: float, card: str) -> np.ndarray:
-    """The linear white [3] that a card says at a pixel of an sRGB frame [H, W, 3]; `card` is one of settings.CARDS.
-    Raises Problem where the place is outside, burnt out or uneven."""
+    """The white that a card says at a pixel of a frame.
+
+    Parameters
+    ----------
+    srgb : [H, W, 3] in [0, 1], the frame
+    column, row : of the pixel, from the upper left
+    card : one of settings.CARDS
+
+    Returns
+    -------
+    Linear [3].
+
+    Raises
+    ------
+    Problem
+        Where the place is outside, burnt out or black, or uneven.
+    """
     height, width = srgb.shape[:2]
     if not (0 <= column < width and 0 <= row < height):
         raise Problem(f"The place {column:g}, {row:g} is outside of the frame, which is {width} x {height}.",

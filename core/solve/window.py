@@ -38,22 +38,34 @@ MAX_SHARE = 0.5
 
 @dataclass(frozen=True)
 class Window:
-    """Rows and columns of the whole map: `inside` is sampled again, `seen` is what the network sees; `cells` of V
-    belong to `seen`, and of these cells `moving` [h, w] may change."""
+    """Rows and columns of the whole map: `inside` is sampled again, `context` is what the network sees; `cells` of V
+    belong to `context`, and of these cells `moving` [h, w] may change."""
 
     inside: tuple[slice, slice]
-    seen: tuple[slice, slice]
+    context: tuple[slice, slice]
     cells: tuple[slice, slice]
     moving: torch.Tensor
 
 
 def find_window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], multiple: int,
                 reference: int) -> Window | None:
-    """What an edit from the mask `before` to `now` [S, S] touches; None where they are the same.
+    """What an edit of the mask touches.
 
-    `cells` (rows, columns) of V cover the map, the network takes sides that are multiples of `multiple`, `reference` is
-    the size that MARGIN_TEXELS counts texels of. Raises ValueError, with a sentence, where the whole map is to be
-    solved.
+    Parameters
+    ----------
+    before, now : [S, S] in [0, 1], the mask
+    cells : rows and columns of V that cover the map
+    multiple : of which the network takes sides, in texels
+    reference : the size that MARGIN_TEXELS counts texels of
+
+    Returns
+    -------
+    None where the masks are the same.
+
+    Raises
+    ------
+    ValueError
+        With a sentence, where the whole map is to be solved.
     """
     size = now.shape[0]
     touched = (now - before).abs() > 1e-3
@@ -81,7 +93,7 @@ def find_window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int],
     return Window(tuple(inside), tuple(seen), tuple(cells_seen), moving[0][:, None] & moving[1][None])
 
 
-def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], earlier: Solution, part: Window,
+def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], earlier: Solution, window: Window,
                  recipe: Recipe, seed: int, report: Reporter) -> tuple[torch.Tensor, Lights]:
     """The map and the lights of an earlier solve with a window of it sampled anew.
 
@@ -90,7 +102,7 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
     prior : of the earlier solve's skin tone
     observations : of the whole map, by coarsening factor
     earlier : what goes on around the window; stays as it is
-    part : the window
+    window : what is sampled anew
     recipe : the earlier solve's; the walk is its, with at most MAX_STEPS steps
     seed : of the noise
     report : hears each step
@@ -100,13 +112,15 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
     The map [1, 7, S, S] and theta, on the processor.
     """
     device, denoised, lights = prior.device, earlier.denoised, earlier.lights
-    here = {factor: crop_observation(o, part, factor).to(device) for factor, o in observations.items()}
-    known = denoised[(..., *part.seen)].to(device)
-    grid = lights.grid[(..., *part.cells)].to(device)
+    here = {factor: crop_observation(o, window, factor).to(device) for factor, o in observations.items()}
+    known = denoised[(..., *window.context)].to(device)
+    grid = lights.grid[(..., *window.cells)].to(device)
     state = State(0, None, known.clone(),
                   Lights(lights.glob.clone().to(device), grid.clone(), lights.chroma.clone().to(device)))
-    moving, inside = part.moving.to(device), torch.zeros(known.shape[-2:], device=device)
-    inside[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(part.inside, part.seen, strict=True))] = 1
+    moving, inside = window.moving.to(device), torch.zeros(known.shape[-2:], device=device)
+    inside[
+        tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(window.inside, window.context, strict=True))
+    ] = 1
 
     def with_known(x: torch.Tensor, s: float, draw: Callable) -> torch.Tensor:
         factor = known.shape[-1] // x.shape[-1]
@@ -121,19 +135,19 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
     local = replace(recipe, steps=min(recipe.steps, MAX_STEPS), phases=(("cells", 0.0, last),), refit=0.0)
     state = sample_within_memory(Sampler(prior, local, seed_noise(seed, device), with_known), here, state, keep_frozen,
                                  report.log)
-    restored = restore_maps(prior, state.denoised, observations[1].coords.to(device), seed, part.seen)
+    restored = restore_maps(prior, state.denoised, observations[1].coords.to(device), seed, window.context)
     solved, moved = denoised.clone(), lights.grid.clone()
-    moved[(..., *part.cells)] = state.lights.grid.cpu()
-    solved[(..., *part.seen)] = torch.where(inside > 0, restored, known).cpu()
+    moved[(..., *window.cells)] = state.lights.grid.cpu()
+    solved[(..., *window.context)] = torch.where(inside > 0, restored, known).cpu()
     return solved, Lights(lights.glob, moved, lights.chroma)
 
 
-def crop_observation(o: Observation, part: Window, factor: int) -> Observation:
+def crop_observation(o: Observation, window: Window, factor: int) -> Observation:
     """What is known of the window and its surroundings, of a map coarser by `factor`; coordinates keep their place."""
-    rows, columns = (slice(s.start // factor, s.stop // factor) for s in part.seen)
+    rows, columns = (slice(s.start // factor, s.stop // factor) for s in window.context)
     tensors = {f.name: getattr(o, f.name)[..., rows, columns] for f in fields(o)
                if isinstance(getattr(o, f.name), torch.Tensor)}
-    return replace(o, **tensors, shader=o.shader.part(rows, columns, part.cells))
+    return replace(o, **tensors, shader=o.shader.part(rows, columns, window.cells))
 
 
 def average_down(maps: torch.Tensor, factor: int) -> torch.Tensor:

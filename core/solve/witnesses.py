@@ -23,8 +23,15 @@ MIN_VIEWS = 2  # views; where fewer saw it the texture alone decides
 
 
 def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
-    """The marks, in texels of a size x size map, that the delit views agree on; all of them where this capture has no
-    cameras or no delit views."""
+    """The marks that the delit views agree on.
+
+    Parameters
+    ----------
+    capture : with cameras and delit views; without them all marks stay
+    head : in the capture
+    marks : in texels of a map
+    size : of that map, in texels along a side
+    """
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return marks
     covered = head.raster(size)[0] >= 0
@@ -45,7 +52,19 @@ def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) ->
 
 
 def find_visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """bool [N] of surface points [N, 3] with unit normals [N, 3]."""
+    """Which points of a surface a view sees.
+
+    Parameters
+    ----------
+    view : the camera
+    caster : of the surface
+    points : [N, 3], in metres
+    normals : [N, 3], unit
+
+    Returns
+    -------
+    bool [N].
+    """
     towards = view.centre - points
     facing = (towards * normals).sum(1) > MIN_FACING_COSINE * np.linalg.norm(towards, axis=1)
     pixels, _ = view.project(points)

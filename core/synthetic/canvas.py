@@ -65,9 +65,9 @@ class Canvas:
         index[self.covered] = np.arange(len(self.position))
         return raster.bleed(index, self.covered)
 
-    def spread(self, values: np.ndarray) -> np.ndarray:
+    def spread(self, texel_values: np.ndarray) -> np.ndarray:
         """Values [N(, C)] as a picture [S, S(, C)], bled beyond the charts."""
-        return values[self._nearest]
+        return texel_values[self._nearest]
 
     def soft(self, values_of: Callable[[np.ndarray], np.ndarray], step: int = 4) -> np.ndarray:
         """A function of points [M, 3] in mm that varies slowly (over 5 mm or more), computed at every `step`-th texel

@@ -18,7 +18,7 @@ import numpy as np
 from .pigment import LUMINANCE
 
 SURFACES = 14  # in view beside the person
-MIDDLE_GREY = 0.18
+MIDDLE_GREY = 0.18  # linear reflectance that a meter takes for the scene's mean
 
 
 @dataclass(frozen=True)

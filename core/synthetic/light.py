@@ -21,8 +21,8 @@ from ..geometry.noise import noise
 from ..light.skylight import radiance_transfer
 from ..light.spherical_harmonics import LAMBERT, UNIFORM, per_function, sh_basis
 
-TRANSFER_RAYS = 192
-SUN_RAYS = 20
+TRANSFER_RAYS = 192  # of each point, for the sky
+SUN_RAYS = 20  # of each point, over the sun's disc
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,9 @@ def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str,
     shading = np.maximum(ambient, 0.005) + (cosine * seen)[:, None] * light.colour
     shadow = np.where(cosine > 0.02, 1 - seen, 0) * (light.colour.sum() > 0)
 
-    def spread(values: np.ndarray) -> np.ndarray:
-        picture = np.zeros((size, size, *values.shape[1:]), np.float32)
-        picture[covered] = values
+    def spread(texel_values: np.ndarray) -> np.ndarray:
+        picture = np.zeros((size, size, *texel_values.shape[1:]), np.float32)
+        picture[covered] = texel_values
         return raster.bleed(picture, covered)
 
     return spread(shading), spread(shadow), spread(normals)

@@ -11,20 +11,20 @@ import numpy as np
 from ..imaging import images
 
 
-def expose(radiance: np.ndarray, where: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def expose(radiance: np.ndarray, metered_on: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Linear radiance [S, S, 3] as the sensor takes it, clipped to [0, 1], and the factor [3] it was multiplied by.
 
-    Metered on the pixels `where` bool [S, S] and on the whole picture in random parts; the white balance forgives most
-    of the light's colour, not all.
+    Metered on the pixels `metered_on` bool [S, S] and on the whole picture in random parts; the white balance forgives
+    most of the light's colour, not all.
     """
     whole = radiance.mean((0, 1)) + 1e-6
     share = rng.uniform(0.4, 1.0)
-    metered = np.exp(share * np.log(radiance[where].mean() + 1e-6) + (1 - share) * np.log(whole.mean()))
+    metered = np.exp(share * np.log(radiance[metered_on].mean() + 1e-6) + (1 - share) * np.log(whole.mean()))
     exposure = np.exp(rng.normal(np.log(0.26), 0.4)) / metered
-    cast = radiance[where].mean(0) / radiance[where].mean() / [1.35, 0.92, 0.73]  # against usual skin
+    cast = radiance[metered_on].mean(0) / radiance[metered_on].mean() / [1.35, 0.92, 0.73]  # against usual skin
     cast = rng.uniform(0, 0.8) * np.log(np.clip(cast, 0.2, 5))
     gains = exposure * np.exp(-cast + rng.normal(0, [0.10, 0.04, 0.14]))
-    gains = (np.minimum(gains, 1.6 / max(float(np.quantile((radiance[where] * gains).max(-1), 0.9)), 1e-6) * gains)
+    gains = (np.minimum(gains, 1.6 / max(float(np.quantile((radiance[metered_on] * gains).max(-1), 0.9)), 1e-6) * gains)
              if rng.random() < 0.9 else gains)
     return np.clip(radiance * gains, 0, 1).astype(np.float32), gains
 

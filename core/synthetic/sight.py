@@ -62,18 +62,18 @@ class Sight:
         """Unit directions to the camera [P, 3]."""
         return _unit((self.eye - self.position).astype(np.float32))
 
-    def at_pixels(self, values: np.ndarray) -> np.ndarray:
+    def at_pixels(self, vertex_values: np.ndarray) -> np.ndarray:
         """Values of the seen vertices [N, C] at the pixels, float32 [P, C]."""
         count = len(self.pixel)
         around = csr_matrix((self.bary.ravel(), self.corner.ravel(), np.arange(0, 3 * count + 1, 3)),
                             (count, len(self.vertices)))
-        return (around @ np.asarray(values, np.float32)).astype(np.float32, copy=False)
+        return (around @ np.asarray(vertex_values, np.float32)).astype(np.float32, copy=False)
 
-    def picture(self, values: np.ndarray, empty: float = 0.0) -> np.ndarray:
+    def picture(self, pixel_values: np.ndarray, empty: float = 0.0) -> np.ndarray:
         """Values [P(, C)] as a picture [S, S(, C)]."""
-        out = np.full((self.size**2, *values.shape[1:]), empty, np.float32)
-        out[self.pixel] = values
-        return out.reshape(self.size, self.size, *values.shape[1:])
+        out = np.full((self.size**2, *pixel_values.shape[1:]), empty, np.float32)
+        out[self.pixel] = pixel_values
+        return out.reshape(self.size, self.size, *pixel_values.shape[1:])
 
 
 def random_camera(landmarks: np.ndarray, size: int, rng: np.random.Generator) -> View:

@@ -35,7 +35,7 @@ from .foreign import clothes, leave_out_background, leave_out_hair
 from .parts_shown import GROWTHS, PartsShown, tell_parts
 from .projection import UnwrappedView, observe
 
-OBSERVED = 1024
+OBSERVED_TEXELS = 1024
 """Side of the maps on which views are looked at, aligned and weighed: all of that is smooth, and all views are held at
 once. Of a larger texture one view after the other is read along it."""
 
@@ -51,7 +51,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if head.mesh.uvs is None:
         raise Problem("The registered head has no UVs.", advise_again("registration"))
     size = settings.texture.size
-    observations, surface, shown = observe_all(capture, head, min(size, OBSERVED), report)
+    observations, surface, shown = observe_all(capture, head, min(size, OBSERVED_TEXELS), report)
     covered = surface.covered_at(size)
     built = build(observations, surface, settings, report, size)
     if built.confidence[covered].max(initial=0) <= 0:
@@ -63,7 +63,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     images.write_srgb(capture.texture_png, images.linear_to_srgb(texture))
     images.write_data(capture.texture_confidence, built.confidence)
     remove_file(capture.texture_parts)
-    if shown.told.any():
+    if shown.judged.any():
         images.write_data(capture.texture_parts, shown.shares[..., :len(GROWTHS)])
     _leave_figures(capture, report, observations, built, texture, covered)
     detail = fine_detail(observations, surface, size, report)
@@ -92,8 +92,21 @@ class Built:
 
 def observe_all(capture: Capture, head: Head, size: int,
                 report: Reporter) -> tuple[list[UnwrappedView], Unfolded, PartsShown]:
-    """What each delit view sees of the head on a map of `size`, the frame's own sharpness counted, and which parts of
-    the person they show. Raises Problem where no view was delit."""
+    """What each delit view sees of the head, the frame's own sharpness counted, and which parts of the person they
+    show.
+
+    Parameters
+    ----------
+    capture : with delit views
+    head : in the capture
+    size : of the maps, in texels along a side
+    report : hears of progress
+
+    Raises
+    ------
+    Problem
+        Where no view was delit.
+    """
     frames = read_frames(capture).by_name
     views = delit_views(capture)
     if not views:
@@ -125,8 +138,17 @@ def _delit(path: Path, view: View) -> np.ndarray:
 
 def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settings, report: Reporter,
           size: int | None = None, aligned: bool = True) -> Built:
-    """One map from what the views see, of `size` or of the observations' own; changes the observations (gains, warps,
-    weights). `aligned`: off for measurements only."""
+    """One map from what the views see.
+
+    Parameters
+    ----------
+    observations : of the views; change (gains, warps, weights)
+    surface : of the head, unfolded at their size
+    settings : of the texture
+    report : hears of progress, takes the figures
+    size : of the map, in texels along a side; None: the observations' own
+    aligned : off for measurements only
+    """
     built_in = surface.head.built_in
     if built_in:
         leave_out_background(observations, report)

@@ -20,9 +20,9 @@ from .blend import blurred, weighted_mean
 from .projection import UnwrappedView
 
 ROUNDS = 2
-LARGEST = 10 / 1024
+LARGEST_WARP_SHARE = 10 / 1024
 """Longest warp, as a part of the map's side."""
-SMOOTH = 24 / 1024
+SMOOTH_SIDE_SHARE = 24 / 1024
 """Gaussian sigma of the warp's smoothing, as a part of the map's side."""
 
 
@@ -48,7 +48,7 @@ def align(observations: list[UnwrappedView], surface: Unfolded, report: Reporter
         for warp, observation in zip(warps, observations, strict=True):
             report.check()
             warp -= drift  # the views may move against each other, not the texture over the surface
-            _limit(warp, LARGEST * size)
+            _limit(warp, LARGEST_WARP_SHARE * size)
             observation.resample(_moved(observation.pixels, warp), warp if step == ROUNDS - 1 else None)
     moved = [lengths(warp)[o.weight > 0.25 * o.weight.max()] for warp, o in zip(warps, observations, strict=True)]
     return float(np.concatenate(moved).mean())
@@ -75,7 +75,7 @@ def _flow(consensus: np.ndarray, detail: np.ndarray, weight: np.ndarray) -> np.n
     scale = len(consensus) / 1024
     contrast = cv2.GaussianBlur(np.abs(consensus), (0, 0), 6 * scale) / spread
     sure = trust * np.minimum(contrast, 2) + 1e-4
-    return blurred(raw, sure, SMOOTH * len(consensus)).astype(np.float32)
+    return blurred(raw, sure, SMOOTH_SIDE_SHARE * len(consensus)).astype(np.float32)
 
 
 def _limit(warp: np.ndarray, longest: float) -> None:

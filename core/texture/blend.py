@@ -67,11 +67,23 @@ def robust_weights(observations: list[UnwrappedView], tolerance: float = 0.10) -
         o.weight = o.weight * cv2.resize(factor, o.weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
-def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter, what: str = "delit",
+def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter, kind: str = "delit",
           done: int = 2) -> np.ndarray:
-    """One log texture [size, size, 3] of observations of the texels `covered` [S, S], each enlarged when its turn
-    comes; zero weight everywhere leaves zeros. `what` is blended, and how much was `done` before, are for the
-    progress."""
+    """One texture of observations, each enlarged when its turn comes.
+
+    Parameters
+    ----------
+    observations : the views
+    covered : bool [S, S], texels of the head
+    size : texels along a side of the result
+    report : hears of progress
+    kind : a word for what is blended
+    done : steps of the progress before
+
+    Returns
+    -------
+    [size, size, 3], natural log of linear colour; zeros where nobody looked.
+    """
     largest = np.full_like(observations[0].weight, 1e-12)
     for o in observations:
         np.maximum(largest, o.weight, out=largest)
@@ -80,7 +92,7 @@ def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, rep
     scale = len(largest) / 1024
     for i, o in enumerate(observations):
         report.progress(len(observations) + done + 2 * i / len(observations), len(observations) + 6,
-                        f"blending {o.name}, {what}")
+                        f"blending {o.name}, {kind}")
         o = o.enlarged(size, covered)
         seen, share = o.weight > 0, o.weight / largest
         for band, (log_colour, (reach, exponent)) in enumerate(zip(bands_of(o.log_colour, seen), BANDS, strict=True)):
@@ -102,10 +114,10 @@ def _feathered(weight: np.ndarray, reach: float, scale: float) -> np.ndarray:
     return cv2.resize(small, weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
-def bands_of(log_colour: np.ndarray, seen: np.ndarray) -> list[np.ndarray]:
+def bands_of(log_colour: np.ndarray, observed: np.ndarray) -> list[np.ndarray]:
     """Splits [S, S, 3] into bands that sum to it, fine to coarse."""
-    scale = len(seen) / 1024
-    mask = seen.astype(np.float32)
+    scale = len(observed) / 1024
+    mask = observed.astype(np.float32)
     bands, rest = [], log_colour
     for reach, _ in BANDS[:-1]:
         low = blurred(log_colour, mask, reach * scale)
@@ -137,9 +149,9 @@ def weighted_mean(images: Iterable[np.ndarray], weights: Iterable[np.ndarray]) -
     return top / bottom
 
 
-def _weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _weighted_median(samples: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Along the first axis of two [V, h, w]."""
-    order = np.argsort(values, axis=0)
+    order = np.argsort(samples, axis=0)
     cumulative = np.cumsum(np.take_along_axis(weights, order, 0), axis=0)
     middle = (cumulative >= 0.5 * cumulative[-1:]).argmax(0)
-    return np.take_along_axis(np.take_along_axis(values, order, 0), middle[None], 0)[0]
+    return np.take_along_axis(np.take_along_axis(samples, order, 0), middle[None], 0)[0]

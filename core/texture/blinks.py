@@ -16,18 +16,33 @@ from ..geometry.views import View
 from ..imaging import images
 from .projection import UnwrappedView
 
-REACH = 1.7
+REACH_RADII = 1.7
 """Radii of the eyeball around its centre within which the skin moves with the lids."""
-MARKS = 9
+MARKS_PER_EDGE = 9  # points of a lid's edge, from corner to corner
 
 
 def leave_out_blinks(capture: Capture, observations: list[UnwrappedView], surface: Unfolded,
                      report: Reporter) -> list[str]:
     """Takes quality and weight from the texels around an eye in the views whose frame shows it more or less open than
-    the head would look there, next to what the other frames show; returns their names.
+    the head would look there, next to what the other frames show.
 
-    Nothing is done where the eyes were closed, and around an eye that no other view would be left for. Raises Problem
-    for damaged records.
+    Nothing is done where the eyes were closed, and around an eye that no other view would be left for.
+
+    Parameters
+    ----------
+    capture : with the eyes' record
+    observations : of the views; change
+    surface : of the head, unfolded at their size
+    report : hears of it
+
+    Returns
+    -------
+    The names of these views.
+
+    Raises
+    ------
+    Problem
+        For damaged records.
     """
     if not surface.head.eyes_open:
         return []
@@ -57,22 +72,22 @@ def _eyes_in(view: View) -> tuple[float, faces.Eye, faces.Eye] | None:
     return None if face is None else (face.yaw_deg, *faces.find_eyes(srgb, face)[::-1])
 
 
-def _opening(found: tuple | None, view: View, vertices: np.ndarray, side: int) -> float | None:
+def _opening(eye_sight: tuple | None, view: View, vertices: np.ndarray, side: int) -> float | None:
     """How far an eye is open in a view's frame, over how far the head's looks open from there; None where it is seen
     too much from the side."""
-    if found is None or not faces.shows_eye(found[0], side):
+    if eye_sight is None or not faces.shows_eye(eye_sight[0], side):
         return None
-    upper, lower = (view.project(edge[np.linspace(0, len(edge) - 1, MARKS).round().astype(int)])[0]
+    upper, lower = (view.project(edge[np.linspace(0, len(edge) - 1, MARKS_PER_EDGE).round().astype(int)])[0]
                     for edge in lids.edges(vertices, side))
-    return found[1 + side].opening / max(faces.Eye(upper, lower, upper[0], 0.0).opening, 1e-3)
+    return eye_sight[1 + side].opening / max(faces.Eye(upper, lower, upper[0], 0.0).opening, 1e-3)
 
 
 def differing(openings: dict[str, float | None]) -> list[str]:
     """The frames whose opening is another than the usual one."""
     known = {name: opening for name, opening in openings.items() if opening is not None}
     usual = float(np.median(list(known.values()))) if known else 1.0
-    return [name for name, opening in known.items() if abs(opening / usual - 1) > faces.AS_OPEN]
+    return [name for name, opening in known.items() if abs(opening / usual - 1) > faces.AS_OPEN_SHARE]
 
 
 def _around(surface: Unfolded, ball: Eyeball) -> np.ndarray:
-    return (np.linalg.norm(surface.points - ball.centre, axis=1) < REACH * ball.radius).astype(np.float32)
+    return (np.linalg.norm(surface.points - ball.centre, axis=1) < REACH_RADII * ball.radius).astype(np.float32)

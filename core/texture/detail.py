@@ -17,23 +17,34 @@ from ..face.head import Unfolded
 from ..geometry import raster
 from .projection import UnwrappedView, log_colours
 
-WORTH = 1.3
+WORTH_PX_PER_TEXEL = 1.3
 """Pixels per texel of the texture from which a map twice as fine is worth its while; half of it, from twice as many,
 one four times as fine."""
-LARGEST = 4096
-COARSE = 1.0
+LARGEST_TEXELS = 4096
+COARSE_SIGMA_TEXELS = 1.0
 """Sigma, in texels of the texture, of the blur that parts what it holds from what it does not."""
-AROUND = 3.0
+AROUND_SIGMA_TEXELS = 3.0
 """Sigma, in texels of the texture, of the neighbourhood over which agreement is judged."""
-SHARP = 2.0
+SHARP_EXPONENT = 2.0
 """Exponent of the views' weights: near the best view's own detail, yet of several."""
 
 
 def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: int,
                 report: Reporter) -> np.ndarray | None:
-    """Float32 [F S, F S, 2] for a texture of S = `texels`: the band of log luminance (natural), and Wiener's factor in
-    [0, 1] that it is already multiplied by. None where the frames hold nothing finer than the texture, or fewer than
-    two views see the head."""
+    """What the frames hold that is finer than the texture.
+
+    Parameters
+    ----------
+    observations : of the views
+    surface : of the head, unfolded at their size
+    texels : side S of the texture
+    report : hears of progress
+
+    Returns
+    -------
+    float32 [F S, F S, 2]: the band of log luminance (natural), and Wiener's factor in [0, 1] that it is already
+    multiplied by. None where the frames hold nothing finer, or fewer than two views see the head.
+    """
     factor = finer(observations, texels)
     if factor == 1 or len(observations) < 2:
         return None
@@ -41,11 +52,11 @@ def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: in
     total, squares, weights, weights2 = (np.zeros((size, size), np.float32) for _ in range(4))
     for observation in observations:
         report.progress(len(observations) + 5, len(observations) + 6, f"fine detail of {observation.name}")
-        weight = cv2.resize(observation.weight, (size, size), interpolation=cv2.INTER_LINEAR) ** SHARP
+        weight = cv2.resize(observation.weight, (size, size), interpolation=cv2.INTER_LINEAR) ** SHARP_EXPONENT
         pixels = cv2.resize(raster.bleed(observation.pixels, surface.covered), (size, size),
                             interpolation=cv2.INTER_LINEAR)
         grey = log_colours(observation.picture, pixels).mean(-1)
-        band = grey - cv2.GaussianBlur(grey, (0, 0), COARSE * factor)
+        band = grey - cv2.GaussianBlur(grey, (0, 0), COARSE_SIGMA_TEXELS * factor)
         total += weight * band
         squares += weight * band ** 2
         weights += weight
@@ -54,9 +65,9 @@ def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: in
     views = weights ** 2 / np.maximum(weights2, 1e-12)  # how many views count, in effect
     seen = (views > 1.2) & (cv2.resize(surface.covered.astype(np.float32), (size, size)) > 0.99)
 
-    def around(values: np.ndarray) -> np.ndarray:
-        sigma = AROUND * factor
-        spread = cv2.GaussianBlur(values * seen, (0, 0), sigma)
+    def around(image: np.ndarray) -> np.ndarray:
+        sigma = AROUND_SIGMA_TEXELS * factor
+        spread = cv2.GaussianBlur(image * seen, (0, 0), sigma)
         return spread / np.maximum(cv2.GaussianBlur(seen.astype(np.float32), (0, 0), sigma), 1e-6)
 
     # variance of the mean
@@ -76,5 +87,5 @@ def finer(observations: list[UnwrappedView], texels: int) -> int:
         if best.any():
             density.append(np.sqrt(np.median(area[best])))
     most = float(np.median(density)) * len(observations[0].weight) / texels if density else 0.0
-    factor = 1 if most < WORTH else 2 if most < 2 * WORTH else 4
-    return max(1, min(factor, LARGEST // texels))
+    factor = 1 if most < WORTH_PX_PER_TEXEL else 2 if most < 2 * WORTH_PX_PER_TEXEL else 4
+    return max(1, min(factor, LARGEST_TEXELS // texels))

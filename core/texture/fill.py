@@ -10,14 +10,14 @@ import numpy as np
 
 from ..geometry import raster
 
-TRUSTED = 0.1
+TRUSTED_CONFIDENCE = 0.1
 """Confidence from which a texel is kept as it was seen."""
 
 
 def fill(texture: np.ndarray, confidence: np.ndarray, covered: np.ndarray) -> np.ndarray:
-    """Linear [S, S, 3] with confidence [S, S] in [0, 1] -> the same without holes; texels above TRUSTED are
+    """Linear [S, S, 3] with confidence [S, S] in [0, 1] -> the same without holes; texels above TRUSTED_CONFIDENCE are
     unchanged."""
-    known = np.clip(confidence / TRUSTED, 0, 1).astype(np.float32)
+    known = np.clip(confidence / TRUSTED_CONFIDENCE, 0, 1).astype(np.float32)
     smooth = _push_pull(texture * known[..., None], known)
     filled = texture * known[..., None] + smooth * (1 - known[..., None])
     return raster.bleed(filled.astype(np.float32), covered)

@@ -14,9 +14,19 @@ from .projection import UnwrappedView, log_colours
 
 
 def filmed(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter) -> np.ndarray | None:
-    """Linear [size, size, 3] with the light in it, in the frames' exposure; 1 where no view sees anything. The
-    observations, of the texels `covered`, show the frames from then on. None where a frame is gone: it is only looked
-    at."""
+    """The texture with the light in it, in the frames' exposure.
+
+    Parameters
+    ----------
+    observations : of the views; show the frames from then on
+    covered : bool [S, S], texels of the head
+    size : of the map, in texels along a side
+    report : hears of progress
+
+    Returns
+    -------
+    Linear [size, size, 3], 1 where no view sees anything. None where a frame is gone: it is only looked at.
+    """
     if not all(o.view.path.is_file() for o in observations):
         return None
     for o in observations:

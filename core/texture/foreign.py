@@ -21,39 +21,42 @@ from ..imaging import images
 from .parts_shown import ASKED, PartsShown
 from .projection import UnwrappedView
 
-COLOUR = 0.35
+CLOTH_COLOUR_LOG = 0.35
 """How far the logarithms of R/G and B/G of a cloth lie from the face's skin; light that a delighter left does not reach
 that far."""
-DARK, BRIGHT = -1.3, 0.8
+DARK_CLOTH_LOG, BRIGHT_CLOTH_LOG = -1.3, 0.8
 """Differences of log luminance to the face's skin from which the neck is no skin whatever its colour: black and white
 cloth."""
-SMOOTH = 5 / 1024
+SMOOTH_SIDE_SHARE = 5 / 1024
 """Sigma of the smoothing before the comparison, as a part of the map's side: a pattern is judged by its mean, a mole
 not at all."""
-GROW = 10 / 1024
+GROW_SIDE_SHARE = 10 / 1024
 """How far a cloth's edge, where it throws its shade, is taken with it."""
 
 
-HIDDEN = 0.35, 0.65
+HIDDEN_SHARES = 0.35, 0.65
 """Share of hair and cloth in a pixel, or of the views that show a texel so, between which it fades out."""
-LEAST_HAIR = 0.005
+LEAST_HAIR_SHARE = 0.005
 """Share of the map below which nothing is hair: the parser's doubts."""
 
 
-def leave_out_hair(observations: list[UnwrappedView], shown: PartsShown, surface: Unfolded) -> np.ndarray:
+def leave_out_hair(observations: list[UnwrappedView], parts_shown: PartsShown, surface: Unfolded) -> np.ndarray:
     """Takes quality and weight from texels that lie under hair of the head or cloth, and returns how surely they do,
     float32 [S, S] in [0, 1].
 
     What most views show so counts in all of them; what one view shows so (a strand before a cheek) counts in that one.
     """
-    usual = shown.shares[..., [ASKED.index("hair"), ASKED.index("clothes")]].sum(-1)
+    usual = parts_shown.shares[..., [ASKED.index("hair"), ASKED.index("clothes")]].sum(-1)
     if surface.head.built_in:  # of the scalp behind what any crop shows, what is next to it tells
-        usual = np.where(~shown.told & (template.mask("scalp", len(usual)) > 0.5), raster.bleed(usual, shown.told),
-                         usual)
-    if (usual[surface.covered] > HIDDEN[1]).mean() < LEAST_HAIR:
+        usual = np.where(
+            ~parts_shown.judged & (template.mask("scalp", len(usual)) > 0.5),
+            raster.bleed(usual, parts_shown.judged),
+            usual,
+        )
+    if (usual[surface.covered] > HIDDEN_SHARES[1]).mean() < LEAST_HAIR_SHARE:
         return np.zeros_like(usual)
-    low, high = HIDDEN
-    for observation, own in zip(observations, shown.hidden, strict=True):
+    low, high = HIDDEN_SHARES
+    for observation, own in zip(observations, parts_shown.hidden, strict=True):
         hidden = usual if own is None else np.maximum(usual, own)
         kept = np.clip((high - hidden) / (high - low), 0, 1).astype(np.float32)
         observation.quality, observation.weight = observation.quality * kept, observation.weight * kept
@@ -99,13 +102,15 @@ def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Unfolded) 
     if not skin.any() or not seen.any():
         return np.zeros_like(confidence)
     weight = ((neck > 0.3) & surface.covered).astype(np.float32) * confidence
-    sigma = SMOOTH * size
+    sigma = SMOOTH_SIDE_SHARE * size
     spread = cv2.GaussianBlur(log_texture * weight[..., None], (0, 0), sigma)
     smooth = spread / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)[..., None]
     away = smooth - np.median(log_texture[skin], axis=0)
     colour = np.hypot(away[..., 0] - away[..., 1], away[..., 2] - away[..., 1])
-    strange = seen & ((colour > COLOUR) | (away.mean(-1) < DARK) | (away.mean(-1) > BRIGHT))
-    radius = max(1, round(GROW * size))
+    strange = seen & (
+        (colour > CLOTH_COLOUR_LOG) | (away.mean(-1) < DARK_CLOTH_LOG) | (away.mean(-1) > BRIGHT_CLOTH_LOG)
+    )
+    radius = max(1, round(GROW_SIDE_SHARE * size))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
     _, labels = cv2.connectedComponents(cv2.morphologyEx(strange.astype(np.uint8), cv2.MORPH_CLOSE, disc))
     rim = cv2.dilate(_rim(surface, neck), disc) > 0

@@ -23,12 +23,12 @@ ASKED = (*GROWTHS, "clothes")
 
 @dataclass(frozen=True)
 class PartsShown:
-    """shares float32 [S, S, len(ASKED)] in [0, 1], 0 where nobody tells; told bool [S, S]: where somebody does; hidden:
-    of each view how much of what it shows at a texel is hair of the head or cloth, float32 [S, S], or None where the
-    view's picture tells nothing."""
+    """shares float32 [S, S, len(ASKED)] in [0, 1], 0 where nobody tells; judged bool [S, S]: where somebody does;
+    hidden: of each view how much of what it shows at a texel is hair of the head or cloth, float32 [S, S], or None
+    where the view's picture tells nothing."""
 
     shares: np.ndarray
-    told: np.ndarray
+    judged: np.ndarray
     hidden: list[np.ndarray | None]
 
 

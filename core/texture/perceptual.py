@@ -3,8 +3,9 @@
 """The paper's texture loss: a perceptual distance plus L1 of the gradients, between the textured head as the V views
 see it and their delit frames.
 
-Starts from the blend, which also keeps the tone: only detail finer than KEPT is taken from the optimisation. The
-rendering is differentiable in the texture alone: where each pixel looks on the map is worked out once per view.
+Starts from the blend, which also keeps the tone: only detail finer than KEPT_SIGMA_TEXELS is taken from the
+optimisation. The rendering is differentiable in the texture alone: where each pixel looks on the map is worked out once
+per view.
 """
 
 from __future__ import annotations
@@ -23,18 +24,18 @@ from ..geometry import raster
 from ..imaging import images
 from .blend import blurred
 from .features import Features
-from .projection import DARKEST, UnwrappedView
+from .projection import DARKEST_LINEAR, UnwrappedView
 
-TILE = 288
+TILE_PX = 288
 """Pixels along a side of the part of a view that one step looks at: bounds memory and seconds whatever the frames'
 size; a multiple of 16."""
-OVER = 2
+RAYS_PER_SIDE = 2
 """Rays along a pixel's side; their mean is what keeps a map that is finer than the picture from aliasing."""
-RATE = 0.002
+LEARNING_RATE = 0.002
 """Adam's first step, in the logarithm of linear colour; falls to a tenth."""
-GRADIENTS = 10.0
+GRADIENT_WEIGHT = 10.0
 """Weight of the gradients' L1 beside the perceptual distance, both means over positions."""
-KEPT = 8.0
+KEPT_SIGMA_TEXELS = 8.0
 """Sigma in texels of a 1024 map: coarser changes are taken back, so that tone stays the mean of all views."""
 
 
@@ -44,11 +45,11 @@ class Target:
 
     name: str
     picture: np.ndarray  # float32 [h, w, 3] sRGB
-    grid: np.ndarray  # float32 [OVER * h, OVER * w, 2]: the map as grid_sample counts it, in [-1, 1]
+    grid: np.ndarray  # float32 [RAYS_PER_SIDE * h, RAYS_PER_SIDE * w, 2]: the map as grid_sample counts it, in [-1, 1]
     trust: np.ndarray  # float32 [h, w] in [0, 1]: how far a pixel may pull; zero off the head
 
 
-def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: Unfolded, wanted: np.ndarray,
+def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: Unfolded, face_mask: np.ndarray,
            features: Features, steps: int, report: Reporter) -> tuple[np.ndarray, dict]:
     """The blend with its detail optimised; same machine, same map.
 
@@ -57,7 +58,7 @@ def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: 
     log_texture : [S, S, 3], natural log of linear colour
     observations : the views
     surface : of the head, unfolded at their size
-    wanted : bool [S, S], texels worth looking at (the face)
+    face_mask : bool [S, S], texels worth looking at (the face)
     features : what tells the perceptual distance; its device is computed on
     steps : of the optimisation
     report : hears of progress
@@ -70,7 +71,7 @@ def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: 
     targets = []
     for i, observation in enumerate(observations):
         report.progress(i, len(observations), f"perceptual step: looking through {observation.name}")
-        if (target := _target(observation.enlarged(len(wanted), surface.covered), surface, wanted)) is not None:
+        if (target := _target(observation.enlarged(len(face_mask), surface.covered), surface, face_mask)) is not None:
             targets.append(target)
     if not targets or steps < 1:
         return log_texture, {}
@@ -78,7 +79,7 @@ def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: 
     covered = surface.covered_at(len(log_texture))
     start = _tensor(raster.bleed(log_texture, covered), device)  # [1, 3, S, S]
     change = torch.zeros_like(start, requires_grad=True)
-    optimiser = torch.optim.Adam([change], lr=RATE, betas=(0.8, 0.99))
+    optimiser = torch.optim.Adam([change], lr=LEARNING_RATE, betas=(0.8, 0.99))
     schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / steps))
     checks = [_tile(target, np.random.default_rng(1), device) for target in targets[::max(1, len(targets) // 4)]]
     before = _losses(start, checks, features, report)
@@ -91,26 +92,26 @@ def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: 
         schedule.step()
     moved = change.detach()[0].cpu().numpy().transpose(1, 2, 0)
     scale = len(log_texture) / 1024
-    fine = moved - blurred(moved, covered.astype(np.float32), KEPT * scale)
-    fine *= cv2.GaussianBlur(wanted.astype(np.float32), (0, 0), 4 * scale)[..., None] * covered[..., None]
+    fine = moved - blurred(moved, covered.astype(np.float32), KEPT_SIGMA_TEXELS * scale)
+    fine *= cv2.GaussianBlur(face_mask.astype(np.float32), (0, 0), 4 * scale)[..., None] * covered[..., None]
     result = log_texture + fine
     after = _losses(_tensor(raster.bleed(result, covered), device), checks, features, report)
     return result.astype(np.float32), {"before": before, "after": after}
 
 
-def _target(observation: UnwrappedView, surface: Unfolded, wanted: np.ndarray) -> Target | None:
+def _target(observation: UnwrappedView, surface: Unfolded, face_mask: np.ndarray) -> Target | None:
     """A view's pixels that see wanted texels; None where there are none. Follows the alignment, so all views pull at
     the same texels."""
-    seen = (observation.weight > 0) & wanted
+    seen = (observation.weight > 0) & face_mask
     if seen.sum() < 64:
         return None
     height, width = observation.picture.shape[:2]
     pixels = observation.pixels[seen]
     low = np.maximum(np.floor(pixels.min(0)).astype(int) - 4, 0)
     high = np.minimum(np.ceil(pixels.max(0)).astype(int) + 4, [width, height])
-    (w, h), view, size = high - low, observation.view, len(wanted)
-    y, x = np.mgrid[0:OVER * h, 0:OVER * w]
-    at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) / OVER + low
+    (w, h), view, size = high - low, observation.view, len(face_mask)
+    y, x = np.mgrid[0:RAYS_PER_SIDE * h, 0:RAYS_PER_SIDE * w]
+    at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) / RAYS_PER_SIDE + low
     mesh, caster = surface.mesh, surface.caster
     directions = view.rays(at * [view.width / width, view.height / height])
     face, bary, _ = caster.first_hits(np.repeat(view.centre[None], len(directions), 0), directions)
@@ -120,29 +121,35 @@ def _target(observation: UnwrappedView, surface: Unfolded, wanted: np.ndarray) -
     # pixels(x) shows what lay at x + warp(x) before: the texel that now shows there is one warp back
     if observation.warp is not None:
         texel -= raster.sample(observation.warp, texel)
-    weight = np.minimum(observation.weight / max(np.percentile(observation.weight[seen], 80), 1e-9), 1) * wanted
-    trust = np.where(face >= 0, raster.sample(weight.astype(np.float32), texel), 0).reshape(OVER * h, OVER * w)
+    weight = np.minimum(observation.weight / max(np.percentile(observation.weight[seen], 80), 1e-9), 1) * face_mask
+    trust = np.where(face >= 0, raster.sample(weight.astype(np.float32), texel), 0).reshape(
+        RAYS_PER_SIDE * h, RAYS_PER_SIDE * w
+    )
     trust = cv2.resize(trust.astype(np.float32), (int(w), int(h)), interpolation=cv2.INTER_AREA)
     picture = images.linear_to_srgb(observation.picture[low[1]:high[1], low[0]:high[0]])
-    return Target(observation.name, picture, (texel / size * 2 - 1).astype(np.float32).reshape(OVER * h, OVER * w, 2),
-                  trust)
+    return Target(
+        observation.name,
+        picture,
+        (texel / size * 2 - 1).astype(np.float32).reshape(RAYS_PER_SIDE * h, RAYS_PER_SIDE * w, 2),
+        trust,
+    )
 
 
 def _tile(target: Target, rng: np.random.Generator, device: str) -> tuple[Tensor, Tensor, Tensor]:
-    """A random part of a view: picture [1, 3, t, t'], grid [1, OVER t, OVER t', 2], trust [1, 1, t, t']; sides at most
-    TILE, around a trusted pixel."""
+    """A random part of a view: picture [1, 3, t, t'], grid [1, RAYS_PER_SIDE t, RAYS_PER_SIDE t', 2], trust [1, 1, t,
+    t']; sides at most TILE_PX, around a trusted pixel."""
     height, width = target.trust.shape
     y, x = np.unravel_index(rng.choice(np.flatnonzero(target.trust.ravel() > 0.2 * target.trust.max())),
                             target.trust.shape)
     rows, columns = _span(y, height), _span(x, width)
-    fine = tuple(slice(OVER * span.start, OVER * span.stop) for span in (rows, columns))
+    fine = tuple(slice(RAYS_PER_SIDE * span.start, RAYS_PER_SIDE * span.stop) for span in (rows, columns))
     grid = torch.from_numpy(target.grid[fine].copy())[None].to(device)
     return _tensor(target.picture[rows, columns], device), grid, _tensor(target.trust[rows, columns], device)
 
 
 def _span(centre: int, side: int) -> slice:
-    """TILE pixels around `centre`, or as many of `side` as are a multiple of 16."""
-    length = min(side, TILE) // 16 * 16 or side
+    """TILE_PX pixels around `centre`, or as many of `side` as are a multiple of 16."""
+    length = min(side, TILE_PX) // 16 * 16 or side
     start = int(np.clip(centre - length // 2, 0, side - length))
     return slice(start, start + length)
 
@@ -153,13 +160,13 @@ def _loss(log_texture: Tensor, tile: tuple[Tensor, Tensor, Tensor], features: Fe
     picture, grid, trust = tile
     linear = functional.grid_sample(log_texture.exp(), grid, mode="bilinear", padding_mode="border",
                                     align_corners=False)
-    linear = functional.avg_pool2d(linear, OVER)
+    linear = functional.avg_pool2d(linear, RAYS_PER_SIDE)
     rendered = _srgb(linear) * trust + picture * (1 - trust)
     with torch.no_grad():
         wanted = features.layers(picture)
     loss = features.distance(features.layers(rendered), wanted)
     for axis in (2, 3):
-        loss = loss + GRADIENTS * (rendered.diff(dim=axis) - picture.diff(dim=axis)).abs().mean()
+        loss = loss + GRADIENT_WEIGHT * (rendered.diff(dim=axis) - picture.diff(dim=axis)).abs().mean()
     return loss
 
 
@@ -173,7 +180,7 @@ def _losses(log_texture: Tensor, tiles: list, features: Features, report: Report
 
 
 def _srgb(linear: Tensor) -> Tensor:
-    linear = linear.clamp(DARKEST / 4, 1.0)
+    linear = linear.clamp(DARKEST_LINEAR / 4, 1.0)
     return torch.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear.clamp(min=0.0031308) ** (1 / 2.4) - 0.055)
 
 

@@ -13,13 +13,13 @@ from ..face.head import Unfolded
 from ..geometry import raster
 from ..geometry.views import View, lengths
 
-DARKEST = 2e-3
+DARKEST_LINEAR = 2e-3
 """Linear values below this are noise to a logarithm."""
 MARGIN_PX = (1.5, 12.0)
 """Pixels from a silhouette at which a texel starts to count, and counts in full."""
-GRAZING = 0.15
+GRAZING_COSINE = 0.15
 """Cosine of the steepest viewing angle that counts."""
-POINTS = 1 << 18
+POINTS_AT_ONCE = 1 << 18
 """Points of the surface that are looked at at once: of a whole map the numbers on the way would take a gigabyte."""
 
 
@@ -53,8 +53,8 @@ class UnwrappedView:
         if size == len(self.weight):
             return self
 
-        def larger(values: np.ndarray) -> np.ndarray:
-            return cv2.resize(values, (size, size), interpolation=cv2.INTER_LINEAR)
+        def larger(image: np.ndarray) -> np.ndarray:
+            return cv2.resize(image, (size, size), interpolation=cv2.INTER_LINEAR)
 
         pixels = larger(raster.bleed(self.pixels, covered))
         warp = None if self.warp is None else larger(self.warp) * np.float32(size / len(self.weight))
@@ -64,14 +64,22 @@ class UnwrappedView:
 
 def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float,
             reference_m: float | None = None) -> UnwrappedView:
-    """Projects every texel into a linear picture [H, W, 3] of any size of that view. sharpness in [0, 1] scales its
-    weight; so does how many pixels show a texel, beside those of a view whose pixels are `reference_m` metres wide on
-    the head (None: this view's own)."""
+    """Projects every texel into a picture of a view.
+
+    Parameters
+    ----------
+    view : the camera
+    picture : [H, W, 3], linear, of any size
+    surface : of the head, unfolded
+    sharpness : in [0, 1], scales the view's weight
+    reference_m : width in metres, on the head, of the pixels of the view that others are weighed beside; None: this
+        view's own
+    """
     count, scale = len(surface.points), [picture.shape[1] / view.width, picture.shape[0] / view.height]
     pixels, quality, distance = np.empty((count, 2), np.float32), np.empty(count), np.empty(count)
     seen, silhouette = np.empty(count, bool), _silhouette_distance(surface.caster, view)
-    for first in range(0, count, POINTS):
-        chunk = slice(first, first + POINTS)
+    for first in range(0, count, POINTS_AT_ONCE):
+        chunk = slice(first, first + POINTS_AT_ONCE)
         xy, quality[chunk], distance[chunk], seen[chunk] = _look(view, surface, chunk, silhouette)
         pixels[chunk] = np.nan_to_num(xy, nan=-1) * scale
     pixels = surface.spread(pixels)
@@ -83,29 +91,31 @@ def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float
                          surface.spread(weight))
 
 
-def _look(view: View, surface: Unfolded, part: slice,
+def _look(view: View, surface: Unfolded, rows: slice,
           silhouette: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Of a part of the surface's points: pixels [N, 2] (nan behind the camera), quality [N], distance [N], and whether
     they are seen [N]."""
-    points, normals = surface.points[part], surface.normals[part]
+    points, normals = surface.points[rows], surface.normals[rows]
     xy, depth = view.project(points)
     inside = (depth > 0) & (xy[:, 0] > 1) & (xy[:, 1] > 1) & (xy[:, 0] < view.width - 1) & (xy[:, 1] < view.height - 1)
     towards = view.centre - points
     distance = lengths(towards)
     cosine = (towards * normals).sum(1) / distance
-    seen = inside & (cosine > GRAZING)
+    seen = inside & (cosine > GRAZING_COSINE)
     seen[seen] = raster.visible_from(surface.caster, points[seen], normals[seen], view.centre)
     margin = np.zeros(len(xy))
     margin[seen] = raster.sample(silhouette, xy[seen])
     near, far = MARGIN_PX
     ramp = np.clip((margin - near) / (far - near), 0, 1)
-    return xy, np.where(seen, np.clip((cosine - GRAZING) / (1 - GRAZING), 0, 1) * ramp, 0), distance, seen
+    return xy, np.where(seen, np.clip((cosine - GRAZING_COSINE) / (1 - GRAZING_COSINE), 0, 1) * ramp, 0), distance, seen
 
 
 def log_colours(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Bicubic log colours [S, S, 3] of a linear picture at pixels [S, S, 2]; bilinear would soften pores."""
     x, y = (np.ascontiguousarray(pixels[..., i] - 0.5, np.float32) for i in range(2))
-    return np.log(np.maximum(cv2.remap(picture, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), DARKEST))
+    return np.log(
+        np.maximum(cv2.remap(picture, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), DARKEST_LINEAR)
+    )
 
 
 def _silhouette_distance(caster: raster.RayCaster, view: View, scale: float = 0.5) -> np.ndarray:

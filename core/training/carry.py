@@ -29,7 +29,7 @@ from ..imaging import images
 from ..registration import own_mesh, own_template, render_landmarks
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr")
-FAR_M = 0.010
+FAR_M = 0.010  # farther apart, two heads are not partners
 MOUTH = render_landmarks.LIP_LINE
 TILE = 256
 

@@ -36,12 +36,12 @@ def add_skins(options: argparse.ArgumentParser) -> None:
                          help="skins of FOLDER that are kept from training, each with its cluster")
 
 
-def add_sights(options: argparse.ArgumentParser, whose: str) -> None:
-    """The options of a training on sights that are made first: `whose` they are, in the plural."""
+def add_sights(options: argparse.ArgumentParser, sight_kind: str) -> None:
+    """The options of a training on sights that are made first: `sight_kind` names them, in the plural."""
     options.add_argument("--hdri", type=Path, metavar="FOLDER",
                          help="panoramas whose licence lets weights trained with them be shipped")
-    options.add_argument("--growing", action="store_true", help=f"train on the {whose} that are there already")
-    options.add_argument("--prepare", action="store_true", help=f"make the {whose} and stop")
+    options.add_argument("--growing", action="store_true", help=f"train on the {sight_kind} that are there already")
+    options.add_argument("--prepare", action="store_true", help=f"make the {sight_kind} and stop")
 
 
 def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, train: Callable[..., dict],

@@ -21,7 +21,7 @@ import torch
 from torch.nn import functional
 
 from ..contract.messages import Reporter
-from ..face.eye_reader import CLASSES, SIDE, to_eye_crop
+from ..face.eye_reader import CLASSES, SIDE_PX, to_eye_crop
 from ..face.parser_network import ParseNet, network_input
 from ..face.parts import cut, inside
 from ..synthetic.environments import read_panoramas
@@ -135,13 +135,13 @@ def example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, r
     """A photograph as the network sees it, and the shares of its classes."""
     move = to_eye_crop(sight.corners, sight.left)
     if augment:
-        move = jittered(move, SIDE, JITTER, rng)
-    seen = cut(picture, move, SIDE)
+        move = jittered(move, SIDE_PX, JITTER, rng)
+    seen = cut(picture, move, SIDE_PX)
     if augment:
         seen = spoilt(seen, rng)
-    shares = np.clip(cut(ball, move, SIDE), 0, 1)
+    shares = np.clip(cut(ball, move, SIDE_PX), 0, 1)
     shares = np.concatenate([1 - shares.sum(-1, keepdims=True), shares], -1)
-    return (network_input(seen, inside(picture.shape, move, SIDE)),
+    return (network_input(seen, inside(picture.shape, move, SIDE_PX)),
             np.ascontiguousarray(np.clip(shares, 0, 1).transpose(2, 0, 1), np.float32))
 
 

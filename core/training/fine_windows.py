@@ -87,18 +87,18 @@ def random_degradation(rng: np.random.Generator) -> Degradation:
                        rng.uniform(0.0, 0.006), rng.uniform(0.8, 1.0))
 
 
-def degraded(large: np.ndarray, how: Degradation, rng: np.random.Generator) -> np.ndarray:
+def degraded(large: np.ndarray, degradation: Degradation, rng: np.random.Generator) -> np.ndarray:
     """The small map [7, H, W] (network channels) of a large one [7, 4H, 4W]: the albedo is averaged in linear light,
     normals are of length one again."""
     height, width = large.shape[1] // FACTOR, large.shape[2] // FACTOR
     linear = np.concatenate([images.srgb_to_linear(large[:3]), large[3:]])
     small = linear.reshape(CHANNELS, height, FACTOR, width, FACTOR).mean((2, 4))
-    for channels, sigma in ((slice(0, 3), how.blur), (slice(3, CHANNELS), how.other_blur)):
+    for channels, sigma in ((slice(0, 3), degradation.blur), (slice(3, CHANNELS), degradation.other_blur)):
         if sigma > 0.15:
             small[channels] = cv2.GaussianBlur(small[channels].transpose(1, 2, 0), (0, 0), sigma).transpose(2, 0, 1)
-    small[3:5] *= how.relief
+    small[3:5] *= degradation.relief
     small[:3] = images.linear_to_srgb(np.clip(small[:3], 0, 1))
-    noise = rng.normal(0, 1, small.shape).astype(np.float32) * how.noise
+    noise = rng.normal(0, 1, small.shape).astype(np.float32) * degradation.noise
     noise[3:] *= 2
     small = small + noise
     small[:3], small[6] = np.clip(small[:3], 0, 1), np.clip(small[6], 0, 1)
@@ -125,9 +125,9 @@ def _path(work: Path, seed: int, index: int) -> Path:
     return Path(work) / f"window_{seed}_{index}.npy"
 
 
-def _paint(work: Path, what: tuple[int, int]) -> None:
+def _paint(work: Path, window: tuple[int, int]) -> None:
     """One window as float16 [7, S, S]: three of four lie on the face, the others anywhere on the head."""
-    seed, index = what
+    seed, index = window
     rng = np.random.default_rng([seed, 40, index])
     where = _face() if index % 4 != 3 else _head()
     row, column = where[rng.integers(len(where))] * FACTOR - rng.integers(SIDE // 4, 3 * SIDE // 4, 2)

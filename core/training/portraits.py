@@ -111,15 +111,17 @@ def stacked(examples: list[tuple[np.ndarray, ...]]) -> PortraitBatch:
     return PortraitBatch(*(torch.from_numpy(np.stack(arrays)) for arrays in zip(*examples, strict=True)))
 
 
-def example(portrait: Portrait, known: tuple[np.ndarray, ...], rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-    """What a batch holds of a portrait. known: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the
+def example(
+    portrait: Portrait, geometry_maps: tuple[np.ndarray, ...], rng: np.random.Generator
+) -> tuple[np.ndarray, ...]:
+    """What a batch holds of a portrait. geometry_maps: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the
     registered head, and where it is [S, S]."""
     geometry = ()
     if rng.random() < WITH_GEOMETRY:
         # a registered head lies a pixel off
         slip = np.float32([[1, 0, rng.normal(0, 0.8)], [0, 1, rng.normal(0, 0.8)]])
         geometry = [cv2.warpAffine(np.ascontiguousarray(array, np.float32), slip, (len(array), len(array)))
-                    for array in known]
+                    for array in geometry_maps]
     layers, middle = network_input(portrait.srgb, *geometry)
     sure = (_half(portrait.head) > 0.99) & (_half(portrait.albedo).min(-1) > 0.002)
     shading = np.log(np.maximum(_half(portrait.even), LEAST)) - middle

@@ -159,7 +159,7 @@ def _store(path: Path, maps: np.ndarray) -> None:
         np.save(file, np.concatenate([maps, np.stack(logs, -1)], -1).transpose(2, 0, 1).astype(np.float16))
 
 
-def _read(paths: list[Path], names: list[str], known: np.ndarray | None) -> Skins:
+def _read(paths: list[Path], names: list[str], learnable: np.ndarray | None) -> Skins:
     maps: dict[int, list[torch.Tensor]] = {scale: [] for scale in SCALES}
     tones, skin = [], template.mask("skin", SIZE) * template.mask("face", SIZE) * (1 - template.mask("eyes", SIZE))
     for path in paths:
@@ -167,8 +167,8 @@ def _read(paths: list[Path], names: list[str], known: np.ndarray | None) -> Skin
         for scale in SCALES:
             maps[scale].append(torch.from_numpy(shrink(full, scale)))
         tones.append(((full[:3].astype(np.float32) + 1) / 2 * skin).sum((1, 2)) / skin.sum())
-    areas = {scale: None if known is None
-             else torch.from_numpy(cv2.resize(known.astype(np.float32), (SIZE // scale,) * 2,
+    areas = {scale: None if learnable is None
+             else torch.from_numpy(cv2.resize(learnable.astype(np.float32), (SIZE // scale,) * 2,
                                               interpolation=cv2.INTER_AREA) > 0.99)
              for scale in SCALES}
     tones = torch.from_numpy(np.stack(tones)).float() if tones else torch.zeros(0, 3)

@@ -19,7 +19,7 @@ from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
 from ..face.parser_network import network_input
-from ..face.parts import SIDE, cut, inside, to_crop
+from ..face.parts import SIDE_PX, cut, inside, to_crop
 from ..synthetic.environments import read_panoramas
 from ..synthetic.people import unlit
 from ..synthetic.people.figure import make_figure
@@ -110,7 +110,7 @@ def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np
         landmarks = landmarks * [-1, 1] + [srgb.shape[1], 0]
     move = to_crop(landmarks)  # of the bridge, the chin and the box, which a mirror leaves what they are
     if augment:
-        move = jittered(move, SIDE, JITTER, rng)
+        move = jittered(move, SIDE_PX, JITTER, rng)
     known = inside(srgb.shape, move)
     if augment and rng.random() < 0.35:
         known = known * _ended(rng)
@@ -135,11 +135,11 @@ def jittered(move: np.ndarray, side: int, spread: Jitter, rng: np.random.Generat
 
 def _ended(rng: np.random.Generator) -> np.ndarray:
     """A picture that ends within the crop [SIDE, SIDE], as that of a close face does."""
-    known = np.ones((SIDE, SIDE), np.float32)
+    known = np.ones((SIDE_PX, SIDE_PX), np.float32)
     for turn in range(4):
         if rng.random() < 0.4:
             known = np.rot90(known, turn).copy()
-            known[:int(rng.uniform(0, 0.25) * SIDE)] = 0
+            known[:int(rng.uniform(0, 0.25) * SIDE_PX)] = 0
             known = np.rot90(known, -turn).copy()
     return known
 

@@ -118,13 +118,13 @@ def _head():
             raster.interpolate(light.sky_transfer(), mesh.faces, face, bary), raster.RayCaster(mesh))
 
 
-def photographed(shown: LitSkin, rng: np.random.Generator) -> tuple[Look, np.ndarray]:
+def photographed(lit_skin: LitSkin, rng: np.random.Generator) -> tuple[Look, np.ndarray]:
     """What a phone shows of a scene, and of its card (linear [3])."""
-    exposure = phone_exposure(rng, shown.colours, shown.light)
-    colours = np.clip(shown.colours * exposure.gain, 0, None)
+    exposure = phone_exposure(rng, lit_skin.colours, lit_skin.light)
+    colours = np.clip(lit_skin.colours * exposure.gain, 0, None)
     whole = (colours < 0.97).all(1)
-    weight = shown.weight * (whole if whole.sum() > 30 else 1)
-    return summarise_look(colours, shown.normals, weight, exposure.surroundings), shown.card * exposure.gain
+    weight = lit_skin.weight * (whole if whole.sum() > 30 else 1)
+    return summarise_look(colours, lit_skin.normals, weight, exposure.surroundings), lit_skin.card * exposure.gain
 
 
 def fitted(scenes: list[LitSkin]) -> dict:

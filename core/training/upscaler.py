@@ -20,7 +20,7 @@ from torch.utils.data import Dataset
 from ..contract.messages import Reporter
 from ..solve.prior import fast_dtype
 from ..upscale.enlarge import WEIGHTS
-from ..upscale.network import MISSED, Rcan, bicubic
+from ..upscale.network import BICUBIC_ERRORS, Rcan, bicubic
 from . import command_line, descent
 from .fine_windows import FineWindows, prepare
 from .release import TrainingCard, again, release
@@ -97,7 +97,7 @@ def _error(network: Rcan, pairs: tuple[torch.Tensor, torch.Tensor], device: str,
     missing = large - bicubic(small)
     with torch.autocast(device, torch.bfloat16, enabled=device == "cuda" or fast_dtype("cpu") == torch.bfloat16):
         predicted = network(small, depth)
-    return (predicted.float() - missing).abs().mean((0, 2, 3)) / torch.tensor(MISSED, device=device)
+    return (predicted.float() - missing).abs().mean((0, 2, 3)) / torch.tensor(BICUBIC_ERRORS, device=device)
 
 
 @torch.no_grad()
@@ -108,7 +108,7 @@ def figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor]
     network.load_state_dict(average)
     parts = [tuple(x[i:i + 4] for x in pairs) for i in range(0, len(pairs[0]), 4)]
     error = sum(_error(network, chunk, device, None).cpu() for chunk in parts) / len(parts)
-    missed = (pairs[1] - bicubic(pairs[0])).abs().mean((0, 2, 3)) / torch.tensor(MISSED)
+    missed = (pairs[1] - bicubic(pairs[0])).abs().mean((0, 2, 3)) / torch.tensor(BICUBIC_ERRORS)
     return {name: round(float(error[channels].sum() / missed[channels].sum()), 4)
             for name, channels in (("diffuse", slice(0, 3)), ("normal", slice(3, 6)), ("specular", slice(6, 7)))}
 

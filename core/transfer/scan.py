@@ -19,11 +19,11 @@ from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
 from ..imaging import images
 
-LEAST_PART = 0.02
+LEAST_PART_SHARE = 0.02
 """Share of all triangles under which a loose part is dropped as a floater."""
 STEP_M = 0.003
 """How far behind what a view saw a point may lie and still count as seen: the scan's noise."""
-SHARPNESS = 6
+COSINE_POWER = 6
 """Power of the cosine between a view and the surface: the view that looks squarely wins, its neighbours hide the
 borders."""
 FAR_M = 0.010
@@ -48,7 +48,7 @@ def reduced(scan: Mesh, cell: float) -> Mesh:
     faces = _two_sided(vertices, faces[np.sort(first)])
     # across edges: what hangs by a corner is a floater
     label = trimesh.graph.connected_component_labels(trimesh.graph.face_adjacency(faces), len(faces))
-    faces = faces[np.bincount(label)[label] >= LEAST_PART * len(faces)]
+    faces = faces[np.bincount(label)[label] >= LEAST_PART_SHARE * len(faces)]
     used, index = np.unique(faces, return_inverse=True)
     return Mesh(vertices[used], index.reshape(-1, 3))
 
@@ -75,8 +75,19 @@ def _two_sided(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float], None]) -> np.ndarray:
-    """Linear colours [S, S, 3] of the unwrapped scan as the views show them, zero where none does. `at` gives the
-    covered texels."""
+    """The unwrapped scan's colours as the views show them.
+
+    Parameters
+    ----------
+    scan : with UVs, in metres
+    at : its covered texels
+    views : with their pictures
+    tick : hears the share done
+
+    Returns
+    -------
+    Linear [S, S, 3], zero where no view shows it.
+    """
     size = len(at.covered)
     face, bary = raster.rasterize_uv(scan, size)
     points = raster.interpolate(scan.vertices, scan.faces, face[at.covered], bary[at.covered]).astype(np.float32)
@@ -101,7 +112,7 @@ def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float]
         seen = distance[looked] < depth[cell[:, 1], cell[:, 0]] + STEP_M / np.maximum(cosine[looked], 0.3)
         looked, pixels = looked[seen], pixels[seen]
         picture = images.read_linear(view.path)
-        weight = (cosine[looked] ** SHARPNESS).astype(np.float32)
+        weight = (cosine[looked] ** COSINE_POWER).astype(np.float32)
         scale = [picture.shape[1] / view.width, picture.shape[0] / view.height]
         total[looked] += weight[:, None] * raster.sample(picture, pixels * scale)
         weights[looked] += weight
@@ -122,8 +133,19 @@ def continued(albedo: np.ndarray, lit_map: np.ndarray, at: TexelPartners) -> np.
 
 
 def displacement(head: Mesh, scan: Mesh, size: int, tick: Callable[[float], None]) -> np.ndarray:
-    """How far the scan lies outside the head, along the head's normals, in metres: float32 [S, S] in the head's UVs;
-    zero where there is no scan."""
+    """How far the scan lies outside the head, along the head's normals.
+
+    Parameters
+    ----------
+    head : with UVs, in metres
+    scan : in metres
+    size : of the map, in texels along a side
+    tick : hears the share done
+
+    Returns
+    -------
+    float32 [S, S] in metres; zero where there is no scan.
+    """
     surface, normals = surfaces.Surface(scan, 0.01), vertex_normals(head)
     out, known = np.zeros((size, size), np.float32), np.zeros((size, size), bool)
     for row in range(0, size, STRIP_ROWS):
@@ -141,11 +163,11 @@ def displacement(head: Mesh, scan: Mesh, size: int, tick: Callable[[float], None
     return _faded(out, known)
 
 
-def _faded(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+def _faded(displacement: np.ndarray, valid: np.ndarray) -> np.ndarray:
     import cv2
 
-    inside = cv2.distanceTransform(np.pad(known, 1, constant_values=True).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
-    return values * np.clip(inside / (FADE_PX * len(values) / 1024), 0, 1)
+    inside = cv2.distanceTransform(np.pad(valid, 1, constant_values=True).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    return displacement * np.clip(inside / (FADE_PX * len(displacement) / 1024), 0, 1)
 
 
 def unwrapped(scan: Mesh, cell: float, size: int) -> Mesh:

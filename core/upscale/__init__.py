@@ -28,12 +28,12 @@ from .maps import HeadMaps, read_maps
 from .surface import lay_out
 from .whole_head import complete
 
-STRIP = 256
+STRIP_ROWS = 256
 """Rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make
 another."""
 WRITERS = 2
 """Maps that are encoded at once: each takes 0.5 GB meanwhile."""
-CROP = 0.12
+CROP_SIDE_SHARE = 0.12
 """Side of the report's picture, as a share of the map."""
 SHARES = {"network": 0.8, "lanczos": 0.3}  # of the time that the enlarging takes
 
@@ -113,9 +113,20 @@ def _whole(capture: Capture, maps: HeadMaps, settings: Settings,
 
 
 def enlarged(maps: HeadMaps, size: int, method: str, device: str, progress) -> np.ndarray:
-    """Diffuse (sRGB), unit normal and specular at `size`: float32 [size, size, 7]. `progress` hears the share done.
+    """The maps at another size. The network makes four times as many texels of a side; more or fewer than that are
+    resampled.
 
-    The network makes four times as many texels of a side; more or fewer than that are resampled.
+    Parameters
+    ----------
+    maps : of the head
+    size : texels along a side
+    method : "network" or "lanczos"
+    device : that torch computes on
+    progress : hears the share done
+
+    Returns
+    -------
+    Diffuse (sRGB), unit normal and specular: float32 [size, size, 7].
     """
     if method == "network" and size > len(maps.diffuse):
         from .enlarge import enlarge  # torch is only needed here
@@ -173,12 +184,12 @@ def _mapped(image: np.ndarray, operation: Callable) -> np.ndarray:
 
 def _by_strips(image: np.ndarray, operation) -> None:
     """Applies a texel-wise operation in place."""
-    for row in range(0, len(image), STRIP):
-        image[row:row + STRIP] = operation(image[row:row + STRIP])
+    for row in range(0, len(image), STRIP_ROWS):
+        image[row:row + STRIP_ROWS] = operation(image[row:row + STRIP_ROWS])
 
 
 def _picture(capture: Capture, srgb: np.ndarray) -> None:
     """A crop from the middle of the map, texel by texel."""
-    side = int(CROP * len(srgb))
+    side = int(CROP_SIDE_SHARE * len(srgb))
     start = (len(srgb) - side) // 2
     images.write_srgb(capture.picture("upscale", "crop"), srgb[start:start + side, start:start + side])

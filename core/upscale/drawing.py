@@ -14,30 +14,30 @@ from .hair import Hair
 from .maps import HeadMaps
 from .surface import HeadSurface
 
-SIDES = {"left": (1, 0.1, 0), "back": (0.25, 1, 0.2), "below": (0.35, -0.6, -0.75)}
+VIEW_DIRECTIONS = {"left": (1, 0.1, 0), "back": (0.25, 1, 0.2), "below": (0.35, -0.6, -0.75)}
 """Where the head is looked at from."""
 LAMPS = (((0.8, 0.6, 1.0), 1.5), ((-1.2, 0.0, 0.5), 0.7), ((-0.2, 1.0, 0.2), 0.5))
 """Directions (right, up, towards the eye) and strengths."""
 AMBIENT, GROUND = 0.15, 0.06
-REACH = 165.0
+REACH_MM = 165.0
 """mm from the middle of a picture to its edge."""
-SHININESS = 40
-TINTS = {"brows": (1.0, 0.1, 0.1), "lashes": (0.1, 0.9, 0.2), "beard": (0.1, 0.35, 1.0)}
-FACE = 0.04, 0.96  # rows and columns of the map that the face fills
+SHININESS = 40  # exponent of Blinn's highlight
+TINTS = {"brows": (1.0, 0.1, 0.1), "lashes": (0.1, 0.9, 0.2), "beard": (0.1, 0.35, 1.0)}  # sRGB of the hairs, by growth
+FACE_EXTENT = 0.04, 0.96  # rows and columns of the map that the face fills
 
 
 def turned(surface: HeadSurface, several: list[HeadMaps], side: int = 240) -> np.ndarray:
-    """sRGB picture: a row for each of `several`, the head from SIDES under three lamps."""
+    """sRGB picture: a row for each of `several`, the head from VIEW_DIRECTIONS under three lamps."""
     caster, normals, tangent = (
         raster.RayCaster(surface.mesh),
         vertex_normals(surface.mesh),
         surfaces.tangents(surface.mesh),
     )
     columns = []
-    for direction in SIDES.values():
+    for direction in VIEW_DIRECTIONS.values():
         towards, right, up = _axes(direction)
         row, column = np.mgrid[0:side, 0:side]
-        across, along = ((at + 0.5) / side * 2 * REACH - REACH for at in (column, side - 1 - row))
+        across, along = ((at + 0.5) / side * 2 * REACH_MM - REACH_MM for at in (column, side - 1 - row))
         middle = (surface.mesh.vertices.max(0) + surface.mesh.vertices.min(0)) / 2
         origins = middle + 500 * towards + across[..., None] * right + along[..., None] * up
         face, bary, _ = caster.first_hits(origins.reshape(-1, 3), np.repeat(-towards[None], side * side, 0))
@@ -54,13 +54,24 @@ def turned(surface: HeadSurface, several: list[HeadMaps], side: int = 240) -> np
 
 
 def masks(diffuse: np.ndarray, hair: Hair, cleaned: np.ndarray, side: int = 400) -> np.ndarray:
-    """sRGB picture of the face: the albedo, the same with brows red, lashes green and beard blue, and the skin
-    below."""
+    """A picture of the face: the albedo, the same with brows red, lashes green and beard blue, and the skin below.
+
+    Parameters
+    ----------
+    diffuse : [S, S, 3], linear albedo
+    hair : its masks
+    cleaned : [S, S, 3], linear albedo of the skin below
+    side : of each of the three, in pixels
+
+    Returns
+    -------
+    [side, 3 side, 3], sRGB.
+    """
     tinted = images.linear_to_srgb(diffuse) * 0.6
     for name, tint in TINTS.items():
         cover = getattr(hair, name)[..., None]
         tinted = tinted * (1 - cover) + np.float32(tint) * cover
-    first, last = (round(share * len(diffuse)) for share in FACE)
+    first, last = (round(share * len(diffuse)) for share in FACE_EXTENT)
     inner = np.s_[first:last, first:last]
     return np.hstack([images.resize(picture[inner], side, side)
                       for picture in (images.linear_to_srgb(diffuse), tinted, images.linear_to_srgb(cleaned))])

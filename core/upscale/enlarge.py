@@ -16,19 +16,30 @@ from ..contract.messages import Problem
 from ..face.networks import has_files, read_network
 from ..imaging import images
 from .maps import HeadMaps
-from .network import CHANNELS, FACTOR, HALO, Rcan, bicubic
+from .network import CHANNELS, FACTOR, HALO_TEXELS, Rcan, bicubic
 
 DATA_FILES = ("weights/upscaler.safetensors", "weights/upscaler.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
-STRIP = 64
+STRIP_ROWS = 64
 """Rows of the small map whose tail is worked out at once."""
 
 
 @torch.no_grad()
 def enlarge(maps: HeadMaps, progress: Callable[[float], None], device: str = "cpu",
             network: Rcan | None = None) -> np.ndarray:
-    """Diffuse (sRGB), unit normal and specular of `maps` [S, S], four times as large: float32 [4S, 4S, 7]. `progress`
-    hears the share done."""
+    """The maps four times as large, by the network.
+
+    Parameters
+    ----------
+    maps : of the head, [S, S]
+    progress : hears the share done
+    device : that torch computes on
+    network : in place of the shipped one
+
+    Returns
+    -------
+    Diffuse (sRGB), unit normal and specular: float32 [4S, 4S, 7].
+    """
     network = network or load_network()
     network = network.to(device, memory_format=torch.channels_last)
     small = channels_of(maps).to(device, memory_format=torch.channels_last)
@@ -36,8 +47,8 @@ def enlarge(maps: HeadMaps, progress: Callable[[float], None], device: str = "cp
     large = np.empty((FACTOR * height, FACTOR * width, CHANNELS), np.float32)
     with torch.autocast(device, torch.bfloat16, enabled=device == "cuda" or torch.cpu._is_avx512_bf16_supported()):
         features = network.features(small, tick=lambda share: progress(0.75 * share))
-        for row in range(0, height, STRIP):
-            rows = slice(row, min(row + STRIP, height))
+        for row in range(0, height, STRIP_ROWS):
+            rows = slice(row, min(row + STRIP_ROWS, height))
             large[FACTOR * rows.start:FACTOR
                   * rows.stop] = _strip(network, small, features, rows).permute(1, 2, 0).cpu().numpy()
             progress(0.75 + 0.25 * rows.stop / height)
@@ -62,7 +73,7 @@ def load_network(path: Path = WEIGHTS) -> Rcan:
 
 def _strip(network: Rcan, small: torch.Tensor, features: torch.Tensor, rows: slice) -> torch.Tensor:
     """Rows of the result, [7, 4R, 4W]."""
-    first, end = max(rows.start - HALO, 0), min(rows.stop + HALO, small.shape[2])
+    first, end = max(rows.start - HALO_TEXELS, 0), min(rows.stop + HALO_TEXELS, small.shape[2])
     inner = slice(FACTOR * (rows.start - first), FACTOR * (rows.stop - first))
     details = network.details(features[:, :, first:end])[:, :, inner].float()
     strip = (bicubic(small[:, :, first:end])[:, :, inner] + details)[0]

@@ -18,16 +18,16 @@ from scipy.optimize import nnls
 from ..geometry.noise import noise
 from .surface import HeadSurface
 
-SIGMAS = (0.24, 0.48, 0.96, 1.92)
+SIGMAS_MM = (0.24, 0.48, 0.96, 1.92)
 """mm; the bands lie between them, the first one below the first."""
-WAVELENGTHS = (0.55, 1.1, 2.2, 4.4)
+WAVELENGTHS_MM = (0.55, 1.1, 2.2, 4.4)
 """mm; of the noises that are mixed, one for each band. What is larger differs from place to place for a reason (blood,
 bone, light) and is left to the tone: repeated as noise it looks like a stain."""
-STEP = 0.05
+STEP_MM = 0.05
 """mm between two points of whose heights a slope is taken."""
-BLUNT = 1.2
+LEAST_TEXELS_PER_WAVE = 1.2
 """How many texels a wavelength must span at least to be painted in full."""
-SAMPLE = 200_000
+SAMPLE_TEXELS = 200_000
 """So many texels are enough to measure how a noise answers to the bands."""
 
 
@@ -42,15 +42,23 @@ class Grain:
 
 
 def measure(channels: np.ndarray, slopes: np.ndarray, weight: np.ndarray, surface: HeadSurface, seed: int = 0) -> Grain:
-    """channels [S, S, 4]: log albedo and specular; slopes [S, S, 2]: of the normal, x / z and y / z; weight [S, S]:
-    where there is skin to learn from."""
+    """The grain of skin that was seen.
+
+    Parameters
+    ----------
+    channels : [S, S, 4], log albedo and specular
+    slopes : [S, S, 2], of the normal, x / z and y / z
+    weight : [S, S] in [0, 1], where there is skin to learn from
+    surface : of the head
+    seed : of the noises that are compared
+    """
     where = weight > 0.99
     texel = float(np.median(surface.texel[where])) if where.any() else 1.0
     parts = [bands(picture, weight, texel) for picture in (channels, slopes)]
     moments = [[np.cov(_clipped(band[where]), rowvar=False) if where.sum() > 100 else np.zeros((band.shape[-1],) * 2)
                 for band in picture_bands] for picture_bands in parts]
     answer, answer_slope = _answers(surface, where, texel, np.random.default_rng([seed, 1]))
-    mix, tie = np.zeros((len(WAVELENGTHS), 4, 4)), np.ones(len(WAVELENGTHS))
+    mix, tie = np.zeros((len(WAVELENGTHS_MM), 4, 4)), np.ones(len(WAVELENGTHS_MM))
     strength = np.stack([nnls(answer, [cov[i, i] for cov in moments[0]])[0] for i in range(4)], 1)  # [K, 4] variances
     for k, variance in enumerate(strength):
         deviation = np.sqrt(np.maximum(np.diag(moments[0][k]), 1e-12))
@@ -62,21 +70,36 @@ def measure(channels: np.ndarray, slopes: np.ndarray, weight: np.ndarray, surfac
     return Grain(mix, slope, tie)
 
 
-def paint(grain: Grain, surface: HeadSurface, where: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Log albedo and specular [N, 4] and slopes [N, 2] of mean 0 at the texels of bool [S, S]. The same seed paints the
-    same head alike at any size."""
-    points, texel = surface.position[where], surface.texel[where]
-    tangent, bitangent = surface.frames(where)
+def paint(grain: Grain, surface: HeadSurface, mask: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """The grain on texels of a head. The same seed paints the same head alike at any size.
+
+    Parameters
+    ----------
+    grain : as measured
+    surface : of the head
+    mask : bool [S, S], the N texels that are painted
+    seed : of the noise
+
+    Returns
+    -------
+    Log albedo and specular [N, 4] and slopes [N, 2], all of mean 0.
+    """
+    points, texel = surface.position[mask], surface.texel[mask]
+    tangent, bitangent = surface.frames(mask)
     channels, slopes = np.zeros((len(points), 4), np.float32), np.zeros((len(points), 2), np.float32)
-    for k, wavelength in enumerate(WAVELENGTHS):
-        fits = np.exp(-0.5 * (BLUNT * np.maximum(texel - surface.texel.min(), 0) / wavelength) ** 2)[:, None]
+    for k, wavelength in enumerate(WAVELENGTHS_MM):
+        fits = np.exp(-0.5 * (LEAST_TEXELS_PER_WAVE * np.maximum(texel - surface.texel.min(), 0) / wavelength) ** 2)[
+            :, None
+        ]
         height = noise(points, wavelength, _begun(seed, k, 0))
         parts = np.stack([height, *(noise(points, wavelength, _begun(seed, k, i)) for i in (1, 2, 3))], 1)
         channels += fits * (parts @ grain.mix[k].T.astype(np.float32))
         if grain.slope[k] > 0:
-            rise = [noise(points + np.float32(STEP) * way.astype(np.float32), wavelength, _begun(seed, k, 0)) - height
-                    for way in (tangent, bitangent)]
-            slopes -= np.float32(grain.slope[k] * grain.tie[k] / STEP) * fits * np.stack(rise, 1)
+            rise = [
+                noise(points + np.float32(STEP_MM) * way.astype(np.float32), wavelength, _begun(seed, k, 0)) - height
+                for way in (tangent, bitangent)
+            ]
+            slopes -= np.float32(grain.slope[k] * grain.tie[k] / STEP_MM) * fits * np.stack(rise, 1)
     return channels, slopes
 
 
@@ -84,7 +107,7 @@ def bands(picture: np.ndarray, weight: np.ndarray, texel: float) -> list[np.ndar
     """The bands [S, S, C] of a picture, fine to coarse, by means that count texels by their weight [S, S]; texel in
     mm."""
     levels, finer = [], picture
-    for sigma in SIGMAS:
+    for sigma in SIGMAS_MM:
         coarser = blurred(picture, weight, sigma / texel)
         levels.append(finer - coarser)
         finer = coarser
@@ -97,12 +120,12 @@ def blurred(picture: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray
     return top / np.maximum(cv2.GaussianBlur(weight, (0, 0), max(sigma, 0.3)), 1e-4)[..., None]
 
 
-def _answers(surface: HeadSurface, where: np.ndarray, texel: float,
+def _answers(surface: HeadSurface, mask: np.ndarray, texel: float,
              rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Variances [band, wavelength] that a noise of deviation 1, and the slopes of such a height, have in each band of
     the map."""
-    rows, columns = np.nonzero(where)
-    side = int(min(np.sqrt(SAMPLE), surface.size))
+    rows, columns = np.nonzero(mask)
+    side = int(min(np.sqrt(SAMPLE_TEXELS), surface.size))
     top, left = (int(np.clip(np.median(at) - side / 2, 0, surface.size - side)) if len(at) else 0
                  for at in (rows, columns))
     window = np.s_[top:top + side, left:left + side]
@@ -110,23 +133,25 @@ def _answers(surface: HeadSurface, where: np.ndarray, texel: float,
     there = np.zeros(surface.covered.shape, bool)
     there[window] = True
     tangent = surface.frames(there)[0].astype(np.float32)
-    variances = np.zeros((2, len(SIGMAS), len(WAVELENGTHS)))
-    for k, wavelength in enumerate(WAVELENGTHS):
+    variances = np.zeros((2, len(SIGMAS_MM), len(WAVELENGTHS_MM)))
+    for k, wavelength in enumerate(WAVELENGTHS_MM):
         seed = int(rng.integers(1 << 31))
         height = noise(points, wavelength, np.random.default_rng(seed))
-        rise = (noise(points + np.float32(STEP) * tangent, wavelength, np.random.default_rng(seed)) - height) / STEP
+        rise = (
+            noise(points + np.float32(STEP_MM) * tangent, wavelength, np.random.default_rng(seed)) - height
+        ) / STEP_MM
         both = np.stack([height, rise], 1).reshape(side, side, 2)
         for b, band in enumerate(bands(both, inner, texel)):
             variances[:, b, k] = band.reshape(-1, 2).var(0)
     return variances[0], variances[1]
 
 
-def _begun(seed: int, wavelength: int, part: int) -> np.random.Generator:
-    return np.random.default_rng([seed, 2, wavelength, part])
+def _begun(seed: int, wavelength: int, channel: int) -> np.random.Generator:
+    return np.random.default_rng([seed, 2, wavelength, channel])
 
 
-def _clipped(values: np.ndarray) -> np.ndarray:
+def _clipped(samples: np.ndarray) -> np.ndarray:
     """Without what is no grain: moles, hairs and the edges of shadows lie far out."""
-    middle, (low, high) = np.median(values, 0), np.percentile(values, [16, 84], axis=0)
+    middle, (low, high) = np.median(samples, 0), np.percentile(samples, [16, 84], axis=0)
     reach = 2.5 * np.maximum(high - low, 1e-9) / 2
-    return np.clip(values, middle - reach, middle + reach)
+    return np.clip(samples, middle - reach, middle + reach)

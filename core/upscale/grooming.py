@@ -26,26 +26,26 @@ from .maps import HeadMaps
 from .strokes import HairTexels
 from .surface import HeadSurface
 
-LEAST_COVER, FEWEST = 0.05, 20
+LEAST_COVER_SHARE, FEWEST_TEXELS = 0.05, 20
 """Share of hair from which a texel is worth a hair, and texels from which a part has hair."""
 TAPER = 2 / 3
 """Mean width of a hair over that at its root: tips have a third of it (Strands)."""
-TRUST = 0.1
+TRUSTED_COHERENCE = 0.1
 """How clear strokes must be (coherence) to outweigh the usual direction: `python -m benchmarks.groomed FOLDER --trust`
 chose it on three people."""
-STEPS = 6
+POINTS_PER_HAIR = 6
 """Points of a hair."""
-WALK = 4
+WALK_STEPS = 4
 """Steps in which half a hair's way is followed."""
-UNLIKE = 0.12
+UNLIKE_RAD = 0.12
 """Radians by which a hair lies otherwise than its neighbours."""
-CLEARANCE = 0.0003
+CLEARANCE_M = 0.0003
 """Metres that a hair keeps from the skin."""
-COLOUR_REACH, DARKEST = 5.0, 0.003
+COLOUR_REACH_MM, DARKEST_LINEAR = 5.0, 0.003
 """mm over which hair has one colour, and the darkest that it may be."""
 LEAST_SEEN = 1e-3
 """Mean square of the cover around a texel below which its hair takes the colour of the whole part."""
-BROWN = 0.05, 0.03, 0.018
+BROWN_LINEAR = 0.05, 0.03, 0.018
 """Linear albedo of brown hair: of what nothing was seen."""
 
 
@@ -67,29 +67,42 @@ KINDS = (HairKind("brows", (7.0, 1.3), 0.08, 0.30, 3.0, 0.35), HairKind("beard",
 Blender scales it."""
 LASH = {"upper": (110, 9.0), "lower": (60, 5.5)}
 """Lashes of a lid and their length in mm."""
-LASH_DIAMETER, LASH_DARKER, LASH_LIGHTEST = 0.1, 0.4, 0.05
+LASH_DIAMETER_MM, LASH_ALBEDO_RATIO, LASH_LIGHTEST_LINEAR = 0.1, 0.4, 0.05
 """mm at the root; albedo over that of the brows, and the highest that it may be."""
-OFF_SEAM = 0.0003
+OFF_SEAM_M = 0.0003
 """Metres from where the lids meet, so that each lash is nearest to its own lid."""
 
 
-def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface, seed: int = 0, trust: float = TRUST,
-          check: Callable[[], None] = lambda: None) -> dict[str, Strands]:
-    """The hairs of each part that has any, by its name; metres, on the head with closed lids. cleaned: linear albedo
-    [S, S, 3] of the skin below; trust: how clear strokes must be to outweigh the usual direction. `check` may raise to
-    cancel."""
+def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface, seed: int = 0,
+          trust: float = TRUSTED_COHERENCE, check: Callable[[], None] = lambda: None) -> dict[str, Strands]:
+    """The hairs of each growth that a face has, by its name.
+
+    Parameters
+    ----------
+    maps : of the head
+    hair : its masks, at the maps' size
+    cleaned : [S, S, 3], linear albedo of the skin below
+    surface : of the head with closed lids
+    seed : of what is drawn
+    trust : how clear strokes must be, in [0, 1], to outweigh the usual direction
+    check : may raise to cancel
+
+    Returns
+    -------
+    Hairs in metres, in the axes of the head.
+    """
     hairs, landmarks = {}, template.landmark_points(surface.mesh)
     for number, kind in enumerate(KINDS):
         check()
         cover = getattr(hair, kind.name)
-        where = (cover > LEAST_COVER) & surface.covered
-        if where.sum() < FEWEST:
+        where = (cover > LEAST_COVER_SHARE) & surface.covered
+        if where.sum() < FEWEST_TEXELS:
             continue
         texels, texel = strokes.lay_texels(surface, where), float(np.median(surface.texel[where]))
         seen = 1 - hair.hidden  # what lies before a brow is no stroke of it, and not its colour
         tensors = strokes.measure_tensors(maps.diffuse, texels, texel) * seen[where][:, None, None]
         way = strokes.choose_ways(tensors, texels, ways.usual(kind.name, texels.position, landmarks), trust)
-        colours = _unmix(maps.diffuse, cleaned, cover * where * seen, COLOUR_REACH / texel)[where]
+        colours = _unmix(maps.diffuse, cleaned, cover * where * seen, COLOUR_REACH_MM / texel)[where]
         check()
         hairs[kind.name] = _grown(kind, cover[where], colours, texels, way, surface,
                                   np.random.default_rng([seed, number]))
@@ -99,11 +112,11 @@ def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface,
     return hairs
 
 
-def write(path: Path, found: dict[str, Strands]) -> None:
+def write(path: Path, strands_of: dict[str, Strands]) -> None:
     """An .npz: PART_points float32 [M, K, 3] metres, in the axes of head.obj, from root to tip; PART_radius [M, K]
     metres; PART_colour [M, 3] linear albedo."""
     arrays = {}
-    for part, hairs in found.items():
+    for part, hairs in strands_of.items():
         arrays |= {f"{part}_points": hairs.points, f"{part}_radius": hairs.taper(), f"{part}_colour": hairs.colour}
     with replacing(path) as temporary, open(temporary, "wb") as file:
         np.savez_compressed(file, **arrays)
@@ -112,7 +125,7 @@ def write(path: Path, found: dict[str, Strands]) -> None:
 def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairTexels, way: np.ndarray,
            surface: HeadSurface, rng: np.random.Generator) -> Strands:
     """The hairs over texels of which hair covers `cover` [N], in `colours` [N, 3], along `way` [N, 3]."""
-    texel = surface.texel[texels.where]
+    texel = surface.texel[texels.mask]
     density = np.minimum(-np.log1p(-np.minimum(cover, 0.95)) / (kind.length[0] * TAPER * kind.diameter), kind.most)
     middle = _strewn(density * texel**2, rng)
     length = np.clip(rng.normal(*kind.length, len(middle)), 0.4 * kind.length[0], 1.8 * kind.length[0])
@@ -127,12 +140,12 @@ def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairT
     place = (texels.position[root]
              + texels.raise_up(rng.uniform(-0.5, 0.5, (len(root), 2)) * texel[root, None], root)) / 1000
     normal = texels.normal[root]
-    roots = Roots(place, normal, _turned(way[root], normal, rng.normal(0, UNLIKE, len(root))), place)
+    roots = Roots(place, normal, _turned(way[root], normal, rng.normal(0, UNLIKE_RAD, len(root))), place)
     skin = strands.SkinSurface(surface.mesh.moved(surface.mesh.vertices / 1000))
     lift = rng.normal(kind.lift, 0.3 * kind.lift, len(root)).clip(0.05)
     points = strands.grow(roots, length, lift, skin, way[tip] - way[root] - kind.bend * normal,
-                          np.full(len(root), CLEARANCE), STEPS)
-    colour = np.clip(colours[middle] * np.exp(rng.normal(0, 0.15, (len(root), 1))), DARKEST, 0.8)
+                          np.full(len(root), CLEARANCE_M), POINTS_PER_HAIR)
+    colour = np.clip(colours[middle] * np.exp(rng.normal(0, 0.15, (len(root), 1))), DARKEST_LINEAR, 0.8)
     return Strands(points, np.full(len(root), kind.diameter / 2000, np.float32), colour.astype(np.float32), kind.name)
 
 
@@ -151,8 +164,8 @@ def _walked(start: np.ndarray, sign: int, far: np.ndarray, texels: HairTexels, w
     texel with hair is within `beyond` mm."""
     at, gone = start.copy(), np.zeros(len(start))
     walking = np.ones(len(start), bool)
-    step = far / WALK
-    for _ in range(WALK):
+    step = far / WALK_STEPS
+    for _ in range(WALK_STEPS):
         target = texels.position[at] + sign * step[:, None] * way[at]
         distance, nearest = tree.query(target)
         walking &= distance < beyond
@@ -171,25 +184,27 @@ def _unmix(albedo: np.ndarray, skin: np.ndarray, cover: np.ndarray, reach: float
     hair's own colour. Where none is seen, that of all."""
     share = cover[..., None]
     mixed, square = (share * (albedo - (1 - share) * skin)).astype(np.float32), (share**2).astype(np.float32)
-    whole = mixed.sum((0, 1)) / square.sum() if square.sum() > FEWEST else np.float32(BROWN)
+    whole = mixed.sum((0, 1)) / square.sum() if square.sum() > FEWEST_TEXELS else np.float32(BROWN_LINEAR)
     mixed, square = (cv2.GaussianBlur(picture, (0, 0), reach) for picture in (mixed, square))
     mixed = (mixed + LEAST_SEEN * whole) / (square[..., None] + LEAST_SEEN)
-    return np.minimum.accumulate(np.maximum(mixed, DARKEST), -1)
+    return np.minimum.accumulate(np.maximum(mixed, DARKEST_LINEAR), -1)
 
 
 def _lashes(brows: np.ndarray, vertices: np.ndarray, rng: np.random.Generator) -> Strands:
     """Along the edges of the lids, as they lie when these are closed: no texture shows lashes one by one. brows: their
     colour [3]; vertices [V, 3] of the head, metres."""
-    rows = [_lash_row(lids.closed_edge(vertices, side, number, OFF_SEAM)[::-1], lid, rng) for side in (0, 1)
+    rows = [_lash_row(lids.closed_edge(vertices, side, number, OFF_SEAM_M)[::-1], lid, rng) for side in (0, 1)
             for number, lid in enumerate(LASH)]
     lashes = np.concatenate(rows).astype(np.float32)
-    colour = np.exp(rng.normal(0, 0.1, (len(lashes), 1))) * np.minimum(LASH_DARKER * brows, LASH_LIGHTEST)
-    return Strands(lashes, np.full(len(lashes), LASH_DIAMETER / 2000, np.float32), colour.astype(np.float32), "lashes")
+    colour = np.exp(rng.normal(0, 0.1, (len(lashes), 1))) * np.minimum(LASH_ALBEDO_RATIO * brows, LASH_LIGHTEST_LINEAR)
+    return Strands(
+        lashes, np.full(len(lashes), LASH_DIAMETER_MM / 2000, np.float32), colour.astype(np.float32), "lashes"
+    )
 
 
 def _lash_row(edge: np.ndarray, lid: str, rng: np.random.Generator) -> np.ndarray:
-    """Points [M, STEPS, 3] in metres of the lashes along a closed lid's edge [n, 3] from the inner to the outer
-    corner."""
+    """Points [M, POINTS_PER_HAIR, 3] in metres of the lashes along a closed lid's edge [n, 3] from the inner to the
+    outer corner."""
     count, length = LASH[lid]
     up, outwards = 1 if lid == "upper" else -1, np.sign(edge[-1, 0])
     t = np.sort(rng.uniform(0.12, 0.96, count))
@@ -200,5 +215,5 @@ def _lash_row(edge: np.ndarray, lid: str, rng: np.random.Generator) -> np.ndarra
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     size = length / 1000 * rng.uniform(0.7, 1.1, count) * np.interp(t, [0, 0.4, 1], [0.55, 0.9, 1.0])
     bow = np.array([0, 0, 0.75 if up > 0 else -0.1])
-    s = np.linspace(0, 1, STEPS)[None, :, None]
+    s = np.linspace(0, 1, POINTS_PER_HAIR)[None, :, None]
     return at[:, None] + size[:, None, None] * (s * way[:, None] + s**2 * bow)

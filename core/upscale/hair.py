@@ -26,14 +26,14 @@ from .whole_head import FEATURES, apart, seen_well
 
 LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133), (263, 249, 390, 373, 374, 380, 381, 382, 362)
 """Along the lower rims of the lids; where they are closed the lashes lie there."""
-LASHES = 1.6
+LASH_ZONE_MM = 1.6
 """mm on either side of the rim in which lashes are looked for."""
-LEAST_HAIR = 0.25
+LEAST_HAIR_LOG = 0.25
 """Log albedo by which hair must be darker than its skin to be told from it by that alone; the fair brows of some people
 are not."""
-USUAL = {"brows": 0.5, "beard": 0.5}
+USUAL_COVER = {"brows": 0.5, "beard": 0.5}
 """Share that hair covers where there is some,"""
-SPREAD = 0.25
+USUAL_COVER_SIGMA = 0.25
 """and its deviation: what counts where hair is hardly another colour than its skin."""
 
 
@@ -48,29 +48,50 @@ class Hair:
     hidden: np.ndarray
 
 
-def find(maps: HeadMaps, surface: HeadSurface, parts: np.ndarray | None = None,
+def find(maps: HeadMaps, surface: HeadSurface, part_shares: np.ndarray | None = None,
          check: Callable[[], None] = lambda: None) -> Hair:
-    """The hair of a face. parts: what read_parts gives. `check` may raise to cancel, here and below."""
+    """The hair of a face.
+
+    Parameters
+    ----------
+    maps : of the head
+    surface : of the head, at their size
+    part_shares : [S, S, len(GROWTHS)] in [0, 1], what `read_parts` gives
+    check : may raise to cancel, here and below
+    """
     channels, _ = apart(maps)
     light = channels[..., :3].mean(2)
     zones, texel = _zones(surface), float(np.median(surface.texel))
     check()
-    grown = growth.find(light, maps.seen, zones, surface, parts)
+    grown = growth.find(light, maps.seen, zones, surface, part_shares)
     check()
     darker = _skin(light[..., None], zones, grown.beard, grown.head, surface)[..., 0] - light
     lashes = _cover(_closed(light, texel) - light, zones["lashes"], grown.grain)
-    if not grown.told:
+    if not grown.by_parser:
         return Hair(_cover(darker, grown.brows, grown.grain), lashes, _cover(darker, grown.beard, grown.grain),
                     grown.head)
-    brows, clearest = _told_cover(darker, grown.brows * (1 - grown.head), grown.grain, USUAL["brows"])
-    bearded, _ = _told_cover(darker, grown.beard, grown.grain, USUAL["beard"], clearest)
+    brows, clearest = _told_cover(darker, grown.brows * (1 - grown.head), grown.grain, USUAL_COVER["brows"])
+    bearded, _ = _told_cover(darker, grown.beard, grown.grain, USUAL_COVER["beard"], clearest)
     return Hair(_behind(brows, grown, surface), lashes, bearded, grown.head)
 
 
 def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0,
           check: Callable[[], None] = lambda: None) -> tuple[np.ndarray, np.ndarray]:
-    """Linear albedo [S, S, 3] without the hair, and how far each texel was replaced [S, S]; 0 leaves the albedo's
-    bytes."""
+    """The skin below the hair.
+
+    Parameters
+    ----------
+    maps : of the head
+    hair : its masks, at the maps' size
+    surface : of the head, at their size
+    seed : of the grain that is painted
+    check : may raise to cancel
+
+    Returns
+    -------
+    Linear albedo [S, S, 3] without the hair, and how far each texel was replaced [S, S] in [0, 1]; 0 leaves the
+    albedo's bytes.
+    """
     channels, slopes = apart(maps)
     zones, texel = _zones(surface), float(np.median(surface.texel))
     share = np.zeros_like(hair.brows)
@@ -99,8 +120,17 @@ def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0,
 
 def write(folder: Path, albedo: np.ndarray, hair: Hair, cleaned: np.ndarray, share: np.ndarray,
           check: Callable[[], None] = lambda: None) -> None:
-    """The masks at the size of `albedo` (sRGB [L, L, 3]), and that albedo where `clean`'s share is 0, the cleaned one
-    elsewhere."""
+    """The masks at the albedo's size, and the albedo without hair.
+
+    Parameters
+    ----------
+    folder : that they are written to
+    albedo : [L, L, 3], sRGB in [0, 1]; stays where `share` is 0
+    hair : the masks
+    cleaned : [S, S, 3], linear albedo of the skin below
+    share : [S, S] in [0, 1], where that is taken
+    check : may raise to cancel
+    """
     size = len(albedo)
     for name in ("brows", "lashes", "beard"):
         images.write_data(folder / f"{name}.png", _enlarged(getattr(hair, name), size), check=check)
@@ -126,7 +156,7 @@ def _zones(surface: HeadSurface) -> dict[str, np.ndarray]:
         for a, b in zip(points[list(side)][:-1], points[list(side)][1:], strict=True):
             rims = np.minimum(rims, _off(position[eyes], a.astype(np.float32), b.astype(np.float32)))
     lashes = np.zeros((size, size), np.float32)
-    lashes[eyes] = np.clip(2 - 2 * rims / LASHES, 0, 1)
+    lashes[eyes] = np.clip(2 - 2 * rims / LASH_ZONE_MM, 0, 1)
     brows = cv2.dilate(template.mask("brows", size), beard.disc(1.5 / float(np.median(surface.texel))))
     return {"brows": brows, "lashes": lashes, "beard": beard.zone(points, position)}
 
@@ -152,13 +182,13 @@ def _cover(darker: np.ndarray, zone: np.ndarray, usual: float) -> np.ndarray:
     bare skin and the darkest hairs."""
     there = zone > 0.5
     full = float(np.percentile(darker[there], 99)) if there.sum() > 20 else 0.0
-    if full < max(LEAST_HAIR, 4 * usual):
+    if full < max(LEAST_HAIR_LOG, 4 * usual):
         return np.zeros_like(zone)
     least, most = (1 - np.exp(-x) for x in (2 * usual, full))
     return (np.clip((1 - np.exp(-darker) - least) / (most - least), 0, 1) * zone).astype(np.float32)
 
 
-def _told_cover(darker: np.ndarray, there: np.ndarray, grain: float, usual: float,
+def _told_cover(darker: np.ndarray, hair_share: np.ndarray, grain: float, usual: float,
                 clearest: float = 0.0) -> tuple[np.ndarray, float]:
     """Share of hair [S, S] where the parser says that there is some, and how far below the skin's albedo the clearest
     hairs lie, as a share of it.
@@ -167,15 +197,15 @@ def _told_cover(darker: np.ndarray, there: np.ndarray, grain: float, usual: floa
     sure it is: the less hair differs from its skin, over the `grain` of that, the less does its contrast tell.
     `clearest`: of the person's other dark hair, for stubble nowhere fills a texel.
     """
-    off, sure = 1 - np.exp(-darker), there > 0.5
+    off, sure = 1 - np.exp(-darker), hair_share > 0.5
     if not sure.any():
-        return np.zeros_like(there), clearest
+        return np.zeros_like(hair_share), clearest
     dark = off[sure].mean() >= 0
     # grey hair has strokes of the other sign, too
     off = np.maximum(off, -off - 2 * grain) if dark else np.maximum(-off, off - 2 * grain)
     full = max(float(np.percentile(off[sure], 99)), clearest if dark else 0.0, grain)
-    trust = SPREAD**2 / (SPREAD**2 + (grain / full) ** 2)
-    cover = (trust * np.clip(off / full, 0, 1) + (1 - trust) * usual) * there
+    trust = USUAL_COVER_SIGMA**2 / (USUAL_COVER_SIGMA**2 + (grain / full) ** 2)
+    cover = (trust * np.clip(off / full, 0, 1) + (1 - trust) * usual) * hair_share
     return cover.astype(np.float32), full if dark else clearest
 
 
@@ -183,7 +213,7 @@ def _behind(brows: np.ndarray, grown: Growth, surface: HeadSurface) -> np.ndarra
     """Brows with those that lie behind hair of the head: as the other one is, where that is seen, and as brows usually
     are where neither is."""
     other, hidden = brows[:, ::-1], grown.head[:, ::-1]  # the template's two sides mirror each other on the map
-    usual = USUAL["brows"] * template.mask("brows", surface.size)
+    usual = USUAL_COVER["brows"] * template.mask("brows", surface.size)
     return brows * (1 - grown.head) + grown.head * (other * (1 - hidden) + usual * hidden)
 
 

@@ -15,14 +15,14 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-FACTOR = 4
-CHANNELS = 7
-MIDDLE = (0.5, 0.5, 0.5, 0.0, 0.0, 1.0, 0.35)
-SPREAD = (0.2, 0.2, 0.2, 0.15, 0.15, 0.05, 0.15)
+FACTOR = 4  # of the sides
+CHANNELS = 7  # albedo, normal, specular
+CHANNEL_MEANS = (0.5, 0.5, 0.5, 0.0, 0.0, 1.0, 0.35)
+CHANNEL_DEVIATIONS = (0.2, 0.2, 0.2, 0.15, 0.15, 0.05, 0.15)
 """Of a channel's values, about: what the network reads is centred and scaled by them."""
-MISSED = (0.012, 0.012, 0.012, 0.05, 0.05, 0.015, 0.012)
+BICUBIC_ERRORS = (0.012, 0.012, 0.012, 0.05, 0.05, 0.015, 0.012)
 """How far bicubic resampling is off in a channel, about: the unit of what the network answers, and of its loss."""
-HALO = 2
+HALO_TEXELS = 2
 """Texels of the small map that the tail reads around a strip: 1 + 1/2 + 1/4 by three 3 x 3 convolutions on ever finer
 grids, two by the bicubic kernel."""
 
@@ -81,7 +81,7 @@ class Rcan(nn.Module):
                  tick: Callable[[float], None] = lambda share: None) -> torch.Tensor:
         """The body: [N, 7, H, W] -> [N, width, H, W]. Its attention looks at the whole map, so it cannot be had in
         pieces. `tick` hears the share done."""
-        begun = self.head((maps - _channels(MIDDLE, maps)) / _channels(SPREAD, maps))
+        begun = self.head((maps - _channels(CHANNEL_MEANS, maps)) / _channels(CHANNEL_DEVIATIONS, maps))
         x = begun
         for i, (group, join) in enumerate(zip(self.groups, self.joins, strict=True)):
             y = x
@@ -93,12 +93,12 @@ class Rcan(nn.Module):
         return begun + self.join(x)
 
     def details(self, features: torch.Tensor) -> torch.Tensor:
-        """The tail: [N, width, H, W] -> [N, 7, 4H, 4W]. Local: strips with HALO texels around them give the same as the
-        whole."""
+        """The tail: [N, width, H, W] -> [N, 7, 4H, 4W]. Local: strips with HALO_TEXELS texels around them give the same
+        as the whole."""
         x = features
         for widen in self.widen:
             x = functional.pixel_shuffle(widen(x), 2)
-        return self.tail(x) * _channels(MISSED, features)
+        return self.tail(x) * _channels(BICUBIC_ERRORS, features)
 
 
 def bicubic(maps: torch.Tensor) -> torch.Tensor:
@@ -116,5 +116,5 @@ def linear_to_srgb(x: torch.Tensor) -> torch.Tensor:
     return torch.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clamp_min(0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def _channels(values: tuple[float, ...], like: torch.Tensor) -> torch.Tensor:
-    return torch.tensor(values, dtype=like.dtype, device=like.device)[:, None, None]
+def _channels(per_channel: tuple[float, ...], like: torch.Tensor) -> torch.Tensor:
+    return torch.tensor(per_channel, dtype=like.dtype, device=like.device)[:, None, None]

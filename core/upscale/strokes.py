@@ -19,18 +19,18 @@ from ..geometry.views import lengths
 from ..imaging import images
 from .surface import HeadSurface
 
-COARSEST = 0.7
+COARSEST_MM = 0.7
 """mm: what is smoother than that is skin, or the edge of a brow, and no stroke."""
-AROUND = 1.5
+AROUND_MM = 1.5
 """mm over which neighbouring hairs lie alike, and their strokes are taken together."""
 
 
 @dataclass(frozen=True)
 class HairTexels:
-    """The N texels on which hair grows. where bool [S, S]; position [N, 3] mm, normal, tangent and bitangent [N, 3]
+    """The N texels on which hair grows. mask bool [S, S]; position [N, 3] mm, normal, tangent and bitangent [N, 3]
     unit, row by row."""
 
-    where: np.ndarray
+    mask: np.ndarray
     position: np.ndarray
     normal: np.ndarray
     tangent: np.ndarray
@@ -46,32 +46,41 @@ class HairTexels:
         return flat[:, :1] * self.tangent[index] + flat[:, 1:] * self.bitangent[index]
 
 
-def lay_texels(surface: HeadSurface, where: np.ndarray) -> HairTexels:
-    """The texels of `where` bool [S, S], all of them on the head."""
-    tangent, bitangent = surface.frames(where)
-    normal = raster.interpolate(vertex_normals(surface.mesh), surface.mesh.faces, surface.face[where],
-                                surface.bary[where])
-    return HairTexels(where, surface.position[where].astype(np.float64), normal / lengths(normal)[:, None], tangent,
+def lay_texels(surface: HeadSurface, mask: np.ndarray) -> HairTexels:
+    """The texels of `mask` bool [S, S], all of them on the head."""
+    tangent, bitangent = surface.frames(mask)
+    normal = raster.interpolate(vertex_normals(surface.mesh), surface.mesh.faces, surface.face[mask],
+                                surface.bary[mask])
+    return HairTexels(mask, surface.position[mask].astype(np.float64), normal / lengths(normal)[:, None], tangent,
                       bitangent)
 
 
 def measure_tensors(albedo: np.ndarray, texels: HairTexels, texel: float) -> np.ndarray:
     """Structure tensors [N, 2, 2] of the strokes of a linear albedo [S, S, 3] in the tangent plane, of trace 1 (0 where
-    nothing is seen), over AROUND: large across the strokes, small along them. texel: its width in mm."""
+    nothing is seen), over AROUND_MM: large across the strokes, small along them. texel: its width in mm."""
     grey = images.linear_to_srgb(albedo).mean(2)
-    fine = cv2.GaussianBlur(grey - cv2.GaussianBlur(grey, (0, 0), COARSEST / texel), (0, 0), 0.7)
+    fine = cv2.GaussianBlur(grey - cv2.GaussianBlur(grey, (0, 0), COARSEST_MM / texel), (0, 0), 0.7)
     right, down = (cv2.Scharr(fine, cv2.CV_32F, *axis, scale=1 / 32) for axis in ((1, 0), (0, 1)))
-    slopes = np.where(texels.where[..., None], np.stack([right, -down], -1), 0)  # the bitangent points up the map
+    slopes = np.where(texels.mask[..., None], np.stack([right, -down], -1), 0)  # the bitangent points up the map
     products = (slopes[..., :, None] * slopes[..., None, :]).reshape(*grey.shape, 4)
-    tensors = cv2.GaussianBlur(products, (0, 0), AROUND / texel)[texels.where].reshape(-1, 2, 2).astype(np.float64)
+    tensors = cv2.GaussianBlur(products, (0, 0), AROUND_MM / texel)[texels.mask].reshape(-1, 2, 2).astype(np.float64)
     return tensors / np.maximum(np.trace(tensors, axis1=1, axis2=2), 1e-12)[:, None, None]
 
 
 def choose_ways(tensors: np.ndarray, texels: HairTexels, usual: np.ndarray, trust: float) -> np.ndarray:
-    """Unit directions from root to tip along the skin [N, 3].
+    """How hairs lie along the skin.
 
-    `usual` [N, 3], how such hair grows, tells root from tip, and the direction where strokes tell none: it counts as
-    strokes of coherence `trust`."""
+    Parameters
+    ----------
+    tensors : [N, 2, 2], of the strokes at the texels
+    texels : the N texels
+    usual : [N, 3], how such hair grows: tells root from tip, and the direction where strokes tell none
+    trust : the usual direction counts as strokes of this coherence
+
+    Returns
+    -------
+    Unit directions from root to tip [N, 3].
+    """
     usual = texels.flatten(usual)
     across = np.stack([-usual[:, 1], usual[:, 0]], 1)
     along = np.linalg.eigh(tensors + trust * across[:, :, None] * across[:, None])[1][..., 0]

@@ -19,9 +19,9 @@ from scipy.sparse.linalg import splu
 from ..geometry import raster, surfaces
 from ..geometry.meshes import Mesh, vertex_normals
 
-STRIP = 128
+STRIP_ROWS = 128
 """Rows whose triangles are found between two looks at a cancel."""
-FAR = 25.0
+FAR_MM = 25.0
 """mm over which a field falls back to its mean where nothing is known: one odd texel on the border must not colour the
 back of the head."""
 
@@ -56,27 +56,36 @@ class HeadSurface:
         width = np.sqrt(solid / np.maximum(flat, 1e-3 * np.median(flat)))
         return width.astype(np.float32)[np.maximum(self.face, 0)]
 
-    def frames(self, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def frames(self, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Unit tangent and bitangent [N, 3] at the texels of bool [S, S], as normal maps mean them."""
         tangent, hand = surfaces.tangents(self.mesh)
-        face = np.maximum(self.face, 0)[where]
-        return surfaces.frames(vertex_normals(self.mesh), self.mesh.faces, tangent, hand, face, self.bary[where])[:2]
+        face = np.maximum(self.face, 0)[mask]
+        return surfaces.frames(vertex_normals(self.mesh), self.mesh.faces, tangent, hand, face, self.bary[mask])[:2]
 
-    def spread(self, values: np.ndarray) -> np.ndarray:
+    def spread(self, vertex_values: np.ndarray) -> np.ndarray:
         """Values of the vertices [V, C] as a map, float32 [S, S, C]."""
-        return raster.bleed(raster.interpolate(values, self.mesh.faces, self.face, self.bary).astype(np.float32),
+        return raster.bleed(raster.interpolate(vertex_values, self.mesh.faces, self.face, self.bary).astype(np.float32),
                             self.covered)
 
-    def smooth(self, values: np.ndarray, weight: np.ndarray, reach: float,
+    def smooth(self, field: np.ndarray, weight: np.ndarray, reach: float,
                tolerance: float | None = None) -> np.ndarray:
-        """The field [S, S, C] that follows a map's values [S, S, C] where their weight [S, S] is, and is as even as can
-        be elsewhere.
+        """The map that follows a field where its weight is, and is as even as can be elsewhere.
 
-        Minimises the integral of weight (x - value)^2 + reach^2 |grad x|^2 over the surface, with a weak pull to the
-        mean where there is no weight. reach in mm: detail below it is left out. Values that lie by more than about
-        `tolerance` off a broader field lose their weight (Cauchy's).
+        Minimises the integral of weight (x - field)^2 + reach^2 |grad x|^2 over the surface, with a weak pull to the
+        mean where there is no weight.
+
+        Parameters
+        ----------
+        field : [S, S, C]
+        weight : [S, S], from 0 up
+        reach : mm; detail below it is left out
+        tolerance : values that lie by more than about this off a broader field lose their weight (Cauchy's)
+
+        Returns
+        -------
+        float32 [S, S, C].
         """
-        means, known = self._on_vertices(values, weight * self.texel**2)
+        means, known = self._on_vertices(field, weight * self.texel**2)
         if tolerance is not None:
             trusted = known
             for _ in range(3):
@@ -85,21 +94,21 @@ class HeadSurface:
             known = trusted
         return self.spread(self._solved(means, known, reach))
 
-    def _on_vertices(self, values: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _on_vertices(self, field: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Weighted means [V, C] of texels around each vertex and the weight's mean there [V]."""
         there = self.covered & (weight > 0)
         corners, count = self.mesh.faces[self.face[there]].ravel(), len(self.mesh.vertices)
         share = (self.bary[there] * weight[there][:, None]).ravel()
         total = np.bincount(corners, share, count)
-        sums = [np.bincount(corners, share * np.repeat(channel, 3), count) for channel in values[there].T]
+        sums = [np.bincount(corners, share * np.repeat(channel, 3), count) for channel in field[there].T]
         return np.stack(sums, 1) / np.maximum(total, 1e-12)[:, None], np.minimum(total, self._areas)
 
-    def _solved(self, means: np.ndarray, known: np.ndarray, reach: float) -> np.ndarray:
+    def _solved(self, means: np.ndarray, weight: np.ndarray, reach: float) -> np.ndarray:
         """The field's values [V, C]."""
-        middle = (means * known[:, None]).sum(0) / max(known.sum(), 1e-12)
-        pull = (reach / FAR) ** 2 * np.maximum(self._areas, 1e-6)
-        system = sparse.diags(known + pull) + reach**2 * self._stiffness
-        return splu(system.tocsc()).solve((means - middle) * known[:, None]) + middle
+        middle = (means * weight[:, None]).sum(0) / max(weight.sum(), 1e-12)
+        pull = (reach / FAR_MM) ** 2 * np.maximum(self._areas, 1e-6)
+        system = sparse.diags(weight + pull) + reach**2 * self._stiffness
+        return splu(system.tocsc()).solve((means - middle) * weight[:, None]) + middle
 
     @cached_property
     def _areas(self) -> np.ndarray:
@@ -130,7 +139,7 @@ def lay_out(head: Mesh, size: int, check: Callable[[], None] = lambda: None) -> 
     """The surface of a head in metres, with UVs, under maps of that size. `check` may raise to cancel."""
     sewn, _ = surfaces.welded(head.moved(head.vertices * 1000))
     strips = []
-    for row in range(0, size, STRIP):
+    for row in range(0, size, STRIP_ROWS):
         check()
-        strips.append(raster.rasterize_uv(sewn, size, (row, min(row + STRIP, size))))
+        strips.append(raster.rasterize_uv(sewn, size, (row, min(row + STRIP_ROWS, size))))
     return HeadSurface(sewn, size, *(np.concatenate(parts) for parts in zip(*strips, strict=True)))

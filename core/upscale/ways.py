@@ -16,10 +16,10 @@ RIGHT_BROW = ((55, 107), (65, 66), (52, 105), (53, 63), (46, 70))
 NOSE_BASE, MOUTH_CORNER = 2, 291
 
 
-def usual(part: str, position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
+def usual(growth: str, position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
     """Directions from root to tip [N, 3], of any length and not yet along the skin, at positions [N, 3] mm with
     landmarks [468, 3] mm."""
-    return _brows(position, landmarks) if part == "brows" else _beard(position, landmarks)
+    return _brows(position, landmarks) if growth == "brows" else _beard(position, landmarks)
 
 
 def _brows(position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:

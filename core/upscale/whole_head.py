@@ -24,13 +24,13 @@ from . import grain
 from .maps import HeadMaps
 from .surface import HeadSurface
 
-UNSEEN, SEEN = 0.015, 0.09
+UNSEEN_CONFIDENCE, SEEN_CONFIDENCE = 0.015, 0.09
 """The texture's confidence at which a texel counts as not seen, and from which on as seen well."""
 BELIEVED = 0.3
 """The solver's confidence from which on skin is plain enough to learn its grain from: a beard is not."""
-SPECK = 1.5
+SPECK_MM = 1.5
 """mm: darker lines and dots of it are strands before the face, not holes in what was seen."""
-SKIRT, FEATHER = 2.5, 5.0
+SKIRT_MM, FEATHER_MM = 2.5, 5.0
 """mm inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the
 mean face; then comes the fade."""
 ISLAND = 10.0
@@ -39,22 +39,30 @@ the pictures is of another tone and another stubble than what is made up around 
 GLANCED, WATCHED = 0.5, 0.8
 """Shares of usual skin's confidence: a scalp whose surroundings were seen with the first is made up, with the second
 kept."""
-REACH = 2.5
+REACH_MM = 2.5
 """mm below which detail is no tone."""
-ODD = 0.20
+ODD_LOG = 0.20
 """Difference of log albedo from its surroundings at which the fringe of the seen part loses half of its say: stray
 light, clothes, hair in front."""
-LEAST_SCALP = 1500.0
+LEAST_SCALP_MM2 = 1500.0
 """mm^2 of scalp that must have been seen for it to have a tone of its own."""
 DATA_FILES = ("weights/prior.safetensors",)
 MEAN_FACE = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 FEATURES = ("brows", "lips", "eyes", "nostrils")
-DARKEST = 0.004
+DARKEST_LINEAR = 0.004  # albedo below which a logarithm says nothing
 
 
 def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int = 0) -> HeadMaps:
-    """The maps with what was not seen replaced; shading and confidence as they were. Texels whose `seen_well` is 1 keep
-    their bytes, but for stray ones beyond the face and a scalp that was seen badly."""
+    """The maps with what was not seen replaced; shading and confidence as they were.
+
+    Parameters
+    ----------
+    maps : of the head; texels whose `seen_well` is 1 keep their bytes, but for stray ones beyond the face and a scalp
+        that was seen badly
+    surface : of the head, at their size
+    report : hears whether it is cancelled, takes the share that was completed
+    seed : of the grain that is painted
+    """
     report.check()
     seen = seen_well(maps.seen, surface)
     size = surface.size
@@ -89,13 +97,14 @@ def seen_well(seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
     Holes in the face's features count as seen: their shape comes with the mean face, and no smooth field knows it.
     """
     texel = float(np.median(surface.texel))
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(1, round(SPECK / texel)) + 1,) * 2)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(1, round(SPECK_MM / texel)) + 1,) * 2)
     closed = cv2.morphologyEx(seen, cv2.MORPH_CLOSE, disc)
     closed = np.maximum(closed, _features(surface.size))
-    enough = _smoothstep((closed - UNSEEN) / (SEEN - UNSEEN))
-    inside = cv2.distanceTransform(np.pad((closed >= UNSEEN) | ~surface.covered, 1, mode="edge").astype(np.uint8),
-                                   cv2.DIST_L2, 5)[1:-1, 1:-1]
-    return (enough * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT) / FEATHER)
+    enough = _smoothstep((closed - UNSEEN_CONFIDENCE) / (SEEN_CONFIDENCE - UNSEEN_CONFIDENCE))
+    inside = cv2.distanceTransform(
+        np.pad((closed >= UNSEEN_CONFIDENCE) | ~surface.covered, 1, mode="edge").astype(np.uint8), cv2.DIST_L2, 5
+    )[1:-1, 1:-1]
+    return (enough * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT_MM) / FEATHER_MM)
             * surface.covered).astype(np.float32)
 
 
@@ -111,28 +120,36 @@ def _without_strays(enough: np.ndarray, seen: np.ndarray, off: np.ndarray) -> np
     """`enough` [S, S] without what was `seen` [S, S] at a glance only and lies `off` the head's tone (log albedo [S,
     S]): light that was divided out wrongly, cloth, hair.
 
-    What one believes of a texel is a matter of both: off by ODD it has to be seen as much better as is missing to usual
-    skin. Nothing goes from the face, which every capture sees well and where marks are.
+    What one believes of a texel is a matter of both: off by ODD_LOG it has to be seen as much better as is missing to
+    usual skin. Nothing goes from the face, which every capture sees well and where marks are.
     """
     sure = np.clip(seen / max(float(np.median(seen[enough == 1])), 1e-6), 0, 1)
-    missing = (1 - sure) * (1 - template.mask("face", len(seen))) * off / ODD
+    missing = (1 - sure) * (1 - template.mask("face", len(seen))) * off / ODD_LOG
     return np.where(missing > 0, enough * sure**2 / np.maximum(sure**2 + missing**2, 1e-12), enough).astype(np.float32)
 
 
 def apart(maps: HeadMaps) -> tuple[np.ndarray, np.ndarray]:
     """Log albedo and specular [S, S, 4], and the normal's slopes [S, S, 2]."""
-    channels = np.concatenate([np.log(np.maximum(maps.diffuse, DARKEST)), maps.specular[..., None]], 2)
+    channels = np.concatenate([np.log(np.maximum(maps.diffuse, DARKEST_LINEAR)), maps.specular[..., None]], 2)
     return channels, maps.normal[..., :2] / np.maximum(maps.normal[..., 2:], 0.1)
 
 
-def joined(maps: HeadMaps, where: np.ndarray, channels: np.ndarray, slopes: np.ndarray | None = None) -> HeadMaps:
-    """`maps` with new values at the texels of bool [S, S]: what `apart` makes of them, [N, 4] and [N, 2]."""
+def joined(maps: HeadMaps, mask: np.ndarray, channels: np.ndarray, slopes: np.ndarray | None = None) -> HeadMaps:
+    """The maps with new values at some texels.
+
+    Parameters
+    ----------
+    maps : stay as they are
+    mask : bool [S, S], of N texels
+    channels : [N, 4], log albedo and specular, as `apart` makes them
+    slopes : [N, 2], of the normal, x / z and y / z
+    """
     diffuse, specular, normal = maps.diffuse.copy(), maps.specular.copy(), maps.normal.copy()
-    diffuse[where] = np.clip(np.exp(channels[:, :3]), DARKEST, 1)
-    specular[where] = np.clip(channels[:, 3], 0, 1)
+    diffuse[mask] = np.clip(np.exp(channels[:, :3]), DARKEST_LINEAR, 1)
+    specular[mask] = np.clip(channels[:, 3], 0, 1)
     if slopes is not None:
         tilted = np.concatenate([slopes, np.ones_like(slopes[:, :1])], 1)
-        normal[where] = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
+        normal[mask] = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
     return replace(maps, diffuse=diffuse, specular=specular, normal=normal)
 
 
@@ -149,11 +166,11 @@ def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: i
     """
     scalp, usual = template.mask("scalp", surface.size), usual_skin(surface.size)
     bare = trust * (1 - _features(surface.size))
-    bald = surface.smooth(usual, (1 - _features(surface.size)) * (1 - scalp) ** 4, REACH)
-    of_skin = bald + surface.smooth(channels - bald, bare * (1 - scalp), REACH, ODD)
-    if float(((bare > 0) * scalp * surface.texel**2).sum()) < LEAST_SCALP:
+    bald = surface.smooth(usual, (1 - _features(surface.size)) * (1 - scalp) ** 4, REACH_MM)
+    of_skin = bald + surface.smooth(channels - bald, bare * (1 - scalp), REACH_MM, ODD_LOG)
+    if float(((bare > 0) * scalp * surface.texel**2).sum()) < LEAST_SCALP_MM2:
         return of_skin
-    of_scalp = usual + surface.smooth(channels - usual, bare * scalp, REACH, ODD)
+    of_scalp = usual + surface.smooth(channels - usual, bare * scalp, REACH_MM, ODD_LOG)
     uneven = noise(surface.position.reshape(-1, 3), 3.0, np.random.default_rng([seed, 3])).reshape(scalp.shape)
     soft = surface.smooth(scalp[..., None], np.ones_like(scalp), 3.0)[..., 0]
     # no hairline is a drawn line
@@ -171,8 +188,10 @@ def usual_skin(size: int) -> np.ndarray:
     return np.concatenate([np.log(np.maximum(mean[..., :3], 0.05)), (mean[..., 6:] + 1) / 2], 2)
 
 
-def _low(channels: np.ndarray, seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
-    return grain.blurred(channels, np.maximum(seen, 1e-3).astype(np.float32), REACH / float(np.median(surface.texel)))
+def _low(channels: np.ndarray, observed: np.ndarray, surface: HeadSurface) -> np.ndarray:
+    return grain.blurred(
+        channels, np.maximum(observed, 1e-3).astype(np.float32), REACH_MM / float(np.median(surface.texel))
+    )
 
 
 def _smoothstep(share: np.ndarray) -> np.ndarray:

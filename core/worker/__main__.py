@@ -20,7 +20,7 @@ from ..contract import switchlight_api
 from ..contract.messages import Message, to_line
 from .runner import run_job
 
-PRIORITY = 15
+NICE_VALUE = 15
 """Nice value: beside a Blender that wants all of the processor, the worker gets a thirtieth of it."""
 
 
@@ -45,10 +45,10 @@ def _step_back() -> None:
     Linux desktops share the processor between sessions first (sched(7), "The autogroup feature"). A worker is a session
     of its own, so its nice value alone says nothing to Blender: that of its group does.
     """
-    os.nice(PRIORITY)
+    os.nice(NICE_VALUE)
     # only there on such a Linux
     with contextlib.suppress(OSError), open("/proc/self/autogroup", "w", encoding="ascii") as group:
-        group.write(str(PRIORITY))
+        group.write(str(NICE_VALUE))
 
 
 def _take_stdout():

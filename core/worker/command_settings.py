@@ -22,7 +22,7 @@ from ..contract.settings import STAGE_KINDS, Settings, find_setting, from_json, 
 METAVARS = {"file": "FILE", "folder": "FOLDER", "file_or_folder": "PATH"}
 COMMANDS = {name: "deliver" if name.startswith("deliver.") else "run" for name in known_settings()}
 """The command that each setting is for."""
-WIDTH = 120
+WIDTH = 120  # columns of the terminal
 
 
 def add_options(parser: argparse.ArgumentParser, command: str) -> None:
@@ -83,11 +83,11 @@ def read_file(path: Path) -> dict:
             if stage in STAGE_KINDS else own for stage, own in settings.items()}
 
 
-def refuse_lone_flags(options: argparse.Namespace, values: dict) -> None:
-    """Raises Problem for a flag of `run` that means something beside another setting only; `values` are those of
+def refuse_lone_flags(options: argparse.Namespace, by_stage: dict) -> None:
+    """Raises Problem for a flag of `run` that means something beside another setting only; `by_stage` are those of
     `read_options`."""
     given = vars(options)
-    delighter = values.get("delight", {}).get("delighter")
+    delighter = by_stage.get("delight", {}).get("delighter")
     for name, wanted in (("delight.folder", "folder"), ("delight.checkpoint", "opendelight")):
         if given.get(name) and delighter != wanted:
             flag = find_setting(name).metadata["flag"]
@@ -96,7 +96,7 @@ def refuse_lone_flags(options: argparse.Namespace, values: dict) -> None:
     if (given.get("delight.switchlight_preview") or options.send_frames) and delighter != "switchlight":
         raise Problem("--preview and --send-frames go with --delighter switchlight only.",
                       "Add --delighter switchlight, or leave them out.")
-    if given.get("registration.new_atlas") and not values.get("registration", {}).get("template"):
+    if given.get("registration.new_atlas") and not by_stage.get("registration", {}).get("template"):
         raise Problem("--new-atlas goes with --template only.",
                       "Name your head mesh with --template, or leave --new-atlas out.")
 

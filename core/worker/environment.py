@@ -68,22 +68,22 @@ def survey(python: Path, requirements: Path, importing: bool = False) -> dict:
                       "Choose another Python, or install the solver again.") from None
 
 
-def judge(found: dict, requirements: Path) -> list[str]:
+def judge(survey: dict, requirements: Path) -> list[str]:
     """What is wrong with a survey's findings, one sentence each."""
     problems = []
-    if tuple(found["python"]) not in PYTHONS:
-        problems.append(f"It is Python {found['python'][0]}.{found['python'][1]}; "
+    if tuple(survey["python"]) not in PYTHONS:
+        problems.append(f"It is Python {survey['python'][0]}.{survey['python'][1]}; "
                         + " or ".join(f"{a}.{b}" for a, b in PYTHONS) + " is needed.")
     for name, version in required(requirements).items():
-        has = found["versions"][name]
+        has = survey["versions"][name]
         if has is None:
             problems.append(f"{name} {version} is missing.")
         elif has.partition("+")[0] != version:
             problems.append(f"{name} is {has}, not {version}.")
-    if len(found["opencv"]) > 1:
-        problems.append(f"More than one OpenCV is installed ({', '.join(found['opencv'])}); remove all but "
+    if len(survey["opencv"]) > 1:
+        problems.append(f"More than one OpenCV is installed ({', '.join(survey['opencv'])}); remove all but "
                         "opencv-contrib-python-headless.")
-    return problems + [f"{module} does not load: {text}." for module, text in found["errors"].items()]
+    return problems + [f"{module} does not load: {text}." for module, text in survey["errors"].items()]
 
 
 def remove(folder: Path) -> None:

@@ -100,19 +100,19 @@ def _check_names(root: Path, source: str | Path) -> None:
                           "Rename the file or folder: it may come from an old disk or archive.") from None
 
 
-def _job(values: dict, folder: Path) -> JobRequest:
+def _job(request: dict, folder: Path) -> JobRequest:
     """`folder` is where the job file lies; its paths are relative to that where they can be."""
     first, last = (stages.NAMES.index(stages.by_name(name).name) if name else default
-                   for name, default in ((values.get("from"), 0), (values.get("until"), len(stages.NAMES) - 1)))
+                   for name, default in ((request.get("from"), 0), (request.get("until"), len(stages.NAMES) - 1)))
     if first > last:
         raise Problem(f"The stage {stages.NAMES[first]} comes after {stages.NAMES[last]}.",
                       "Name the first stage to run before the last one.")
-    chosen = convert_settings(values.get("settings") or {}, lambda path: str(read_portable(path, folder)))
-    settings = from_json(chosen, preset(values.get("quality") or "standard"))
-    tool = next((each for each in stages.TOOLS if each.name == values.get("tool")), None)
-    if values.get("tool") and tool is None:
-        raise Problem(f"There is no tool named {values['tool']!r}.",
+    chosen = convert_settings(request.get("settings") or {}, lambda path: str(read_portable(path, folder)))
+    settings = from_json(chosen, preset(request.get("quality") or "standard"))
+    tool = next((each for each in stages.TOOLS if each.name == request.get("tool")), None)
+    if request.get("tool") and tool is None:
+        raise Problem(f"There is no tool named {request['tool']!r}.",
                       f"The tools are {', '.join(each.name for each in stages.TOOLS)}.")
-    source = str(read_portable(values["source"], folder)) if values.get("source") else ""
-    return JobRequest(Capture(read_portable(values["capture"], folder)), source, stages.STAGES[first:last + 1],
-                      bool(values.get("from")), settings, tool)
+    source = str(read_portable(request["source"], folder)) if request.get("source") else ""
+    return JobRequest(Capture(read_portable(request["capture"], folder)), source, stages.STAGES[first:last + 1],
+                      bool(request.get("from")), settings, tool)

@@ -24,7 +24,7 @@ from ..contract.messages import Problem
 from . import locks
 
 INDEX = "https://pypi.org/simple"
-TIMEOUT_S = 60
+TIMEOUT_S = 60  # of one request
 
 
 def fetch(requirements: Path, wheels: Path | None = None) -> bytes:

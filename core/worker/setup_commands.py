@@ -17,7 +17,7 @@ from .commands import add_command
 from .environment import answer, python_of
 
 REQUIREMENTS = Path(__file__).resolve().parents[2] / "requirements"
-POLL_S = 0.1
+POLL_S = 0.1  # between two looks at the installation
 
 
 def add_commands(commands) -> None:

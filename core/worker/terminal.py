@@ -16,7 +16,7 @@ from ..contract.messages import Cancelled, Done, Failed, Log, Message, Progress,
 from .client import Worker
 from .job import read_job
 
-POLL_S = 0.1
+POLL_S = 0.1  # between two looks at the job
 
 
 def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str]) -> int:

@@ -17,8 +17,8 @@ from .filmed import FilmedEyes
 
 STEPS = 80  # of averaging: each neighbourhood reaches some 7 (lids) to 20 mm (cheeks)
 CORNEA = (0.06, 0.52)  # how far it stands out, as a share of the radius, and how wide it is, radians
-CLEAR = 0.0005  # metres between eyeball and lids
-BEHIND = 0.002  # metres between teeth and lips
+CLEAR_M = 0.0005  # metres between eyeball and lids
+BEHIND_M = 0.002  # metres between teeth and lips
 
 
 def carried(asset: FaceUnits, head: np.ndarray,
@@ -62,14 +62,14 @@ def carried(asset: FaceUnits, head: np.ndarray,
     return rest, units
 
 
-def _as_filmed(rest: np.ndarray, rows: np.ndarray, moves: np.ndarray, filmed: FilmedEyes) -> np.ndarray:
+def _as_filmed(rest_points: np.ndarray, rows: np.ndarray, moves: np.ndarray, filmed: FilmedEyes) -> np.ndarray:
     """An opening [n, 3] of the lids to where they were; what the capture does not tell of (the lips' seam is none of a
     lid's) moves as the unit says."""
-    place = np.full(len(rest), -1)
+    place = np.full(len(rest_points), -1)
     place[filmed.rows] = np.arange(len(filmed.rows))
     known = place[rows] >= 0
     moves = moves.copy()
-    moves[known] = filmed.places[place[rows[known]]] - rest[rows[known]]
+    moves[known] = filmed.places[place[rows[known]]] - rest_points[rows[known]]
     return moves
 
 
@@ -156,7 +156,7 @@ def _behind_lids(asset: FaceUnits, head: np.ndarray, ball: np.ndarray, matrix: n
     low, high = -0.003, 0.012
     for _ in range(24):
         middle = (low + high) / 2
-        low, high = (low, middle) if clearance(middle) > CLEAR else (middle, high)
+        low, high = (low, middle) if clearance(middle) > CLEAR_M else (middle, high)
     return centre - high * gaze
 
 
@@ -168,15 +168,15 @@ def _behind_lips(asset: FaceUnits, head: np.ndarray, jaws: np.ndarray) -> np.nda
     gap = np.linalg.norm((jaws[:, None] - front[None])[..., [0, 2]], axis=2)
     nearest = gap.argmin(1)
     depth = jaws[:, 1] - front[nearest, 1]
-    return np.array([0, max(0.0, BEHIND - depth[gap.min(1) < 0.003].min(initial=BEHIND)), 0])
+    return np.array([0, max(0.0, BEHIND_M - depth[gap.min(1) < 0.003].min(initial=BEHIND_M)), 0])
 
 
-def _over_ball(rest: np.ndarray, moves: np.ndarray, ball: tuple[np.ndarray, float, np.ndarray]) -> np.ndarray:
+def _over_ball(rest_points: np.ndarray, moves: np.ndarray, ball: tuple[np.ndarray, float, np.ndarray]) -> np.ndarray:
     """An opening [n, 3] of the lids that ends outside of the eyeball."""
     centre, radius, matrix = ball
-    v = rest + moves - centre
+    v = rest_points + moves - centre
     length = np.linalg.norm(v, axis=1)
     v = v / length[:, None]
-    inside = np.clip(_surface(v, matrix, radius) + CLEAR - length, 0, 0.003)
+    inside = np.clip(_surface(v, matrix, radius) + CLEAR_M - length, 0, 0.003)
     front = v @ (matrix @ [0, -1, 0]) > 0
     return moves + v * (inside * front)[:, None]

@@ -19,7 +19,7 @@ from .close_up.ball import places
 KEY = "wildcap_gaze"
 """Custom property of the empty, and of the shape keys whose units look at it."""
 AHEAD_M = 0.5
-MOST = 1.2
+MOST_LOOK = 1.2
 """How far the units go: at 1 MakeHuman's turn eyes by 8 to 17 degrees, and at this by a fifth more; further on the lids
 are drawn out of shape."""
 WAYS = ("Out", "In", "Up", "Down")
@@ -72,7 +72,7 @@ def keep_up(obj, _capture) -> None:
 
 
 def drive(obj, empty) -> None:
-    """Each unit is as much of its turn as the eye needs to look at the empty, from 0 to MOST."""
+    """Each unit is as much of its turn as the eye needs to look at the empty, from 0 to MOST_LOOK."""
     obj.data.shape_keys[KEY] = True
     for number, side in enumerate(SIDES):
         eye = _eye(obj, number)
@@ -84,10 +84,10 @@ def drive(obj, empty) -> None:
             rest, full = angle(eye.ahead, outwards), angle(eye.turned[way], outwards)
             key = obj.data.shape_keys.key_blocks[f"eyeLook{way}{side}"]
             key.driver_remove("value")
-            key.slider_max = MOST
+            key.slider_max = MOST_LOOK
             driver = key.driver_add("value").driver
             driver.type = 'SCRIPTED'
-            driver.expression = f"max(0, min({MOST}, ({gaze_angle} - {rest:.6f}) / {full - rest:.6f}))"
+            driver.expression = f"max(0, min({MOST_LOOK}, ({gaze_angle} - {rest:.6f}) / {full - rest:.6f}))"
             for axis in "XYZ":
                 variable = driver.variables.new()
                 variable.name, variable.type = axis.lower(), 'TRANSFORMS'

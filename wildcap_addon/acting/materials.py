@@ -9,9 +9,9 @@ import numpy as np
 from .. import node_trees
 from ..data_blocks import find
 
-SIZE = 512
-IRIS_ANGLE = 0.42  # radians from the pupil's middle to the iris' rim, seen from the eye's centre
-PUPIL_ANGLE = 0.15
+SIZE_PX = 512
+IRIS_ANGLE_RAD = 0.42  # radians from the pupil's middle to the iris' rim, seen from the eye's centre
+PUPIL_ANGLE_RAD = 0.15
 IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0.14, 0.20, 0.10),
           "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
 """Linear colours."""
@@ -89,7 +89,7 @@ def _paint(material, name: str, iris: str | tuple) -> None:
         node.location = (-320, 280)
         shader = next(n for n in nodes if n.type == 'BSDF_PRINCIPLED')
         links.new(node.outputs["Color"], shader.inputs["Base Color"])
-        node.image = bpy.data.images.new(f"{name} Eye", SIZE, SIZE)
+        node.image = bpy.data.images.new(f"{name} Eye", SIZE_PX, SIZE_PX)
     colour = IRISES.get(iris, iris)
     told = iris if iris in IRISES else " ".join(f"{value:.3f}" for value in colour)
     if node.image is not None and node.image.get("wildcap_iris") != told:
@@ -100,15 +100,15 @@ def _paint(material, name: str, iris: str | tuple) -> None:
 
 
 def picture(iris: tuple[float, float, float]) -> np.ndarray:
-    """An eye as its UVs lay it out, sRGB float32 [SIZE, SIZE, 4]: rings around the pupil, the angle from it growing
-    outwards (core/assets/acting.py)."""
-    y, x = (np.mgrid[:SIZE, :SIZE] + 0.5) / SIZE - 0.5
+    """An eye as its UVs lay it out, sRGB float32 [SIZE_PX, SIZE_PX, 4]: rings around the pupil, the angle from it
+    growing outwards (core/assets/acting.py)."""
+    y, x = (np.mgrid[:SIZE_PX, :SIZE_PX] + 0.5) / SIZE_PX - 0.5
     angle = np.pi * (2 * np.hypot(x, y)) ** (1 / 0.6)
     turn = np.arctan2(y, x)
     fibres = sum(np.sin(k * turn + p + 3 * np.sin(9 * angle + p)) / (1 + i)
                  for i, (k, p) in enumerate(((23, 0.3), (41, 1.7), (67, 4.1), (97, 2.2))))
-    rim, pupil = _step(angle, IRIS_ANGLE, 0.03), _step(angle, PUPIL_ANGLE, 0.012)
-    across = np.clip((angle - PUPIL_ANGLE) / (IRIS_ANGLE - PUPIL_ANGLE), 0, 1)
+    rim, pupil = _step(angle, IRIS_ANGLE_RAD, 0.03), _step(angle, PUPIL_ANGLE_RAD, 0.012)
+    across = np.clip((angle - PUPIL_ANGLE_RAD) / (IRIS_ANGLE_RAD - PUPIL_ANGLE_RAD), 0, 1)
     # a dark ring at the limbus
     brightness = (1 + 0.22 * fibres) * (1.25 - 0.4 * across) * (1 - 0.65 * np.clip((across - 0.8) / 0.2, 0, 1))
     coloured = np.array(iris) * brightness[..., None] * (1 - pupil[..., None]) + 0.003
@@ -116,7 +116,7 @@ def picture(iris: tuple[float, float, float]) -> np.ndarray:
     white = np.array([0.62, 0.56, 0.52]) * (1 - veins * [0.15, 0.42, 0.45])
     linear = coloured * rim[..., None] + white * (1 - rim[..., None])
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055)
-    return np.concatenate([srgb, np.ones((SIZE, SIZE, 1))], 2).clip(0, 1).astype(np.float32)
+    return np.concatenate([srgb, np.ones((SIZE_PX, SIZE_PX, 1))], 2).clip(0, 1).astype(np.float32)
 
 
 def _step(angle: np.ndarray, edge: float, soft: float) -> np.ndarray:

@@ -81,11 +81,11 @@ def add(obj, iris: str = "") -> None:
     _drive(new.shape_keys, seen is not None)
 
 
-def measured_iris(seen: filmed.FilmedEyes | None) -> tuple[float, float, float] | None:
+def measured_iris(filmed_eyes: filmed.FilmedEyes | None) -> tuple[float, float, float] | None:
     """The colour of both irises, linear; None where none was measured."""
-    if seen is None or seen.irises is None:
+    if filmed_eyes is None or filmed_eyes.irises is None:
         return None
-    return tuple(float(sum(pair) / 2) for pair in zip(*seen.irises, strict=True))
+    return tuple(float(sum(pair) / 2) for pair in zip(*filmed_eyes.irises, strict=True))
 
 
 def filmed_iris(obj) -> tuple[float, float, float]:
@@ -110,7 +110,7 @@ def follow(obj, head: np.ndarray, normals: np.ndarray) -> None:
     _shape(obj, *carrying.carried(asset, head, filmed_eyes(obj, asset)), normals)
 
 
-def _shape(obj, rest: np.ndarray, units: dict, normals: np.ndarray) -> None:
+def _shape(obj, rest_points: np.ndarray, units: dict, normals: np.ndarray) -> None:
     keys = obj.data.shape_keys
     before = read_field(keys.reference_key.data, "co", 3)
     for key in keys.key_blocks:
@@ -118,13 +118,13 @@ def _shape(obj, rest: np.ndarray, units: dict, normals: np.ndarray) -> None:
             continue
         if key.name in units:
             rows, moves = units[key.name]
-            shape = rest.copy()
+            shape = rest_points.copy()
             shape[rows] += moves
         else:  # one that the artist made: its displacements stay as they are
-            shape = read_field(key.data, "co", 3) - before + rest
+            shape = read_field(key.data, "co", 3) - before + rest_points
         key.data.foreach_set("co", shape.astype(np.float32).ravel())
-    keys.reference_key.data.foreach_set("co", rest.astype(np.float32).ravel())
-    obj.data.vertices.foreach_set("co", rest.astype(np.float32).ravel())
+    keys.reference_key.data.foreach_set("co", rest_points.astype(np.float32).ravel())
+    obj.data.vertices.foreach_set("co", rest_points.astype(np.float32).ravel())
     _set_normals(obj.data, normals)
     obj.data.update()
 
@@ -168,27 +168,27 @@ def is_built_in(obj, asset: FaceUnits) -> bool:
     return len(obj.data.vertices) == len(asset.template) and np.array_equal(corners, asset.triangles.ravel())
 
 
-def _built(old, asset: FaceUnits, rest: np.ndarray):
+def _built(head_mesh, asset: FaceUnits, rest_points: np.ndarray):
     """The mesh at rest, with the UVs and the settings of the head's; inner parts but the skin's have their UVs in tiles
     to the right, where no map of the skin lies."""
     triangles = asset.triangles.copy()
     triangles[asset.corners[:, 0], asset.corners[:, 1]] = asset.corners[:, 2]
     inner = [[i for i in face if i >= 0] for face in asset.faces.tolist()]
-    mesh = old.copy()
+    mesh = head_mesh.copy()
     mesh.clear_geometry()
     mesh.materials.clear()  # before any polygon says in which slot it is
-    mesh.from_pydata(rest, [], triangles.tolist() + inner)
-    uv = read_field(old.uv_layers[0].data, "uv", 2)
-    first = len(rest) - len(asset.parts)
-    known = np.zeros((len(rest), 2))  # of each vertex of the seams, by its side
+    mesh.from_pydata(rest_points, [], triangles.tolist() + inner)
+    uv = read_field(head_mesh.uv_layers[0].data, "uv", 2)
+    first = len(rest_points) - len(asset.parts)
+    known = np.zeros((len(rest_points), 2))  # of each vertex of the seams, by its side
     np.put_along_axis(known, triangles.ravel()[:, None].repeat(2, 1), uv, 0)
     known[first:] = asset.uvs
     corners = np.concatenate([np.array(face) for face in inner])
     tile = np.repeat(asset.slots, [len(face) for face in inner])
     extra = known[corners] + np.stack([tile, 0 * tile], 1)
-    layer = mesh.uv_layers.new(name=old.uv_layers[0].name)
+    layer = mesh.uv_layers.new(name=head_mesh.uv_layers[0].name)
     layer.data.foreach_set("uv", np.concatenate([uv, extra.astype(np.float32)]).ravel())
-    slots = read_field(old.polygons, "material_index", kind=np.int32)
+    slots = read_field(head_mesh.polygons, "material_index", kind=np.int32)
     slots[slots > 0] += len(materials.SLOTS)  # the artist's own come after those of the inner parts
     mesh.polygons.foreach_set("material_index", np.concatenate([slots, asset.slots.astype(np.int32)]))
     mesh.shade_smooth()
@@ -196,15 +196,16 @@ def _built(old, asset: FaceUnits, rest: np.ndarray):
     return mesh
 
 
-def _attributes(old, new, asset: FaceUnits) -> None:
+def _attributes(source, target, asset: FaceUnits) -> None:
     """What the artist and we know of each vertex, edge, face and corner of the head (its roughness, a mask, other UV
     maps), on the copies as on what they double; zero inside."""
     origin = _origin(asset)
-    known, ends = (read_field(mesh.edges, "vertices", 2, np.int32) for mesh in (old, new))
+    known, ends = (read_field(mesh.edges, "vertices", 2, np.int32) for mesh in (source, target))
     edges = {tuple(sorted(pair)): at for at, pair in enumerate(known.tolist())}
-    going_over.copy_attributes(old, new, {
+    going_over.copy_attributes(source, target, {
         'POINT': origin, 'EDGE': np.array([edges.get(tuple(sorted(pair)), -1) for pair in origin[ends].tolist()]),
-        'FACE': _first(len(old.polygons), len(new.polygons)), 'CORNER': _first(len(old.loops), len(new.loops))})
+        'FACE': _first(len(source.polygons), len(target.polygons)),
+        'CORNER': _first(len(source.loops), len(target.loops))})
 
 
 def _origin(asset: FaceUnits) -> np.ndarray:

@@ -12,7 +12,7 @@ from . import gaze, materials, mesh
 from .close_up import building
 
 FILMED = ("filmed", "As Filmed", "What the frames show, where the eyes were open; brown otherwise")
-OPEN = 0.22
+OPEN_RATIO = 0.22
 """Height over width of an eye from which the registration takes it for open (core/registration/eyes.py)."""
 
 
@@ -100,7 +100,7 @@ def filmed_open(capture) -> str:
     """What there is to say of the lids of a face that was filmed with open eyes and reconstructed by WildCap 0.1.0, ''
     for others."""
     seen = capture.read()["stages"].get("registration", {}).get("figures", {}).get("eye_opening")
-    on_lids = seen is not None and seen > OPEN and not capture.eyes.is_file()
+    on_lids = seen is not None and seen > OPEN_RATIO and not capture.eyes.is_file()
     return ("The eyes were open while filming: the lids carry a picture of them, which shows when they move. "
             "Reconstruct again to have them open"
             if on_lids else "")

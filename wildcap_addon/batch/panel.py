@@ -52,14 +52,14 @@ class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
             problems.draw(layout, Problem(face_state.problem, face_state.remedy), width)
 
 
-def count_words(known: batches.BatchView) -> str:
+def count_words(view: batches.BatchView) -> str:
     """How far the faces are: 'Masks waiting: 5, done: 3, to do: 4'."""
-    of, seen = len(known.batch.faces), len(known.states)
+    of, seen = len(view.batch.faces), len(view.states)
     waiting = len(batches.waiting())
-    accepted = known.count(WAITING) - waiting  # and not looked at since
-    counts = [(waiting, iface_("masks waiting: {}")), (known.count(DONE), iface_("done: {}")),
-              (known.count(WORKING), iface_("in work: {}")),
-              (known.count(STOPPED), iface_("stopped: {}")), (known.count(TO_DO) + accepted, iface_("to do: {}")),
+    accepted = view.count(WAITING) - waiting  # and not looked at since
+    counts = [(waiting, iface_("masks waiting: {}")), (view.count(DONE), iface_("done: {}")),
+              (view.count(WORKING), iface_("in work: {}")),
+              (view.count(STOPPED), iface_("stopped: {}")), (view.count(TO_DO) + accepted, iface_("to do: {}")),
               (of - seen, iface_("not looked at yet: {}"))]
     text = ", ".join(words.format(count) for count, words in counts if count)
     return text[:1].upper() + text[1:]

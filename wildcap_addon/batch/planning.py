@@ -60,12 +60,12 @@ def _list_faces(context) -> tuple[list[BatchFace], list[str]]:
     return faces, left_out
 
 
-def _name(wanted: str, taken: set[str]) -> str:
+def _name(base: str, taken: set[str]) -> str:
     """A name of its own for a face; two captures in two folders may have the same."""
     # on a command line a hyphen would begin an option
-    wanted = wanted.lstrip("-") if plain_name(wanted.lstrip("-")) else "face"
+    base = base.lstrip("-") if plain_name(base.lstrip("-")) else "face"
     name = next(name for number in itertools.count(1)
-                if (name := wanted if number == 1 else f"{wanted}_{number}").casefold() not in taken)
+                if (name := base if number == 1 else f"{base}_{number}").casefold() not in taken)
     taken.add(name.casefold())
     return name
 

@@ -19,7 +19,7 @@ from .. import batches, captures, incoming, jobs, preferences, problems, status
 
 INTERVAL_S = 0.5
 LOG = "run.log"
-BEHIND = 10
+NICE_VALUE = 10
 """Nice value of a batch, to which that of its workers is added: what the artist waits for comes first, a job of
 Blender's own among it."""
 SUMMARY = re.compile(r"\d+ faces?: ")
@@ -58,7 +58,7 @@ def start(batch: Batch, *words: str) -> None:
                           "Install the solver again, or choose another Python.") from error
     if os.name == "posix":
         with contextlib.suppress(OSError):  # it has ended already
-            os.setpriority(os.PRIO_PROCESS, _process.pid, BEHIND)
+            os.setpriority(os.PRIO_PROCESS, _process.pid, NICE_VALUE)
     _batch, _stopping = batch, False
     problems.clear("")
 

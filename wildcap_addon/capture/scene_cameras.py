@@ -33,12 +33,12 @@ def write_cameras(scene: bpy.types.Scene, path: str) -> int:
     return len(entries)
 
 
-def _entry(thing: bpy.types.Object, width: int, height: int) -> dict:
+def _entry(camera: bpy.types.Object, width: int, height: int) -> dict:
     """The sensor's width is that of the picture's longer side where its fit is automatic; the lens's shift is a share
     of the same side."""
-    lens = thing.data
+    lens = camera.data
     across = lens.sensor_fit == 'HORIZONTAL' or (lens.sensor_fit == 'AUTO' and width >= height)
     side = width if across else height
     focal = lens.lens / (lens.sensor_height if lens.sensor_fit == 'VERTICAL' else lens.sensor_width) * side
-    return {"matrix_world": [list(row) for row in thing.matrix_world.normalized()], "focal_px": focal,
+    return {"matrix_world": [list(row) for row in camera.matrix_world.normalized()], "focal_px": focal,
             "centre_px": [width / 2 - lens.shift_x * side, height / 2 + lens.shift_y * side]}

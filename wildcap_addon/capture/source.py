@@ -19,7 +19,7 @@ from ..base_panel import WildcapPanel
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm")
 PHOTOGRAPHS = (*hashes.PHOTOGRAPHS, ".dng")
 """What the stage frames reads, and what it explains how to convert."""
-WIDTH = 240
+WIDTH_PX = 240
 """Of the file browser's sidebar, pixels."""
 
 
@@ -45,11 +45,11 @@ class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
     def draw(self, context):
         """Beside the file browser."""
         folder = preferences.captures_folder()
-        problems.draw_text(self.layout, iface_("The capture goes to {}.").format(folder), WIDTH)
+        problems.draw_text(self.layout, iface_("The capture goes to {}.").format(folder), WIDTH_PX)
         if not bpy.data.filepath and folder == preferences.captures_default():
             told = ("No cloud copies that folder. Another one is chosen in the preferences, and a saved .blend has its "
                     "captures beside it.")
-            problems.draw_text(self.layout, told, WIDTH)
+            problems.draw_text(self.layout, told, WIDTH_PX)
 
     def work(self, context):
         folder = Path(bpy.path.abspath(self.directory))

@@ -12,9 +12,9 @@ from ...core.contract.messages import Problem
 from .. import captures, frame_icons, status
 
 INTERVAL_S = 0.5
-MOST = 12
+MOST_FRAMES = 12
 """Frames in the strip"""
-BLURRED = 0.5
+BLURRED_SHARE = 0.5
 """Sharpness below this share of the median counts as blurred."""
 
 
@@ -69,9 +69,9 @@ def _read(capture: Capture) -> Strip | None:
         return None
     sharpness = [frame.sharpness for frame in frames]
     used = [i for i, frame in enumerate(frames) if frame.selected]
-    limit = BLURRED * sorted(sharpness)[len(sharpness) // 2]
+    limit = BLURRED_SHARE * sorted(sharpness)[len(sharpness) // 2]
     choice = used or list(range(len(frames)))
-    shown = [choice[i * len(choice) // min(MOST, len(choice))] for i in range(min(MOST, len(choice)))]
+    shown = [choice[i * len(choice) // min(MOST_FRAMES, len(choice))] for i in range(min(MOST_FRAMES, len(choice)))]
     sharpest = max(sharpness) or 1.0
     return Strip(tuple(Frame(frames[i].name.rpartition(".")[0], sharpness[i] / sharpest, sharpness[i] < limit,
                              frame_icons.load(capture.frames / frames[i].name))

@@ -13,21 +13,21 @@ from .. import captures, head, jobs, problems
 from ..terminal import Command
 from . import waiting
 
-POLL_S = 0.1
+POLL_S = 0.1  # between two looks at the worker
 
 
-def _deliver(asked) -> list[Path]:
+def _deliver(arguments) -> list[Path]:
     """The delivery's folder. Empties the open file first. Raises Problem as the buttons do."""
     bpy.ops.wm.read_homefile(use_empty=True)
-    item = captures.add(bpy.context, asked.capture.absolute())
+    item = captures.add(bpy.context, arguments.capture.absolute())
     obj = head.bring_in(bpy.context, item)
-    if asked.what == "head":
+    if arguments.what == "head":
         head.complete(obj, captures.folder(item))
-        if delivery_presets.PRESETS[asked.preset].open_eyes and not obj.data.shape_keys:
+        if delivery_presets.PRESETS[arguments.preset].open_eyes and not obj.data.shape_keys:
             bpy.ops.wildcap.add_face_units()
     chosen = item.deliver
-    chosen.what, chosen.preset, chosen.format = asked.what, asked.preset, asked.format
-    chosen.folder = str(asked.to or "")
+    chosen.what, chosen.preset, chosen.format = arguments.what, arguments.preset, arguments.format
+    chosen.folder = str(arguments.to or "")
     root = captures.root(item)
     with contextlib.suppress(RuntimeError):  # what the button refuses, it has told
         bpy.ops.wildcap.deliver('EXEC_DEFAULT')

@@ -207,17 +207,17 @@ def _skin(name: str, plan: DeliveryPlan, maps: list[dict], roughness: float, uv_
     return material
 
 
-def _plain(other, plan: DeliveryPlan) -> bpy.types.Material:
+def _plain(original, plan: DeliveryPlan) -> bpy.types.Material:
     """A plain material in another's place, with its name, its colour in the viewport and the picture of its colour, if
     that is packed (the eyes')."""
-    material, shader = _new(f"{other.name} Delivered" if other is not None else "Plain")
-    if other is None:
+    material, shader = _new(f"{original.name} Delivered" if original is not None else "Plain")
+    if original is None:
         return material
-    shader.inputs["Base Color"].default_value = other.diffuse_color
-    shader.inputs["Roughness"].default_value = other.roughness
-    packed = _packed(other)
+    shader.inputs["Base Color"].default_value = original.diffuse_color
+    shader.inputs["Roughness"].default_value = original.roughness
+    packed = _packed(original)
     if packed is not None:
-        path = plan.staged / "textures" / f"{plan.name}_{other.name.split()[-1].lower()}.png"
+        path = plan.staged / "textures" / f"{plan.name}_{original.name.split()[-1].lower()}.png"
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(packed.packed_file.data)
         node = material.node_tree.nodes.new('ShaderNodeTexImage')
@@ -226,9 +226,9 @@ def _plain(other, plan: DeliveryPlan) -> bpy.types.Material:
     return material
 
 
-def _packed(other) -> bpy.types.Image | None:
+def _packed(original) -> bpy.types.Image | None:
     """The packed PNG before a material's Base Color."""
-    for node in other.node_tree.nodes if other.node_tree is not None else ():
+    for node in original.node_tree.nodes if original.node_tree is not None else ():
         socket = node.inputs.get("Base Color")
         image = getattr(socket.links[0].from_node, "image", None) if socket is not None and socket.is_linked else None
         if image is not None and image.packed_file is not None and image.packed_file.data[:4] == b"\x89PNG":

@@ -12,13 +12,13 @@ from .. import jobs, preferences
 from ..terminal import Command
 
 
-def _run(asked) -> int:
-    source = asked.source if asked.source == "-" else Path(asked.source).absolute()
-    return _core("run", source, Path(asked.capture).absolute(), *asked.options)
+def _run(arguments) -> int:
+    source = arguments.source if arguments.source == "-" else Path(arguments.source).absolute()
+    return _core("run", source, Path(arguments.capture).absolute(), *arguments.options)
 
 
-def _solve(asked) -> int:
-    return _core("run", "-", Path(asked.capture).absolute(), "--from", "solve", *asked.options)
+def _solve(arguments) -> int:
+    return _core("run", "-", Path(arguments.capture).absolute(), "--from", "solve", *arguments.options)
 
 
 def _core(*words: str | Path) -> int:

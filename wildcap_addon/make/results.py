@@ -74,11 +74,11 @@ def take(context, item) -> None:
         del _making[root]
 
 
-def _show(context, item, made: _Made) -> None:
+def _show(context, item, progress: _Made) -> None:
     """Turns the 3D views to the head once, lit as Material Preview lights it."""
-    if made.shown or bpy.app.background or context.window is None:
+    if progress.shown or bpy.app.background or context.window is None:
         return
-    made.shown = True
+    progress.shown = True
     head.look_at(context, captures.head(context, item))
     for area in context.window.screen.areas:
         if area.type == 'VIEW_3D' and area.spaces.active.shading.type in ('WIREFRAME', 'SOLID'):

@@ -10,7 +10,7 @@ import contextlib
 import bpy
 
 NAME = "WildCap Mask"
-RADIUS_PX = 40
+RADIUS_PX = 40  # of the brush at first
 
 
 def activate(context) -> dict:

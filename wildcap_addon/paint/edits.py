@@ -4,13 +4,13 @@
 
 import numpy as np
 
-STEP = 4 / 1024
+STEP_SIDE_SHARE = 4 / 1024
 """How far one click grows or shrinks the mask, as a part of the map's side."""
 
 
 def grow(mask: np.ndarray) -> np.ndarray:
     """The mask, wider by a few texels on every side."""
-    for i in range(max(1, round(STEP * len(mask)))):
+    for i in range(max(1, round(STEP_SIDE_SHARE * len(mask)))):
         mask = _widened(mask, corners=i % 2 == 1)
     return mask
 
@@ -24,7 +24,7 @@ def soften(mask: np.ndarray) -> np.ndarray:
     """Borders faded over a few texels: the mean of the mask grown and shrunk, step by step."""
     total, count = mask.astype(np.float32), 1
     wide = narrow = mask
-    for i in range(max(1, round(STEP * len(mask)))):
+    for i in range(max(1, round(STEP_SIDE_SHARE * len(mask)))):
         wide, narrow = _widened(wide, i % 2 == 1), 1 - _widened(1 - narrow, i % 2 == 1)
         total, count = total + wide + narrow, count + 2
     return total / count

@@ -20,12 +20,12 @@ from ...core.contract.messages import Problem
 from . import mask_image
 
 
-def store(mask: np.ndarray, capture: Capture, which: str, written: tuple) -> tuple:
-    """Writes a mask [H, W], rows from the top, if it differs from the capture's. `written` is the stamp of what this
+def store(mask: np.ndarray, capture: Capture, mask_kind: str, stamp: tuple) -> tuple:
+    """Writes a mask [H, W], rows from the top, if it differs from the capture's. `stamp` is that of what this
     session wrote last; returns the new one. Raises Problem when it cannot be written."""
-    path = mask_image.file_of(capture, which)
+    path = mask_image.file_of(capture, mask_kind)
     try:
-        return _stamp(path) if mask_image.store(mask, capture, which, keep=_stamp(path) != tuple(written)) else written
+        return _stamp(path) if mask_image.store(mask, capture, mask_kind, keep=_stamp(path) != tuple(stamp)) else stamp
     except OSError as error:  # a file server that is away for a moment: the next look tries again
         raise storage_problem(error, path) from error
 
@@ -37,12 +37,12 @@ class Saving(threading.Thread):
     """One `store` of an image's mask aside. Its thread touches nothing of Blender's; `result` is for the main thread,
     once it has ended."""
 
-    def __init__(self, image: bpy.types.Image, capture: Capture, which: str, written: tuple):
+    def __init__(self, image: bpy.types.Image, capture: Capture, mask_kind: str, stamp: tuple):
         global _pixels
         super().__init__(name="wildcap-mask", daemon=False)  # Blender waits for it when it closes
         _pixels = mask_image.pixels(image, _pixels)
-        self._arguments = _pixels, capture, which, written
-        self._stamp: tuple = written
+        self._arguments = _pixels, capture, mask_kind, stamp
+        self._stamp: tuple = stamp
         self._problem: Problem | None = None
         self.start()
 

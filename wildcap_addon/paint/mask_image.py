@@ -19,22 +19,22 @@ from ...core.contract.messages import Problem
 from .. import colours
 
 
-def file_of(capture: Capture, which: str) -> Path:
+def file_of(capture: Capture, mask_kind: str) -> Path:
     """Where the mask SHADOW or PROTECT is kept."""
-    return capture.protect_mask if which == 'PROTECT' else capture.shadow_mask
+    return capture.protect_mask if mask_kind == 'PROTECT' else capture.shadow_mask
 
 
-def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
+def load(capture: Capture, mask_kind: str = 'SHADOW') -> bpy.types.Image:
     """The artist's mask as a Non-Color image of the texture's size that is ready to be painted on; where there is none
     yet the proposal for the shadow, and nothing for what is to be protected."""
-    kept = file_of(capture, which)
+    kept = file_of(capture, mask_kind)
     path = kept if kept.is_file() else capture.shadow_mask_auto
     if not path.is_file():
         raise Problem("This capture has no shadow mask yet.", "Click Reconstruct first.")
-    name = f"{capture.root.stem} {which.capitalize()} Mask"
+    name = f"{capture.root.stem} {mask_kind.capitalize()} Mask"
     image = bpy.data.images.get(name)
     if image is not None:
-        settle(image, capture, which)
+        settle(image, capture, mask_kind)
         path = kept if kept.is_file() else path
         bpy.data.images.remove(image)
     image = bpy.data.images.load(str(path))
@@ -46,15 +46,15 @@ def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
                       "Restore it from mask_history, or delete it to start from the proposal.")
     # The proposal is never overwritten: should Blender save the image itself, it goes where masks of artists go.
     image.filepath_raw = str(kept)
-    if which == 'PROTECT' and not kept.is_file():
+    if mask_kind == 'PROTECT' and not kept.is_file():
         set_values(image, np.zeros_like(mask_values(image)))
     return image
 
 
-def settle(image: bpy.types.Image, capture: Capture, which: str) -> None:
+def settle(image: bpy.types.Image, capture: Capture, mask_kind: str) -> None:
     """A mask that a .blend has packed against the capture's own: the newer one becomes the capture's, the other goes to
     the history."""
-    path = file_of(capture, which)
+    path = file_of(capture, mask_kind)
     if image.packed_file is None or not bpy.data.filepath or not image.size[0]:
         return
     packed = grey_png(mask_values(image))
@@ -67,11 +67,11 @@ def settle(image: bpy.types.Image, capture: Capture, which: str) -> None:
         mask_history.keep(capture, path, packed)
 
 
-def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
+def refresh(image: bpy.types.Image, capture: Capture, mask_kind: str) -> None:
     """The image of a .blend that was opened again, as the newer of that file and the capture has it. Raises Problem
     when there is no mask."""
-    path = file_of(capture, which)
-    settle(image, capture, which)
+    path = file_of(capture, mask_kind)
+    settle(image, capture, mask_kind)
     if image.packed_file is not None:
         image.unpack(method='REMOVE')
     image.filepath_raw = str(path)
@@ -80,7 +80,7 @@ def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
     elif capture.shadow_mask_auto.is_file():
         image.source = 'FILE'
         set_values(image,
-                   proposal(image, capture.shadow_mask_auto) if which == 'SHADOW'
+                   proposal(image, capture.shadow_mask_auto) if mask_kind == 'SHADOW'
                    else np.zeros_like(mask_values(image)))
     colours.as_data(image)
     if not image.size[0]:
@@ -102,9 +102,9 @@ def pixels(image: bpy.types.Image, into: np.ndarray | None = None) -> np.ndarray
     return buffer
 
 
-def from_top(found: np.ndarray) -> np.ndarray:
+def from_top(pixels: np.ndarray) -> np.ndarray:
     """The mask [H, W], rows from the top, of an image's pixels. Knows no bpy: a thread may do it."""
-    return np.flipud(found[..., 0])
+    return np.flipud(pixels[..., 0])
 
 
 def set_values(image: bpy.types.Image, mask: np.ndarray) -> None:
@@ -131,20 +131,20 @@ def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
         bpy.data.images.remove(other)
 
 
-def save(image: bpy.types.Image, capture: Capture, which: str = 'SHADOW', keep: bool = True) -> bool:
+def save(image: bpy.types.Image, capture: Capture, mask_kind: str = 'SHADOW', keep: bool = True) -> bool:
     """As `store`, of an image."""
-    return store(mask_values(image), capture, which, keep)
+    return store(mask_values(image), capture, mask_kind, keep)
 
 
-def store(mask: np.ndarray, capture: Capture, which: str, keep: bool) -> bool:
+def store(mask: np.ndarray, capture: Capture, mask_kind: str, keep: bool) -> bool:
     """Writes a mask [H, W] to its file (8 bit grey), atomically, and with `keep` the mask that was there to
     mask_history. Knows no bpy: a thread may do it.
 
     False, and nothing is written, where the file holds that mask already, or there is nothing to protect and never was.
     """
-    path = file_of(capture, which)
+    path = file_of(capture, mask_kind)
     content = grey_png(mask)
-    if path.read_bytes() == content if path.is_file() else which == 'PROTECT' and not mask.any():
+    if path.read_bytes() == content if path.is_file() else mask_kind == 'PROTECT' and not mask.any():
         return False
     if keep:
         mask_history.keep(capture, path)

@@ -95,10 +95,10 @@ def push_undo(context) -> None:
             bpy.ops.image.invert(invert_r=False, invert_g=False, invert_b=False, invert_a=False)
 
 
-def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
+def begin(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') -> None:
     """Enters Texture Paint on the head or on the sheet, the mask as its tinted stencil and the mask brush in hand."""
     global _session
-    if _session is not None and _session.which == which:
+    if _session is not None and _session.which == mask_kind:
         places.follow_name(_session)
         places.turn(context, _session, use_sheet)
         return
@@ -108,8 +108,8 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
     texture = head.load_image(capture.texture_png) if capture.texture_png.is_file() else None
     if texture is None:
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
-    image = mask_image.load(capture, which)
-    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, which,
+    image = mask_image.load(capture, mask_kind)
+    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, mask_kind,
                        before=before.remember(context, obj))
     before.at_rest(obj)
     props, paint = context.scene.wildcap, context.scene.tool_settings.image_paint
@@ -118,7 +118,7 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
     paint.canvas = texture
     paint.use_stencil_layer = True
     paint.stencil_image = image
-    paint.stencil_color = getattr(props, TINTS[which])
+    paint.stencil_color = getattr(props, TINTS[mask_kind])
     paint.invert_stencil = False
     try:
         places.enter(context, _session, use_sheet)

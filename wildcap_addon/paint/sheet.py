@@ -12,7 +12,7 @@ import bpy
 
 from .. import captures, node_trees
 
-SIDE_M = 0.4
+SIDE_M = 0.4  # of the plane
 NAME = "WildCap Mask Sheet"
 HIDDEN_KEY = "wildcap_hidden"
 

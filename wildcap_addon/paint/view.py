@@ -73,17 +73,17 @@ def face_head(before: list[dict]) -> None:
             _look(space, kept)
 
 
-def _look(space, kept: dict) -> None:
+def _look(space, saved: dict) -> None:
     region = space.region_3d
-    region.view_perspective = kept["perspective"]
+    region.view_perspective = saved["perspective"]
     region.view_rotation, region.view_location, region.view_distance = (
-        kept["rotation"],
-        kept["location"],
-        kept["distance"],
+        saved["rotation"],
+        saved["location"],
+        saved["distance"],
     )
 
 
-def _space(kept: dict):
-    screen = bpy.data.screens.get(kept["screen"])
-    area = screen.areas[kept["area"]] if screen and kept["area"] < len(screen.areas) else None
+def _space(saved: dict):
+    screen = bpy.data.screens.get(saved["screen"])
+    area = screen.areas[saved["area"]] if screen and saved["area"] < len(screen.areas) else None
     return area.spaces.active if area and area.type == 'VIEW_3D' else None

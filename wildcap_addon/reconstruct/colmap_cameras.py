@@ -19,7 +19,7 @@ from ...core.contract.stages import advise_again
 
 PARAMETERS = {0: 3, 1: 4, 2: 4, 3: 5, 4: 8, 5: 8, 6: 12, 7: 5, 8: 4, 9: 5, 10: 12}
 """Number of parameters of each camera model, by COLMAP's number for it"""
-LONGEST_SIDE = 1 << 16
+LONGEST_SIDE_PX = 1 << 16
 """Pixels: beyond what any picture file here may have"""
 TWO_FOCALS = (1, 4, 5, 6, 7, 10)
 """Models whose parameters begin with a focal length for each axis"""
@@ -59,7 +59,7 @@ def _check(camera: FrameCamera) -> None:
     numbers = (camera.focal, *camera.centre, *(value for row in camera.matrix for value in row))
     if not plain_name(camera.name):
         raise ValueError(f"{camera.name!r} is no name of a frame")
-    sized = 0 < min(camera.width, camera.height) and max(camera.width, camera.height) <= LONGEST_SIDE
+    sized = 0 < min(camera.width, camera.height) and max(camera.width, camera.height) <= LONGEST_SIDE_PX
     if not (sized and camera.focal > 0 and all(map(math.isfinite, numbers))):
         raise ValueError(f"the camera of {camera.name} makes no sense")
 

@@ -18,11 +18,11 @@ from ...core.contract.stages import advise_again
 from .. import colours
 from ..data_blocks import read_pixels
 
-SIDE = 256
+SIDE_PX = 256
 """Of the square icon, pixels"""
 
 _icons: bpy.utils.previews.ImagePreviewCollection | None = None
-# capture folder, frame, and the frame before and after [SIDE, SIDE, 4], rows from below
+# capture folder, frame, and the frame before and after [SIDE_PX, SIDE_PX, 4], rows from below
 _pair: tuple[str, str, np.ndarray, np.ndarray] | None = None
 
 
@@ -31,14 +31,14 @@ def frames(capture: Capture) -> list[str]:
     return sorted(path.stem for path in capture.delit.glob("*.png"))
 
 
-def show(capture: Capture, which: int, wipe: float) -> None:
-    """Reads a frame before and after delighting. `which` counts the delit frames and goes round. Raises Problem where
+def show(capture: Capture, index: int, wipe: float) -> None:
+    """Reads a frame before and after delighting. `index` counts the delit frames and goes round. Raises Problem where
     there is none."""
     global _pair
     frame_names = frames(capture)
     if not frame_names:
         raise Problem("No frame has been delit yet.", "Click Reconstruct: Delight is one of its stages.")
-    name = frame_names[which % len(frame_names)]
+    name = frame_names[index % len(frame_names)]
     before = next((path for path in capture.frames.glob(f"{name}.*")), None)
     if before is None:
         raise Problem(f"The frame {name} is not in this capture any more.", advise_again("frames"))
@@ -59,7 +59,7 @@ def move(wipe: float) -> None:
     if _icons is None:
         _icons = bpy.utils.previews.new()
     picture = _icons.get("wipe") or _icons.new("wipe")
-    picture.image_size = SIDE, SIDE
+    picture.image_size = SIDE_PX, SIDE_PX
     picture.image_pixels_float.foreach_set(mixed(*_pair[2:], wipe).ravel())
 
 
@@ -86,18 +86,18 @@ def forget() -> None:
 
 
 def _read(path: Path) -> np.ndarray:
-    """A picture fitted into a square [SIDE, SIDE, 4], as the eye sees it (sRGB), transparent around it."""
+    """A picture fitted into a square [SIDE_PX, SIDE_PX, 4], as the eye sees it (sRGB), transparent around it."""
     image = bpy.data.images.load(str(path))
     colours.as_data(image)  # or Blender would linearise what has 16 bits, and what has 8 it would not
     try:
-        scale = SIDE / max(1, *image.size)
+        scale = SIDE_PX / max(1, *image.size)
         image.scale(max(1, round(image.size[0] * scale)), max(1, round(image.size[1] * scale)))
         pixels = read_pixels(image)
     finally:
         bpy.data.images.remove(image)
-    square = np.zeros((SIDE, SIDE, 4), np.float32)
+    square = np.zeros((SIDE_PX, SIDE_PX, 4), np.float32)
     height, width = pixels.shape[:2]
-    left, low = (SIDE - width) // 2, (SIDE - height) // 2
+    left, low = (SIDE_PX - width) // 2, (SIDE_PX - height) // 2
     square[low:low + height, left:left + width, :3] = pixels[..., :3]
     square[low:low + height, left:left + width, 3] = 1
     return square

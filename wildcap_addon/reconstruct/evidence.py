@@ -24,8 +24,8 @@ MADE_KEY = "wildcap_made_as"
 """Custom property of it: the name under which it was made. A copy has another one, and is the artist's own."""
 FRAME_KEY = "wildcap_frame"
 """Custom property of a camera: the name of its frame."""
-CAMERA_SIZE_M = 0.03
-SENSOR_MM = 36.0
+CAMERA_SIZE_M = 0.03  # at which cameras are drawn
+SENSOR_MM = 36.0  # width; Blender's own default
 
 
 def bring_in_cameras(context, item, every: bool = False) -> int:
@@ -111,9 +111,9 @@ def _camera(context, item, capture: Capture, camera: colmap_cameras.FrameCamera,
     return thing
 
 
-def _belongs(thing: bpy.types.Object, context, item, kind: str) -> None:
-    thing.parent = captures.head(context, item)
-    thing[KIND_KEY], thing[captures.HEAD_KEY], thing[MADE_KEY] = kind, item.path, thing.name
+def _belongs(obj: bpy.types.Object, context, item, kind: str) -> None:
+    obj.parent = captures.head(context, item)
+    obj[KIND_KEY], obj[captures.HEAD_KEY], obj[MADE_KEY] = kind, item.path, obj.name
 
 
 def _brought_in(item, kind: str) -> list[bpy.types.Object]:

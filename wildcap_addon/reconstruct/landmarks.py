@@ -21,7 +21,7 @@ COLLECTION = "WildCap Landmarks"
 INDEX_KEY = "wildcap_landmark"
 FOUND_KEY = "wildcap_found"
 """Custom properties of an empty: the landmark's number, and where it was when it was shown."""
-MOVED_M = 1e-4
+MOVED_M = 1e-4  # less is rounding, and no landmark that was moved
 
 # Numbers in MediaPipe's face mesh. Left and right are the person's.
 NAMES = {

@@ -11,7 +11,7 @@ from ...core.contract.messages import Problem
 from .. import captures, frame_icons, preferences, properties
 from ..base_operator import CaptureOperator, Dialog
 
-COLUMNS, SCALE = 6, 4.0
+COLUMNS, ICON_SCALE = 6, 4.0
 """Of the pictures in the dialog: how many side by side, and how many buttons high each is."""
 
 
@@ -22,7 +22,7 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
     bl_idname = "wildcap.allow_sending"
     bl_label = "Allow Sending"
 
-    told: consent.Sending | None = None
+    sending_plan: consent.Sending | None = None
     icons: tuple[int, ...] = ()
 
     @classmethod
@@ -33,20 +33,20 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
 
     def tell(self) -> tuple[str, ...]:
         item = captures.require(bpy.context)
-        self.told = plan(item)
-        self.icons = tuple(frame_icons.load(captures.folder(item).frames / name) for name in self.told.frames)
-        return tuple(consent.lines(self.told, iface_))
+        self.sending_plan = plan(item)
+        self.icons = tuple(frame_icons.load(captures.folder(item).frames / name) for name in self.sending_plan.frames)
+        return tuple(consent.lines(self.sending_plan, iface_))
 
     def draw(self, context):
         super().draw(context)
         grid = self.layout.grid_flow(row_major=True, columns=COLUMNS, even_columns=True, align=True)
         for icon in self.icons:
-            grid.template_icon(icon_value=icon, scale=SCALE)
+            grid.template_icon(icon_value=icon, scale=ICON_SCALE)
 
     def work(self, context):
         item = captures.require(context)
         now = plan(item)
-        if self.told is not None and now != self.told:
+        if self.sending_plan is not None and now != self.sending_plan:
             raise Problem("The frames changed while the question was open.",
                           "Click Allow Sending again, and look at what would be sent now.")
         consent.give(captures.folder(item), now)

@@ -16,7 +16,7 @@ CATALOGUE = "6c1f7a52-8e0d-4f6b-9b7e-3d5a0c94e217"
 LINE = f"{CATALOGUE}:WildCap/Skin:WildCap-Skin"
 FILE = "blender_assets.cats.txt"
 HEADER = "# This is an Asset Catalog Definition file for Blender.\n\nVERSION 1\n\n"
-SIDE = 128
+SIDE_PX = 128  # of the preview
 
 
 def mark(group: bpy.types.NodeTree) -> None:
@@ -34,16 +34,16 @@ def mark(group: bpy.types.NodeTree) -> None:
             data.tags.new(tag, skip_if_exists=True)
         data.catalog_id = CATALOGUE
         preview = group.preview_ensure()
-        preview.image_size = (SIDE, SIDE)
+        preview.image_size = (SIDE_PX, SIDE_PX)
         preview.image_pixels_float.foreach_set(ball().ravel())
     if group.asset_data is not None:
         _name_catalogue()
 
 
 def ball() -> np.ndarray:
-    """The preview: a ball of skin under one lamp, sRGB with alpha, float32 [SIDE, SIDE, 4], rows from the bottom.
+    """The preview: a ball of skin under one lamp, sRGB with alpha, float32 [SIDE_PX, SIDE_PX, 4], rows from the bottom.
     Drawn, as a window is not always there."""
-    y, x = (np.mgrid[:SIDE, :SIDE] + 0.5) / SIDE * 2.2 - 1.1
+    y, x = (np.mgrid[:SIDE_PX, :SIDE_PX] + 0.5) / SIDE_PX * 2.2 - 1.1
     inside = np.hypot(x, y)
     normal = np.stack([x, y, np.sqrt(np.clip(1 - inside**2, 0, None))], -1)
     lamp = np.array([-0.5, 0.6, 0.65]) / np.linalg.norm([-0.5, 0.6, 0.65])
@@ -52,7 +52,7 @@ def ball() -> np.ndarray:
     diffuse = np.array([0.58, 0.36, 0.27]) * (0.06 + 0.9 * np.clip((cosine + wrap) / (1 + wrap), 0, None))
     half = (lamp + [0, 0, 1]) / np.linalg.norm(lamp + [0, 0, 1])
     linear = np.clip(diffuse + 0.3 * np.clip(normal @ half, 0, 1)[..., None] ** 40, 0, 1)
-    alpha = np.clip((1 - inside) * SIDE / 2.2, 0, 1)[..., None]
+    alpha = np.clip((1 - inside) * SIDE_PX / 2.2, 0, 1)[..., None]
     return np.concatenate([linear ** (1 / 2.2), alpha], -1).astype(np.float32)
 
 

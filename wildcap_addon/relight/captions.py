@@ -8,9 +8,9 @@ import numpy as np
 
 from ..data_blocks import read_field
 
-FONT = 0.52
+FONT_LINE_SHARE = 0.52
 """Size of the letters as a share of a line's height"""
-FINE = 4
+SUBPIXELS = 4
 """Subpixels to a side"""
 
 
@@ -19,12 +19,12 @@ def draw(lines: list[list[str]], width: int, height: int) -> list[np.ndarray]:
     1], rows from the bottom."""
     strips = []
     for words in lines:
-        fine = np.zeros((height * FINE, width * FINE), bool)
+        fine = np.zeros((height * SUBPIXELS, width * SUBPIXELS), bool)
         for i, word in enumerate(words):
             shift = np.array([(i + 0.5) / len(words) * width, height / 2])
-            for triangle in (_triangles(word) * FONT * height + shift) * FINE:
+            for triangle in (_triangles(word) * FONT_LINE_SHARE * height + shift) * SUBPIXELS:
                 _fill(fine, triangle)
-        strips.append(fine.reshape(height, FINE, width, FINE).mean((1, 3), dtype=np.float32)[..., None])
+        strips.append(fine.reshape(height, SUBPIXELS, width, SUBPIXELS).mean((1, 3), dtype=np.float32)[..., None])
     return strips
 
 

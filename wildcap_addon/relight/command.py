@@ -8,19 +8,28 @@ from ..terminal import Command
 from . import headless
 
 
-def _relight(asked) -> list[Path]:
-    return headless.render_relit(asked.capture, asked.lights or headless.ALL, resolution=asked.resolution,
-                                 samples=asked.samples)
+def _relight(arguments) -> list[Path]:
+    return headless.render_relit(arguments.capture, arguments.lights or headless.ALL, resolution=arguments.resolution,
+                                 samples=arguments.samples)
 
 
-def _contact_sheet(asked) -> list[Path]:
-    return [headless.render_contact_sheet(asked.capture, view=asked.view, resolution=asked.resolution,
-                                          samples=asked.samples)]
+def _contact_sheet(arguments) -> list[Path]:
+    return [headless.render_contact_sheet(arguments.capture, view=arguments.view, resolution=arguments.resolution,
+                                          samples=arguments.samples)]
 
 
-def _turntable(asked) -> list[Path]:
-    return [headless.render_turntable(asked.capture, asked.light, asked.turns.upper(), asked.frames, asked.film,
-                                      resolution=asked.resolution, samples=asked.samples)]
+def _turntable(arguments) -> list[Path]:
+    return [
+        headless.render_turntable(
+            arguments.capture,
+            arguments.light,
+            arguments.turns.upper(),
+            arguments.frames,
+            arguments.film,
+            resolution=arguments.resolution,
+            samples=arguments.samples,
+        )
+    ]
 
 
 def _sized(kind) -> None:

@@ -19,7 +19,7 @@ from . import captions, lights, output, picture, reel
 
 NAME = "contact_sheet.png"
 COLUMNS = 3
-GROUND = 0.07
+GROUND_SRGB = 0.07
 """Of the caption rows, sRGB"""
 
 
@@ -56,11 +56,11 @@ def render(obj: bpy.types.Object, folder: Path, wait: bool, settings: picture.Re
 
 def _joined(paths: list[Path], strips: list[np.ndarray], size: int) -> np.ndarray:
     """[H, W, 3], rows from the bottom: rows of pictures, each over its captions, and the last strip."""
-    strips = [GROUND + (1 - GROUND) * np.repeat(strip, 3, 2) for strip in strips]
+    strips = [GROUND_SRGB + (1 - GROUND_SRGB) * np.repeat(strip, 3, 2) for strip in strips]
     rows = []
     for i, strip in zip(range(0, len(paths), COLUMNS), strips, strict=False):
         cells = [load_pixels(path)[..., :3] for path in paths[i:i + COLUMNS]]
-        cells += [np.full((size, size, 3), GROUND, np.float32)] * (COLUMNS - len(cells))
+        cells += [np.full((size, size, 3), GROUND_SRGB, np.float32)] * (COLUMNS - len(cells))
         rows += [np.hstack(cells), strip]
     return np.vstack([*rows, strips[-1]][::-1])
 

@@ -167,14 +167,14 @@ def _set_before(material, obj) -> dict[str, float]:
             else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * _scale(obj)})
 
 
-def _set(material, values: dict[str, float], before: dict[str, float]) -> None:
+def _set(material, inputs: dict[str, float], before: dict[str, float]) -> None:
     """Sets sockets of the skin to what this capture and the head's size ask for, but for those that the artist changed
     since."""
     sockets = material.node_tree.nodes["WildCap Skin"].inputs
-    for name, value in values.items():
+    for name, value in inputs.items():
         if name not in before or isclose(sockets[name].default_value, before[name], rel_tol=1e-4):
             sockets[name].default_value = value
-    material[SET] = values
+    material[SET] = inputs
 
 
 def _specular_amount(capture: Capture) -> float:

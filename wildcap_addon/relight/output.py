@@ -104,8 +104,8 @@ def _write_as(scene, kind: str, bits: str) -> None:
     scene.render.use_file_extension = False
 
 
-def _render(scene, wait: bool, **what) -> None:
-    bpy.ops.render.render('EXEC_DEFAULT' if wait else 'INVOKE_DEFAULT', scene=scene.name, **what)
+def _render(scene, wait: bool, **options) -> None:
+    bpy.ops.render.render('EXEC_DEFAULT' if wait else 'INVOKE_DEFAULT', scene=scene.name, **options)
     if wait:
         _finish()
 

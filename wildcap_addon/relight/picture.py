@@ -17,8 +17,8 @@ from ..hdri import Hdri
 from . import lights, output
 from .output import SCENE, view_label
 
-CAMERA_DIRECTION = (-0.28, -1.0, 0.05)
-FOCAL_LENGTH_MM = 85.0
+CAMERA_DIRECTION = (-0.28, -1.0, 0.05)  # from the head to the camera, in the head's axes
+FOCAL_LENGTH_MM = 85.0  # a portrait lens
 
 
 @dataclass(frozen=True)

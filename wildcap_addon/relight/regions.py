@@ -14,7 +14,7 @@ from ..data_blocks import load_pixels, read_field
 
 ATTRIBUTE = "wildcap_roughness"
 MASKS = Path(__file__).resolve().parents[2] / "core" / "assets" / "masks"
-STEP = 4
+STEP_TEXELS = 4
 """Every fourth texel of the masks' 1024 is finer than the mesh"""
 SHARES = skin_regions.ROUGHNESS
 """Region -> how much rougher than the cheeks, as a share; later ones win where they meet"""
@@ -40,7 +40,7 @@ def write(mesh: bpy.types.Mesh) -> None:
 @cache
 def _shares() -> np.ndarray:
     """[S, S], rows from the bottom as v goes."""
-    masks = {name: load_pixels(MASKS / f"{name}.png")[::STEP, ::STEP, 0]
+    masks = {name: load_pixels(MASKS / f"{name}.png")[::STEP_TEXELS, ::STEP_TEXELS, 0]
              for name in ("face", "brows", "neck", "ears", "scalp", "nose", "eyes", "lips")}
     rows = np.arange(len(masks["face"]))
     above = np.clip((rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max())

@@ -49,9 +49,9 @@ def world() -> bpy.types.World:
     return sky_world
 
 
-def show(found: bpy.types.World, sky: Sky, frame: Matrix) -> None:
+def show(world: bpy.types.World, sky: Sky, frame: Matrix) -> None:
     """Makes the sky the world's background, upright with the head whose place is `frame` [4, 4]."""
-    nodes, links = found.node_tree.nodes, found.node_tree.links
+    nodes, links = world.node_tree.nodes, world.node_tree.links
     background = next(n for n in nodes if n.type == 'BACKGROUND')
     coordinates, upright, split, edge, rise = (nodes.new(kind) for kind in (
         'ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeSeparateXYZ', 'ShaderNodeMapRange', 'ShaderNodeClamp'))
@@ -70,14 +70,14 @@ def show(found: bpy.types.World, sky: Sky, frame: Matrix) -> None:
     links.new(_colour(above, "Result", 'outputs'), _colour(below, "B"))
     links.new(_colour(below, "Result", 'outputs'), background.inputs["Color"])
     # it is smooth; a fine map of it would take a second to make
-    found.cycles.sampling_method, found.cycles.sample_map_resolution = 'MANUAL', 128
-    for socket, colour in zip(sockets(found), colours(sky), strict=True):
+    world.cycles.sampling_method, world.cycles.sample_map_resolution = 'MANUAL', 128
+    for socket, colour in zip(sockets(world), colours(sky), strict=True):
         socket.default_value = colour
 
 
-def sockets(found: bpy.types.World) -> list[bpy.types.NodeSocket]:
+def sockets(world: bpy.types.World) -> list[bpy.types.NodeSocket]:
     """Those that hold the horizon's, the zenith's and the ground's colour."""
-    return [_colour(found.node_tree.nodes[node], name) for node, name in COLOURS]
+    return [_colour(world.node_tree.nodes[node], name) for node, name in COLOURS]
 
 
 def colours(sky: Sky) -> list[tuple]:

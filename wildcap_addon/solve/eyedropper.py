@@ -14,7 +14,7 @@ from .. import captures
 from ..base_operator import BaseOperator
 from ..data_blocks import read_pixels
 
-PATCH = 1 / 128
+PATCH_SIDE_SHARE = 1 / 128
 """Half the side of the square that is averaged, in UV: pores and freckles do not decide."""
 
 
@@ -110,7 +110,7 @@ def colour_at(image: bpy.types.Image, uv) -> tuple[float, float, float]:
     """Mean of the image around a UV as sRGB in [0, 1], averaged as light is: linearly."""
     width, height = image.size
     column, row = int(uv[0] * width), int(uv[1] * height)  # Blender's rows go up
-    reach = max(1, round(PATCH * width))
+    reach = max(1, round(PATCH_SIDE_SHARE * width))
     top, left = max(0, row - reach), max(0, column - reach)
     patch = read_pixels(image)[top:row + reach + 1, left:column + reach + 1, :3]
     if not image.is_float:  # bytes are as in the file, sRGB; float images are linear already

@@ -13,7 +13,7 @@ from .. import bring_back, captures, jobs, undo
 from ..base_operator import CaptureOperator, JobOperator
 from .eyedropper import colour_at
 
-BURNT, BLACK = 0.97, 0.04
+BURNT_SRGB, BLACK_SRGB = 0.97, 0.04
 """sRGB beyond which a channel has lost its value"""
 
 
@@ -90,7 +90,7 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
             colour = np.array(colour_at(image, self.uv))
         finally:
             bpy.data.images.remove(image)
-        if colour.max() > BURNT or colour.min() < BLACK:
+        if colour.max() > BURNT_SRGB or colour.min() < BLACK_SRGB:
             raise Problem("The card is burnt out or black there.",
                           "Choose another frame or place, or a grey card instead of white paper.")
         linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4) / CARDS[self.card]

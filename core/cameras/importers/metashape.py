@@ -16,7 +16,7 @@ import numpy as np
 from ...contract.messages import Problem
 from ..calibrated import Calibrated, rigid, trailing_number
 
-MOST_SKEW_PX = 1.0
+MOST_SKEW_PX = 1.0  # COLMAP's lens models have none; less is no error that shows
 
 
 def read(text: str, name: str) -> list[Calibrated]:

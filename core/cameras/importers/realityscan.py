@@ -20,7 +20,7 @@ from ..calibrated import Calibrated, rigid, trailing_number
 
 ALIASES = {"yaw": "heading", "f_35mm": "f", "px_norm": "px", "py_norm": "py"}
 NEEDED = ("name", "x", "y", "alt", "heading", "pitch", "roll", "f")
-FILM_MM = 36.0
+FILM_MM = 36.0  # width to which its focal lengths are converted (35 mm film)
 
 
 def read(text: str, name: str) -> list[Calibrated]:

@@ -15,7 +15,7 @@ from .person import Person
 
 DENSITY = {"stubble": 0.75, "moustache": 1.3, "full": 0.85}  # hairs per mm^2 where it is densest
 SIDEBURNS = [[162, 127, 234, 93], [389, 356, 454, 323]]  # from the temples down before the ears
-RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}
+RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}  # of a hair at its root
 
 
 def beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:

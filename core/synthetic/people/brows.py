@@ -12,7 +12,7 @@ from ..regions import regions
 from .ground import Ground, strewn, turned
 from .person import Person
 
-RADIUS_M = 0.000045
+RADIUS_M = 0.000045  # of a hair at its root
 UPPER, LOWER = (110, 0.0085), (60, 0.0050)  # lashes on a lid, and their length in metres
 
 

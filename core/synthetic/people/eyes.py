@@ -38,7 +38,7 @@ def eye_picture(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512
     return (coloured * (1 - outside) + white * outside).astype(np.float32)
 
 
-def _step(value: np.ndarray, at: float, width: float) -> np.ndarray:
+def _step(x: np.ndarray, at: float, width: float) -> np.ndarray:
     """A smooth step from 0 to 1 about `at`."""
-    t = np.clip((value - at) / width + 0.5, 0, 1)
+    t = np.clip((x - at) / width + 0.5, 0, 1)
     return t * t * (3 - 2 * t)

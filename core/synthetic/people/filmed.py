@@ -47,7 +47,7 @@ def render(work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot
     render_parts(work, figure.person.seed, parts, strands, light, shot, module)
 
 
-def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Path], light: scene.SceneLight,
+def render_parts(work: Path, seed: int, mesh_jobs: dict[str, dict], strands: list[Path], light: scene.SceneLight,
                  shot: scene.Shot, module: str = TRACED) -> None:
     """As `render`, of meshes and strands that are files already.
 
@@ -55,7 +55,7 @@ def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Pa
     ----------
     work, light, shot, module : as `render` takes them
     seed : of the room behind the person
-    parts : by name what the job says of a mesh, as `skin_part` gives it
+    mesh_jobs : by name what the job says of a mesh, as `skin_part` gives it
     strands : files of hair
     """
     work.mkdir(parents=True, exist_ok=True)
@@ -67,7 +67,7 @@ def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Pa
         sky = str(work / "sky.exr")
     still = np.tile(np.eye(4), (len(shot.cameras), 1, 1))
     write_json(work / "job.json", {
-        "seed": seed, "room": shot.room, "meshes": parts, "strands": [str(path) for path in strands],
+        "seed": seed, "room": shot.room, "meshes": mesh_jobs, "strands": [str(path) for path in strands],
         "leaves": str(work / "leaves.obj") if light.blockers else None, "suffix": ".exr", "out": str(work),
         "frames": list(shot.frames), "samples": shot.samples,
         "cameras": shot.cameras.tolist(), "poses": (still if shot.poses is None else shot.poses).tolist(),

@@ -13,10 +13,10 @@ from ..regions import regions
 from .ground import Ground, strewn, turned
 from .person import Person
 
-COUNT = {"cropped": 34000, "short": 26000, "long": 24000}
+COUNT = {"cropped": 34000, "short": 26000, "long": 24000}  # hairs
 # fewer hairs than people have, each a little thicker
 RADIUS_M = {"cropped": 0.00006, "short": 0.00008, "long": 0.00010}
-STEPS = {"cropped": 4, "short": 10, "long": 20}
+STEPS = {"cropped": 4, "short": 10, "long": 20}  # segments of a hair
 CROWN_MM = np.array([8.0, 120.0, 95.0])
 NAPE_MM, BEHIND_MM = -72.0, 100.0  # below the nape, and below the ears before them, grows nothing
 FRINGE_MM = 56.0  # half the width of a fringe of long hair

@@ -86,5 +86,5 @@ def sample_person(seed: int) -> Person:
         collar=str(rng.choice(["crew", "v"])))
 
 
-def _tuple(values: np.ndarray) -> tuple[float, float, float]:
-    return tuple(float(v) for v in np.clip(values, 0.002, 0.8))
+def _tuple(colour: np.ndarray) -> tuple[float, float, float]:
+    return tuple(float(v) for v in np.clip(colour, 0.002, 0.8))

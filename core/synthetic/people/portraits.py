@@ -195,13 +195,13 @@ def _lamps(stage: RelightableView, environment: Environment,
 @dataclass(frozen=True)
 class _Surface:
     """normal [S, S, 3]; reach [S, S, LAMPS] of the lamps; sky [S, S, 3] irradiance over pi; free [S, S, 1] of the sky;
-    there [S, S]: what light spreads in; rough [S, S] and reflectance [S, S, 1]: of its gloss."""
+    scatters [S, S]: what light spreads in; rough [S, S] and reflectance [S, S, 1]: of its gloss."""
 
     normal: np.ndarray
     reach: np.ndarray
     sky: np.ndarray
     free: np.ndarray
-    there: np.ndarray
+    scatters: np.ndarray
     rough: np.ndarray
     reflectance: np.ndarray
 
@@ -240,18 +240,20 @@ def _lit(stage: RelightableView, surface: _Surface, sky: np.ndarray, lamps: list
     for k, tint, through in zip(lamps, tints, before, strict=True):
         lamp = stage.unlit.lamps[k]
         arrives = surface.reach[..., k] * through
-        diffuse = diffuse + _softened(np.maximum(surface.normal @ lamp, 0) * arrives, surface.there, radius) * tint
+        diffuse = diffuse + _softened(np.maximum(surface.normal @ lamp, 0) * arrives, surface.scatters, radius) * tint
         glint = highlight(surface.normal, towards, lamp, surface.rough) * arrives
         shine = shine + glint[..., None] * surface.reflectance * tint
     return diffuse.astype(np.float32), shine.astype(np.float32)
 
 
-def _softened(direct: np.ndarray, there: np.ndarray, radius: float) -> np.ndarray:
+def _softened(direct: np.ndarray, scatters: np.ndarray, radius: float) -> np.ndarray:
     """Direct light [S, S] -> [S, S, 3] spread under the skin, red farthest (d'Eon et al. 2007); `radius` in pixels, of
     the red."""
     channels = []
     for share in (1.0, 0.4, 0.2):
-        lit, base = (cv2.GaussianBlur(picture, (0, 0), max(share * radius, 0.3)) for picture in (direct * there, there))
+        lit, base = (
+            cv2.GaussianBlur(picture, (0, 0), max(share * radius, 0.3)) for picture in (direct * scatters, scatters)
+        )
         channels.append(lit / np.maximum(base, 1e-3))
     return np.stack(channels, -1)
 

@@ -55,21 +55,21 @@ def build(job: dict) -> tuple[bpy.types.Scene, bpy.types.Object]:
     return scene, body
 
 
-def _add(name: str, part: dict) -> bpy.types.Object:
+def _add(name: str, mesh_job: dict) -> bpy.types.Object:
     """A mesh with UVs at its corners and the material that its kind says."""
-    with np.load(part["mesh"], allow_pickle=False) as stored:
+    with np.load(mesh_job["mesh"], allow_pickle=False) as stored:
         vertices, faces, uv = stored["vertices"], stored["faces"], stored["uv"]
     data = bpy.data.meshes.new(name)
     data.from_pydata(vertices.tolist(), [], faces.tolist())
     data.uv_layers.new(name="UVMap").data.foreach_set("uv", uv.astype(np.float32).ravel())
     data.shade_smooth()
-    data.materials.append(_material(name, part))
+    data.materials.append(_material(name, mesh_job))
     thing = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(thing)
     return thing
 
 
-def _material(name: str, part: dict) -> bpy.types.Material:
+def _material(name: str, mesh_job: dict) -> bpy.types.Material:
     material, nodes, links, shader = principled(name)
 
     def texture(path: str, space: str) -> bpy.types.NodeSocket:
@@ -78,17 +78,17 @@ def _material(name: str, part: dict) -> bpy.types.Material:
         node.image.colorspace_settings.name = space
         return node.outputs["Color"]
 
-    links.new(texture(part["albedo"], "sRGB"), shader.inputs["Base Color"])
-    if part["kind"] == "skin":
-        links.new(texture(part["specular"], "Non-Color"), shader.inputs["Specular IOR Level"])
+    links.new(texture(mesh_job["albedo"], "sRGB"), shader.inputs["Base Color"])
+    if mesh_job["kind"] == "skin":
+        links.new(texture(mesh_job["specular"], "Non-Color"), shader.inputs["Specular IOR Level"])
         normal = nodes.new("ShaderNodeNormalMap")
         normal.uv_map = "UVMap"
-        links.new(texture(part["normal"], "Non-Color"), normal.inputs["Color"])
+        links.new(texture(mesh_job["normal"], "Non-Color"), normal.inputs["Color"])
         links.new(normal.outputs["Normal"], shader.inputs["Normal"])
         shader.inputs["Roughness"].default_value = 0.5
     else:
         shader.inputs["Roughness"].default_value, shader.inputs["Specular IOR Level"].default_value = GLOSS[
-            part["kind"]
+            mesh_job["kind"]
         ]
     return material
 

@@ -19,7 +19,7 @@ from .beards import beard_region
 from .person import Person
 
 SYMMETRIC = 0.85, 0.95
-WAVELENGTHS_MM = [70.0, 40.0]
+WAVELENGTHS_MM = [70.0, 40.0]  # of the noise of which traits are made
 FADE_MM = 7.0  # half the width of a tan line
 
 

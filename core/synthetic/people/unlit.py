@@ -17,7 +17,7 @@ import pycolmap
 
 from ...contract.files import replacing
 from ...face import template
-from ...face.parts import MARGIN, PARTS
+from ...face.parts import MARGIN_FACE_HEIGHTS, PARTS
 from ...geometry import raster
 from ...geometry.views import View
 from ...imaging import images
@@ -66,7 +66,9 @@ def landmarks_of(figure: Figure) -> np.ndarray:
     return template.landmark_points(figure.head)
 
 
-def random_view(figure: Figure, rng: np.random.Generator, size: int = SIZE, margin: float = WIDER * MARGIN) -> View:
+def random_view(
+    figure: Figure, rng: np.random.Generator, size: int = SIZE, margin: float = WIDER * MARGIN_FACE_HEIGHTS
+) -> View:
     """A square picture around the head, `margin` times as large as the face's landmarks, from the front to beyond the
     profile, from above and below, near and far, held askew."""
     yaw, pitch, roll = np.radians([rng.uniform(-100, 100) if rng.random() < 0.45 else rng.normal(0, 25),
@@ -126,12 +128,12 @@ def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) ->
                  view.project(landmarks_of(scene.figure))[0].astype(np.float32))
 
 
-def true_shares(parts: np.ndarray) -> np.ndarray:
-    """The parts [..., len(figure.PARTS)] of truth.look as shares of face/parts.py [..., len(PARTS)]; the rest is
+def true_shares(coverage: np.ndarray) -> np.ndarray:
+    """The coverage [..., len(figure.PARTS)] of truth.look as shares of face/parts.py [..., len(PARTS)]; the rest is
     background."""
-    out = np.zeros((*parts.shape[:-1], len(PARTS)), np.float32)
+    out = np.zeros((*coverage.shape[:-1], len(PARTS)), np.float32)
     for k, name in enumerate(GROWN):
-        out[..., PARTS.index(OF_TRUTH[name])] += parts[..., k]
+        out[..., PARTS.index(OF_TRUTH[name])] += coverage[..., k]
     out[..., -1] = np.clip(1 - out[..., :-1].sum(-1), 0, 1)
     return out
 
@@ -177,5 +179,5 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
-def _bytes(values: np.ndarray) -> np.ndarray:
-    return np.round(255 * np.clip(values, 0, 1)).astype(np.uint8)
+def _bytes(unit_values: np.ndarray) -> np.ndarray:
+    return np.round(255 * np.clip(unit_values, 0, 1)).astype(np.uint8)

@@ -12,7 +12,7 @@ from ...data_blocks import read_field
 from ..asset import LEFT_EYE, SIDES, FaceUnits, load
 
 WAYS = ("Up", "Down", "In", "Out")
-WHITE = 0.6
+WHITE_RAD = 0.6
 """Radians from the gaze beyond which a ball is a sphere, and not its cornea."""
 
 
@@ -45,7 +45,7 @@ def of(obj, number: int) -> RiggedEyeball:
     rows, out = len(asset.template) + len(asset.copies) + inner, np.linalg.norm(asset.uvs[inner] - 0.5, axis=1)
     rest = places(keys[0])
     # the UV grows with the angle from the gaze (core/assets/acting.py)
-    white = rest[rows[np.pi * (2 * out) ** (1 / 0.6) > WHITE]]
+    white = rest[rows[np.pi * (2 * out) ** (1 / 0.6) > WHITE_RAD]]
     fit = np.linalg.lstsq(np.concatenate([2 * white, np.ones((len(white), 1))], 1), (white**2).sum(1), rcond=None)[0]
     centre, pupil = fit[:3], rows[out.argmin()]
     pitch, yaw = _angles(rest[pupil] - centre)

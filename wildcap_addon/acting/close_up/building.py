@@ -83,10 +83,10 @@ def keep_up(obj, _capture) -> str:
         ", ".join(left)) if left else ""
 
 
-def _drop(kept, blocks) -> None:
+def _drop(collection, blocks) -> None:
     for block in blocks:
         if block.users == 0:
-            kept.remove(block)
+            collection.remove(block)
 
 
 def _irises(obj) -> tuple[float, float]:

@@ -18,14 +18,14 @@ from . import ball, keeping, materials, nodes, shapes
 
 REACH_M = 0.00042
 """How far tears climb onto the ball and up the margin of a lid."""
-ACROSS = 5
+VERTICES_ACROSS = 5
 """Vertices of the margin and of the wet line from the lid to the ball."""
 CARUNCLE_M = 0.0054
 """From the inner corner outwards, over which the caruncle comes down to the ball: life's is some 5 mm wide, and its
 fold follows."""
 BOWED = 0.5
 """How much sooner it comes down in its middle than at the lids: its edge is a crescent."""
-LIFT = 0.10
+LIFT_SHARE = 0.10
 """How far the caruncle stands out in its middle, as a share of the lids' opening there."""
 
 
@@ -94,10 +94,13 @@ def _along_lids(name: str, rims: ball.LidRims, constant: dict[str, float]):
     """Two strips, along the upper and the lower lid; where its vertices lie, geometry nodes find."""
     rim = np.concatenate([rims.upper, rims.lower])
     opposite = np.concatenate([rims.lower, rims.upper])
-    across = np.tile(np.linspace(0, 1, ACROSS), len(rim))
-    strips = [_grid(len(rims.upper), ACROSS, flipped=True), len(rims.upper) * ACROSS + _grid(len(rims.lower), ACROSS)]
+    across = np.tile(np.linspace(0, 1, VERTICES_ACROSS), len(rim))
+    strips = [
+        _grid(len(rims.upper), VERTICES_ACROSS, flipped=True),
+        len(rims.upper) * VERTICES_ACROSS + _grid(len(rims.lower), VERTICES_ACROSS),
+    ]
     return _strip(name, np.concatenate(strips),
-                  {"rim": rim.repeat(ACROSS), "opposite": opposite.repeat(ACROSS), "across": across,
+                  {"rim": rim.repeat(VERTICES_ACROSS), "opposite": opposite.repeat(VERTICES_ACROSS), "across": across,
                    **{key: np.full(len(across), value) for key, value in constant.items()}})
 
 
@@ -106,7 +109,7 @@ def _margin(name: str, rims: ball.LidRims, head):
     mesh = _along_lids(name, rims, {})
     known = np.zeros((len(head.vertices), 2), np.float32)
     known[read_field(head.loops, "vertex_index", kind=np.int32)] = read_field(head.uv_layers[0].data, "uv", 2)
-    of_rim = known[np.concatenate([rims.upper, rims.lower])].repeat(ACROSS, 0)
+    of_rim = known[np.concatenate([rims.upper, rims.lower])].repeat(VERTICES_ACROSS, 0)
     own = read_field(mesh.loops, "vertex_index", kind=np.int32)
     mesh.uv_layers.new(name=head.uv_layers[0].name).data.foreach_set("uv", of_rim[own].ravel())
     return mesh
@@ -126,7 +129,7 @@ def _caruncle(name: str, rims: ball.LidRims, asset: FaceUnits):
     hump = np.sin(np.pi * across) * (1 - 0.5 * onto)
     return _strip(name, _grid(count + 1, rows, flipped=True),
                   {"rim": upper.repeat(rows), "opposite": lower.repeat(rows), "across": across, "onto": onto,
-                   "lift": LIFT * hump})
+                   "lift": LIFT_SHARE * hump})
 
 
 def _grid(count: int, rows: int, flipped: bool = False) -> np.ndarray:
@@ -148,12 +151,12 @@ def _strip(name: str, faces: np.ndarray, attributes: dict[str, np.ndarray]):
     return mesh
 
 
-def _place(thing, obj, eye: ball.RiggedEyeball, side: str) -> None:
+def _place(eye_object, obj, eye: ball.RiggedEyeball, side: str) -> None:
     """At the ball's middle, turned by the head's look units: sums of products, which need no script."""
-    thing.location, thing.rotation_mode = eye.centre, 'XYZ'
+    eye_object.location, eye_object.rotation_mode = eye.centre, 'XYZ'
     for axis, rest, share in ((0, -eye.pitch, 0), (2, eye.yaw, 1)):
-        thing.driver_remove("rotation_euler", axis)
-        driver = thing.driver_add("rotation_euler", axis).driver
+        eye_object.driver_remove("rotation_euler", axis)
+        driver = eye_object.driver_add("rotation_euler", axis).driver
         driver.type = 'SCRIPTED'
         terms = [f"{rest:.6f}"]
         for way, turn in eye.turns.items():
@@ -165,13 +168,13 @@ def _place(thing, obj, eye: ball.RiggedEyeball, side: str) -> None:
         driver.expression = " + ".join(terms)
 
 
-def _let_light_in(thing) -> None:
+def _let_light_in(obj) -> None:
     """What is clear throws no shadow on what is behind; light that was scattered there goes out through it. Set once:
     afterwards it is the artist's."""
-    if keeping.MADE not in thing:
-        thing.visible_shadow = thing.visible_diffuse = False
+    if keeping.MADE not in obj:
+        obj.visible_shadow = obj.visible_diffuse = False
 
 
-def _smoothed(thing) -> None:
-    modifier = thing.modifiers.get("Subdivision") or thing.modifiers.new("Subdivision", 'SUBSURF')
+def _smoothed(obj) -> None:
+    modifier = obj.modifiers.get("Subdivision") or obj.modifiers.new("Subdivision", 'SUBSURF')
     modifier.levels, modifier.render_levels = 1, 2

@@ -19,7 +19,7 @@ WHITE_COLOUR = (0.63, 0.555, 0.51)
 VESSEL_COLOUR, PINK = (0.40, 0.085, 0.06), (0.90, 0.60, 0.58)
 WARM = (1.5, 1.05, 0.55)
 """Times the iris' colour around the pupil."""
-FADED = 0.08
+OPAQUE_V = 0.08
 """v of the white's UVs at which it is opaque: over the limbus it fades to the iris' rim."""
 DEEP_M, DEEP_DARK = 0.035, 0.92
 """Metres behind the front teeth where the mouth is darkest in EEVEE, and how dark: without ray tracing it lights a
@@ -42,7 +42,7 @@ def white(name: str) -> bpy.types.Material:
     _bumped(tree, shader, told["Blue"], 0.25, 0.0001)
     uv = add(tree, 'ShaderNodeUVMap').outputs[0]
     fading = add(tree, 'ShaderNodeMapRange',
-                 {"Value": add(tree, 'ShaderNodeSeparateXYZ', (uv,)).outputs[1], "From Min": 0.0, "From Max": FADED},
+                 {"Value": add(tree, 'ShaderNodeSeparateXYZ', (uv,)).outputs[1], "From Min": 0.0, "From Max": OPAQUE_V},
                  interpolation_type='SMOOTHSTEP').outputs[0]
     _seen_through(tree, shader, fading)
     return material
@@ -144,11 +144,11 @@ def tongue(name: str, front: float) -> bpy.types.Material:
     return material
 
 
-def fill(thing, *wanted) -> None:
+def fill(obj, *materials) -> None:
     """Materials for an object that has none yet; what is in its slots, an empty one, too, is the artist's choice."""
-    if not thing.data.materials:
-        for material in wanted:
-            thing.data.materials.append(material)
+    if not obj.data.materials:
+        for material in materials:
+            obj.data.materials.append(material)
 
 
 def _moist(shader, inside: float, radius: tuple[float, float, float], scale: float, coat: float) -> None:

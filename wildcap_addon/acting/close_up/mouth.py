@@ -102,16 +102,18 @@ def _data(name: str, vertices: np.ndarray, faces: list, slots: np.ndarray):
     return mesh
 
 
-def _keyed(thing, obj, rest: np.ndarray, moves: dict[str, np.ndarray], led_by: dict[str, str] | None = None) -> None:
+def _keyed(
+    mouth_object, obj, rest_points: np.ndarray, moves: dict[str, np.ndarray], led_by: dict[str, str] | None = None
+) -> None:
     """Shape keys of the units that move it, driven by the head's own. led_by: expressions of units for keys that more
     than one unit leads."""
-    thing.shape_key_add(name="Basis", from_mix=False)
+    mouth_object.shape_key_add(name="Basis", from_mix=False)
     for name, moved in moves.items():
         if np.abs(moved).max() < LEAST_M:
             continue
-        key = thing.shape_key_add(name=name, from_mix=False)
+        key = mouth_object.shape_key_add(name=name, from_mix=False)
         key.slider_min, key.slider_max = -10, 10  # the head's own sliders are the limit
-        key.data.foreach_set("co", (rest + moved).astype(np.float32).ravel())
+        key.data.foreach_set("co", (rest_points + moved).astype(np.float32).ravel())
         driver = key.driver_add("value").driver
         driver.type = 'SCRIPTED'
         driver.expression = (led_by or {}).get(name, name)

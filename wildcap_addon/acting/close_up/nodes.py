@@ -35,13 +35,13 @@ def add(tree, kind: str, inputs: dict | tuple = (), **settings):
     return node
 
 
-def math(tree, operation: str, *values):
-    return add(tree, 'ShaderNodeMath', values, operation=operation).outputs[0]
+def math(tree, operation: str, *inputs):
+    return add(tree, 'ShaderNodeMath', inputs, operation=operation).outputs[0]
 
 
-def vector(tree, operation: str, *values):
+def vector(tree, operation: str, *inputs):
     """The vector, or the number where the operation gives one."""
-    node = add(tree, 'ShaderNodeVectorMath', values, operation=operation)
+    node = add(tree, 'ShaderNodeVectorMath', inputs, operation=operation)
     return node.outputs["Value" if operation in ('LENGTH', 'DOT_PRODUCT', 'DISTANCE') else "Vector"]
 
 

@@ -12,9 +12,9 @@ from ...data_blocks import find
 IRIS, WHITE = "WildCap Iris", "WildCap White"
 IRIS_SIZE, WHITE_SIZE = (384, 1536), (640, 2048)  # rows from the pupil, or from the limbus, outwards; columns around
 VESSELS = 34
-CORNER = 0.9
+CORNER_RAD = 0.9
 """Radians about the horizontal within which most vessels come in: those of the corners."""
-LONGEST = 900
+LONGEST_STEPS = 900
 """Steps of a pixel after which a vessel ends, wherever it is."""
 SEED = 11
 
@@ -63,7 +63,7 @@ def white_pattern() -> np.ndarray:
     dots: tuple[list, list] = ([], [])
     for number in range(VESSELS):
         at_corner = number % 4 != 0
-        around = (rng.integers(2) * np.pi + rng.normal(0, CORNER / 2)) if at_corner else rng.uniform(0, 2 * np.pi)
+        around = (rng.integers(2) * np.pi + rng.normal(0, CORNER_RAD / 2)) if at_corner else rng.uniform(0, 2 * np.pi)
         width = rng.uniform(0.7, 1.9) if at_corner else rng.uniform(0.5, 1.0)
         vessel = _vessel(rng, around, rows * rng.uniform(0.75, 1.0), width, rng.uniform(0.06, 0.45) * rows)
         dots[number % 3 == 0].extend(vessel)
@@ -87,8 +87,8 @@ def _vessel(rng: np.random.Generator, around: float, row: float, width: float,
     while pending:
         x, y, heading, width, ends = pending.pop()
         swing, phase, pace = rng.uniform(0.15, 0.4), rng.uniform(0, 6.3), rng.uniform(0.03, 0.07)
-        turns, forks = rng.normal(0, 0.07, LONGEST), rng.random(LONGEST)
-        for step in range(LONGEST):
+        turns, forks = rng.normal(0, 0.07, LONGEST_STEPS), rng.random(LONGEST_STEPS)
+        for step in range(LONGEST_STEPS):
             heading += turns[step] + 0.05 * (inwards - heading) + swing * pace * np.cos(pace * step + phase)
             x, y = x + np.cos(heading), y + np.sin(heading)
             if not ends <= y < rows:
@@ -131,8 +131,8 @@ def _blur(picture: np.ndarray, sigma: float) -> np.ndarray:
                          s=twice.shape)[:len(picture)]
 
 
-def _smooth(value: np.ndarray, low: np.ndarray | float, high: np.ndarray | float) -> np.ndarray:
-    t = np.clip((value - low) / (high - low), 0, 1)
+def _smooth(x: np.ndarray, low: np.ndarray | float, high: np.ndarray | float) -> np.ndarray:
+    t = np.clip((x - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
 
 

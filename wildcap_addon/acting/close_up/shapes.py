@@ -15,17 +15,17 @@ IRIS_M = 0.0059
 LIMBUS_AT = (0.33, 0.46)
 """Radians from the gaze between which the iris ends, however large the ball is: the cornea over it has to end within
 the ball's own, at 0.52."""
-BULGE = 0.06
+BULGE_SHARE = 0.06
 """How far the cornea stands out before the white's sphere, as a share of the radius: 0.9 to 1 mm."""
-EDGE = 0.08
+EDGE_RAD = 0.08
 """Radians beyond the iris at which the cornea has become the white's sphere."""
 FILM_M = 0.00012
 """Between the white and the clear shell."""
-SOFT = 0.075
+SOFT_RAD = 0.075
 """Radians over which the white fades over the iris' rim."""
-BACK, SHELL_BACK = 2.4, 2.0
+BACK_RAD, SHELL_BACK_RAD = 2.4, 2.0
 """Radians from the gaze where the white, and the shell, end; lids cover what is behind."""
-PUPIL = 0.34
+PUPIL_SHARE = 0.34
 """Radius of the pupil over the iris'."""
 ROOT_M, DISH_M = 0.0001, 0.00065
 """How far the iris' outer edge lies behind the plane of the limbus, and its inner edge behind the outer one."""
@@ -51,39 +51,41 @@ def limbus(radius: float, iris_m: float) -> float:
 
 def surface(angle: np.ndarray, radius: float, edge: float) -> np.ndarray:
     """Distance of the shell from the ball's centre at angles from the gaze; edge: the limbus."""
-    return radius * (1 + BULGE * np.clip(1 - (angle / (edge + EDGE)) ** 2, 0, None) ** 1.5)
+    return radius * (1 + BULGE_SHARE * np.clip(1 - (angle / (edge + EDGE_RAD)) ** 2, 0, None) ** 1.5)
 
 
 def shell(radius: float, edge: float) -> Turned:
     """Cornea, and tears over the white: one surface without a step."""
-    angle = np.concatenate([np.linspace(1e-4, edge + EDGE, 22), np.linspace(edge + EDGE, SHELL_BACK, 20)[1:]])
+    angle = np.concatenate(
+        [np.linspace(1e-4, edge + EDGE_RAD, 22), np.linspace(edge + EDGE_RAD, SHELL_BACK_RAD, 20)[1:]]
+    )
     far = surface(angle, radius, edge)
-    return _turn([(far * np.sin(angle), -far * np.cos(angle), angle / SHELL_BACK, 0)])
+    return _turn([(far * np.sin(angle), -far * np.cos(angle), angle / SHELL_BACK_RAD, 0)])
 
 
 def inner(radius: float, edge: float) -> Turned:
     """White, iris and the dark behind the pupil."""
     white = radius - FILM_M
-    angle = np.concatenate([np.linspace(edge - SOFT, edge + SOFT, 8), np.linspace(edge + SOFT, 1.6, 14)[1:],
-                            np.linspace(1.6, BACK, 6)[1:]])
+    angle = np.concatenate([np.linspace(edge - SOFT_RAD, edge + SOFT_RAD, 8), np.linspace(edge + SOFT_RAD, 1.6, 14)[1:],
+                            np.linspace(1.6, BACK_RAD, 6)[1:]])
     outside = (white * np.sin(angle), -white * np.cos(angle),
-               np.clip((angle - edge + SOFT) / (1.6 - edge + SOFT), 0.002, 0.998), WHITE)
+               np.clip((angle - edge + SOFT_RAD) / (1.6 - edge + SOFT_RAD), 0.002, 0.998), WHITE)
     rim, plane = white * np.sin(edge), -white * np.cos(edge) + ROOT_M
     across = np.linspace(0, 1.04, 20)  # a little farther than the white begins
-    hole = PUPIL * rim
+    hole = PUPIL_SHARE * rim
     iris = (hole + across * (rim - hole), plane + DISH_M * (1 - across), np.clip(across, 0.002, 0.998), IRIS)
     behind = np.array([hole, 1.05 * hole, 0.8 * hole, 0.0001])
     dark = (behind, plane + DISH_M + np.array([0, 0.0004, 0.0014, 0.0016]), np.zeros(4), PUPIL_SLOT)
     return _turn([outside, iris, dark])
 
 
-def _turn(parts: list[tuple]) -> Turned:
-    """Each part: distance [R] from the axis, y [R], the UVs' v [R], and a slot. Rings are told from the gaze outwards,
-    but for the dark behind the pupil."""
+def _turn(profiles: list[tuple]) -> Turned:
+    """Each profile: distance [R] from the axis, y [R], the UVs' v [R], and a slot. Rings are told from the gaze
+    outwards, but for the dark behind the pupil."""
     k, first = np.arange(TURNS), 0
     n, turn = (k + 1) % TURNS, k * 2 * np.pi / TURNS
     vertices, faces, uvs, slots = [], [], [], []
-    for away, y, v, slot in parts:
+    for away, y, v, slot in profiles:
         vertices.append(np.stack([away[:, None] * np.cos(turn), y[:, None] + 0 * turn, away[:, None] * np.sin(turn)],
                                  -1).reshape(-1, 3))
         for ring in range(len(away) - 1):
