@@ -53,7 +53,8 @@ def _refit(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe)
 
 
 def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
-    """L_pho + L_neg + 0.1 L_TV of theta, and what our recipe adds. L_TV makes M's border seamless.
+    """L_pho + L_neg + 0.1 L_TV of theta (paper, supplement), or L_pho, L_neg and what our recipe has in the place of
+    L_TV (recipes.py): either makes M's border seamless.
 
     Parameters
     ----------

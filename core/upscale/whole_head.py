@@ -26,17 +26,17 @@ from .surface import HeadSurface
 
 UNSEEN_CONFIDENCE, SEEN_CONFIDENCE = 0.015, 0.09
 """The texture's confidence at which a texel counts as not seen, and from which on as seen well."""
-BELIEVED = 0.3
+BELIEVED_CONFIDENCE = 0.3
 """The solver's confidence from which on skin is plain enough to learn its grain from: a beard is not."""
 SPECK_MM = 1.5
 """mm: darker lines and dots of it are strands before the face, not holes in what was seen."""
 SKIRT_MM, FEATHER_MM = 2.5, 5.0
 """mm inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the
 mean face; then comes the fade."""
-ISLAND = 10.0
+SURROUNDINGS_MM = 10.0
 """mm around a place on the scalp that count as its surroundings. A patch seen between hair, shadow and the border of
 the pictures is of another tone and another stubble than what is made up around it, and looks like a stain."""
-GLANCED, WATCHED = 0.5, 0.8
+GLANCED_SHARE, WATCHED_SHARE = 0.5, 0.8
 """Shares of usual skin's confidence: a scalp whose surroundings were seen with the first is made up, with the second
 kept."""
 REACH_MM = 2.5
@@ -78,7 +78,7 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     area = surface.covered * surface.texel**2
     completed = ((1 - seen) * area).sum() / area.sum()
     report.figure("completed_share_percent", round(100 * float(completed), 1))
-    plain = (template.mask("skin", size) * seen >= 0.99) & (maps.confidence >= BELIEVED)
+    plain = (template.mask("skin", size) * seen >= 0.99) & (maps.confidence >= BELIEVED_CONFIDENCE)
     learnt = grain.measure(channels, slopes, plain.astype(np.float32), surface, seed)
     report.check()
     painted, tilt = grain.paint(learnt, surface, holes, seed)
@@ -111,8 +111,8 @@ def seen_well(seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
 def _scalp_share(confidence: np.ndarray, seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
     """[S, S] in [0, 1]: 1 off the scalp, and on it where its surroundings were seen about as well as usual skin."""
     usual = float(np.median(confidence[seen == 1])) if (seen == 1).any() else 1.0
-    around = surface.smooth(confidence[..., None], np.ones_like(confidence), ISLAND)[..., 0]
-    kept = _smoothstep((around / max(usual, 1e-6) - GLANCED) / (WATCHED - GLANCED))
+    around = surface.smooth(confidence[..., None], np.ones_like(confidence), SURROUNDINGS_MM)[..., 0]
+    kept = _smoothstep((around / max(usual, 1e-6) - GLANCED_SHARE) / (WATCHED_SHARE - GLANCED_SHARE))
     return 1 - template.mask("scalp", surface.size) * (1 - kept)
 
 
