@@ -86,14 +86,13 @@ def compare(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int
     head, item = headless.open_head(capture.root)
     bpy.ops.wildcap.add_face_units()
     folders = {each: deliver(item, *each) for each in deliveries}
-    scene = picture.set_up(head, LIGHT, resolution, samples)
-    original, covered = render(scene, work / "original.png")
+    original, covered = render(picture.set_up(head, LIGHT, resolution, samples), work / "original.png")
     with without_scattering(head):
-        flat, _ = render(scene, work / "flat.png")
-    scene.collection.objects.unlink(head)
+        flat, _ = render(picture.set_up(head, LIGHT, resolution, samples), work / "flat.png")
     returned = {}
     for (preset, kind), folder in folders.items():
-        back = bring_back(folder)
+        back, scene = bring_back(folder), picture.set_up(head, LIGHT, resolution, samples)
+        scene.collection.objects.unlink(head)
         for thing in back:
             scene.collection.objects.link(thing)
         shown, _ = render(scene, work / f"{preset}_{kind}.png")

@@ -79,9 +79,9 @@ def test_drops_are_taken_where_the_tab_is_shown(addon):
     source = addon("capture.source")
     # not imported: it needs OpenCV
     stage = ast.parse((Path(__file__).parents[1] / "core" / "frames" / "photographs.py").read_text(encoding="utf-8"))
-    raw = next(ast.literal_eval(node.value) for node in stage.body
-               if isinstance(node, ast.Assign) and node.targets[0].id == "RAW")
-    assert set(source.PHOTOGRAPHS) == {*hashes.PHOTOGRAPHS, *raw}
+    unread = next(ast.literal_eval(node.value) for node in stage.body
+                  if isinstance(node, ast.Assign) and node.targets[0].id == "UNREAD")
+    assert set(source.PHOTOGRAPHS) == {*hashes.PHOTOGRAPHS, *unread}
 
     def taken(tab: str) -> bool:
         space = SimpleNamespace(show_region_ui=bool(tab))

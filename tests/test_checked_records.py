@@ -146,7 +146,7 @@ def test_other_files_of_every_wrong_kind(tmp_path, text):
     refused(lambda: read_frames(capture), "frames.json")
     refused(lambda: own_head.read_skin(capture, 9), "own_head.json")
     capture.landmarks_artist.write_text('{"points": {"1": [' + "1" * 30 + ", 0, 0]}}")
-    refused(lambda: artist_landmarks.read(capture.landmarks_artist), "no place")
+    refused(lambda: artist_landmarks.read(capture.landmarks_artist), "not on the head")
 
 
 @pytest.mark.parametrize("runs", [[[0, 10]], [[-1, 2]], [[2, 2]], [[0.5, 2]], [[0]], "ab", None])

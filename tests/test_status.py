@@ -42,6 +42,7 @@ def test_only_what_the_tab_is_about_is_looked_at_again_and_never_in_blenders_own
     monkeypatch.setattr(status, "_stamp", lambda capture, told: stamped.append(
         (capture.root.stem, threading.current_thread())) or stamp(capture, told))
     monkeypatch.setattr(strip, "look", lambda root: in_strip.append(root) or look(root))
+    strip._wanted.clear()  # of other tests
     for item in items:
         status.of(item), strip.of(item)
 

@@ -155,7 +155,7 @@ def test_a_broken_answer_is_none_and_is_asked_for_again(capture, serve, monkeypa
     ((200, {}, {"message": "No Credit. Please purchase credit."}), "no credits left"),
     ((401, {}, {"message": f"Unauthorized key {KEY}."}),
      r"does not accept the key \(401: Unauthorized key \(the key\)\)"),
-    ((413, {}, {"detail": [{"msg": "too large"}]}), "413: .*too large"), ((400, {}, []), r"documents say \(400\)"),
+    ((413, {}, {"detail": [{"msg": "too large"}]}), "413: .*too large"), ((400, {}, []), r"not as documented \(400\)"),
     ((429, {"Retry-After": "86400"}, {}), "asks you to wait 1440 minutes"),
 ])
 def test_a_refusal_is_said_and_not_repeated(capture, serve, refusal, words):

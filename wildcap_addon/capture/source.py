@@ -17,7 +17,7 @@ from ..base_operator import FileOperator
 from ..base_panel import WildcapPanel
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm")
-PHOTOGRAPHS = (*hashes.PHOTOGRAPHS, ".dng")
+PHOTOGRAPHS = (*hashes.PHOTOGRAPHS, ".dng", ".avif")
 """What the stage frames reads, and what it explains how to convert."""
 WIDTH_PX = 240
 """Of the file browser's sidebar, pixels."""
