@@ -36,7 +36,7 @@ def test_a_known_step_is_told_at_the_border_with_caution_and_less_inwards(taken)
     found = border.measure_missing_light(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()[40:-40]
     within = 90 - np.abs(X - 500)[40:-40]
     at_border = (within > 0) & (within < 25)
-    assert found[at_border].min() > 0.8 * taken - 0.01 and found.max() < taken + 0.01
+    assert found[at_border].min() > 0.65 * taken - 0.01 and found.max() < taken + 0.01
     middle = found[within > 80].mean()
     assert 0.2 * taken - 0.01 < middle < 0.6 * found[at_border].mean()
 

@@ -26,10 +26,7 @@ SIDE_TEXELS, BAND_TEXELS = 9.0, 8.0
 REACH_TEXELS = 14.0  # how far from the border a step is read
 WINDOW_TEXELS = 8.0  # deviation of the windows over which a side is averaged
 INWARDS_TEXELS = 40.0  # deviation over which a step holds for what is around it
-# share of a window of INWARDS_TEXELS that border must fill, for its step to hold in full: that of a disc of that size;
-# a long, straight, clean one fills 0.116
-FULL_BORDER_SHARE = 0.163
-SHORT_BORDER = 0.45  # part of that at which the step holds by three quarters
+MIN_BORDER_SHARE = 0.05  # share of a window of INWARDS_TEXELS that border must fill, for its step to hold by half
 MAX_MISSING_SHARE = 0.9  # more of the light than this never goes
 # deviation, along M's border, of the step in the light that a delighter left, natural log: benchmarks/shadow_steps.py
 LEFT_LOG = 0.14
@@ -52,10 +49,7 @@ def measure_missing_light(light: torch.Tensor, alpha: torch.Tensor, weight: torc
     """
     value = np.log(np.clip(light.numpy(), 0.05, 4)).mean(0).astype(np.float32)
     steps, sure = measure_border_steps(value, alpha.numpy(), weight.numpy(), texel)
-    known = _blurred(sure, INWARDS_TEXELS / texel)
-    length = known / FULL_BORDER_SHARE
-    held = np.minimum(length * (1 + SHORT_BORDER) / (length + SHORT_BORDER), 1)
-    step = held * _blurred(-sure * steps, INWARDS_TEXELS / texel) / np.maximum(known, 1e-6)
+    step = _blurred(-sure * steps, INWARDS_TEXELS / texel) / (_blurred(sure, INWARDS_TEXELS / texel) + MIN_BORDER_SHARE)
     share = 1 - np.exp(-np.maximum(estimate_light_share(steps, sure) * step, 0))
     return torch.from_numpy(share.clip(0, MAX_MISSING_SHARE).astype(np.float32))
 
