@@ -36,7 +36,7 @@ class Picture:
     box: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
 
 
-HEAD = (0.08, 0.12, 0.27, 0.85)
+HEAD = (0.285, 0.13, 0.54, 0.8)
 """The head in the 3D view, between its tools and the sidebar."""
 PICTURES = {
     "paint_on_head": Picture(("4_stroke_on_head",), 1280),

@@ -183,7 +183,7 @@ def relight(root: Path):
     image = head().data.materials[0].node_tree.nodes["WildCap Albedo"].image
     assert Path(bpy.path.abspath(image.filepath)).is_relative_to(root) and image.colorspace_settings.name == 'sRGB'
     d.screenshot("7_assembled")
-    bpy.context.scene.wildcap.resolution, bpy.context.scene.wildcap.samples = 256, 8
+    bpy.context.scene.wildcap.resolution, bpy.context.scene.wildcap.samples = 320, 96
     yield 1.5
     yield from d.press("wildcap.render")
     yield from d.until(lambda: (root / "renders" / "three_point.png").is_file(), "the picture", 120)
