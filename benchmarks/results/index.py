@@ -123,8 +123,8 @@ def losses(of: Figures) -> str:
         - **Freer lights are ahead on delit synthetic people**: ten regions by
           {delit["regions 10"].PSNR - delit.wildcap.PSNR:.1f} dB, one environment by
           {delit.environment.PSNR - delit.wildcap.PSNR:.1f} dB ([comparison](comparison.md)).
-        - **Our relief and gloss do not help yet**: without them a relit head is
-          {relit.plain.psnr - relit.solved.psnr:.2f} dB nearer to the truth ([relit](relit.md)); normals and specular
+        - **Our relief and gloss do not help yet**: with them a relit head is
+          {relit.solved.psnr - relit.plain.psnr:+.2f} dB nearer to the truth ([relit](relit.md)); normals and specular
           say no more than the mean face's ([prior](prior.md)).
         - **Brows and lips lose contrast** ({answers.solved.kept_brows.mean:.2f} and
           {answers.solved.kept_lips.mean:.2f} of the truth's is kept; [state](state.md#features-kept)), and edges of
