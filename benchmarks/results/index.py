@@ -33,9 +33,10 @@ def sections(*records: Figures) -> Sections:
     return [("", prose("""
         Every page has the command, the commit and the day that made its figures, all on 2 cores of a shared machine
         (25 GB; each page names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic
-        subjects only, and may be older than the figures beside them. Only the sample and the state of the albedo are by
-        delighter and solver as they are (the state's masks end at the face; since then they reach neck and ears), and
-        *the delighter's answers* by the delighter; pages of older code name their commit.
+        subjects only, and may be older than the figures beside them. Only the sample, as it is and relit, is by
+        delighter and solver as they are; the state of the albedo and *the delighter's answers* are by the delighter,
+        the state by a solver of the same day (masks that end at the face, M's border told in full); pages of older code
+        name their commit.
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),
