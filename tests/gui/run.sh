@@ -43,6 +43,7 @@ exec unshare --mount --pid --fork --kill-child --propagation private bash -c '
     mount --rbind /sys "$root/sys"
     mount --rbind /dev "$root/dev"
     mount -t tmpfs tmpfs "$root/tmp"
+    mount -t tmpfs tmpfs "$root/home"
     chroot="$root"
     for path in "$checkout" "$@"; do
         [ "$path" = -- ] && break
