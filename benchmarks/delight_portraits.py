@@ -17,7 +17,7 @@ from core.synthetic import pigment
 from core.synthetic.identities import subject_mesh
 from core.synthetic.olat import LightStage, light_stage
 from core.synthetic.parameters import adorned, sample_parameters
-from core.synthetic.portrait import relit, sight_of
+from core.synthetic.portrait import relight_sight, sample_sight
 from core.synthetic.sight import Sight
 from core.synthetic.skin import make_skin
 
@@ -59,7 +59,7 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
     if not path.is_file():
         print(f"\rportrait of subject {seed}", end="", file=sys.stderr, flush=True)
         stage, sight = portrait_parts(seed, SIZE)
-        made = relit(sight, stage, np.random.default_rng([seed, 41, light]))
+        made = relight_sight(sight, stage, np.random.default_rng([seed, 41, light]))
         with replacing(path) as temporary:
             np.savez_compressed(temporary,
                                 **{name: np.round(255 * np.clip(p, 0, 1)).astype(np.uint8) if name == "srgb"
@@ -75,4 +75,4 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
 def portrait_parts(seed: int, size: int) -> tuple[LightStage, Sight]:
     """The light stage of a subject, and the subject as its camera sees it in a picture of side `size`."""
     stage, skin = light_stage(subject_mesh(seed)), make_skin(adorned(sample_parameters(seed), seed), TEXELS)
-    return stage, sight_of(stage, skin, np.random.default_rng([seed, 40, 0]), size)
+    return stage, sample_sight(stage, skin, np.random.default_rng([seed, 40, 0]), size)

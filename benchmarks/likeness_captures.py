@@ -46,7 +46,7 @@ def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, descr
     began, spent, seed = time.monotonic(), _spent(), figure.person.seed
     taken = phone.sample_phone(seed)
     cameras = scene.camera_path(seed, frames)
-    poses = motion.sway(frames, taken.sway_mm, taken.sway_degrees, np.random.default_rng([seed, 71]))
+    poses = motion.sample_sway(frames, taken.sway_mm, taken.sway_degrees, np.random.default_rng([seed, 71]))
     work = folder / "rendered" / name
     filmed.render(work, figure, light, scene.Shot(cameras, range(frames), SAMPLES, SCALE, poses, room))
     rendered = time.monotonic()
@@ -85,7 +85,7 @@ def _write_truth(target: Path, figure: Figure, light: scene.SceneLight, views: l
     faces = {}
     for frame in np.unique(np.linspace(1, len(views) - 2, TRUTHS).round().astype(int)).tolist():
         sun = poses[frame, :3, :3].T @ light.sun.direction if light.sun else None
-        found, name = truth.look(seen, views[frame], sun), f"{frame:04d}.png"
+        found, name = truth.trace_truth(seen, views[frame], sun), f"{frame:04d}.png"
         for folder in ("albedo", "bare", "face", "normal", *(["shadow"] if light.sun else []),
                        *(f"parts/{part}" for part in PARTS)):
             (target / folder).mkdir(parents=True, exist_ok=True)
@@ -147,7 +147,8 @@ def _flows(figure: Figure, cameras: np.ndarray, poses: np.ndarray) -> list[np.nd
     flows = []
     for k in range(len(views)):
         a, b = max(k - 1, 0), min(k + 1, len(views) - 1)
-        flows.append(motion.image_motion(caster, (views[a], views[k], views[b]), poses[[a, k, b]]) * 2 / (b - a) / PACE)
+        flow = motion.measure_image_motion(caster, (views[a], views[k], views[b]), poses[[a, k, b]])
+        flows.append(flow * 2 / (b - a) / PACE)
     return flows
 
 

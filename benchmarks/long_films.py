@@ -110,7 +110,7 @@ def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: 
     gain = TO / np.percentile(first[rows:-rows, columns:-columns].max(-1), METERED)
     for k in numbers:
         around = max(k - 1, 0), k, min(k + 1, len(views) - 1)
-        flow = motion.image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])
+        flow = motion.measure_image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])
         linear = motion.motion_blur(images.read_linear(work / f"{k:05d}.exr").astype(np.float32), flow, camera.shutter)
         yield phone.develop(linear, camera, np.full(3, gain), np.random.default_rng([SEED, 72, k]))
 

@@ -86,7 +86,7 @@ def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     scene = Scene(figure)
     for view in range(VIEWS):
         rng = np.random.default_rng([seed, 92, view])
-        yield snapshot.photograph(unlit.see(scene, unlit.random_view(figure, rng, SIZE), rng), rng)
+        yield snapshot.photograph(unlit.trace_unlit(scene, unlit.random_view(figure, rng, SIZE), rng), rng)
 
 
 def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:

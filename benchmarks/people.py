@@ -114,7 +114,7 @@ def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
     opaque = meshes.joined([head, light.blockers]) if light.blockers else head
     for frame in np.unique(np.linspace(1, len(cameras) - 2, TRUTHS).round().astype(int)).tolist():
         view, sun = sample.view_of(cameras[frame], SCALE), light.sun.direction if light.sun else None
-        albedo, alpha, face, shadow = sample.frame_truth(head, opaque, skin, view, sun)
+        albedo, alpha, face, shadow = sample.trace_frame_truth(head, opaque, skin, view, sun)
         faces[frame] = albedo, face
         _write_truth(truth, frame, albedo, alpha, face, shadow if light.sun else None)
         total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.geometry.meshes import Mesh
-from core.synthetic.scene import SKY, AreaLamp, SceneLight, Sun, leaves
+from core.synthetic.scene import SKY, AreaLamp, SceneLight, Sun, strew_leaves
 
 HEIGHT = 64  # rows of a panorama
 GRASS, ROOM = (0.10, 0.13, 0.06), (0.11, 0.10, 0.09)
@@ -21,7 +21,7 @@ GRASS, ROOM = (0.10, 0.13, 0.06), (0.11, 0.10, 0.09)
 def noon(seed: int) -> SceneLight:
     """High sun behind a twig, blue sky, grass that shines back."""
     sun = Sun(_towards(np.random.default_rng([seed, 50]).choice([-1, 1]) * 32, 56))
-    return SceneLight(panorama(SKY, SKY, GRASS), sun, leaves(seed, sun))
+    return SceneLight(panorama(SKY, SKY, GRASS), sun, strew_leaves(seed, sun))
 
 
 def overcast(seed: int) -> SceneLight:

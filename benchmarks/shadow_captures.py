@@ -30,7 +30,7 @@ from core.imaging import images
 from core.shadow_mask.lift import lift_shadows
 from core.synthetic.identities import subject_mesh
 from core.synthetic.light import SkyAndSun, bake, random_light
-from core.synthetic.painted_head import camera
+from core.synthetic.painted_head import place_camera
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 
@@ -106,7 +106,7 @@ def registered(mesh: Mesh, seed: int) -> Mesh:
 def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.random.Generator) -> None:
     """frames/ with frames.json, and cameras/, of a lit texture, linear [S, S, 3]."""
     caster = raster.RayCaster(mesh)
-    views = [camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE)
+    views = [place_camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE)
              for i, azimuth in enumerate(AZIMUTHS)]
     write_views(capture, views, (picture(caster, view, texture, rng) for view in views))
 

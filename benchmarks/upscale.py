@@ -36,7 +36,7 @@ from core.face import template
 from core.geometry import meshes, raster
 from core.imaging import images
 from core.synthetic.identities import subject_mesh
-from core.synthetic.painted_head import camera
+from core.synthetic.painted_head import place_camera
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
@@ -191,7 +191,7 @@ def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
     if not (capture.root / "truth.png").is_file():
         mesh, rng = subject_mesh(seed), np.random.default_rng([seed, 50])
         true = make_skin(sample_parameters(seed), 2048).diffuse
-        views = [camera(azimuth, 0.0, scale=CLOSE) for azimuth in (-45, -25, -8, 8, 25, 45)]
+        views = [place_camera(azimuth, 0.0, scale=CLOSE) for azimuth in (-45, -25, -8, 8, 25, 45)]
         caster = raster.RayCaster(mesh)
         write_views(capture, views, (picture(caster, view, 0.8 * true, rng, rays=1) for view in views))
         meshes.write_obj(capture.head, mesh)  # the true head: an error of its place would be measured, not the detail

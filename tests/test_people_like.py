@@ -39,7 +39,7 @@ def view(scale):
 
 @pytest.fixture(scope="module")
 def seen(ready):
-    return truth.look(ready, view(0.25), over=2)
+    return truth.trace_truth(ready, view(0.25), over=2)
 
 
 def test_the_identity_basis_leaves_two_millimetres_of_a_person():
@@ -99,7 +99,7 @@ def test_eyes_turn_where_they_look():
 
 
 def test_an_eye_is_dark_in_the_middle_coloured_around_it_and_white_outside():
-    picture = eyes.eye_picture(np.array([0.05, 0.08, 0.12]), 0.0155, 1, 256)
+    picture = eyes.paint_eyes(np.array([0.05, 0.08, 0.12]), 0.0155, 1, 256)
     y, x = (np.mgrid[0:256, 0:256] + 0.5) / 256 - 0.5
     angle = np.pi * (2 * np.hypot(x, y)).clip(0, 1) ** (1 / 0.6)
     rim = np.arcsin(eyes.IRIS_MM / 15.5)
@@ -160,7 +160,7 @@ def test_no_hair_hangs_before_the_face_or_flies():
     someone = replace(person.sample_person(910003), hair_length=0.26, curl=0.8)
     head = shape.person_mesh(someone.seed)
     opened = lids.open_lids(head, 0.9, np.zeros(2))
-    growths = figure.grown(replace(someone, beard="none"), head, opened, clothes.shirt(someone, head))
+    growths = figure.grow_hair(replace(someone, beard="none"), head, opened, clothes.shirt(someone, head))
     x, y, z = np.moveaxis(next(growth.points for growth in growths if growth.part == "hair"), -1, 0)
     before = (np.abs(x) < 0.045) & (y < 0.0) & (z < 0.0) & (z > -0.12)
     assert before.any(1).mean() < 0.0002
@@ -194,7 +194,7 @@ def test_hair_is_in_what_is_seen_and_not_in_the_bare_skin(someone, seen):
 
 
 def test_a_sun_behind_the_head_reaches_no_face(ready):
-    night, day = (truth.look(ready, view(0.1), np.array([0, y, 0.0]), over=1) for y in (1.0, -1.0))
+    night, day = (truth.trace_truth(ready, view(0.1), np.array([0, y, 0.0]), over=1) for y in (1.0, -1.0))
     assert night.shadow[night.face].mean() > 0.9 > 0.5 > day.shadow[day.face].mean()
 
 
@@ -202,8 +202,8 @@ def test_a_seed_is_one_person(someone):
     assert person.sample_person(SEED) == someone.person != person.sample_person(SEED + 1)
     assert np.array_equal(shape.person_mesh(SEED).vertices, someone.head.vertices)
     assert np.array_equal(figure.paint(someone.person, SIZE)[1], someone.seen)
-    shaven = figure.grown(replace(someone.person, beard="none", hair="none"), someone.head, someone.opened,
-                          someone.shirt)
+    shaven = figure.grow_hair(replace(someone.person, beard="none", hair="none"), someone.head, someone.opened,
+                              someone.shirt)
     assert all(np.array_equal(a.points, b.points)
                for a, b in zip(shaven, someone.strands, strict=False)), "each growth has a stream of its own"
 

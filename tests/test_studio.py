@@ -89,7 +89,7 @@ def test_another_rigs_calibration_is_refused(studio, tmp_path):
 
 def test_cameras_that_are_some_pixels_off_are_refined_and_not_refused(tmp_path):
     rng = np.random.default_rng(1)
-    true = [painted_head.camera(azimuth, 0.04 * (i % 3), 1.0, scale=1.5)
+    true = [painted_head.place_camera(azimuth, 0.04 * (i % 3), 1.0, scale=1.5)
             for i, azimuth in enumerate(np.linspace(-48, 48, 8))]
     off = []
     for i, view in enumerate(true):

@@ -10,7 +10,7 @@ import numpy as np
 
 from .canvas import Canvas
 from .regions import lid_lines, regions
-from .spots import splat, strew
+from .spots import splat_spots, strew
 
 # albedo, linear sRGB
 LIPSTICKS = np.array([[0.30, 0.02, 0.03], [0.45, 0.10, 0.12], [0.20, 0.01, 0.04], [0.50, 0.16, 0.10],
@@ -27,7 +27,7 @@ class Scars(NamedTuple):
     ridge: np.ndarray
 
 
-def scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator) -> Scars:
+def paint_scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator) -> Scars:
     """Thin lines of 4 to 20 mm, old ones pale, young ones red, sunken or raised; `expected` of them on the bare skin of
     face and neck."""
     nothing = np.zeros(len(on.position), np.float32)
@@ -43,7 +43,7 @@ def scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator)
         line = begin + (along * way + bow) * rng.uniform(4, 20) / max(np.linalg.norm(way), 1e-6)
         _, nearest = on.tree.query(line)  # lays it onto the surface
         line, width = on.position[nearest], rng.uniform(0.3, 0.9)
-        mark = splat(on, line, width * np.sin(np.linspace(0.15, np.pi - 0.15, len(line))), np.ones(len(line)))
+        mark = splat_spots(on, line, width * np.sin(np.linspace(0.15, np.pi - 0.15, len(line))), np.ones(len(line)))
         young = rng.random() ** 2
         stain -= mark * (0.8 - 0.5 * young) * np.float32(rng.uniform(0.5, 1.2))
         flush += mark * np.float32(1.4 * young - 0.3)
@@ -55,12 +55,12 @@ def lid_distance(on: Canvas) -> np.ndarray:
     """Closeness [N] in [0, 1] to the line where the lids meet: 1 on it, 0 from about 2 mm on."""
     if "lid line" not in on.cache:
         lids = lid_lines(on)
-        on.cache["lid line"] = splat(on, lids, np.full(len(lids), 1.0), np.ones(len(lids)))
+        on.cache["lid line"] = splat_spots(on, lids, np.full(len(lids), 1.0), np.ones(len(lids)))
     return on.cache["lid line"]
 
 
-def made_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float,
-            rng: np.random.Generator) -> np.ndarray:
+def put_on_make_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float,
+                   rng: np.random.Generator) -> np.ndarray:
     """The albedo [N, 3] under make-up: each of lipstick, eye shadow, liner and blusher is worn or not, up to `amount`
     in [0, 1]."""
     if amount <= 0:

@@ -100,7 +100,7 @@ def make_canvas(mesh: Mesh, size: int, landmarks: np.ndarray, mask: Callable[[st
     return _canvas(mesh, size, *raster.rasterize_uv(mesh, size), landmarks, mask)
 
 
-def window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
+def make_window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
     """A square window, `side` texels wide, of the built-in template's canvas of `size`: what is painted on it is what
     the whole would show there, but for what is laid onto the nearest texel from outside (hairs and scars that begin
     beyond its border)."""

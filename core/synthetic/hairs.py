@@ -12,7 +12,7 @@ from .canvas import Canvas
 from .spots import strew
 
 
-def brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+def grow_brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
     """How much of each texel brow hair covers, [N] in [0, 1]; `region` on the ground is where it grows, `density` 1 is
     a usual brow."""
     # a sparse brow is a narrow one
@@ -25,8 +25,8 @@ def brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: n
     return _strokes(on, roots, direction, rng.uniform(4.5, 8, len(roots)), 0.11, np.full(len(roots), -0.25), rng)
 
 
-def stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float,
-            rng: np.random.Generator) -> np.ndarray:
+def grow_stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float,
+                 rng: np.random.Generator) -> np.ndarray:
     """Cover [N] of beard hair of `length` mm (0.3: shaven yesterday) at `density` hairs per mm^2 in the full of
     `region` [N] on the ground."""
     roots, texel = strew(ground, density * np.clip(region * 1.3 - 0.15, 0, 1) ** 1.5, rng)
@@ -41,7 +41,7 @@ def beard_shadow(albedo: np.ndarray, amount: np.ndarray) -> np.ndarray:
     return albedo * (1 - amount[:, None] * np.array([0.42, 0.30, 0.22], np.float32))
 
 
-def cropped(on: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+def grow_cropped_hair(on: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
     """Cover [N] of very short hair on the scalp; `region` [N] on this canvas."""
     cover, there = np.zeros_like(region), region > 0.01
     grain = octaves(on.position[there], [0.6, 1.1], rng)

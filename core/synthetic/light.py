@@ -88,8 +88,8 @@ def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str,
     return spread(shading), spread(shadow), spread(normals)
 
 
-def transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster,
-             rays: int = TRANSFER_RAYS) -> np.ndarray:
+def trace_transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster,
+                   rays: int = TRANSFER_RAYS) -> np.ndarray:
     """[N, 9]: shading of points [N, 3] per coefficient of the sky's radiance, blocked where the mesh is in the way; an
     open surface under radiance 1 gets 1."""
     return radiance_transfer(caster, points, normals, rays)
@@ -116,13 +116,13 @@ def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray,
     if shadows != "self":
         away = rng.uniform(0.25, 1.0)  # metres to what throws the shadow
         at = points[None, facing] + away * directions[:, None]
-        seen[:, facing] *= 1 - in_the_way(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
+        seen[:, facing] *= 1 - draw_sheet(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
     share = np.zeros(len(points))
     share[facing] = seen[:, facing].mean(0)
     return share
 
 
-def in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
+def draw_sheet(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
     """How far an opaque sheet with holes covers (x, y) [...] in metres, in a plane across the sunlight; edges are
     `blur` metres wide, the distance between two of the sun's rays there, so that few rays make an even penumbra."""
     turn, shift = rng.uniform(0, np.pi), rng.uniform(-0.05, 0.05)
@@ -143,9 +143,9 @@ def in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.ran
 
 @lru_cache(maxsize=2)
 def sky_transfer() -> np.ndarray:
-    """`transfer` of the built-in head's vertices [V, 9]; computed once per process."""
+    """`trace_transfer` of the built-in head's vertices [V, 9]; computed once per process."""
     mesh = template.load()
-    return transfer(mesh.vertices, vertex_normals(mesh), raster.RayCaster(mesh))
+    return trace_transfer(mesh.vertices, vertex_normals(mesh), raster.RayCaster(mesh))
 
 
 def _transfer_of(mesh: Mesh, caster: raster.RayCaster) -> np.ndarray:
@@ -153,4 +153,4 @@ def _transfer_of(mesh: Mesh, caster: raster.RayCaster) -> np.ndarray:
     same = template.load()
     if mesh.vertices.shape == same.vertices.shape and np.array_equal(mesh.vertices, same.vertices):
         return sky_transfer()
-    return transfer(mesh.vertices, vertex_normals(mesh), caster)
+    return trace_transfer(mesh.vertices, vertex_normals(mesh), caster)

@@ -54,8 +54,8 @@ def speaking(seed: int, jaw: float) -> tuple[raster.RayCaster, np.ndarray]:
     return raster.RayCaster(mesh), meshes.vertex_normals(mesh)
 
 
-def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035),
-           scale: float = 1.0) -> View:
+def place_camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035),
+                 scale: float = 1.0) -> View:
     """A camera that looks at the head; `height` above the eyes and `distance` in metres; `scale` of its picture's
     size."""
     a = np.radians(azimuth_deg)
@@ -73,7 +73,7 @@ def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, targ
 def studio(scale: float = 1.0) -> list[View]:
     """Sixteen fixed cameras a metre away in two rows, over 100 degrees from side to side: the layout of multi-view
     studios as NeRSemble's."""
-    return [camera(azimuth, height, 1.0, scale=scale) for height in (-0.15, 0.25)
+    return [place_camera(azimuth, height, 1.0, scale=scale) for height in (-0.15, 0.25)
             for azimuth in np.linspace(-50, 50, 8)]
 
 

@@ -77,7 +77,7 @@ def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: b
     """
     work.mkdir(parents=True, exist_ok=True)
     sun = scene.sun_of(seed)
-    light = light or scene.SceneLight(scene.SKY, sun, scene.leaves(seed, sun) if leaves else None)
+    light = light or scene.SceneLight(scene.SKY, sun, scene.strew_leaves(seed, sun) if leaves else None)
     meshes.write_obj(work / "head.obj", subject_mesh(seed))
     if light.blockers:
         meshes.write_obj(work / "leaves.obj", light.blockers)
@@ -111,10 +111,10 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
                 "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
     write_video(out / "capture.mp4", (images.read_srgb(work / f"{k:05d}.png") for k in range(frames)))
     head, sun = subject_mesh(seed), scene.sun_of(seed)
-    opaque = joined([head, scene.leaves(seed, sun)])
+    opaque = joined([head, scene.strew_leaves(seed, sun)])
     total, count = np.zeros(3), 0
     for frame in truth_frames(frames):
-        albedo, alpha, face, shadow = frame_truth(head, opaque, skin, view_of(cameras[frame]), sun.direction)
+        albedo, alpha, face, shadow = trace_frame_truth(head, opaque, skin, view_of(cameras[frame]), sun.direction)
         name = f"{frame:04d}.png"
         for folder in ("albedo", "face", "shadow"):
             (out / folder).mkdir(exist_ok=True)
@@ -142,8 +142,8 @@ def view_of(matrix: np.ndarray, scale: float = 1.0) -> View:
     return View("", Path(), camera, rotation, -rotation @ matrix[:3, 3], True)
 
 
-def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None,
-                over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def trace_frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None,
+                      over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun
     (unit direction, or None) does not reach.
 

@@ -81,7 +81,7 @@ def sun_of(seed: int) -> Sun:
     return Sun(np.array([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)]))
 
 
-def leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: float = 0.15) -> Mesh:
+def strew_leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: float = 0.15) -> Mesh:
     """A loose twig between head and sun: pointed leaves of 2 to 5 cm, strewn over a disc of radius `reach` across the
     beam.
 

@@ -30,7 +30,8 @@ def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tupl
     return here + (steps * share).sum(1), texel
 
 
-def splat(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, blend=np.maximum) -> np.ndarray:
+def splat_spots(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray,
+                blend=np.maximum) -> np.ndarray:
     """Bell-shaped spots [N]: `strength` [M] at the points [M, 3], falling to nothing at twice `radius` [M] mm; `blend`
     where they overlap.
 
@@ -46,8 +47,8 @@ def splat(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarr
     return out
 
 
-def patches(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, rng: np.random.Generator,
-            ragged: float = 0.25) -> tuple[np.ndarray, np.ndarray]:
+def splat_patches(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, rng: np.random.Generator,
+                  ragged: float = 0.25) -> tuple[np.ndarray, np.ndarray]:
     """Flat spots with a ragged edge (a mole's stain) and their dome: two arrays [N] of `strength` [M] at most."""
     stain, dome = np.zeros(len(on.position), np.float32), np.zeros(len(on.position), np.float32)
     if len(points):

@@ -14,7 +14,7 @@ from ..contract.messages import Log, Reporter
 from .descent import TrainingRun
 
 
-def parser(training: str, description: str, configs: dict, out: Path) -> argparse.ArgumentParser:
+def make_parser(training: str, description: str, configs: dict, out: Path) -> argparse.ArgumentParser:
     """The options of every training; `training` is its name in `python -m core train NAME`, `out` where its weights go
     by default."""
     options = argparse.ArgumentParser(f"python -m core train {training}", description=description,

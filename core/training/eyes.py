@@ -30,7 +30,7 @@ from ..synthetic.people.figure import make_figure
 from ..synthetic.people.person import sample_person
 from . import command_line, descent
 from .seeds import named_subjects, panorama_names
-from .snapshots import Echoed, Jitter, export_parsing, jittered, recipe_of, require_figures, spoilt
+from .snapshots import Echoed, Jitter, export_parsing, jitter_crop, recipe_of, require_figures, spoilt
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "eyes.safetensors"
 _MODEL = {"widths": [32, 48, 64, 96], "depths": [1, 1, 1, 2]}
@@ -82,7 +82,7 @@ def train_eyes(config: str, out: Path, report: Reporter, run: descent.TrainingRu
     state = descent.resumed(work, descent.beginning(config, data, network))
     objective = descent.Objective(Echoed(Eyes(data["seeds"], t["poses"], work, run.hdri), t),
                                   lambda batch, step, share: loss(network, batch, device),
-                                  lambda average: figures(average, config, unseen, device))
+                                  lambda average: measure_figures(average, config, unseen, device))
     descent.descend(network, state, objective, recipe_of(t, run.minutes), work, device, report)
     return export(work, out)
 
@@ -126,16 +126,16 @@ class Eyes:
             sight = eye_sights.load(path)
             picture, ball = eye_sights.photograph_eye(sight, rng, self.panoramas)
             for batch in batches:
-                batch.append(example(picture, ball, sight, rng, augment))
+                batch.append(make_example(picture, ball, sight, rng, augment))
         return [tuple(torch.from_numpy(np.stack(arrays)) for arrays in zip(*batch, strict=True)) for batch in batches]
 
 
-def example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, rng: np.random.Generator,
-            augment: bool = True) -> tuple[np.ndarray, np.ndarray]:
+def make_example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, rng: np.random.Generator,
+                 augment: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """A photograph as the network sees it, and the shares of its classes."""
     move = to_eye_crop(sight.corners, sight.left)
     if augment:
-        move = jittered(move, SIDE_PX, JITTER, rng)
+        move = jitter_crop(move, SIDE_PX, JITTER, rng)
     seen = cut(picture, move, SIDE_PX)
     if augment:
         seen = spoilt(seen, rng)
@@ -158,7 +158,7 @@ def loss(network: ParseNet, batch: tuple, device: str) -> torch.Tensor:
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, batch: tuple, device: str) -> dict[str, float]:
+def measure_figures(average: dict, config: str, batch: tuple, device: str) -> dict[str, float]:
     """The averaged network on photographs of held-out figures: intersection over union of the ball and of its iris,
     where a class is what most of a pixel is."""
     network = ParseNet(**CONFIGS[config]["model"], parts=len(CLASSES))
@@ -188,7 +188,7 @@ def _path(work: Path, seed: int, number: int) -> Path:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = command_line.parser("eyes", __doc__, CONFIGS, WEIGHTS)
+    options = command_line.make_parser("eyes", __doc__, CONFIGS, WEIGHTS)
     command_line.add_sights(options, "figures")
     return command_line.carry_out(options, arguments, train_eyes, export, prepare_figures)
 

@@ -23,7 +23,7 @@ from ..contract.messages import Reporter
 from ..face import template
 from ..geometry import raster
 from ..imaging import images
-from ..synthetic.canvas import canvas, window_canvas
+from ..synthetic.canvas import canvas, make_window_canvas
 from ..synthetic.parameters import adorned, sample_parameters
 from ..synthetic.skin import GROUND, paint_skin
 
@@ -133,7 +133,7 @@ def _paint(work: Path, window: tuple[int, int]) -> None:
     row, column = where[rng.integers(len(where))] * FACTOR - rng.integers(SIDE // 4, 3 * SIDE // 4, 2)
     row, column = (int(np.clip(at // FACTOR * FACTOR, 0, SIZE - SIDE)) for at in (row, column))
     parameters = replace(adorned(sample_parameters(seed), seed), scars=0.0)
-    skin = paint_skin(parameters, window_canvas(SIZE, row, column, SIDE), canvas(GROUND))
+    skin = paint_skin(parameters, make_window_canvas(SIZE, row, column, SIDE), canvas(GROUND))
     inner = slice(MARGIN, SIDE - MARGIN)
     maps = np.concatenate([images.linear_to_srgb(skin.diffuse), skin.normal, skin.specular[..., None]],
                           -1)[inner, inner]

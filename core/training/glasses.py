@@ -105,7 +105,7 @@ def prepare(of: list[int], work: Path, report: Reporter) -> None:
             rng = np.random.default_rng([seed, 94, number])
             view = _before(figure, rng)
             depth = raster.render_view(scene.whole, view)[2]
-            unlit.save(_path(work, seed, number).with_suffix(".unlit.npz"), unlit.see(scene, view, rng, 1))
+            unlit.save(_path(work, seed, number).with_suffix(".unlit.npz"), unlit.trace_unlit(scene, view, rng, 1))
             with replacing(_path(work, seed, number)) as temporary, open(temporary, "wb") as file:
                 np.savez_compressed(file, depth=depth.astype(np.float32), landmarks=unlit.landmarks_of(figure),
                                     translation=view.translation, params=view.camera.params)
@@ -121,8 +121,8 @@ def read(work: Path, seed: int, number: int) -> BareSight:
         return BareSight(sight, depth, stored["landmarks"], view)
 
 
-def photographed(sight: BareSight, pair: glasses.Glasses | None, rng: np.random.Generator,
-                 panoramas: list[np.ndarray] = ()) -> np.ndarray:
+def photograph_sight(sight: BareSight, pair: glasses.Glasses | None, rng: np.random.Generator,
+                     panoramas: list[np.ndarray] = ()) -> np.ndarray:
     """An sRGB photograph [S, S, 3] of a sight, with a pair of glasses or without."""
     def worn(radiance: np.ndarray, light: float) -> np.ndarray:
         return glasses.put_on(radiance, sight.view, sight.depth, pair, light, rng) if pair else radiance
@@ -138,7 +138,7 @@ def draw(of: list[int], pictures: int, work: Path, panoramas: list[np.ndarray], 
             rng = np.random.default_rng([salt, seed, number])
             sight = read(work, seed, number // 2 % VIEWS)
             pair = glasses.sample_glasses(sight.landmarks, rng) if number % 2 else None
-            srgb = photographed(sight, pair, rng, panoramas)
+            srgb = photograph_sight(sight, pair, rng, panoramas)
             face = faces.detect(srgb)
             if face is not None and abs(face.yaw_deg) <= MOST_YAW_DEG:
                 rows.append((band(srgb, face.landmarks), pair is not None, seed))

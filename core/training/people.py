@@ -20,7 +20,7 @@ from ..contract.messages import Reporter
 from ..synthetic.environments import read_panoramas
 from ..synthetic.people import portraits
 from ..synthetic.people.figure import make_figure
-from .portraits import PortraitBatch, example, stacked
+from .portraits import PortraitBatch, make_example, stacked
 
 TEXELS = 512  # of a figure's maps: pixels of a crop are larger than theirs
 
@@ -58,7 +58,7 @@ class People:
                 picture = stage.here.shape
                 normal = lit.fitted.normal @ stage.unlit.rotation.T
                 parts = [pixels.reshape(*picture, 3) for pixels in (lit.fitted.ambient, lit.fitted.sunlit, normal)]
-                drawn.append(example(lit, (*parts, stage.here.astype(np.float32)), rng))
+                drawn.append(make_example(lit, (*parts, stage.here.astype(np.float32)), rng))
         return stacked(drawn)
 
 

@@ -27,7 +27,7 @@ from ..synthetic import sight
 from ..synthetic.environments import read_panoramas
 from ..synthetic.identities import subject_mesh
 from ..synthetic.olat import LightStage, light_stage
-from ..synthetic.portrait import Portrait, relit, sight_of
+from ..synthetic.portrait import Portrait, relight_sight, sample_sight
 from ..synthetic.skin import Skin
 from .skins import Skins, carried_skins, synthetic_skins
 
@@ -77,7 +77,8 @@ class Portraits:
 
     def draw(self, pairs: int, rng: np.random.Generator, augment: bool = True) -> PortraitBatch:
         """`pairs` sights under two lights each."""
-        return stacked([example(portrait, geometry, rng) for portrait, geometry in self.portraits(pairs, rng, augment)])
+        return stacked([make_example(portrait, geometry, rng)
+                        for portrait, geometry in self.portraits(pairs, rng, augment)])
 
     def portraits(self, pairs: int, rng: np.random.Generator, augment: bool):
         for _ in range(pairs):
@@ -88,7 +89,7 @@ class Portraits:
                 albedo = np.clip(albedo * np.exp(rng.normal(0, 0.12) + rng.normal(0, 0.04, 3)), 0.003,
                                  0.9).astype(np.float32)
             for _ in range(2):
-                lit = relit(seen, self._stage(seed), rng, self.panoramas, albedo)
+                lit = relight_sight(seen, self._stage(seed), rng, self.panoramas, albedo)
                 parts = (
                     lit.fitted.ambient,
                     lit.fitted.sunlit,
@@ -111,7 +112,7 @@ def stacked(examples: list[tuple[np.ndarray, ...]]) -> PortraitBatch:
     return PortraitBatch(*(torch.from_numpy(np.stack(arrays)) for arrays in zip(*examples, strict=True)))
 
 
-def example(
+def make_example(
     portrait: Portrait, geometry_maps: tuple[np.ndarray, ...], rng: np.random.Generator
 ) -> tuple[np.ndarray, ...]:
     """What a batch holds of a portrait. geometry_maps: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the
@@ -161,7 +162,7 @@ def _prepare_one(job: tuple) -> None:
     with replacing(place / "visible.npy") as temporary, open(temporary, "wb") as file:
         np.save(file, np.packbits(stage.visible, axis=1))
     for view in range(views):
-        sight.save(place / f"{view}.npz", sight_of(stage, skin, np.random.default_rng([seed, 51, view]), SIDE_PX))
+        sight.save(place / f"{view}.npz", sample_sight(stage, skin, np.random.default_rng([seed, 51, view]), SIDE_PX))
 
 
 def _skin(skins: Skins, index: int) -> Skin:

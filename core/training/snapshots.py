@@ -79,7 +79,7 @@ class Snapshots:
             sight = unlit.load(_path(self.work, ready[rng.integers(len(ready))], int(rng.integers(self.views))))
             srgb, shares = photograph(sight, rng, self.panoramas)
             for batch in batches:
-                batch.append(example(srgb, shares, sight.landmarks, rng, augment))
+                batch.append(make_example(srgb, shares, sight.landmarks, rng, augment))
         return [SnapshotBatch(*(torch.from_numpy(np.stack(arrays)) for arrays in zip(*batch, strict=True)))
                 for batch in batches]
 
@@ -102,15 +102,15 @@ class Echoed(Dataset):
         return self.drawn[1][turn]
 
 
-def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator,
-            augment: bool = True) -> tuple[np.ndarray, ...]:
+def make_example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator,
+                 augment: bool = True) -> tuple[np.ndarray, ...]:
     """A photograph as the network sees it, the shares of its parts, and where they are known."""
     if augment and rng.random() < 0.5:
         srgb, shares = srgb[:, ::-1], shares[:, ::-1]
         landmarks = landmarks * [-1, 1] + [srgb.shape[1], 0]
     move = to_crop(landmarks)  # of the bridge, the chin and the box, which a mirror leaves what they are
     if augment:
-        move = jittered(move, SIDE_PX, JITTER, rng)
+        move = jitter_crop(move, SIDE_PX, JITTER, rng)
     known = inside(srgb.shape, move)
     if augment and rng.random() < 0.35:
         known = known * _ended(rng)
@@ -123,7 +123,7 @@ def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np
     return network_input(picture, known), np.ascontiguousarray(parts.transpose(2, 0, 1)), known[None].astype(np.float32)
 
 
-def jittered(move: np.ndarray, side: int, spread: Jitter, rng: np.random.Generator) -> np.ndarray:
+def jitter_crop(move: np.ndarray, side: int, spread: Jitter, rng: np.random.Generator) -> np.ndarray:
     """A map [2, 3] to a crop of `side` pixels as if the landmarks that it goes by lay a little elsewhere."""
     turn, scale = np.radians(rng.normal(0, spread.turn_deg)), np.exp(rng.normal(0, spread.scale))
     c, s = scale * np.cos(turn), scale * np.sin(turn)
@@ -175,7 +175,7 @@ def _prepare_one(seed: int, views: int, work: Path) -> None:
     _path(work, seed, 0).parent.mkdir(parents=True, exist_ok=True)
     for view in range(views):
         rng = np.random.default_rng([seed, 91, view])
-        unlit.save(_path(work, seed, view), unlit.see(scene, unlit.random_view(figure, rng), rng))
+        unlit.save(_path(work, seed, view), unlit.trace_unlit(scene, unlit.random_view(figure, rng), rng))
 
 
 def require_figures(training: str, data: dict, prepared: Callable[[int], bool], work: Path) -> None:

@@ -18,7 +18,8 @@ EYES = ((33, 133), (362, 263))
 RIMS = 0.1
 
 
-def backdrop(directions: np.ndarray, environment: Environment, light: float, rng: np.random.Generator) -> np.ndarray:
+def paint_backdrop(directions: np.ndarray, environment: Environment, light: float,
+                   rng: np.random.Generator) -> np.ndarray:
     """Radiance [S, S, 3] behind the person: the panorama out of focus, or walls and cloth of any colour, with or
     without things before them."""
     size = len(directions)
@@ -42,8 +43,8 @@ def backdrop(directions: np.ndarray, environment: Environment, light: float, rng
     return cv2.GaussianBlur(np.maximum(ground, 0), (0, 0), blur)
 
 
-def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light: float, rng: np.random.Generator,
-          rims: float = RIMS) -> tuple[np.ndarray, np.ndarray]:
+def cover_person(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light: float,
+                 rng: np.random.Generator, rims: float = RIMS) -> tuple[np.ndarray, np.ndarray]:
     """Things before the person, a hat or, in a share `rims` of pictures, the rims of glasses, now and then: they are
     background."""
     size, face = len(radiance), float(np.ptp(landmarks[:, 1]))
@@ -66,8 +67,8 @@ def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light
     return radiance, shares
 
 
-def with_open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray,
-                    rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray,
+               rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """A mouth that stands open on some: dark, with teeth or without; it belongs to the lips."""
     if rng.random() > 0.25:
         return albedo, shares

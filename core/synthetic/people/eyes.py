@@ -13,7 +13,7 @@ WHITE = np.array([0.50, 0.43, 0.39])  # linear albedo
 VESSELS = np.array([0.55, 0.20, 0.15])
 
 
-def eye_picture(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512) -> np.ndarray:
+def paint_eyes(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512) -> np.ndarray:
     """Linear albedo float32 [size, size, 3] of both eyes of a person; iris: its albedo [3]; ball_radius in metres."""
     rng = np.random.default_rng([seed, 64])
     y, x = (np.mgrid[0:size, 0:size] + 0.5) / size - 0.5

@@ -35,8 +35,8 @@ def render(work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot
     bare : without hair, lashes and clothes
     module : what is run to do the job
     """
-    parts = {"skin": skin_part(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen,
-                               figure.skin.specular, figure.skin.normal)}
+    parts = {"skin": write_skin(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen,
+                                figure.skin.specular, figure.skin.normal)}
     for side, ball in zip(("left", "right"), figure.opened.balls, strict=True):
         parts[f"{side}_eye"] = _written(work, f"{side}_eye", ball.mesh, "eyes", figure.eye)
     strands = []
@@ -55,7 +55,7 @@ def render_parts(work: Path, seed: int, mesh_jobs: dict[str, dict], strands: lis
     ----------
     work, light, shot, module : as `render` takes them
     seed : of the room behind the person
-    mesh_jobs : by name what the job says of a mesh, as `skin_part` gives it
+    mesh_jobs : by name what the job says of a mesh, as `write_skin` gives it
     strands : files of hair
     """
     work.mkdir(parents=True, exist_ok=True)
@@ -79,7 +79,7 @@ def render_parts(work: Path, seed: int, mesh_jobs: dict[str, dict], strands: lis
                    stdout=subprocess.DEVNULL)
 
 
-def skin_part(work: Path, mesh: Mesh, albedo: np.ndarray, specular: np.ndarray, normal: np.ndarray) -> dict:
+def write_skin(work: Path, mesh: Mesh, albedo: np.ndarray, specular: np.ndarray, normal: np.ndarray) -> dict:
     """A skin for render_parts: a mesh with UVs, its linear albedo [S, S, 3], Specular IOR Level [S, S] and unit tangent
     normals [S, S, 3]."""
     skin = _written(work, "skin", mesh, "skin", albedo)

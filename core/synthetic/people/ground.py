@@ -36,7 +36,7 @@ def ground_of(skin: Mesh) -> Ground:
                   normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))
 
 
-def strewn(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.random.Generator) -> Roots:
+def strew_roots(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.random.Generator) -> Roots:
     """Roots at `density` [N] hairs per mm^2 whose hairs lie along `way` [N, 3] (template's space, any length),
     flattened onto the skin."""
     at, texel = strew(ground.canvas, density, rng)

@@ -19,7 +19,7 @@ TAPS = 9
 FAR_M = 1.6  # what is behind the person
 
 
-def sway(frames: int, millimetres: float, degrees: float, rng: np.random.Generator) -> np.ndarray:
+def sample_sway(frames: int, millimetres: float, degrees: float, rng: np.random.Generator) -> np.ndarray:
     """Head-to-world matrices [frames, 4, 4] of a person who keeps still as well as people do: smooth motion of these
     deviations per axis, of mean zero."""
     path = gaussian_filter1d(rng.normal(size=(frames + 8 * PERIOD, 6)), PERIOD, axis=0)[4 * PERIOD:4 * PERIOD + frames]
@@ -31,8 +31,8 @@ def sway(frames: int, millimetres: float, degrees: float, rng: np.random.Generat
     return poses
 
 
-def image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray,
-                 coarse: float = 0.125) -> np.ndarray:
+def measure_image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray,
+                         coarse: float = 0.125) -> np.ndarray:
     """How far each pixel of the middle view moves in a frame's time, [H, W, 2] in pixels: from the views before and
     after it, the head (`caster`) being where poses [3, 4, 4] say; all else stands still."""
     before, now, after = views

@@ -58,19 +58,19 @@ def sample_phone(seed: int) -> Phone:
 def develop(linear: np.ndarray, phone: Phone, gain: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """sRGB [H, W, 3] in [0, 1] of scene light; `gain` [3] is the exposure and white balance. Compression is left to
     what stores the picture."""
-    sensed = np.clip(noisy(np.clip(linear * gain, 0, 4), phone.shot, phone.read, rng), 0, None)
-    picture = tone(reduced(sensed, phone.reduction, phone.shot, phone.read), phone.contrast, phone.shoulder)
+    sensed = np.clip(add_noise(np.clip(linear * gain, 0, 4), phone.shot, phone.read, rng), 0, None)
+    picture = tone(reduce_noise(sensed, phone.reduction, phone.shot, phone.read), phone.contrast, phone.shoulder)
     picture = with_local_contrast(picture, phone.local, phone.local_radius * len(picture))
     return np.clip(sharpened(picture, phone.sharpening, phone.sharpening_px), 0, 1).astype(np.float32)
 
 
-def noisy(linear: np.ndarray, shot: float, read: float, rng: np.random.Generator) -> np.ndarray:
+def add_noise(linear: np.ndarray, shot: float, read: float, rng: np.random.Generator) -> np.ndarray:
     """A sensor's noise: photons and reading, of variance shot x signal + read^2."""
     return (linear + rng.standard_normal(linear.shape, np.float32)
             * np.sqrt(shot * np.maximum(linear, 0) + read**2)).astype(np.float32)
 
 
-def reduced(linear: np.ndarray, strength: float, shot: float, read: float) -> np.ndarray:
+def reduce_noise(linear: np.ndarray, strength: float, shot: float, read: float) -> np.ndarray:
     """Noise reduction that keeps edges (bilateral, in the space where the noise is even), mixed in by `strength`: fine
     texture goes with the noise."""
     if strength <= 0:

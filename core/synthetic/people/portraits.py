@@ -26,14 +26,14 @@ from ...light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..environments import Environment, made_environment, panorama_environment
 from ..fitted_light import FittedLight, LampOnHead, fitted_light
 from ..olat import BASIS, LIGHTS
-from ..portrait import GOBOS, Portrait, gobo, with_lips
+from ..portrait import GOBOS, Portrait, cast_gobo, with_lips
 from ..response import curve, develop, expose
-from .clutter import backdrop, cover, with_open_mouth
+from .clutter import cover_person, open_mouth, paint_backdrop
 from .figure import Figure
 from .markings import moles, stains, tufts
-from .snapshot import GLOSS, SKIN, directions, highlight, recoloured, weave
+from .snapshot import GLOSS, SKIN, directions, recoloured, shade_highlight, weave
 from .truth import Scene
-from .unlit import Unlit, random_view, scene_of, see
+from .unlit import Unlit, random_view, scene_of, trace_unlit
 
 SIDE = 256
 CLOSEST, WIDEST = 1.25, 2.0  # side of the picture in sides of the face's landmarks
@@ -81,7 +81,7 @@ class Sitter:
     def stage(self, rng: np.random.Generator) -> RelightableView:
         """A sight from anywhere before the person."""
         view = random_view(self.scene.figure, rng, SIDE, rng.uniform(CLOSEST, WIDEST))
-        unlit = see(self.scene, view, rng)
+        unlit = trace_unlit(self.scene, view, rng)
         mesh = self.bald.mesh
         face, bary, _ = raster.render_view(self.bald, view, 1)
         here = face >= 0
@@ -132,7 +132,7 @@ def colours_of(stage: RelightableView, rng: np.random.Generator) -> Colours:
     if rng.random() < 0.6:
         log += tufts(len(albedo), stage.unlit.landmarks, rng)
     albedo = np.clip(albedo * np.exp(on_skin * log), 0.003, 0.92).astype(np.float32)
-    return Colours(*with_open_mouth(albedo, shares, stage.unlit.landmarks, rng))
+    return Colours(*open_mouth(albedo, shares, stage.unlit.landmarks, rng))
 
 
 def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator,
@@ -151,8 +151,9 @@ def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator,
     seen = shares[..., :-1].sum(-1) > 0.5
     light = float(np.mean(diffuse[seen])) if seen.any() else 1.0
     behind = shares[..., -1:]
-    radiance = (albedo * diffuse + shine) * (1 - behind) + backdrop(directions(sight), environment, light, rng) * behind
-    radiance, shares = cover(radiance, shares, sight.landmarks, light, rng)
+    ground = paint_backdrop(directions(sight), environment, light, rng)
+    radiance = (albedo * diffuse + shine) * (1 - behind) + ground * behind
+    radiance, shares = cover_person(radiance, shares, sight.landmarks, light, rng)
     face = shares[..., SKIN] > 0.5
     linear, gains = expose(radiance, face if face.sum() > 50 else shares[..., -1] < 0.5, rng)
     tone = (albedo[face] if face.sum() > 50 else albedo[seen] if seen.any() else albedo.reshape(-1, 3)).mean(0)
@@ -184,8 +185,8 @@ def _lamps(stage: RelightableView, environment: Environment,
         tint = strength * np.exp([0.6 * warm, rng.normal(0, 0.04), -warm])
         if environment.colour.any() and rng.random() < 0.5:
             tint = strength * environment.colour / max(float(environment.colour.mean()), 1e-6)
-        lost = gobo(stage.position.reshape(-1, 3).astype(np.float32), stage.unlit.lamps[k], 0.01,
-                    str(rng.choice(GOBOS)), rng)
+        lost = cast_gobo(stage.position.reshape(-1, 3).astype(np.float32), stage.unlit.lamps[k], 0.01,
+                         str(rng.choice(GOBOS)), rng)
         chosen.append(int(k))
         tints.append(tint.astype(np.float32))
         before.append(1 - np.reshape(lost, (side, side)).astype(np.float32) if np.ndim(lost) else 1.0)
@@ -241,7 +242,7 @@ def _lit(stage: RelightableView, surface: _Surface, sky: np.ndarray, lamps: list
         lamp = stage.unlit.lamps[k]
         arrives = surface.reach[..., k] * through
         diffuse = diffuse + _softened(np.maximum(surface.normal @ lamp, 0) * arrives, surface.scatters, radius) * tint
-        glint = highlight(surface.normal, towards, lamp, surface.rough) * arrives
+        glint = shade_highlight(surface.normal, towards, lamp, surface.rough) * arrives
         shine = shine + glint[..., None] * surface.reflectance * tint
     return diffuse.astype(np.float32), shine.astype(np.float32)
 

@@ -72,7 +72,7 @@ class Scene:
         return out
 
 
-def look(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3) -> Truth:
+def trace_truth(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3) -> Truth:
     """The truth through a view in the head's own axes; sun: unit direction to it, in the same axes; `over`: rays along
     a pixel's side."""
     face, bary, _ = raster.render_view(scene.whole, view, over)

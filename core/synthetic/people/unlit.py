@@ -91,7 +91,7 @@ def random_view(
     return View("", Path(), camera, rotation, np.array([0, 0, distance]) - rotation @ middle, True)
 
 
-def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) -> Unlit:
+def trace_unlit(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) -> Unlit:
     """A view of a scene with lamps from anywhere before the person."""
     face, bary, _ = raster.render_view(scene.whole, view, over)
     hit = face >= 0
@@ -129,7 +129,7 @@ def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) ->
 
 
 def true_shares(coverage: np.ndarray) -> np.ndarray:
-    """The coverage [..., len(figure.PARTS)] of truth.look as shares of face/parts.py [..., len(PARTS)]; the rest is
+    """The coverage [..., len(figure.PARTS)] of truth.Truth as shares of face/parts.py [..., len(PARTS)]; the rest is
     background."""
     out = np.zeros((*coverage.shape[:-1], len(PARTS)), np.float32)
     for k, name in enumerate(GROWN):
