@@ -18,7 +18,7 @@ import numpy as np
 
 from ..contract.messages import Reporter
 from ..synthetic.environments import read_panoramas
-from ..synthetic.people import portraits
+from ..synthetic.people import portraits, relightable
 from ..synthetic.people.figure import make_figure
 from .portraits import PortraitBatch, make_example, stacked
 
@@ -51,7 +51,7 @@ class People:
         ready = [seed for seed in self.seeds if is_prepared(seed, self.views, self.work)]
         drawn = []
         for _ in range(pairs):
-            stage = portraits.load(_path(self.work, ready[rng.integers(len(ready))], int(rng.integers(self.views))))
+            stage = relightable.load(_path(self.work, ready[rng.integers(len(ready))], int(rng.integers(self.views))))
             colours = portraits.colours_of(stage, rng)
             for _ in range(2):
                 lit = portraits.portray(stage, colours, rng, self.panoramas)
@@ -69,7 +69,7 @@ def _path(work: Path, seed: int, view: int) -> Path:
 def _prepare_one(job: tuple[int, int, Path]) -> None:
     seed, views, work = job
     cv2.setNumThreads(1)
-    sitter = portraits.Sitter(make_figure(seed, TEXELS), np.random.default_rng([seed, 92]))
+    sitter = relightable.Sitter(make_figure(seed, TEXELS), np.random.default_rng([seed, 92]))
     _path(work, seed, 0).parent.mkdir(parents=True, exist_ok=True)
     for view in range(views):
-        portraits.save(_path(work, seed, view), sitter.stage(np.random.default_rng([seed, 93, view])))
+        relightable.save(_path(work, seed, view), sitter.stage(np.random.default_rng([seed, 93, view])))
