@@ -28,8 +28,15 @@ class Scars(NamedTuple):
 
 
 def paint_scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator) -> Scars:
-    """Thin lines of 4 to 20 mm, old ones pale, young ones red, sunken or raised; `expected` of them on the bare skin of
-    face and neck."""
+    """Thin lines of 4 to 20 mm on the bare skin of face and neck, old ones pale, young ones red, sunken or raised.
+
+    Parameters
+    ----------
+    on : what is painted on
+    ground : of the same head, GROUND texels wide: where they begin
+    expected : their mean number
+    rng : draws them
+    """
     nothing = np.zeros(len(on.position), np.float32)
     if expected <= 0:
         return Scars(nothing, nothing, nothing)
@@ -61,8 +68,20 @@ def lid_distance(on: Canvas) -> np.ndarray:
 
 def put_on_make_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float,
                    rng: np.random.Generator) -> np.ndarray:
-    """The albedo [N, 3] under make-up: each of lipstick, eye shadow, liner and blusher is worn or not, up to `amount`
-    in [0, 1]."""
+    """Each of lipstick, eye shadow, liner and blusher is worn or not, at random.
+
+    Parameters
+    ----------
+    diffuse : [N, 3], linear albedo
+    area : `regions` of the canvas
+    lids : [N], its `lid_distance`
+    amount : in [0, 1], strength at most; 0 is none
+    rng : what is worn, how strong and of which colour
+
+    Returns
+    -------
+    [N, 3], linear albedo.
+    """
     if amount <= 0:
         return diffuse
     worn = amount * (rng.random(4) < [0.8, 0.5, 0.5, 0.6]) * rng.uniform(0.4, 1.0, 4)

@@ -90,8 +90,19 @@ def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str,
 
 def trace_transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster,
                    rays: int = TRANSFER_RAYS) -> np.ndarray:
-    """[N, 9]: shading of points [N, 3] per coefficient of the sky's radiance, blocked where the mesh is in the way; an
-    open surface under radiance 1 gets 1."""
+    """Shading of points per coefficient of the sky's radiance, blocked where the mesh is in the way.
+
+    Parameters
+    ----------
+    points : [N, 3] on it, in metres
+    normals : [N, 3], unit
+    caster : of the mesh
+    rays : of each point
+
+    Returns
+    -------
+    [N, 9]; an open surface under radiance 1 gets 1.
+    """
     return radiance_transfer(caster, points, normals, rays)
 
 
@@ -123,8 +134,20 @@ def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray,
 
 
 def draw_sheet(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
-    """How far an opaque sheet with holes covers (x, y) [...] in metres, in a plane across the sunlight; edges are
-    `blur` metres wide, the distance between two of the sun's rays there, so that few rays make an even penumbra."""
+    """How far an opaque sheet with holes, drawn at random, covers places in a plane across the sunlight.
+
+    Parameters
+    ----------
+    x, y : [...], the places, in metres
+    blur : width of the sheet's edges, in metres; where rays are cast, the distance between two of them there, so that
+        few make an even penumbra
+    kind : edge or blinds; leaves otherwise
+    rng : of the sheet
+
+    Returns
+    -------
+    [...] in [0, 1]; 1 where it is opaque.
+    """
     turn, shift = rng.uniform(0, np.pi), rng.uniform(-0.05, 0.05)
     along = (x - x.mean()) * np.cos(turn) + (y - y.mean()) * np.sin(turn) + shift
     if kind == "edge":
