@@ -19,7 +19,15 @@ RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}  # of a h
 
 
 def grow_beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
-    """Hairs that leave the mouth aside and fall; a longer beard is bent down and clumps."""
+    """Hairs that leave the mouth aside and fall; a longer beard is bent down and clumps.
+
+    Parameters
+    ----------
+    person : whose beard is not "none"
+    ground : of their head
+    skin : which hairs may not enter
+    rng : of single hairs
+    """
     on, kind = ground.canvas, person.beard
     density = DENSITY[kind] * beard_density(kind, on, np.random.default_rng([person.seed, 65]))
     roots = strew_roots(ground, density, _ways(on), rng)

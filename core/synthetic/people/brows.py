@@ -17,7 +17,15 @@ UPPER, LOWER = (110, 0.0085), (60, 0.0050)  # lashes on a lid, and their length 
 
 
 def grow_brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
-    """Near the nose hairs stand up, then they lie along the brow, and at the tail they point down."""
+    """Near the nose hairs stand up, then they lie along the brow, and at the tail they point down.
+
+    Parameters
+    ----------
+    person : whose they are
+    ground : of their head
+    skin : which hairs may not enter
+    rng : of single hairs
+    """
     on = ground.canvas
     region = regions(on)["brows"]
     outer = np.abs(on.position[:, :1]) / np.abs(on.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail

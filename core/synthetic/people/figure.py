@@ -80,7 +80,15 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
 
 
 def grow_hair(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:
-    """All hairs of a person: brows, lashes, and beard and hair where there are any."""
+    """All hairs of a person: brows, lashes, and beard and hair where there are any.
+
+    Parameters
+    ----------
+    person : whose they are
+    head : their closed head, in the template's topology
+    opened : the same with its lids as they are
+    cloth : on which long hair lies
+    """
     ground, skin = ground_of(head), SkinSurface(head)
     strands = [brows.grow_brows(person, ground, skin, _rng(person, 0)),
                brows.grow_lashes(person, opened, _rng(person, 1))]

@@ -80,8 +80,20 @@ def render_parts(work: Path, seed: int, mesh_jobs: dict[str, dict], strands: lis
 
 
 def write_skin(work: Path, mesh: Mesh, albedo: np.ndarray, specular: np.ndarray, normal: np.ndarray) -> dict:
-    """A skin for render_parts: a mesh with UVs, its linear albedo [S, S, 3], Specular IOR Level [S, S] and unit tangent
-    normals [S, S, 3]."""
+    """Writes a skin for `render_parts`: skin.npz, skin.png, specular.png and normal.png.
+
+    Parameters
+    ----------
+    work : folder of the job
+    mesh : of the skin, with UVs
+    albedo : [S, S, 3], linear
+    specular : [S, S], Specular IOR Level in [0, 1]
+    normal : [S, S, 3], unit, tangent space, OpenGL Y+
+
+    Returns
+    -------
+    What the job says of it.
+    """
     skin = _written(work, "skin", mesh, "skin", albedo)
     images.write_data(work / "specular.png", specular, bits=16)
     images.write_data(work / "normal.png", normal / 2 + 0.5, bits=16)

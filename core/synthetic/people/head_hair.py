@@ -47,6 +47,15 @@ def _before_the_ears(on: Canvas) -> np.ndarray:
 
 
 def grow_head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
+    """Cropped, short or long hair; long hair hangs beside the face and lies on the shoulders.
+
+    Parameters
+    ----------
+    person : whose hair is not "none"
+    ground : of their head
+    skin : which hairs may not enter, clothes included
+    rng : of single hairs
+    """
     on, style = ground.canvas, person.hair
     density = scalp_density(on, person.seed)
     roots = strew_roots(ground, density * COUNT[style] / float((density * on.area).sum()), _ways(on, person), rng)
