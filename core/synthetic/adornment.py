@@ -74,7 +74,7 @@ def put_on_make_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.nd
     ----------
     diffuse : [N, 3], linear albedo
     area : `regions` of the canvas
-    lids : [N], its `lid_distance`
+    lids : [N], `lid_distance` of the canvas
     amount : in [0, 1], strength at most; 0 is none
     rng : what is worn, how strong and of which colour
 

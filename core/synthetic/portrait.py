@@ -48,14 +48,31 @@ class Portrait:
 
 
 def sample_sight(stage: LightStage, skin: Skin, rng: np.random.Generator, size: int) -> Sight:
-    """A subject through a random camera."""
+    """A subject through a random camera.
+
+    Parameters
+    ----------
+    stage : the head
+    skin : its maps
+    rng : of camera, eyes and lamps
+    size : pixels along a side
+    """
     camera = random_camera(landmarks_of(stage), size, rng)
     return trace_sight(stage, camera, skin.diffuse, F0 * skin.specular, skin.normal, rng, open_eyes=rng.random() < 0.7)
 
 
 def relight_sight(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: list[np.ndarray] = (),
                   albedo: np.ndarray | None = None) -> Portrait:
-    """One picture of a sight under a random light. `albedo` [P, 3] replaces the sight's."""
+    """One picture of a sight under a random light.
+
+    Parameters
+    ----------
+    sight : what is seen
+    stage : of the same head
+    rng : of light, background, hair and camera
+    panoramas : as `read_panoramas` gives them; they may light it
+    albedo : [P, 3], linear, in place of the sight's
+    """
     albedo = sight.albedo if albedo is None else albedo
     environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
                    and rng.random() < 0.6 else made_environment(rng))
@@ -136,8 +153,20 @@ def with_lips(tone: np.ndarray, albedo: np.ndarray, lips: np.ndarray) -> np.ndar
 
 def cast_gobo(position: np.ndarray, lamp: np.ndarray, radius: float, kind: str,
               rng: np.random.Generator) -> np.ndarray | float:
-    """The share [P] of a lamp's light that leaves, blinds or an edge before it take away from places [P, 3] in
-    metres."""
+    """What leaves, blinds or an edge before a lamp take away of its light.
+
+    Parameters
+    ----------
+    position : [P, 3], in metres
+    lamp : [3], unit direction to it
+    radius : of the lamp, in radians; above 0.03 counts as that
+    kind : one of GOBOS
+    rng : of the gobo
+
+    Returns
+    -------
+    [P] in [0, 1]; 0 alone for none.
+    """
     if kind == "none":
         return 0.0
     right = np.cross(lamp, [0.0, 0.0, 1.0] if abs(lamp[2]) < 0.9 else [1.0, 0.0, 0.0])

@@ -103,7 +103,16 @@ def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: b
 
 
 def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> None:
-    """The video and its truth from rendered frames."""
+    """Writes the video and its truth from rendered frames.
+
+    Parameters
+    ----------
+    out : folder of both
+    work : folder of the frames, NNNNN.png
+    seed : the subject
+    skin : its maps, MAPS texels wide
+    frames : their number
+    """
     out.mkdir(parents=True, exist_ok=True)
     cameras = scene.camera_path(seed, frames)
     write_json(out / "cameras.json",
@@ -144,10 +153,21 @@ def view_of(matrix: np.ndarray, scale: float = 1.0) -> View:
 
 def trace_frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None,
                       over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun
-    (unit direction, or None) does not reach.
+    """What is true of a frame.
 
-    `opaque` is all that throws shadows, the head included; `over`: rays along a pixel's side.
+    Parameters
+    ----------
+    head : with UVs, in metres
+    opaque : all that throws shadows, the head included
+    skin : of it, MAPS texels wide
+    view : the camera, in the head's axes
+    sun : [3], unit direction to it; None: there is no shadow
+    over : rays along a pixel's side
+
+    Returns
+    -------
+    Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun does
+    not reach.
     """
     caster = raster.RayCaster(head)
     face, bary, _ = raster.render_view(caster, view, over)

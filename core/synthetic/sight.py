@@ -106,8 +106,18 @@ def landmarks_of(stage: LightStage) -> np.ndarray:
 
 def trace_sight(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, relief: np.ndarray,
                 rng: np.random.Generator, open_eyes: bool = True) -> Sight:
-    """A head through a camera. diffuse [M, M, 3] linear albedo, gloss [M, M] reflectance at normal incidence, relief
-    [M, M, 3] tangent-space normals."""
+    """A head through a camera.
+
+    Parameters
+    ----------
+    stage : the head
+    view : a square one
+    diffuse : [M, M, 3], linear albedo
+    gloss : [M, M], reflectance at normal incidence
+    relief : [M, M, 3], unit, tangent space, OpenGL Y+
+    rng : of the lamps and the eyes
+    open_eyes : whether they are drawn onto the lids
+    """
     mesh, caster = stage.mesh, raster.RayCaster(stage.mesh)
     face, bary, _ = raster.render_view(caster, view)
     hit = face >= 0

@@ -47,9 +47,16 @@ def make_skin(parameters: SkinParameters | int, size: int = 1024) -> Skin:
 
 def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas,
                traits: tuple[np.ndarray, np.ndarray] | None = None, hair: bool = True) -> Skin:
-    """make_skin on any canvas; `ground` is a canvas of the same head (GROUND texels wide) on which marks are strewn.
-    traits: what is added to the logarithms of melanin and blood [N] each; hair: whether brows, lashes, beard and scalp
-    are painted."""
+    """`make_skin` on any canvas.
+
+    Parameters
+    ----------
+    parameters : of the subject
+    on : what is painted on
+    ground : of the same head, GROUND texels wide, where marks are strewn
+    traits : added to the logarithms of melanin and of blood, [N] each
+    hair : whether brows, lashes, beard and scalp are painted
+    """
     area = regions(on)
     melanin, blood = _pigments(parameters, on, area)
     if traits is not None:
