@@ -33,9 +33,20 @@ SKIN, HAIR, BROW, BEARD, LIPS, CLOTHES = (PARTS.index(name)
 
 def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarray] = (),
                worn: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """An sRGB picture [S, S, 3] of a sight and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1].
-    worn(radiance [S, S, 3], light) -> radiance puts on what the person wears, of which the shares know nothing;
-    otherwise some wear the rims of glasses."""
+    """A photograph of a sight.
+
+    Parameters
+    ----------
+    sight : what is seen
+    rng : of colours, light, background, what covers the face, and camera
+    panoramas : as `read_panoramas` gives them; they may light it
+    worn : (radiance [S, S, 3], light) -> radiance puts on what the person wears, of which the shares know nothing;
+        without it some wear the rims of glasses
+
+    Returns
+    -------
+    An sRGB picture [S, S, 3] and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1].
+    """
     shares = sight.shares.astype(np.float32) / 255
     shares /= np.maximum(shares.sum(-1, keepdims=True), 1e-6)
     albedo = recoloured(images.srgb_to_linear(sight.albedo.astype(np.float32) / 255), shares, rng)
@@ -129,7 +140,19 @@ def _lit(sight: Unlit, albedo: np.ndarray, shares: np.ndarray, environment: Envi
 
 
 def shade_highlight(normal: np.ndarray, towards: np.ndarray, lamp: np.ndarray, rough: np.ndarray) -> np.ndarray:
-    """GGX over the reflectance [S, S], times the cosine and pi (Walter et al. 2007)."""
+    """GGX over the reflectance, times the cosine and pi (Walter et al. 2007).
+
+    Parameters
+    ----------
+    normal : [S, S, 3], unit
+    towards : [S, S, 3], unit, to the camera
+    lamp : [3], unit direction to it
+    rough : [S, S], roughness
+
+    Returns
+    -------
+    [S, S], 60 at most.
+    """
     half = towards + lamp
     half /= np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-6)
     a2 = np.maximum(rough, 0.1) ** 4

@@ -73,8 +73,15 @@ class Scene:
 
 
 def trace_truth(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3) -> Truth:
-    """The truth through a view in the head's own axes; sun: unit direction to it, in the same axes; `over`: rays along
-    a pixel's side."""
+    """The truth through a view.
+
+    Parameters
+    ----------
+    scene : the person
+    view : the camera, in the head's own axes
+    sun : [3], unit direction to it in these axes; None: there is no shadow
+    over : rays along a pixel's side
+    """
     face, bary, _ = raster.render_view(scene.whole, view, over)
     hit = face >= 0
     seen, parts = np.zeros((*hit.shape, 3), np.float32), np.zeros((*hit.shape, len(PARTS)), np.float32)

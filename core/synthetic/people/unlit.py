@@ -69,8 +69,16 @@ def landmarks_of(figure: Figure) -> np.ndarray:
 def random_view(
     figure: Figure, rng: np.random.Generator, size: int = SIZE, margin: float = WIDER * MARGIN_FACE_HEIGHTS
 ) -> View:
-    """A square picture around the head, `margin` times as large as the face's landmarks, from the front to beyond the
-    profile, from above and below, near and far, held askew."""
+    """A square picture around the head, from the front to beyond the profile, from above and below, near and far, held
+    askew.
+
+    Parameters
+    ----------
+    figure : whose head
+    rng : of where the camera stands
+    size : pixels along a side
+    margin : side of the picture in sides of the face's landmarks
+    """
     yaw, pitch, roll = np.radians([rng.uniform(-100, 100) if rng.random() < 0.45 else rng.normal(0, 25),
                                    rng.normal(0, 13), rng.normal(0, 6)])
     back = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
@@ -92,7 +100,15 @@ def random_view(
 
 
 def trace_unlit(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) -> Unlit:
-    """A view of a scene with lamps from anywhere before the person."""
+    """A view of a scene with lamps from anywhere before the person.
+
+    Parameters
+    ----------
+    scene : the person
+    view : a square one, in the head's axes
+    rng : of the lamps and of the directions of the sky
+    over : rays along a pixel's side
+    """
     face, bary, _ = raster.render_view(scene.whole, view, over)
     hit = face >= 0
     triangle, weight = face[hit], bary[hit].astype(np.float32)
