@@ -117,8 +117,19 @@ class Eyes:
         self.panoramas = read_panoramas(panoramas)
 
     def draw(self, count: int, echo: int, rng: np.random.Generator, augment: bool = True) -> list[tuple]:
-        """`echo` batches of `count` crops each, (layers [N, CHANNELS, SIDE, SIDE], shares [N, len(CLASSES), SIDE,
-        SIDE]): the same photographs, cropped and spoilt in other ways."""
+        """Batches of the same photographs, cropped and spoilt in other ways.
+
+        Parameters
+        ----------
+        count : N, crops of each batch
+        echo : number of batches
+        rng : of all of it
+        augment : off: cropped as the eyes' corners say, and not spoilt
+
+        Returns
+        -------
+        Of each batch layers [N, CHANNELS, SIDE_PX, SIDE_PX] and shares [N, len(CLASSES), SIDE_PX, SIDE_PX].
+        """
         ready = [seed for seed in self.seeds if is_prepared(seed, self.poses, self.work)]
         batches: list[list[tuple]] = [[] for _ in range(echo)]
         for _ in range(count):
@@ -132,7 +143,20 @@ class Eyes:
 
 def make_example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, rng: np.random.Generator,
                  augment: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """A photograph as the network sees it, and the shares of its classes."""
+    """A photograph as the network sees it.
+
+    Parameters
+    ----------
+    picture : sRGB [S, S, 3]
+    ball : [S, S, 2] in [0, 1], shares of white and iris
+    sight : of this eye
+    rng : of the crop and the spoiling
+    augment : whether there are any
+
+    Returns
+    -------
+    Layers float32 [CHANNELS, SIDE_PX, SIDE_PX] and shares of the classes [len(CLASSES), SIDE_PX, SIDE_PX].
+    """
     move = to_eye_crop(sight.corners, sight.left)
     if augment:
         move = jitter_crop(move, SIDE_PX, JITTER, rng)
@@ -159,8 +183,19 @@ def loss(network: ParseNet, batch: tuple, device: str) -> torch.Tensor:
 
 @torch.no_grad()
 def measure_figures(average: dict, config: str, batch: tuple, device: str) -> dict[str, float]:
-    """The averaged network on photographs of held-out figures: intersection over union of the ball and of its iris,
-    where a class is what most of a pixel is."""
+    """The averaged network on photographs of held-out figures, where a class is what most of a pixel is.
+
+    Parameters
+    ----------
+    average : its weights
+    config : one of CONFIGS
+    batch : as `Eyes.draw` gives it
+    device : on which it runs
+
+    Returns
+    -------
+    Intersection over union of the ball and of its iris.
+    """
     network = ParseNet(**CONFIGS[config]["model"], parts=len(CLASSES))
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()

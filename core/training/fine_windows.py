@@ -47,7 +47,16 @@ class Degradation:
 
 
 def prepare(seeds: list[int], views: int, work: Path, report: Reporter, workers: int) -> None:
-    """Paints `views` windows of each seed's skin into `work`, those that are missing (some seconds each)."""
+    """Paints windows of skins, those that are missing (some seconds each).
+
+    Parameters
+    ----------
+    seeds : the subjects
+    views : windows of each
+    work : folder in which they are kept
+    report : hears of progress
+    workers : processes
+    """
     wanted = [(seed, i) for seed in seeds for i in range(views) if not _path(work, seed, i).is_file()]
     if not wanted:
         return

@@ -113,8 +113,19 @@ def loss(network: ParseNet, batch: SnapshotBatch, device: str) -> torch.Tensor:
 
 @torch.no_grad()
 def measure_figures(average: dict, config: str, batch: SnapshotBatch, device: str) -> dict[str, float]:
-    """The averaged network on photographs of held-out figures: intersection over union of each part, where a part is
-    what most of a pixel is."""
+    """The averaged network on photographs of held-out figures, where a part is what most of a pixel is.
+
+    Parameters
+    ----------
+    average : its weights
+    config : one of CONFIGS
+    batch : the photographs
+    device : on which it runs
+
+    Returns
+    -------
+    Intersection over union by part.
+    """
     network = ParseNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()

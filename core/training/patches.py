@@ -55,8 +55,15 @@ class Windows:
                        for m in skins.maps[SCALES[-1]]]
 
     def draw(self, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> PatchBatch:
-        """`count` random windows: a third of each scale, three quarters of them on the face; mirrored and re-toned when
-        `augment`."""
+        """Random windows: a third of each scale, three quarters of them on the face.
+
+        Parameters
+        ----------
+        count : N
+        patch : side P in texels of a window's own scale
+        rng : of all of it
+        augment : whether they are mirrored and re-toned
+        """
         drawn = [self._one(patch, rng, augment) for _ in range(count)]
         return PatchBatch(*(torch.stack(parts) for parts in zip(*drawn, strict=True)))
 

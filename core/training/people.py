@@ -26,7 +26,16 @@ TEXELS = 512  # of a figure's maps: pixels of a crop are larger than theirs
 
 
 def prepare_people(seeds: list[int], views: int, work: Path, report: Reporter, processes: int = 2) -> None:
-    """Makes the sights of these figures that the work folder lacks."""
+    """Makes the sights of these figures that the work folder lacks.
+
+    Parameters
+    ----------
+    seeds : the figures
+    views : sights of each
+    work : folder in which they are kept
+    report : hears of progress
+    processes : that make them
+    """
     jobs = [(seed, views, work) for seed in seeds if not is_prepared(seed, views, work)]
     if not jobs:
         return

@@ -53,8 +53,18 @@ class PortraitBatch:
 
 def prepare(seeds: list[int], views: int, work: Path, report: Reporter, skins: Path | None = None,
             names: list[str] = (), processes: int = 2) -> None:
-    """Makes the sights of these subjects that the work folder lacks; `names` are carried skins of the folder `skins`
-    that some of them wear."""
+    """Makes the sights of these subjects that the work folder lacks.
+
+    Parameters
+    ----------
+    seeds : the subjects
+    views : sights of each
+    work : folder in which they are kept
+    report : hears of progress
+    skins : folder of carried skins
+    names : those of them that some subjects wear
+    processes : that make them; 1: this one
+    """
     missing = [seed for seed in seeds if not (work / f"subject_{seed}" / f"{views - 1}.npz").is_file()]
     jobs = [(seed, views, work, skins, list(names)) for seed in missing]
     if processes < 2:

@@ -103,8 +103,19 @@ def _error(network: Rcan, pairs: tuple[torch.Tensor, torch.Tensor], device: str,
 @torch.no_grad()
 def measure_figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor],
                     device: str) -> dict[str, float]:
-    """The averaged network's mean absolute error on held-out patches as a share of bicubic resampling's: diffuse,
-    normal, specular."""
+    """The averaged network on held-out patches.
+
+    Parameters
+    ----------
+    average : its weights
+    config : one of CONFIGS
+    pairs : small [N, 7, P, P] and large [N, 7, 4 P, 4 P], in the network's channels
+    device : on which it runs
+
+    Returns
+    -------
+    diffuse, normal, specular: mean absolute error as a share of bicubic resampling's.
+    """
     network = Rcan(**CONFIGS[config]["model"]).to(device, memory_format=torch.channels_last)
     network.load_state_dict(average)
     parts = [tuple(x[i:i + 4] for x in pairs) for i in range(0, len(pairs[0]), 4)]
