@@ -23,8 +23,8 @@ REGIONS = ("shadow", "band", "outside")
 FIGURES = ("psnr", "ssim", "flip", "features")
 
 
-def measure(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray,
-            regions: dict[str, np.ndarray]) -> dict[str, dict[str, float]]:
+def measure_regions(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray,
+                    regions: dict[str, np.ndarray]) -> dict[str, dict[str, float]]:
     """Region -> figures: PSNR in dB, SSIM, FLIP and the feature distance (where its network is installed), in sRGB
     after the gain per channel (linear) that is best for the whole face. albedo, truth linear [S, S, 3]; face and
     regions bool [S, S]."""

@@ -30,7 +30,7 @@ from core.geometry import raster
 from core.geometry.views import read_views
 from core.imaging import images
 
-from .figures import markdown, write
+from .figures import markdown, write_record
 from .films import read_film
 from .measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
 
@@ -183,8 +183,8 @@ def main() -> None:
     print(json.dumps(scores, indent=1))
     if arguments.json:
         ours = scores["WildCap"]
-        write(arguments.json, "albedo_score", "python -m benchmarks.albedo_score CAPTURE TRUTH",
-              {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)})
+        write_record(arguments.json, "albedo_score", "python -m benchmarks.albedo_score CAPTURE TRUTH",
+                     {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)})
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict
     return images.read_srgb(capture.maps / "diffuse_albedo.png"), {"seconds": round(seconds, 1), **share}
 
 
-def true_frames(source: Capture, truth: Path, work: Capture, settings: Settings) -> Capture:
+def use_true_frames(source: Capture, truth: Path, work: Capture, settings: Settings) -> Capture:
     """The wild capture with its true albedo frames for delit ones, up to the texture; made once."""
     if not work.texture_confidence.is_file():
         begin_at_delight(source, work.root)

@@ -32,7 +32,8 @@ TONES = (("very light", 55), ("light", 41), ("intermediate", 28), ("tan", 10), (
 and Bernerd 2013)."""
 
 
-def score(predicted: np.ndarray, photograph: np.ndarray, true: AlbedoTruth, features: bool = True) -> dict[str, float]:
+def score_picture(predicted: np.ndarray, photograph: np.ndarray, true: AlbedoTruth,
+                  features: bool = True) -> dict[str, float]:
     """FIGURES of one delit picture sRGB [H, W, 3] over the facial skin of its truth; nan what cannot be told.
     `photograph`: what it was made from."""
     box, mask = face_box(true.face), true.face

@@ -30,7 +30,7 @@ SIZE, TEXELS = 384, 512
 PICTURES = ("srgb", "albedo", "skin", "shadow")
 
 
-def portraits(work: Path, subjects: int = 6, lights: int = 2, every: int = 1) -> Photographs:
+def make_portraits(work: Path, subjects: int = 6, lights: int = 2, every: int = 1) -> Photographs:
     """`lights` pictures of each of `subjects` people per group of skin tone; what was made before lies in the folder
     `work`. Every n-th of each group."""
     found = []

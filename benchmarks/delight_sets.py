@@ -64,7 +64,7 @@ def light_stage(folder: Path, every: int = 1) -> Photographs:
     return Photographs(found)
 
 
-def frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photographs:
+def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photographs:
     """The frames of a registered capture that have a truth (benchmarks/albedo_score.py says how it is laid out),
     selected in a copy in the folder `work`.
 

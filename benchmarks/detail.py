@@ -47,7 +47,7 @@ class FaceRays:
     bare: np.ndarray
 
 
-def look(caster: raster.RayCaster, view: View, true: AlbedoTruth, margin: int = 41) -> FaceRays:
+def cast_face_rays(caster: raster.RayCaster, view: View, true: AlbedoTruth, margin: int = 41) -> FaceRays:
     """A view's rays into the head around the face of `true` (any size of that view)."""
     height, width = true.face.shape
     rows, columns = (np.flatnonzero(true.face.any(axis)) for axis in (1, 0))

@@ -45,10 +45,10 @@ def main() -> None:
     parser.add_argument("--facekit", type=Path, help="ICT-FaceKit's folder: without it they are other heads")
     asked = parser.parse_args()
     for seed in asked.only:
-        photograph(asked.folder.resolve(), seed, EYES[seed], asked.facekit)
+        photograph_person(asked.folder.resolve(), seed, EYES[seed], asked.facekit)
 
 
-def photograph(folder: Path, seed: int, kind: str, facekit: Path | None) -> None:
+def photograph_person(folder: Path, seed: int, kind: str, facekit: Path | None) -> None:
     """One of them, in a light of people_lights.KINDS."""
     capture = Capture(folder / f"{seed}.wildcap")
     if capture.head.is_file():  # written last

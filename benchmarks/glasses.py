@@ -138,7 +138,7 @@ def main() -> None:
     record["rendered"], shown = rendered(asked.work, asked.hdri)
     print(json.dumps(record, indent=1))
     if asked.json:
-        figures.write(asked.json, "glasses", COMMAND, record)
+        figures.write_record(asked.json, "glasses", COMMAND, record)
     if asked.sheet:
         images.write_srgb(asked.sheet, sheet(shown))
 

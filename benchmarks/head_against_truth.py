@@ -30,7 +30,7 @@ from core.synthetic.identities import subject_mesh
 from core.synthetic.sample import RESERVED
 
 
-def compare(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
+def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
     """Median, 90th and 95th percentile in mm over the face's pixels, as placed by the cameras and after ICP beside
     it."""
     pose, shared, theirs = pose_of_truth(capture, truth)
@@ -122,7 +122,7 @@ def main() -> None:
     parser.add_argument("mesh", type=Path, nargs="?")
     parser.add_argument("--surface", default="head.obj")
     args = parser.parse_args()
-    print(json.dumps(compare(Capture(args.capture), args.truth, args.mesh, args.surface), indent=1))
+    print(json.dumps(compare_surface(Capture(args.capture), args.truth, args.mesh, args.surface), indent=1))
 
 
 if __name__ == "__main__":

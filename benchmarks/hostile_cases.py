@@ -92,7 +92,7 @@ def kinds(names: tuple[str, ...]) -> dict[str, Kind]:
     return found
 
 
-def make(kind: Kind, place: Path, stock: Stock, rng: random.Random) -> Case:
+def make_case(kind: Kind, place: Path, stock: Stock, rng: random.Random) -> Case:
     """A new case at `place`, its capture made of hard links: nothing may be written into a file that is there."""
     shutil.copytree(stock.undisturbed.folder / "end", place, symlinks=True, copy_function=os.link)
     case = Case(place)

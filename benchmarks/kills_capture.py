@@ -144,8 +144,8 @@ def capture_at(place: Path) -> Capture:
     return Capture(place / "face.wildcap")
 
 
-def start(place: Path, moment: Moment | None = None, *, log_name: str = "told", limits: dict | None = None,
-          **job) -> Forked:
+def start_job(place: Path, moment: Moment | None = None, *, log_name: str = "told", limits: dict | None = None,
+              **job) -> Forked:
     """Writes a job and starts a worker at it."""
     return fork_worker(write_job(capture_at(place), **job), place.with_name(f"{place.name}.{log_name}"), moment,
                        **(limits or {}))
@@ -153,7 +153,7 @@ def start(place: Path, moment: Moment | None = None, *, log_name: str = "told", 
 
 def run(place: Path, **job) -> Forked:
     """Runs a job to its end, which has to be a good one."""
-    worker = start(place, **job)
+    worker = start_job(place, **job)
     ended = worker.wait()
     assert isinstance(ended, Done), ended or worker.told.with_suffix(".err").read_text()
     return worker

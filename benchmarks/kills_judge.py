@@ -25,7 +25,7 @@ PASSING = ("preview/", "checkpoints/")
 """What they hold in the middle of a stage no other run need have had: it has to be readable."""
 
 
-def after_kill(
+def judge_kill(
     place: Path,
     known_contents: Mapping[str, Collection[str]],
     masks: Mapping[str, Collection[bytes]] | None = None,
@@ -53,13 +53,13 @@ def after_kill(
     return found
 
 
-def after_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mapping[str, Collection[bytes]] | None = None,
+def judge_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mapping[str, Collection[bytes]] | None = None,
                  unlike: Collection[str] = (), within: Collection[str] = ()) -> list[str]:
     """Faults of a place in which the run that goes on has ended: every stage up to `last` has the undisturbed run's
     bytes, all of the user's is in its place, and nothing else is left. `unlike`: stages whose bytes differ from run to
-    run; `within` as of `after_kill`."""
+    run; `within` as of `judge_kill`."""
     capture, expected = capture_at(place), undisturbed.end
-    found = after_kill(place, undisturbed.known, masks, within) + find_lost(place) + _left(place)
+    found = judge_kill(place, undisturbed.known, masks, within) + find_lost(place) + _left(place)
     for stage in stages.STAGES[:stages.NAMES.index(last) + 1]:
         if stage.name in unlike:
             continue

@@ -61,7 +61,7 @@ class RegionShader:
         return self.main(lights) + self.own(lights)
 
 
-def regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
+def light_by_regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
     """`start` under K = count region lights, the recipe, and what moves them. The regions begin as clusters of place
     and lightness on the face."""
     observations = {factor: replace(o, shader=RegionShader(o.shader.normal))
@@ -120,7 +120,7 @@ class EnvironmentShader:
     total = main
 
 
-def environment(start: Start, recipe: Recipe):
+def light_by_environment(start: Start, recipe: Recipe):
     """`start` under one environment cubemap, even at first, the recipe, and what moves it."""
     observations = {factor: replace(o, shader=EnvironmentShader(o.shader.normal))
                     for factor, o in start.observations.items()}

@@ -35,8 +35,8 @@ SCALE, SAMPLES = 5 / 6, 4  # of 720 x 960; rays per pixel before denoising
 PACE = 6
 
 
-def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, description: str, frames: int,
-         room: bool) -> Capture:
+def film_person(folder: Path, name: str, figure: Figure, light: scene.SceneLight, description: str, frames: int,
+                room: bool) -> Capture:
     """FOLDER/NAME (the truth, with the video) and FOLDER/NAME.wildcap (frames, true cameras and a head half a
     millimetre off, where the room has nothing that cameras could be found by), made if they are not there; prints the
     minutes."""

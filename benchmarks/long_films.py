@@ -62,13 +62,13 @@ def main() -> None:
     folder = asked.folder.resolve()
     path = asked.json or folder / "long_films.json"
     for count in asked.frames:
-        known = figures.read(path.stem, path.parent)["figures"] if path.is_file() else {}
+        known = figures.read_record(path.stem, path.parent)["figures"] if path.is_file() else {}
         if asked.again or str(count) not in known.get("frames", {}):
             found = {"frames": {**known.get("frames", {}), str(count): row(folder, count, asked.plain_times)}}
             found["frames"] = dict(sorted(found["frames"].items(), key=lambda item: int(item[0])))
-            figures.write(path, "long_films", "python -m benchmarks.long_films FOLDER",
-                          {**found, "growth": growth(found["frames"])})
-    print(table(figures.read(path.stem, path.parent)["figures"]))
+            figures.write_record(path, "long_films", "python -m benchmarks.long_films FOLDER",
+                                 {**found, "growth": growth(found["frames"])})
+    print(table(figures.read_record(path.stem, path.parent)["figures"]))
 
 
 def film(folder: Path, count: int) -> Path:
@@ -131,8 +131,8 @@ def row(folder: Path, count: int, plain_times: float) -> dict:
     print(count, ours, flush=True)
     found = {"ours": ours, "plain": None, "times": None, "processor_times": None}
     if plain_times and "problem" not in ours:
-        plain = found["plain"] = plain_cost(capture, Capture(folder / f"{count}_plain.wildcap"), truth, count,
-                                            plain_times * ours["seconds"])
+        plain = found["plain"] = measure_plain(capture, Capture(folder / f"{count}_plain.wildcap"), truth, count,
+                                               plain_times * ours["seconds"])
         if "over_s" not in plain:
             found |= {"times": plain["seconds"] / ours["seconds"],
                       "processor_times": plain["processor_s"] / ours["processor_s"]}
@@ -148,7 +148,7 @@ def _against_truth(capture: Capture, truth: Path, frames: int) -> dict:
             "focal_px": found["focal_px"]}
 
 
-def plain_cost(capture: Capture, beside: Capture, truth: Path, count: int, limit_s: float) -> dict:
+def measure_plain(capture: Capture, beside: Capture, truth: Path, count: int, limit_s: float) -> dict:
     """Plain pycolmap on a capture's frames, in a process of its own; its cameras are left in `beside`. {"over_s"} where
     it was ended."""
     with replacing_folder(beside.root) as copy:

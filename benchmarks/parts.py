@@ -35,7 +35,7 @@ from core.synthetic.people.figure import PARTS as GROWN
 from core.synthetic.people.figure import make_figure
 from core.synthetic.people.truth import Scene
 
-from .figures import markdown, write
+from .figures import markdown, write_record
 from .films import read_film
 from .likenesses import LIKENESSES
 
@@ -76,8 +76,8 @@ def main() -> None:
         lines.append([name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in shares)])
     print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
     if asked.json:
-        write(asked.json, "parts", "python -m benchmarks.parts" + (" --frames FOLDER" if asked.frames else ""),
-              {"rows": rows}, keep=True)
+        write_record(asked.json, "parts", "python -m benchmarks.parts" + (" --frames FOLDER" if asked.frames else ""),
+                     {"rows": rows}, keep=True)
 
 
 def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -87,7 +87,7 @@ def main() -> None:
         for place in arguments.places:
             capture = make(person, arguments.folder.resolve(), place)
             if place == "wild" and not arguments.no_solve:
-                solve(capture, arguments.folder / person.name, arguments.until, arguments.quality)
+                solve_person(capture, arguments.folder / person.name, arguments.until, arguments.quality)
 
 
 def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
@@ -147,7 +147,7 @@ def write_maps(folder: Path, skin: Skin) -> None:
     images.write_data(folder / "normal.png", skin.normal / 2 + 0.5, bits=16)
 
 
-def solve(capture: Capture, truth: Path, until: str, quality: str) -> None:
+def solve_person(capture: Capture, truth: Path, until: str, quality: str) -> None:
     """Runs the chain from delight on, from the scan on where there is no head, as the worker would, as far as it is not
     fresh. Raises SystemExit with what was wrong where a stage fails."""
     values = {"solve": {"skin_tone": skin_tone(truth)}}

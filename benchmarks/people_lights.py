@@ -34,7 +34,7 @@ def window_bars(seed: int) -> SceneLight:
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
     sun = Sun(_towards(38 * side, 24), 3.4, 0.0093, (1.0, 0.9, 0.74))
     window = _patch(panorama(ROOM, ROOM, (0.07, 0.05, 0.04)), _towards(60 * side, 18), 34, (1.5, 1.75, 2.1))
-    return SceneLight(window, sun, bars(sun.direction))
+    return SceneLight(window, sun, make_bars(sun.direction))
 
 
 def mixed_lamps(seed: int) -> SceneLight:
@@ -73,8 +73,8 @@ def panorama(zenith, horizon, ground) -> np.ndarray:
     return np.where(height > 0, sky, np.asarray(ground)).astype(np.float32)
 
 
-def bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024,
-         reach: float = 0.25) -> Mesh:
+def make_bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024,
+              reach: float = 0.25) -> Mesh:
     """A window's upright and level bars between the head and the light that comes from a unit direction [3]; metres, in
     a plane across it."""
     side = np.cross(direction, [0, 0, 1.0])

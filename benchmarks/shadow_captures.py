@@ -108,7 +108,7 @@ def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.rando
     caster = raster.RayCaster(mesh)
     views = [place_camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE)
              for i, azimuth in enumerate(AZIMUTHS)]
-    write_views(capture, views, (picture(caster, view, texture, rng) for view in views))
+    write_views(capture, views, (render_picture(caster, view, texture, rng) for view in views))
 
 
 def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray],
@@ -133,8 +133,8 @@ def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarr
     model.write_binary(str(capture.cameras))
 
 
-def picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator,
-            rays: int = 2) -> np.ndarray:
+def render_picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator,
+                   rays: int = 2) -> np.ndarray:
     """sRGB [H, W, 3] before a dim, uneven background; `rays` along each side of a pixel."""
     face, bary, _ = raster.render_view(caster, view, rays)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)

@@ -34,7 +34,7 @@ from core.imaging import images
 
 from . import figures, freeze, people, state_scores
 from .albedo_score import looks
-from .measures.table import Column, Scores, summarise, to_markdown, to_record
+from .measures.table import Column, Scores, format_table, summarise, to_record
 from .pages import write_page
 from .state_captures import DELIT, METHODS, SIZE, SOLVED, Filmed, find
 from .state_scores import Figures, in_pictures, in_uv, mean_of, of_person, small
@@ -128,7 +128,7 @@ def main() -> int:
     scores, by_capture = measure(captures)
     code = code_of(captures)
     if asked.json and asked.json.is_file():
-        scores, by_capture = with_earlier(figures.read(asked.json.stem, asked.json.parent)["figures"], scores,
+        scores, by_capture = merge_earlier(figures.read_record(asked.json.stem, asked.json.parent)["figures"], scores,
                                           by_capture, code)
     text = sections(scores, by_capture)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
@@ -137,7 +137,8 @@ def main() -> int:
     if asked.json:
         found = summarise(scores, {name: column for columns in TABLES.values() for name, column in columns.items()},
                           DELIT)
-        figures.write(asked.json, "state", COMMAND, {**to_record(found, scores), "captures": by_capture, "code": code})
+        figures.write_record(asked.json, "state", COMMAND,
+                             {**to_record(found, scores), "captures": by_capture, "code": code})
     return 0
 
 
@@ -145,7 +146,7 @@ def run_chain(capture: Capture, truth: Path, quality: str) -> None:
     """The chain to the solve as far as it is not fresh; a capture that cannot be taken so far is named, and the others
     go on."""
     try:
-        people.solve(capture, truth, "solve", quality)
+        people.solve_person(capture, truth, "solve", quality)
     except SystemExit as ended:
         print(f"{capture.root.stem}: {ended}", file=sys.stderr, flush=True)
 
@@ -188,8 +189,8 @@ def measuring() -> list[Path]:
     return [*sorted(Path(__file__).parent.glob("measures/*.py")), Path(state_scores.__file__)]
 
 
-def with_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]],
-                 code: dict[str, str]) -> tuple[Scores, dict]:
+def merge_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]],
+                  code: dict[str, str]) -> tuple[Scores, dict]:
     """What was measured now over what a record has of other people, if the same code made that; else that is left out,
     and said."""
     if record.get("code") != code:
@@ -232,7 +233,7 @@ def sections(scores: Scores, by_capture: dict[str, dict[str, Figures]]) -> list[
     for title, columns in TABLES.items():
         found = summarise(scores, columns, DELIT)
         if found:
-            parts.append((title, f"{WORDS[title]}\n\n{to_markdown(found, columns, 'taken for albedo', DELIT)}"))
+            parts.append((title, f"{WORDS[title]}\n\n{format_table(found, columns, 'taken for albedo', DELIT)}"))
     return [*parts,
             ("Capture by capture",
              "PSNR in dB in the picture after one gain, and on the map up to the person's shared light; what the solve "

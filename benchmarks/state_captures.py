@@ -27,7 +27,7 @@ from core.face.head import Head, read_head
 from core.geometry.raster import interpolate
 from core.imaging import images
 
-from .controlled_captures import true_frames
+from .controlled_captures import use_true_frames
 from .measures.features_kept import BARE
 from .measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, flat_colour
 
@@ -69,7 +69,7 @@ class Filmed:
             hash_file(copy.root / name) != hash_file(self.capture.root / name) for name in same)
         if changed:
             copy.texture_confidence.unlink()
-        return true_frames(self.capture, self.truth, copy, Settings())
+        return use_true_frames(self.capture, self.truth, copy, Settings())
 
     def inputs(self) -> list[Path]:
         """The files that the figures of this capture depend on, but for the truth's pictures."""

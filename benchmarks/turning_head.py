@@ -56,8 +56,8 @@ def main() -> int:
            "cameras": record["stages"].get("cameras", {}).get("figures", {}), "stopped": record.get("stopped")}
     print(said.stdout[-2000:], *findings, row, sep="\n")
     if arguments.json:
-        figures.write(arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row},
-                      keep=True)
+        figures.write_record(arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row},
+                             keep=True)
     return (0 if any("stood still" in text for text in [*findings, (record.get("stopped") or {}).get("problem", "")])
             else 1)
 

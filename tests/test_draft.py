@@ -6,7 +6,7 @@ as the shipped one does."""
 import pytest
 import torch
 
-from benchmarks.prior_figures import errors, given_diffuse, of_subject, reflectance
+from benchmarks.prior_figures import errors, of_subject, reflectance, sample_given_diffuse
 from core.face import template
 from core.solve.draft import restore_maps
 from core.solve.prior import coordinates, load
@@ -59,7 +59,7 @@ def test_the_shipped_prior_restores_a_held_out_subject(seed):
     size = 256
     truth, face = reflectance(seed, size), torch.from_numpy(template.mask("face", size) > 0.5)
     prior = of_subject(load(), truth)
-    drawn = given_diffuse(prior, truth, 30, "proximal")  # as many as a draft takes
+    drawn = sample_given_diffuse(prior, truth, 30, "proximal")  # as many as a draft takes
     coords = coordinates(size, slice(0, size), slice(0, size))
     out = restore_maps(prior, drawn[None], coords, 0)[0]
     assert torch.equal(out[:3], drawn[:3])

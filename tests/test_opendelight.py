@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.costs.opendelight import base, enhancer, write_random
+from benchmarks.costs.opendelight import base, enhancer, write_random_checkpoint
 from core import __main__ as terminal
 from core.contract.capture import Capture
 from core.contract.messages import CancelledError, Problem, Reporter
@@ -35,7 +35,7 @@ SMALL = {"width": 64, "depth": 2, "channels": 12, "unet": 4}
 @pytest.fixture(scope="module")
 def checkpoint(tmp_path_factory):
     folder = tmp_path_factory.mktemp("opendelight")
-    write_random(folder, **SMALL)
+    write_random_checkpoint(folder, **SMALL)
     return folder
 
 
@@ -205,7 +205,7 @@ def test_a_checkpoint_must_be_chosen():
 
 
 def test_a_width_that_has_no_heads_is_refused(tmp_path):
-    write_random(tmp_path, width=80, depth=1, channels=12, unet=4)
+    write_random_checkpoint(tmp_path, width=80, depth=1, channels=12, unet=4)
     with pytest.raises(Problem, match="no multiple of 64"):
         load(str(tmp_path))
 

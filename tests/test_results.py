@@ -53,8 +53,8 @@ def test_a_phrase_that_was_reworded_or_stands_there_twice_is_found():
 
 
 def test_a_page_tells_what_its_records_know(tmp_path):
-    figures.write(tmp_path / "one.json", "demo", "make demo", {"views": 14})
-    record = figures.read("one", tmp_path)
+    figures.write_record(tmp_path / "one.json", "demo", "make demo", {"views": 14})
+    record = figures.read_record("one", tmp_path)
     told_of = pages.page_text("One", [record], [("", "Words."), ("More", "| a |\n| --- |")])
     assert told_of.startswith(f"{pages.MADE}\n\n# One\n\nMade by `make demo`, commit ")
     assert told_of.endswith("Words.\n\n## More\n\n| a |\n| --- |\n")

@@ -197,11 +197,11 @@ def test_figures_in_pictures_are_kept_until_something_changes(tmp_path, monkeypa
 def test_people_measured_before_by_the_same_code_stay_in_the_record():
     code, row = {"solve": "a", "measures": "b"}, {"psnr": 30.0}
     record = {"people": {DELIT: {"anna": row}}, "captures": {"anna": {DELIT: row}}, "code": code}
-    scores, by_capture = state.with_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}},
-                                            code)
+    scores, by_capture = state.merge_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}},
+                                             code)
     assert scores == {DELIT: {"anna": row, "ben": row}, SOLVED: {"ben": row}}
     assert list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
-    assert state.with_earlier(record, {}, {}, {**code, "solve": "c"}) == ({}, {})
+    assert state.merge_earlier(record, {}, {}, {**code, "solve": "c"}) == ({}, {})
 
 
 def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
@@ -226,7 +226,7 @@ def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path,
     def fail(capture, truth, until, quality):
         raise SystemExit("There is no head.")
 
-    monkeypatch.setattr(state.people, "solve", fail)
+    monkeypatch.setattr(state.people, "solve_person", fail)
     state.run_chain(Capture(tmp_path / "anna.wildcap"), tmp_path / "anna", "draft")
     assert capsys.readouterr().err == "anna: There is no head.\n"
 

@@ -22,8 +22,8 @@ def forget(key: tuple) -> None:
     _answers.pop(key, None)
 
 
-def ask(key: tuple, work: Callable[[BackgroundTask], object], operator: str,
-        meant: Callable[[], bool] = lambda: True) -> None:
+def find_answer(key: tuple, work: Callable[[BackgroundTask], object], operator: str,
+                meant: Callable[[], bool] = lambda: True) -> None:
     """Runs `work(task)` as a job that the tab shows, and then, where it is `meant` as before, the operator as if it
     were clicked again."""
     task = BackgroundTask("setup", work)
@@ -32,7 +32,7 @@ def ask(key: tuple, work: Callable[[BackgroundTask], object], operator: str,
         _answers[key] = task.result
         _click(operator, meant)
 
-    jobs.begin("", "ask", task, then)
+    jobs.start_worker("", "ask", task, then)
 
 
 def _click(operator: str, meant: Callable[[], bool]) -> None:

@@ -65,7 +65,7 @@ def pages() -> dict[Path, str]:
 def page(name: str) -> str:
     """The text of docs/results/NAME.md."""
     module = import_module(f"{__name__}.{name}")
-    records = [figures.read(record) for record in module.RECORDS]
+    records = [figures.read_record(record) for record in module.RECORDS]
     sections = module.sections(*(figures.Figures.of(record["figures"]) for record in records))
     return page_text(module.TITLE, [] if name == "index" else records, sections)
 

@@ -45,7 +45,7 @@ class _Published:
     """`of.NAME` are the figures of docs/figures/NAME.json."""
 
     def __getattr__(self, name: str) -> figures.Figures:
-        return figures.Figures.of(figures.read(name)["figures"])
+        return figures.Figures.of(figures.read_record(name)["figures"])
 
 
 def told() -> dict[str, list[str]]:

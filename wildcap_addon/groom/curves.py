@@ -38,7 +38,7 @@ def of(obj) -> list[bpy.types.Object]:
     return [hairs[part] for part in TITLES if part in hairs]
 
 
-def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bool:
+def grow_part(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bool:
     """The hairs of a part on the head: points [M, K, 3] in its axes, radius [M, K], colour [M, 3] linear. False where
     somebody combed the ones that are there: then only their material is seen to."""
     hair = next((child for child in of(obj) if child[captures.HAIR_KEY] == part), None)

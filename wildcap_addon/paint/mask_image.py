@@ -131,12 +131,12 @@ def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
         bpy.data.images.remove(other)
 
 
-def save(image: bpy.types.Image, capture: Capture, mask_kind: str = 'SHADOW', keep: bool = True) -> bool:
-    """As `store`, of an image."""
-    return store(mask_values(image), capture, mask_kind, keep)
+def save_image(image: bpy.types.Image, capture: Capture, mask_kind: str = 'SHADOW', keep: bool = True) -> bool:
+    """As `store_mask`, of an image."""
+    return store_mask(mask_values(image), capture, mask_kind, keep)
 
 
-def store(mask: np.ndarray, capture: Capture, mask_kind: str, keep: bool) -> bool:
+def store_mask(mask: np.ndarray, capture: Capture, mask_kind: str, keep: bool) -> bool:
     """Writes a mask [H, W] to its file (8 bit grey), atomically, and with `keep` the mask that was there to
     mask_history. Knows no bpy: a thread may do it.
 

@@ -89,11 +89,11 @@ def turntable(obj, renders: Path, light: str | Hdri, turn: Turn, settings: Rende
     if turn.turns == 'LIGHT' and isinstance(light, str) and not lights.preset(light).lamps:
         raise Problem("This light is the same from every side: turning it changes nothing.",
                       "Choose another light, or turn the head.")
-    scene = reel.turning(obj, light, turn.turns, turn.frames, settings)
+    scene = reel.animate_turn(obj, light, turn.turns, turn.frames, settings)
     if turn.film:
         reel.as_film(scene, FRAMES_PER_SECOND)
     folder = renders / "turntable"
-    output.frames(scene, folder, "turntable.mp4" if turn.film else "####.png", turn.frames, wait)
+    output.render_frames(scene, folder, "turntable.mp4" if turn.film else "####.png", turn.frames, wait)
     return folder
 
 
@@ -128,5 +128,5 @@ def render_light(obj, folder: Path, light: str | Hdri, settings: RenderSettings,
     The PNG's path.
     """
     path = folder / f"{light if isinstance(light, str) else light.path.stem}.png"
-    output.still(settings.scene(obj, light), path, wait)
+    output.render_still(settings.scene(obj, light), path, wait)
     return path

@@ -76,7 +76,8 @@ def preset(name: str) -> LightingPreset:
     return PRESETS[NAMED_BEFORE.get(name, name)]
 
 
-def build(scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float, turn: float = 0.0) -> None:
+def build_light(scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float,
+                turn: float = 0.0) -> None:
     """Replaces the lamps and the world of `scene` by those of a preset or of a picture. `frame` [4, 4] is the head's
     place without scale, `radius` its size in scene units; `turn` turns the light about the head, in radians,
     counter-clockwise from above."""

@@ -34,8 +34,8 @@ def each_light(obj: bpy.types.Object, presets: tuple[str, ...], settings: pictur
     return scene
 
 
-def turning(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int,
-            settings: picture.RenderSettings) -> bpy.types.Scene:
+def animate_turn(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int,
+                 settings: picture.RenderSettings) -> bpy.types.Scene:
     """The relight scene in which, over the frames 1 to `frames`, the 'HEAD' or the 'LIGHT' goes once around,
     counter-clockwise from above."""
     scene = settings.scene(obj, light)

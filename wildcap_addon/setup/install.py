@@ -32,8 +32,8 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
         compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is None:
-            asking.ask(("plan", compute, source, wheels), lambda task: look_up(task, compute, source, wheels, folder),
-                       "install_solver")
+            asking.find_answer(("plan", compute, source, wheels),
+                               lambda task: look_up_plan(task, compute, source, wheels, folder), "install_solver")
             return None
         return describe_plan(plan, compute, folder, index.check_space(plan, folder))
 
@@ -47,7 +47,7 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
                                          installation.PackageSource(compute, source, wheels),
                                          len(plan.packages) if plan is not None else 0)
         asking.forget(("size", str(folder)))
-        jobs.begin("", "install", task, lambda: accept(environment.python_of(folder)))
+        jobs.start_worker("", "install", task, lambda: accept(environment.python_of(folder)))
 
 
 class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
@@ -68,7 +68,7 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
         folder = preferences.environment_folder()
         size = asking.answer(("size", str(folder)))
         if size is None:
-            asking.ask(("size", str(folder)), lambda task: measure(task, folder), "remove_solver")
+            asking.find_answer(("size", str(folder)), lambda task: measure(task, folder), "remove_solver")
             return None
         return (iface_("Deletes {} and frees {}.").format(folder, index.gigabytes(size)),
                 "Captures, masks and maps stay; what pip keeps in its own cache stays, too.")
@@ -79,7 +79,7 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
         asking.forget(("size", str(folder)))
         if preferences.get().python == str(environment.python_of(folder)):
             preferences.set_python(None)
-        jobs.begin("", "ask", environment.removal(folder))
+        jobs.start_worker("", "ask", environment.removal(folder))
 
 
 def describe_plan(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
@@ -102,7 +102,7 @@ def chosen_packages() -> tuple[str, str, Path | None]:
     return pip_steps.compute_of(preferences.get().compute), source, preferences.wheels_folder()
 
 
-def look_up(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.InstallationPlan:
+def look_up_plan(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.InstallationPlan:
     """The plan of an installation, asked of the package index."""
     task.say(0, 4, "looking for a Python to begin with")
     base = installation.base_python()
