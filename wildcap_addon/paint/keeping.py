@@ -21,8 +21,25 @@ from . import mask_image
 
 
 def store_painting(mask: np.ndarray, capture: Capture, mask_kind: str, stamp: tuple) -> tuple:
-    """Writes a mask [H, W], rows from the top, if it differs from the capture's. `stamp` is that of what this
-    session wrote last; returns the new one. Raises Problem when it cannot be written."""
+    """Writes the mask that is being painted if it differs from the capture's; what this session did not write goes to
+    the history first.
+
+    Parameters
+    ----------
+    mask : [H, W] in [0, 1], rows from the top
+    capture : whose it is
+    mask_kind : 'SHADOW' or 'PROTECT'
+    stamp : size and time of the file that this session wrote last; () before the first
+
+    Returns
+    -------
+    The new stamp.
+
+    Raises
+    ------
+    Problem
+        Where it cannot be written.
+    """
     path = mask_image.file_of(capture, mask_kind)
     try:
         written = mask_image.store_mask(mask, capture, mask_kind, keep=_stamp(path) != tuple(stamp))

@@ -96,7 +96,16 @@ def push_undo(context) -> None:
 
 
 def begin_painting(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') -> None:
-    """Enters Texture Paint on the head or on the sheet, the mask as its tinted stencil and the mask brush in hand."""
+    """Enters Texture Paint, the mask as the tinted stencil and the mask brush in hand. Raises Problem without head or
+    texture.
+
+    Parameters
+    ----------
+    context : Blender's
+    item : the capture's
+    use_sheet : paint on the flat sheet, not on the head
+    mask_kind : 'SHADOW' or 'PROTECT'
+    """
     global _session
     if _session is not None and _session.which == mask_kind:
         places.follow_name(_session)

@@ -57,7 +57,15 @@ def render_still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
 
 
 def render_stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable[[], None]) -> None:
-    """As `render_still`, for the frames 1, 2, ... of the scene; `then` is called when all are there."""
+    """As `render_still`, for the frames 1, 2, ... of the scene.
+
+    Parameters
+    ----------
+    scene : of as many frames
+    paths : their PNGs, in one folder
+    wait : False returns at once
+    then : called when all are there
+    """
     global _running
     make_room(paths[0])
     scene.frame_start, scene.frame_end = 1, len(paths)
@@ -70,8 +78,17 @@ def render_stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: C
 
 
 def render_frames(scene: bpy.types.Scene, folder: Path, name: str, count: int, wait: bool) -> None:
-    """Renders the frames 1 to `count` to folder/name, which holds #### or is a film's; the folder replaces the one
-    before when all are there."""
+    """Renders the frames of a scene; the folder replaces the one before when all are there. Raises Problem where it
+    cannot be written.
+
+    Parameters
+    ----------
+    scene : rendered
+    folder : made anew
+    name : of the files in it, with #### for the frame's number; or the film's
+    count : of the frames, from 1 on
+    wait : False returns at once
+    """
     global _running
     hidden = _hidden(folder)
     shutil.rmtree(hidden, ignore_errors=True)

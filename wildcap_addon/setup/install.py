@@ -83,7 +83,19 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
 
 
 def describe_plan(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
-    """What an installation means, before the artist says yes; `free` bytes are on the folder's disk."""
+    """What an installation means, before the artist says yes.
+
+    Parameters
+    ----------
+    plan : of the installation
+    compute : a key of COMPUTES
+    folder : installed to
+    free : bytes on that folder's disk
+
+    Returns
+    -------
+    The dialog's lines.
+    """
     torch, others = plan.packages.get("torch", ""), len(plan.packages) - 1
     return (iface_("PyTorch {} for {} and {} more packages.").format(torch, iface_(COMPUTES[compute]), others),
             iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
@@ -103,7 +115,22 @@ def chosen_packages() -> tuple[str, str, Path | None]:
 
 
 def look_up_plan(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.InstallationPlan:
-    """The plan of an installation, asked of the package index."""
+    """Asks the package index what an installation would bring.
+
+    Parameters
+    ----------
+    task : says how far it is, and runs pip
+    compute : a key of COMPUTES
+    source : as the preferences have it under Packages From
+    wheels : their folder; None where they come from the index
+    folder : installed to
+
+    Raises
+    ------
+    Problem
+        Where there is no Python to begin with or no solver for this machine, the folder's path is too long, or the
+        index cannot be reached or lacks a package.
+    """
     task.say(0, 4, "looking for a Python to begin with")
     base = installation.base_python()
     locks.check_path(pip_steps.lock_of(base, REQUIREMENTS), folder, limited=os.name == "nt")

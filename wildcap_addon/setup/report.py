@@ -45,6 +45,25 @@ class WILDCAP_OT_save_report(FileOperator, bpy.types.Operator):
 
 
 def save_report(task: BackgroundTask, target: Path, python, capture, blender: str) -> Path:
+    """Writes the report in the background.
+
+    Parameters
+    ----------
+    task : says how far it is
+    target : the zip; .zip is added where it lacks
+    python : of the worker; None where there is none
+    capture : told of; None where there is none
+    blender : its version
+
+    Returns
+    -------
+    The zip that was written.
+
+    Raises
+    ------
+    Problem
+        Where the file is there already, or cannot be written.
+    """
     task.say(0, 1, "writing the report")
     return problem_report.write(target, jobs.ROOT, python, capture, Blender=blender)
 
