@@ -101,7 +101,19 @@ def main() -> None:
 
 
 def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
-    """Input -> method -> seed -> figures of one subject; each row's maps lie in work/INPUT_METHOD_SEED."""
+    """Scores all methods on one subject.
+
+    Parameters
+    ----------
+    source : a capture with texture and mask
+    truth : folder of the true albedo, and of the tone that all are given
+    work : takes each row's maps and scores; what is there is not solved again
+    size : of the maps, texels along a side
+
+    Returns
+    -------
+    Input -> method -> seed -> figures.
+    """
     torch.set_num_threads(1)
     found: dict[str, dict] = {given: {} for given in INPUTS}
     for given in INPUTS:
@@ -122,13 +134,33 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
 
 
 def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
-    """Where a row's diffuse_albedo.exr, shading.exr and score.json lie."""
+    """Where a row's diffuse_albedo.exr, shading.exr and score.json lie.
+
+    Parameters
+    ----------
+    work : folder of a subject's rows
+    input_name : one of INPUTS
+    method : one of METHODS
+    seed : of the noise
+    """
     return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
 
 
 def solve_by_method(capture: Capture, settings: Settings, method: str,
                     seed: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """Diffuse albedo and shading, linear [S, S, 3], of one method under one input, and the seconds that it took."""
+    """Solves a capture by one method.
+
+    Parameters
+    ----------
+    capture : with texture and mask
+    settings : of the solve
+    method : one of METHODS
+    seed : of the noise
+
+    Returns
+    -------
+    Diffuse albedo and shading, linear [S, S, 3], and the seconds that it took.
+    """
     began = time.monotonic()
     head = read_head(capture)
     evidence = read_evidence(capture, head, settings.solve.size)

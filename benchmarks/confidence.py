@@ -63,7 +63,18 @@ def main() -> None:
 
 
 def solve_problem(subject: int, shadows: str, size: int, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Error [S, S] and confidence [S, S] of one problem, and bool [S, S], the face."""
+    """Solves a problem as the stage does.
+
+    Parameters
+    ----------
+    subject, shadows, size : as `make_plain_problem` has them
+    steps : of the solve
+
+    Returns
+    -------
+    Error of the albedo in sRGB [S, S], after the gain per channel (linear) that is best for the face, confidence [S, S]
+    in [0, 1], and bool [S, S], the face.
+    """
     given = make_plain_problem(subject, shadows, size)
     settings = from_json({"delight": {"delighter": "none"},
                           "solve": {"size": size, "steps": steps, "skin_tone": format_skin_tone(given.tone),

@@ -102,8 +102,20 @@ def main() -> None:
 
 def measure_rows(chosen: Photographs, settings: Settings, features: bool = True, only: list[str] | None = None,
                  picture: Path | None = None) -> dict[str, dict]:
-    """Row -> {pictures, refused, figures, groups, seconds_per_picture}, or {not_run: why}; `picture`: where to show
-    them beside each other."""
+    """Scores each row's answers to a set of photographs. One that a delighter refuses counts as it is.
+
+    Parameters
+    ----------
+    chosen : the photographs
+    settings : of the delighters
+    features : whether the feature distance is measured, too
+    only : what the names of the rows begin with that are asked for; None: all
+    picture : file that shows six photographs' answers beside each other
+
+    Returns
+    -------
+    Row -> {pictures, refused, figures, groups, seconds_per_picture}, or {not_run: why}.
+    """
     results, shown = {}, []
     spread = chosen.photographs[:: max(1, len(chosen.photographs) // 6)][:6]
     for row in rows(chosen, settings):

@@ -122,7 +122,20 @@ def _bare_truth(seed: int, facekit: Path | None) -> tuple[np.ndarray, np.ndarray
 
 
 def keep_answers(path: Path, capture: Capture, albedo: np.ndarray, known: np.ndarray) -> None:
-    """Asks the delighter and keeps its answers where the albedo is known."""
+    """Asks the delighter and keeps its answers where the albedo is known.
+
+    Parameters
+    ----------
+    path : of the .npz: per answer the light, natural log [N, 3] less its mean, in cells of bare skin
+    capture : with cameras and the built-in head
+    albedo : the truth, linear [S, S, 3], in the head's UVs, of any size
+    known : bool [SIZE, SIZE], where that is one
+
+    Raises
+    ------
+    SystemExit
+        Where the capture has an own head.
+    """
     answers = ask(capture, Settings(device="cpu"), Reporter("delight", emit=lambda message: None))
     if not answers.head.head.built_in:
         raise SystemExit(f"{capture.root} has an own head: the true albedo is in the built-in one's UVs.")

@@ -126,8 +126,20 @@ def time_starts(count: int) -> dict[str, dict[str, float]]:
 
 
 def model_farm(costs: dict, disk: dict[str, float], starts: dict, assumptions: Assumptions) -> dict:
-    """All figures of the page. `costs` is what benchmarks/costs recorded. Raises Problem where its standard row is
-    not whole."""
+    """Works out all figures of the page.
+
+    Parameters
+    ----------
+    costs : what benchmarks/costs recorded
+    disk : MB of each entry of a finished capture, as `weigh` finds them
+    starts : what a task starts -> its median seconds, as `time_starts` finds them
+    assumptions : what nobody measured
+
+    Raises
+    ------
+    Problem
+        Where the standard row of the costs is not whole.
+    """
     row, cores = costs.get("standard", {}), costs["machine"]["cores"]
     if any("seconds" not in row.get(stage, {}) for stage in stages.NAMES):
         raise Problem("docs/figures/costs.json has no whole row 'standard'.",

@@ -66,8 +66,17 @@ def multiplications() -> float:
 
 def write_random_checkpoint(folder: Path, width: int = 768, depth: int = 12, channels: int = 512, unet: int = 64,
                             seed: int = 0) -> None:
-    """The two files of a checkpoint in a folder, with random values; the sizes that are not given are the published
-    ones."""
+    """Writes the two files of a checkpoint with random values; sizes that are not given are the published ones.
+
+    Parameters
+    ----------
+    folder : takes both
+    width : channels of a token of the base network
+    depth : its blocks
+    channels : of its decoder
+    unet : channels of the enhancer's first level
+    seed : of the values
+    """
     rng = torch.Generator().manual_seed(seed)
     for name, shapes in ((BASE, base(width, depth, channels)), (ENHANCER, enhancer(unet))):
         torch.save({key: _random(key, shape, rng) for key, shape in shapes.items()}, folder / name)
