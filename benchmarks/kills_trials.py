@@ -75,6 +75,14 @@ class KillTrial:
         self.faults.append(text)
 
     def judge_end(self, stage: str, masks: dict | None = None, unlike: tuple = (), unlike_folders: tuple = ()) -> None:
+        """Takes in the faults at the end of a run that went on.
+
+        Parameters
+        ----------
+        stage : the last one that was run
+        masks, unlike : as `kills_judge.judge_resume` has them
+        unlike_folders : its `within`
+        """
         self.faults += kills_judge.judge_resume(self.place, self.undisturbed, stage, masks, unlike, unlike_folders)
 
     def judge_kill(self, masks: dict | None = None, within: tuple = ()) -> None:

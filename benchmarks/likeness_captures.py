@@ -37,9 +37,19 @@ PACE = 6
 
 def film_person(folder: Path, name: str, figure: Figure, light: scene.SceneLight, description: str, frames: int,
                 room: bool) -> Capture:
-    """FOLDER/NAME (the truth, with the video) and FOLDER/NAME.wildcap (frames, true cameras and a head half a
-    millimetre off, where the room has nothing that cameras could be found by), made if they are not there; prints the
-    minutes."""
+    """Films a person, if the files are not there, and prints the minutes.
+
+    Parameters
+    ----------
+    folder : takes NAME, the truth with the video, and NAME.wildcap, the capture
+    name : of the capture
+    figure : the person
+    light : filmed in
+    description : of the light, for the record
+    frames : of the video
+    room : whether one is around the person, by which cameras can be found; without, the capture gets frames, true
+        cameras and a head half a millimetre off
+    """
     target, capture = folder / name, Capture(folder / f"{name}.wildcap")
     if (target / "skin_tone.txt").exists():  # written last
         return capture

@@ -149,8 +149,21 @@ def _against_truth(capture: Capture, truth: Path, frames: int) -> dict:
 
 
 def measure_plain(capture: Capture, beside: Capture, truth: Path, count: int, limit_s: float) -> dict:
-    """Plain pycolmap on a capture's frames, in a process of its own; its cameras are left in `beside`. {"over_s"} where
-    it was ended."""
+    """Runs plain pycolmap on a capture's frames, in a process of its own.
+
+    Parameters
+    ----------
+    capture : with frames
+    beside : gets its cameras
+    truth : the film's folder
+    count : of the film's frames
+    limit_s : seconds after which it is ended
+
+    Returns
+    -------
+    {"seconds", "processor_s"} and the figures against the truth, or "registered" 0 where it failed; {"over_s"} where it
+    was ended.
+    """
     with replacing_folder(beside.root) as copy:
         (copy / "cameras").mkdir()
         (copy / "frames").symlink_to(capture.frames)

@@ -104,8 +104,20 @@ def fit_alone(folder: Path) -> dict[str, dict]:
 
 
 def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int, pose: tuple) -> dict:
-    """The figures of the left (0) or the right eye of an open head's vertices, but for its colour and how open it truly
-    is; pose: scale, rotation and translation from the truth's world to theirs."""
+    """Measures how far a fitted eye is off the true one.
+
+    Parameters
+    ----------
+    eye : the fitted eyeball
+    opened : [N, 3], vertices of the open head, in the eyeball's world
+    true : the true open head
+    side : 0 the left eye, 1 the right one
+    pose : scale, rotation [3, 3] and translation [3] from the truth's world to theirs
+
+    Returns
+    -------
+    A figure of each of COLUMNS; None for the iris' colour and the true openness.
+    """
     scale, turn, shift = pose
     ball = true.balls[side]
     rims = [_off(opened[rim], _curve(true, side, lid) @ (scale * turn).T + shift)

@@ -58,7 +58,19 @@ def main() -> None:
 
 
 def solve_darkened(darkening: np.ndarray, mask: np.ndarray, added: bool, size: int) -> np.ndarray:
-    """Linear albedo [size, size, 3] of the sample head whose texture is multiplied by `darkening` [1024, 1024]."""
+    """Solves the sample head with a darkened texture.
+
+    Parameters
+    ----------
+    darkening : [1024, 1024], factor on the linear texture
+    mask : [1024, 1024] in [0, 1]
+    added : the mask is the artist's, and the proposal empty
+    size : of the maps, texels along a side
+
+    Returns
+    -------
+    The albedo, linear [size, size, 3].
+    """
     with tempfile.TemporaryDirectory() as folder:
         sample, capture = sample_head.copy_to(Path(folder)), Capture(Path(folder) / "darkened.wildcap")
         capture.root.mkdir()

@@ -75,8 +75,16 @@ def panorama(zenith, horizon, ground) -> np.ndarray:
 
 def make_bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024,
               reach: float = 0.25) -> Mesh:
-    """A window's upright and level bars between the head and the light that comes from a unit direction [3]; metres, in
-    a plane across it."""
+    """A window's upright and level bars between the head and the light, in a plane across it.
+
+    Parameters
+    ----------
+    direction : [3], unit, where the light comes from
+    distance : of the plane from the head, in metres
+    period : of the upright bars, in metres; level ones have 1.6 of it
+    width : of a bar, in metres
+    reach : half a side of the plane, in metres
+    """
     side = np.cross(direction, [0, 0, 1.0])
     side /= np.linalg.norm(side)
     up, places = np.cross(side, direction), np.arange(-reach, reach, period)

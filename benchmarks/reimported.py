@@ -75,8 +75,19 @@ def table(record: figures.Figures) -> str:
 
 def compare_deliveries(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int, samples: int,
                        ) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], Returned]]:
-    """The original and the original without scattering, sRGB [H, W, 3] each, and what came back of each (preset,
-    format). The extension is enabled; `work` is empty."""
+    """Delivers the sample head, imports each delivery, and renders it like the original. The extension is enabled.
+
+    Parameters
+    ----------
+    work : an empty folder
+    deliveries : (preset, format) of each
+    resolution : pixels of a side
+    samples : of Cycles
+
+    Returns
+    -------
+    The original and the original without scattering, sRGB [H, W, 3] each, and what came back of each delivery.
+    """
     import bpy
 
     from core.contract import sample_head

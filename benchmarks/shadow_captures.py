@@ -113,8 +113,15 @@ def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.rando
 
 def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray],
                 selected: int | None = None) -> None:
-    """frames/ with frames.json, and cameras/: sRGB pictures [H, W, 3] with the known cameras that took them, which
-    share one lens; so many of them, evenly spread, are selected for the texture, or all."""
+    """Writes frames/ with frames.json, and cameras/: pictures with the known cameras that took them.
+
+    Parameters
+    ----------
+    capture : takes them
+    views : the cameras, which share one lens
+    pictures : sRGB [H, W, 3], one of each
+    selected : how many, evenly spread, are selected for the texture; None: all
+    """
     capture.claim()
     taken = np.linspace(0, len(views) - 1, selected or len(views)).round().astype(int)
     model = pycolmap.Reconstruction()
@@ -135,7 +142,20 @@ def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarr
 
 def render_picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator,
                    rays: int = 2) -> np.ndarray:
-    """sRGB [H, W, 3] before a dim, uneven background; `rays` along each side of a pixel."""
+    """A picture of a head before a dim, uneven background.
+
+    Parameters
+    ----------
+    caster : of the head
+    view : the camera
+    texture : lit, linear [S, S, 3]
+    rng : of background and noise
+    rays : along each side of a pixel
+
+    Returns
+    -------
+    sRGB [H, W, 3].
+    """
     face, bary, _ = raster.render_view(caster, view, rays)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)

@@ -191,8 +191,20 @@ def measuring() -> list[Path]:
 
 def merge_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]],
                   code: dict[str, str]) -> tuple[Scores, dict]:
-    """What was measured now over what a record has of other people, if the same code made that; else that is left out,
-    and said."""
+    """What was measured now, over what a record has of other people; the record is left out, and that is said, where
+    other code made it.
+
+    Parameters
+    ----------
+    record : its figures
+    scores : method -> person -> figures
+    by_capture : capture -> method -> figures
+    code : what `code_of` says
+
+    Returns
+    -------
+    Scores and figures by capture.
+    """
     if record.get("code") != code:
         print("The record's figures were made by other code, and are replaced.", file=sys.stderr)
         return scores, by_capture

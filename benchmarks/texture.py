@@ -49,7 +49,27 @@ STEPS = 150
 
 def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: int = STEPS, size: int = 1024,
                  leave_out: int = 4, pictures: Path | None = None) -> dict:
-    """The figures of all rows. Raises Problem where the capture is not registered or no true frame belongs to it."""
+    """Scores the textures of a capture.
+
+    Parameters
+    ----------
+    capture : registered
+    truth : folder, laid out as benchmarks/albedo_score.py says
+    rows : of ROWS
+    steps : of the perceptual row's optimisation
+    size : texels along a side
+    leave_out : how many views are left out, one at a time; 0: none
+    pictures : folder that takes each row's texture
+
+    Returns
+    -------
+    Row -> figures; "leave_one_out", too.
+
+    Raises
+    ------
+    Problem
+        Where the capture is not registered or no true frame belongs to it.
+    """
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     head, report, results = read_head(capture), Reporter("texture"), {}

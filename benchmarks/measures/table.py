@@ -69,7 +69,19 @@ def standard_error(differences: list[float]) -> float | None:
 def format_table(summary: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str,
                  against: str | None = None) -> str:
     """A line per method: mean +- spread over people; with `against`, a second table of the paired differences +- their
-    standard errors. A column that nobody has is left out."""
+    standard errors. A column that nobody has is left out.
+
+    Parameters
+    ----------
+    summary : of `summarise`
+    columns : measure -> its column
+    title : heading of the methods
+    against : the method that `summary` has differences from
+
+    Returns
+    -------
+    Markdown.
+    """
     shown = {name: column for name, column in columns.items() if any(name in row for row in summary.values())}
     tables = [markdown([title, *(column.label for column in shown.values())],
                        [[method, *(_mean_text(row.get(name), column) for name, column in shown.items())]
