@@ -28,6 +28,11 @@ def test_every_page_is_written_and_in_the_index():
     assert sorted([*(name for group in index.GROUPS.values() for name in group), "index"]) == sorted(results.NAMES)
 
 
+def test_the_index_is_one_page_and_a_page_says_what_it_shows():
+    assert len(results.page("index").splitlines()) <= 75
+    assert "\n\nBrows and beards as curves, against people whose every hair is known.\n\n" in results.page("hair")
+
+
 @pytest.mark.parametrize("name", TEXTS)
 def test_figures_of_texts_written_by_hand_are_the_records(name):
     text = (ROOT / name).read_text(encoding="utf-8")

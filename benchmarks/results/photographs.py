@@ -10,7 +10,7 @@ from ..pages import Sections
 from ..photographs import COLUMNS, TITLES, WORDS
 
 TITLE = "Single photographs: the face that is kept and the light that is left"
-SAYS = "real people under many lights, beside answers that do nothing, give one colour, or know the light"
+SAYS = "Real people under many lights, beside answers that do nothing, give one colour, or know the light."
 RECORDS = ("photographs",)
 
 

@@ -11,7 +11,7 @@ from ..pages import Sections, prose
 from ..state_captures import DELIT, SOLVED
 
 TITLE = "The state of version 0.1.0"
-SAYS = "the same captures, heads and measures by the delighter and the solver of 0.1.0, and what has changed since"
+SAYS = "The same captures, heads and measures by the delighter and the solver of 0.1.0, and what has changed since."
 RECORDS = ("state_0_1_0", "state")
 COMPARED = {name: state.TABLES[table][name]
             for table, names in (("In the picture", ("psnr", "ssim", "flip", "detail", "shadow_step")),
