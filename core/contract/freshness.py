@@ -46,13 +46,32 @@ class Verdict:
 
 
 def describe_conditions(root: Path, record: dict, stage: Stage, settings: Settings) -> dict:
-    """All that the result of a stage in the capture folder `root` depends on beside its settings, as capture.json's
-    entry of the stage keeps it."""
+    """All that the result of a stage depends on beside its settings.
+
+    Parameters
+    ----------
+    root : the capture's folder
+    record : capture.json's content
+    stage : that is about to begin
+    settings : for what they name outside of the capture
+
+    Returns
+    -------
+    {"code", "inputs"}, as capture.json's entry of the stage keeps them.
+    """
     return {"code": code_key(stage.module), "inputs": _hash_inputs(root, record, stage, settings)}
 
 
 def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict:
-    """The state of a stage whose outputs are there, or were slimmed away. `record` is capture.json's content."""
+    """The state of a stage whose outputs are there, or were slimmed away.
+
+    Parameters
+    ----------
+    root : the capture's folder
+    record : capture.json's content
+    stage : that is asked about
+    settings : as they are now
+    """
     finished = record["stages"].get(stage.name)
     if finished is None:
         return Verdict(TO_DO)

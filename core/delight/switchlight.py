@@ -70,8 +70,20 @@ def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
 
 
 def parcel(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
-    """A frame as it is sent: its file as it is, and as it was agreed to. Raises Problem where it has changed, and for a
-    kind that the service does not take."""
+    """A frame as it is sent: its file as it is, and as it was agreed to.
+
+    Parameters
+    ----------
+    capture : that consent was given for
+    name : of the frame
+    content : hash of the frame that was agreed to
+    preview : whether small pictures are asked for, at half the credits
+
+    Raises
+    ------
+    Problem
+        Where the frame has changed, and for a kind that the service does not take.
+    """
     path = capture.frames / name
     if path.suffix.lower() not in MEDIA_TYPES:
         raise Problem(f"SwitchLight does not accept pictures like {name}.",
