@@ -75,7 +75,16 @@ class BuiltIn:
 
 
 def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report: Reporter) -> None:
-    """Writes own_head.obj, or removes that of another template where none is chosen."""
+    """Writes own_head.obj, or removes that of another template where none is chosen.
+
+    Parameters
+    ----------
+    capture : takes the files
+    settings : that name the artist's mesh
+    head : as registered, in metres
+    ours : the model and weights that it was registered with
+    report : takes the figures
+    """
     if not settings.registration.template:
         for path in (capture.own_head, capture.own_head_skin, capture.picture("registration", "own_template")):
             remove_file(path)
@@ -98,7 +107,18 @@ def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report:
 
 
 def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> FittedTemplate:
-    """Lays the artist's mesh over the head. Raises Problem where no face is found on it or the fit does not hold."""
+    """Lays the artist's mesh over the head.
+
+    Parameters
+    ----------
+    own : the artist's mesh, in any unit and pose
+    head, ours, report : as in `run`
+
+    Raises
+    ------
+    Problem
+        Where no face is found on it or the fit does not hold.
+    """
     whole, index = surfaces.welded(own.mesh)
     first = np.full(len(whole.vertices), -1)
     first[index[::-1]] = np.arange(len(index))[::-1]  # an old vertex of each welded one

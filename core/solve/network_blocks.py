@@ -64,6 +64,18 @@ class Shaped(torch.autograd.Function):
 
     @staticmethod
     def of(norm: Norm, convolution: nn.Conv2d, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
+        """convolution(gelu(norm(x))), in whichever way is to be had.
+
+        Parameters
+        ----------
+        norm, convolution : the layers
+        x : [N, C, H, W]
+        mapped : [N, M], the mapped noise level and conditions
+
+        Returns
+        -------
+        [N, C', H, W].
+        """
         # it learns, or nobody asks for a gradient
         if mapped.requires_grad or convolution.weight.requires_grad or not x.requires_grad:
             return convolution(functional.gelu(norm(x, mapped)))
@@ -71,6 +83,13 @@ class Shaped(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx, x: torch.Tensor, mapped: torch.Tensor, norm: Norm, convolution: nn.Conv2d) -> torch.Tensor:
+        """What torch.autograd.Function asks for.
+
+        Parameters
+        ----------
+        ctx : keeps what `backward` needs
+        x, mapped, norm, convolution : as in `of`
+        """
         ctx.save_for_backward(x, mapped)
         ctx.layers = norm, convolution
         inner = torch.empty_like(x)
