@@ -117,7 +117,7 @@ def run_local(batch: Batch, faces: Iterable[BatchFace], at_once: int, retry: boo
     forget_stop(batch.root)
     board.write(now=True)
     with ThreadPoolExecutor(at_once) as pool:
-        waiting = {pool.submit(run_face, batch, face, board, retry, ended.is_set, until, threads) for face in faces}
+        waiting = {pool.submit(_run_face, batch, face, board, retry, ended.is_set, until, threads) for face in faces}
         try:
             while waiting:
                 done, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
@@ -156,8 +156,8 @@ def forget_stop(root: Path) -> None:
         (root / STOP).unlink(missing_ok=True)
 
 
-def run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled: Callable[[], bool],
-             until: str | None = None, threads: int | None = None) -> None:
+def _run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled: Callable[[], bool],
+              until: str | None = None, threads: int | None = None) -> None:
     """One face's tasks, one after the other, as far as they go."""
     names = [group.name for group in GROUPS]
     last = names.index(until) if until else len(names) - 1
