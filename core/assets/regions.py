@@ -48,7 +48,7 @@ def distance_inside(points: np.ndarray, outline: np.ndarray) -> np.ndarray:
     return np.array([cv2.pointPolygonTest(polygon, (float(a), float(b)), True) for a, b in around(points)])
 
 
-def wanted_scale(vertices: np.ndarray, faces: np.ndarray, outline: np.ndarray, share: float = 0.70) -> np.ndarray:
+def choose_scale(vertices: np.ndarray, faces: np.ndarray, outline: np.ndarray, share: float = 0.70) -> np.ndarray:
     """UV length per metre: a share of the unit square for the face, the rest for everything else, blended over 12 mm
     outside the outline.
 

@@ -36,7 +36,7 @@ class Calibrated:
     rotation: np.ndarray
     translation: np.ndarray
 
-    def camera(self, number: int, width: int, height: int, picture: str = "") -> pycolmap.Camera:
+    def make_camera(self, number: int, width: int, height: int, picture: str = "") -> pycolmap.Camera:
         """COLMAP's camera for a picture of another size.
 
         Parameters

@@ -188,7 +188,7 @@ class Capture:
         """Whether a stage is to do, done, stale or made by older code, and why (freshness.py)."""
         if not all(self.has(name) for name in stage.writes):
             return Verdict(freshness.TO_DO)
-        return freshness.judge(self.root, self.read(), stage, settings)
+        return freshness.judge_stage(self.root, self.read(), stage, settings)
 
     def require_source(self) -> Path:
         """The source. Raises Problem where it is gone or holds something else than it did: what is made of it could not

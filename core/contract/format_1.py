@@ -34,7 +34,7 @@ def keep_stamp(stamp: list) -> dict:
     return {STAMP: stamp} if any(isinstance(known, int) for _, _, known in stamp) else {}
 
 
-def matches(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
+def is_unchanged(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
     """Whether the inputs and settings of a stage that 0.1.0 finished are what they were then.
 
     Parameters

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether a finished stage is still what its inputs, its settings and its code would give.
 
-When a stage begins, `describe_conditions` says what its result will depend on; capture.json keeps that, and `judge`
-compares it with what is there now. What differs is told apart: inputs and settings are the artist's doing, and such a
-stage is out of date; code that has changed is ours, and a stage that older code made stays as it is until the artist
-has it run again. Standard library only.
+When a stage begins, `describe_conditions` says what its result will depend on; capture.json keeps that, and
+`judge_stage` compares it with what is there now. What differs is told apart: inputs and settings are the artist's
+doing, and such a stage is out of date; code that has changed is ours, and a stage that older code made stays as it is
+until the artist has it run again. Standard library only.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def describe_conditions(root: Path, record: dict, stage: Stage, settings: Settin
     return {"code": code_key(stage.module), "inputs": _hash_inputs(root, record, stage, settings)}
 
 
-def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict:
+def judge_stage(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict:
     """The state of a stage whose outputs are there, or were slimmed away.
 
     Parameters
@@ -77,7 +77,7 @@ def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict
         return Verdict(TO_DO)
     version = str(finished.get("version", ""))
     if "inputs" not in finished:  # by WildCap 0.1.0, which kept one hash of everything
-        same = format_1.matches(root, record, stage, settings)
+        same = format_1.is_unchanged(root, record, stage, settings)
         if same and not stage.reads:
             same = not _other_source(record.get("source_stamp", []), root, record)
         return Verdict(OLDER, version=version) if same else Verdict(STALE, ("an input or a setting",), version)

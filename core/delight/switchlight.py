@@ -65,11 +65,11 @@ def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
                       "pictures at half the credits (--preview).")
     report.log("SwitchLight does not say how many credits are left." if left is None
                else f"Your account has {service.amount(left)}.")
-    return send(account, [parcel(capture, name, content, plan.preview) for name, content in plan.frames.items()],
+    return send(account, [pack_frame(capture, name, content, plan.preview) for name, content in plan.frames.items()],
                 plan.preview, report, PATIENCE)
 
 
-def parcel(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
+def pack_frame(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
     """A frame as it is sent: its file as it is, and as it was agreed to.
 
     Parameters

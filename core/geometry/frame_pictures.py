@@ -31,8 +31,8 @@ def pictures_of(capture: Capture, folder: str, kind: str) -> list[tuple[View, Pa
 
     Raises Problem where none belongs to a registered frame.
     """
-    return match(read_views(capture), {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()},
-                 Path(folder), kind, bool(folder))
+    video_frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
+    return match_pictures(read_views(capture), video_frames, Path(folder), kind, bool(folder))
 
 
 def delit_views(capture: Capture) -> list[tuple[View, Path]]:
@@ -70,8 +70,8 @@ def check_shape(path: Path, image: np.ndarray, view: View, kind: str) -> None:
                       "cropping or turning them.")
 
 
-def match(views: list[View], video_frames: dict[str, int], path: Path, kind: str = "delit",
-          folder_chosen: bool = True) -> list[tuple[View, Path]]:
+def match_pictures(views: list[View], video_frames: dict[str, int], path: Path, kind: str = "delit",
+                   folder_chosen: bool = True) -> list[tuple[View, Path]]:
     """Each registered view with its picture, in frame order.
 
     Parameters

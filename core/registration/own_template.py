@@ -129,7 +129,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     known = np.flatnonzero(np.isfinite(landmarks.points).all(1))
     seen = landmarks.points[known]
     # any side of the surface will do
-    at, bary = surfaces.Surface(whole, 0.004).nearest(seen, np.tile([0.0, -1.0, 0.0], (len(seen), 1)), 0.02, -1.0)
+    at, bary = surfaces.Surface(whole, 0.004).find_nearest(seen, np.tile([0.0, -1.0, 0.0], (len(seen), 1)), 0.02, -1.0)
     label = _components(whole)
     main = np.bincount(label[whole.faces[at[at >= 0], 0]]).argmax()
     used = np.flatnonzero(label == main)
@@ -169,10 +169,10 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     distances = dense.distances(vertices[drawn], vertex_normals(final)[drawn], 0.01)
     _require_laid(own, distances, int(drawn.sum()))
     everything = placed.apply(whole.vertices + np.tensordot(coefficients, shapes, 1))
-    everything = carried.along(everything, label, used, vertices, report)
+    everything = carried.carry_along(everything, label, used, vertices, report)
     counterpart = np.zeros(len(whole.vertices), bool)
     normals = vertex_normals(final)
-    near = surface.nearest(vertices, normals, PAINTED_M)[0] >= 0
+    near = surface.find_nearest(vertices, normals, PAINTED_M)[0] >= 0
     counterpart[used] = near & (_free_sky(final, normals) > OPEN_SKY_SHARES[0])
     return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances,
                           nonrigid.flipped_triangles(skin.moved(start), final), pictures)
@@ -208,7 +208,7 @@ def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, 
                         lambda share: report.progress(0.5 * share, 1, "fitting the head to the scan"))
     known = np.flatnonzero(follow > 0.1)
     source = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M)
-    face, bary = source.nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
+    face, bary = source.find_nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
     known, face, bary = known[face >= 0], face[face >= 0], bary[face >= 0]
     shift = ((head.vertices - over)[head.faces[face]] * bary[..., None]).sum(1)
     return start + carried.field(start[known], shift, start, report)
@@ -219,7 +219,7 @@ def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficien
     """How far each vertex of the placed skin is drawn to the head [V] in [0, 1]."""
     at = model.mesh.moved(placed.apply(model.shape(coefficients)))
     normals = vertex_normals(at)
-    face, bary = surface.nearest(at.vertices, normals, REACH_M[1])
+    face, bary = surface.find_nearest(at.vertices, normals, REACH_M[1])
     there = face >= 0
     distance = np.full(len(face), np.inf)
     nearest = raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there], bary[there])

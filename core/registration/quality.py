@@ -116,7 +116,7 @@ def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follo
                            f"Film once more and bring {name} well into view, in sharp frames.")
 
 
-def figures_of_views(report: Reporter, fitted, views: list[View], head: Mesh) -> None:
+def report_views(report: Reporter, fitted, views: list[View], head: Mesh) -> None:
     """Figures of a fit to what the views show.
 
     Parameters

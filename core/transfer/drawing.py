@@ -13,7 +13,7 @@ from ..geometry.views import View
 from ..imaging import images
 
 
-def own_map(capture: Capture, number: int, srgb: np.ndarray, side: int = 512) -> None:
+def draw_own_map(capture: Capture, number: int, srgb: np.ndarray, side: int = 512) -> None:
     """The baked albedo of a tile, small.
 
     Parameters
@@ -26,8 +26,8 @@ def own_map(capture: Capture, number: int, srgb: np.ndarray, side: int = 512) ->
     images.write_srgb(capture.picture("transfer", f"own_{number}"), images.resize(srgb, side, side))
 
 
-def scan_sheet(capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: np.ndarray, views: list[View],
-               height: int = 420) -> None:
+def draw_scan_sheet(capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: np.ndarray, views: list[View],
+                    height: int = 420) -> None:
     """A frame, and the textured scan through the same camera: lit, then albedo.
 
     Parameters
@@ -45,12 +45,12 @@ def scan_sheet(capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: np.nda
     shots = [images.resize(frame, width, height)]
     caster = raster.RayCaster(mesh)
     for texture in (colours, albedo):
-        shots.append(images.resize(images.linear_to_srgb(textured(caster, texture, view, height / view.height)), width,
-                                   height))
+        shot = images.linear_to_srgb(render_textured(caster, texture, view, height / view.height))
+        shots.append(images.resize(shot, width, height))
     images.write_srgb(capture.picture("transfer", "scan"), np.hstack(shots))
 
 
-def textured(caster: raster.RayCaster, texture: np.ndarray, view: View, scale: float) -> np.ndarray:
+def render_textured(caster: raster.RayCaster, texture: np.ndarray, view: View, scale: float) -> np.ndarray:
     """The mesh with a texture through a camera, unlit; grey behind it.
 
     Parameters

@@ -38,8 +38,10 @@ class InstallationPlan:
         return self.download + self.disk
 
 
-def plan(requirements: Path, base: Path, compute: str, source: str, run: Callable[[list[str]], tuple[int, str]],
-         say: Callable[[float, float, str], None] = lambda *_: None, wheels: Path | None = None) -> InstallationPlan:
+def plan_installation(requirements: Path, base: Path, compute: str, source: str,
+                      run: Callable[[list[str]], tuple[int, str]],
+                      say: Callable[[float, float, str], None] = lambda *_: None,
+                      wheels: Path | None = None) -> InstallationPlan:
     """What an installation would bring (see installation.py).
 
     Parameters
@@ -76,7 +78,7 @@ def plan(requirements: Path, base: Path, compute: str, source: str, run: Callabl
                                                                      entry["download_info"]["url"])
             return code, error
 
-        todo = pip_steps.steps(requirements, lock, compute, source, Path(folder), wheels)
+        todo = pip_steps.plan_steps(requirements, lock, compute, source, Path(folder), wheels)
         code, error = pip_steps.carry_out(todo, ask,
                                           lambda done: say(2 + done / len(todo), 3, "asking the package index"))
         if code:

@@ -56,8 +56,8 @@ class PipStep:
     otherwise: tuple[tuple[str, ...], ...] = ()
 
 
-def steps(requirements: Path, lock: locks.Lock, compute: str, source: str, scratch: Path,
-          wheels: Path | None = None) -> list[PipStep]:
+def plan_steps(requirements: Path, lock: locks.Lock, compute: str, source: str, scratch: Path,
+               wheels: Path | None = None) -> list[PipStep]:
     """What pip is to do in turn.
 
     Parameters

@@ -49,7 +49,7 @@ def download(requirements: Path, name: str, compute: str, source: str, folder: P
     with tempfile.TemporaryDirectory(prefix="wildcap_wheels_") as scratch:
         own_pip = pip_steps.PipStep(("--no-deps", "--require-hashes", "-r",
                                      str(Path(requirements) / "locks" / "pip.txt")))
-        steps = [*pip_steps.steps(requirements, lock, compute, source, Path(scratch)), own_pip]
+        steps = [*pip_steps.plan_steps(requirements, lock, compute, source, Path(scratch)), own_pip]
         code, error = pip_steps.carry_out(steps, lambda words: run([*pip, *words]))
     if code:
         raise Problem(f"Not all wheels for {name} could be downloaded "
