@@ -29,7 +29,7 @@ from core.imaging import images
 from core.solve.draft import restore_maps
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.network import denoise
-from core.solve.prior import WEIGHTS, ConditionedPrior, Prior, coordinates, load, make_condition, mean_at
+from core.solve.prior import WEIGHTS, ConditionedPrior, Prior, load, make_condition, make_coordinates, mean_at
 from core.solve.problem import Observation, State
 from core.solve.recipes import OURS
 from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas, seed_noise
@@ -82,7 +82,7 @@ def show_samples(options: argparse.Namespace) -> None:
     rng, side = np.random.default_rng(0), 1024 // COARSE
     face = np.argwhere(template.mask("face", side) > 0.5)
     corner = np.clip(face[rng.integers(len(face), size=options.count)] - PATCH // 2, 0, side - PATCH)
-    coords = torch.cat([coordinates(side, slice(r, r + PATCH), slice(c, c + PATCH)) for r, c in corner])
+    coords = torch.cat([make_coordinates(side, slice(r, r + PATCH), slice(c, c + PATCH)) for r, c in corner])
     tone = skins.tones[torch.from_numpy(rng.integers(len(skins.tones), size=options.count))]
     drawn = draw_from_prior(prior, coords, tone, options.steps)
     albedo = (drawn[:, :3] + 1) / 2
@@ -153,12 +153,12 @@ def measure_response(options: argparse.Namespace) -> None:
         other = skins[options.subjects[(i + 1) % len(options.subjects)]]
         conditioned = of_subject(prior, truth)
         solved = sample_given_diffuse(conditioned, truth, options.steps)
-        coords = coordinates(options.size, slice(0, options.size), slice(0, options.size))
+        coords = make_coordinates(options.size, slice(0, options.size), slice(0, options.size))
         mean = mean_at(prior.mean_face, coords, conditioned.tone)[0]
         noise = torch.randn(1, *truth.shape, generator=torch.Generator().manual_seed(0))
         expected = conditioned.respond(truth[None], coords, noise)[0]
         draft = sample_given_diffuse(conditioned, truth, options.steps, "proximal")
-        again = restore_maps(conditioned, draft[None], coords, replace(OURS, guidance="proximal"), 0)[0]
+        again = restore_maps(conditioned, draft[None], coords, 0)[0]
         rows.append([errors(maps, truth, face) for maps in (solved, expected, again, draft, mean, other)])
         print(f"{seed}: "
               + "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}"
@@ -211,12 +211,12 @@ def sample_given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: in
         texture = torch.nn.functional.interpolate(albedo[None], (side, side), mode="area")[0]
         normal = torch.zeros(3, side, side)
         normal[2] = 1
-        coords = coordinates(side, slice(0, side), slice(0, side))
+        coords = make_coordinates(side, slice(0, side), slice(0, side))
         one = torch.ones(side, side)
         found[factor] = Observation(texture, one, one, coords, Shader(normal, 0 * one, (1, 1)), (0 * one).bool(),
                                     1024 / side)
     recipe = replace(OURS, steps=steps, phases=(), guidance=guidance)
-    coords = coordinates(size, slice(0, size), slice(0, size))
+    coords = make_coordinates(size, slice(0, size), slice(0, size))
     lights = Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 1, 1), torch.ones(3))
     start = mean_at(prior.prior.mean_face, coords, prior.tone)
     return Sampler(prior, recipe, seed_noise(0)).sample(found, State(0, None, start, lights)).denoised[0] * everywhere

@@ -143,5 +143,6 @@ def test_blenders_cameras_are_written_as_they_are_read(addon, tmp_path):
     point = np.array([0.02, 0.03, -0.04])
     for read in read_cameras(tmp_path / "cameras.json"):
         across, up, _ = world_to_camera_view(scene, bpy.data.objects[read.name], Vector(point))
-        there = np.asarray(read.camera(1, 600, 800).img_from_cam((read.rotation @ point + read.translation)[None]))[0]
+        local = read.rotation @ point + read.translation
+        there = np.asarray(read.make_camera(1, 600, 800).img_from_cam(local[None]))[0]
         assert np.allclose(there, [600 * across, 800 * (1 - up)], atol=1e-3)

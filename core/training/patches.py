@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from ..face import template
-from ..solve.prior import coordinates, mean_at
+from ..solve.prior import make_coordinates, mean_at
 from ..synthetic import pigment
 from .skins import SCALES, SIZE, Skins, shrink
 
@@ -83,7 +83,7 @@ class Windows:
         known = torch.ones_like(clean)
         if area is not None:
             known = torch.cat([area[window].float().expand(3, -1, -1), torch.zeros(4, patch, patch)])
-        coords = coordinates(side, *window)[0]
+        coords = make_coordinates(side, *window)[0]
         if augment:
             clean, tone = self._toned(maps.numpy(), index, rng)
             if rng.random() < 0.5:  # the UV layout is symmetric about u = 0.5

@@ -134,7 +134,7 @@ def look_up_plan(task, compute: str, source: str, wheels: Path | None, folder: P
     task.say(0, 4, "looking for a Python to begin with")
     base = installation.base_python()
     locks.check_path(pip_steps.lock_of(base, REQUIREMENTS), folder, limited=os.name == "nt")
-    return index.plan(REQUIREMENTS, base, compute, source, task.run, task.say, wheels)
+    return index.plan_installation(REQUIREMENTS, base, compute, source, task.run, task.say, wheels)
 
 
 def measure(task, folder) -> int:
