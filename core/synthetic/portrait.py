@@ -78,10 +78,10 @@ def relight_sight(sight: Sight, stage: LightStage, rng: np.random.Generator, pan
                    and rng.random() < 0.6 else made_environment(rng))
     carried = transport(stage, sight.vertices)
     ambient, shine = _under(environment, sight, stage, carried)
-    lamps, colours, blocked = _lamps(environment, sight, rng)
+    lamps, colours, reaches = _lamps(environment, sight, rng)
     softness = np.exp(rng.uniform(np.log(0.2), np.log(2.5))) * sight.size / 256
     diffuse, specular = ambient, shine * _fresnel(sight)
-    for lamp, colour, reach in zip(lamps, colours, blocked, strict=True):
+    for lamp, colour, reach in zip(lamps, colours, reaches, strict=True):
         diffuse = diffuse + _softened(sight, np.maximum(sight.normal @ lamp, 0) * reach, softness) * colour
         specular = specular + (_highlight(sight, lamp, rng.uniform(0.3, 0.5)) * reach)[:, None] * colour
     radiance = sight.picture(albedo * diffuse + specular)
@@ -97,7 +97,7 @@ def relight_sight(sight: Sight, stage: LightStage, rng: np.random.Generator, pan
     picture, hair = _haired(picture, sight, rng) if haired else (picture, np.zeros_like(head))
     truth = sight.picture(albedo)
     shading = images.srgb_to_linear(picture) / np.maximum(truth, 0.004)
-    shadow, strong = _shadow(sight, lamps, colours, blocked, ambient)
+    shadow, strong = _shadow(sight, lamps, colours, reaches, ambient)
     bare = 1 - hair
     return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None],
                     (images.srgb_to_linear(even) / np.where(head[..., None] > 0, sight.picture(plain), 1)
