@@ -192,6 +192,11 @@ def test_figures_in_pictures_are_kept_until_something_changes(tmp_path, monkeypa
     filmed.capture.texture.write_text("another texture")
     state.seen_in_pictures(filmed, {NOTHING: np.zeros(1)})
     assert len(calls) == 2
+    for k, name in enumerate(("face", "shadow")):
+        (filmed.truth / name).mkdir()
+        (filmed.truth / name / "0001.png").write_text("drawn anew")
+        state.seen_in_pictures(filmed, {NOTHING: np.zeros(1)})
+        assert len(calls) == 3 + k, "what is measured rests on it"
 
 
 def test_people_measured_before_by_the_same_code_stay_in_the_record():
