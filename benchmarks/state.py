@@ -195,9 +195,8 @@ def with_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, F
     if record.get("code") != code:
         print("The record's figures were made by other code, and are replaced.", file=sys.stderr)
         return scores, by_capture
-    everybody = figures.merged(record["people"], scores)
-    shown = {method: everybody[method] for method in METHODS if method in everybody}
-    return shown, {**record["captures"], **by_capture}
+    everybody = {method: {**record["people"].get(method, {}), **scores.get(method, {})} for method in METHODS}
+    return {method: rows for method, rows in everybody.items() if rows}, {**record["captures"], **by_capture}
 
 
 def seen_in_pictures(filmed: Filmed, answers: dict[str, np.ndarray]) -> dict[str, Figures]:
