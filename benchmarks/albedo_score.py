@@ -34,6 +34,10 @@ from .figures import markdown, write_record
 from .films import read_film
 from .measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
 
+FINEST = 1024
+"""Texels of a map's side that are looked up one by one: a texel is then a quarter of a millimetre, and no larger than a
+pixel of the frames. Finer ones are averaged, as a pixel does: else it shows one of its texels, and pores count as
+errors."""
 LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true tone": "the true tone everywhere"}
 
 
@@ -91,8 +95,8 @@ def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, t
     -------
     The figures, and "frames_not_registered".
     """
-    albedo = images.read_srgb(texture
-                              or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
+    albedo = averaged(images.read_srgb(
+        texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists())))
     seen, missing = looks(capture, truth)
     if pictures:
         for look in seen:
@@ -100,6 +104,13 @@ def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, t
             images.write_srgb(pictures / f"{look.true.frame:04d}.jpg",
                               np.hstack([look.true.albedo * mask, look.picture(albedo) * mask]))
     return {"frames_not_registered": missing, **score_map(albedo, seen)}
+
+
+def averaged(albedo: np.ndarray) -> np.ndarray:
+    """A map, sRGB [S, S, 3], averaged in linear light to FINEST texels a side where it has more."""
+    if len(albedo) <= FINEST:
+        return albedo
+    return images.linear_to_srgb(images.resize(images.srgb_to_linear(albedo), FINEST, FINEST).clip(0, 1))
 
 
 def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:

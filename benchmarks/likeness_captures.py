@@ -95,7 +95,7 @@ def _write_truth(target: Path, figure: Figure, light: scene.SceneLight, views: l
     faces = {}
     for frame in np.unique(np.linspace(1, len(views) - 2, TRUTHS).round().astype(int)).tolist():
         sun = poses[frame, :3, :3].T @ light.sun.direction if light.sun else None
-        found, name = truth.trace_truth(seen, views[frame], sun), f"{frame:04d}.png"
+        found, name = truth.trace_truth(seen, views[frame], sun, pose=poses[frame]), f"{frame:04d}.png"
         for folder in ("albedo", "bare", "face", "normal", *(["shadow"] if light.sun else []),
                        *(f"parts/{part}" for part in PARTS)):
             (target / folder).mkdir(parents=True, exist_ok=True)

@@ -208,15 +208,15 @@ def merge_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, 
     if record.get("code") != code:
         print("The record's figures were made by other code, and are replaced.", file=sys.stderr)
         return scores, by_capture
-    everybody = figures.merged(record["people"], scores)
-    shown = {method: everybody[method] for method in METHODS if method in everybody}
-    return shown, {**record["captures"], **by_capture}
+    everybody = {method: {**record["people"].get(method, {}), **scores.get(method, {})} for method in METHODS}
+    return {method: rows for method, rows in everybody.items() if rows}, {**record["captures"], **by_capture}
 
 
 def seen_in_pictures(filmed: Filmed, answers: dict[str, np.ndarray]) -> dict[str, Figures]:
     """`in_pictures` of a capture, kept with what it was made from: the maps, the truth and the measures' own code."""
     sources = {"inputs": {path.name: hash_file(path) for path in filmed.inputs()},
-               "truth": hash_tree(filmed.truth / "albedo"), "methods": list(answers),
+               "truth": {name: hash_tree(filmed.truth / name) for name in ("albedo", "face", "shadow")},
+               "methods": list(answers),
                "code": {path.name: hash_file(path) for path in measuring()}}
     kept = filmed.work / f"{filmed.name}.json"
     if kept.is_file() and (stored := json.loads(kept.read_text(encoding="utf-8")))["sources"] == json.loads(

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 pytest.importorskip("OpenImageIO")
 pytest.importorskip("pycolmap")
 
 from core.face import lids, strands, template  # noqa: E402
-from core.geometry.meshes import vertex_normals  # noqa: E402
+from core.geometry.meshes import Mesh, vertex_normals  # noqa: E402
 from core.synthetic import sample, scene  # noqa: E402
 from core.synthetic.canvas import canvas  # noqa: E402
 from core.synthetic.identities import reserved_seeds, subject_mesh  # noqa: E402
@@ -196,6 +197,27 @@ def test_hair_is_in_what_is_seen_and_not_in_the_bare_skin(someone, seen):
 def test_a_sun_behind_the_head_reaches_no_face(ready):
     night, day = (truth.trace_truth(ready, view(0.1), np.array([0, y, 0.0]), over=1) for y in (1.0, -1.0))
     assert night.shadow[night.face].mean() > 0.9 > 0.5 > day.shadow[day.face].mean()
+
+
+def test_the_shadow_of_what_stands_still_moves_over_a_head_that_sways(someone):
+    """A plate before half of the face, its edge at x = 0 in the world: a head that is 10 mm to the side has that edge
+    10 mm from its own middle, and one that is turned with all that is about it where it was."""
+    plate = Mesh(np.array([[0, -0.4, -0.3], [0.3, -0.4, -0.3], [0.3, -0.4, 0.3], [0, -0.4, 0.3]]),
+                 np.array([[0, 1, 2], [0, 2, 3]]))
+    shaven, sun, shift = replace(someone, strands=()), np.array([0, -1.0, 0]), np.eye(4)
+    shift[0, 3] = 0.01
+
+    def shadow(blockers, pose=None, towards_sun=sun):
+        found = truth.trace_truth(truth.Scene(shaven, blockers), view(0.25), towards_sun, 1, pose)
+        return found.shadow[found.face]
+
+    still, moved = shadow(plate), shadow(plate, shift)
+    assert np.array_equal(moved, shadow(plate.moved(plate.vertices - [0.01, 0, 0])))
+    assert (moved & ~still).sum() > 50 and not (still & ~moved).any(), "more of the face lies behind the plate"
+    turned = np.eye(4)
+    turned[:3, :3] = Rotation.from_euler("z", 20, degrees=True).as_matrix()
+    about = plate.moved(plate.vertices @ turned[:3, :3].T)
+    assert (shadow(about, turned) == still).mean() > 0.999
 
 
 def test_a_seed_is_one_person(someone):

@@ -123,10 +123,10 @@ def trace_unlit(scene: Scene, view: View, rng: np.random.Generator, over: int = 
     points = (corners * weight[..., None]).sum(1) + 5e-4 * flat
     lamps = _lamps(view, rng)
     reach = [((normal @ lamp > 0)
-              & ~scene.opaque.blocked(points, np.repeat(lamp[None], len(points), 0))).astype(np.float32)
+              & ~scene.whole.blocked(points, np.repeat(lamp[None], len(points), 0))).astype(np.float32)
              for lamp in lamps]
     sky = normal + _unit(rng.normal(size=normal.shape))  # cosine-weighted about the normal
-    free = ~scene.opaque.blocked(points, _unit(sky))
+    free = ~scene.whole.blocked(points, _unit(sky))
     layers = np.concatenate([scene.albedo(triangle, weight, scene.figure.seen), _shares(scene, triangle, weight),
                              normal, np.stack(reach, 1), free[:, None]], 1)
     picture = np.zeros((*hit.shape, layers.shape[1] + 1), np.float32)
