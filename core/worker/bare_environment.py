@@ -33,7 +33,7 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
     even where Python brings one. Raises Problem."""
     folder = Path(folder)
     _empty(folder, keep)
-    code, error = run([base, "-m", "venv", "--without-pip", folder])
+    code, error = run([base, "-I", "-m", "venv", "--without-pip", folder])
     if code:
         _empty(folder, keep)
         _by_hand(folder, base)
@@ -42,7 +42,7 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
         raise Problem(f"No environment can be made from {base} ({error or 'it does not start'}).",
                       "Click Use an Existing Python.")
     has_pip = not wheel_only and answer(python, "import ensurepip; print(ensurepip.version())")
-    if not has_pip or run([python, "-m", "ensurepip", "--default-pip"])[0]:
+    if not has_pip or run([python, "-I", "-m", "ensurepip", "--default-pip"])[0]:
         unpack_pip(folder, pip_source.fetch(requirements, wheels))
     if answer(python, "import pip; print('pip')") != "pip":
         raise Problem(f"pip does not work in {folder}.", "Click Use an Existing Python, or choose another folder.")

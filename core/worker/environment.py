@@ -144,10 +144,11 @@ print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv"
 
 
 def answer(python: str | Path, code: str, timeout_s: float = 20) -> str:
-    """What `python` prints for `code`; '' when it cannot be run."""
+    """What `python` prints for `code`; '' when it cannot be run. Isolated: a json.py in the folder that Blender was
+    started in is nobody's module."""
     flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
     try:
-        result = subprocess.run([str(python), "-E", "-s", "-c", code], capture_output=True, text=True,
+        result = subprocess.run([str(python), "-I", "-c", code], capture_output=True, text=True,
                                 timeout=timeout_s, stdin=subprocess.DEVNULL, **flags)
         return result.stdout.strip()
     except (OSError, subprocess.TimeoutExpired):

@@ -135,8 +135,8 @@ class _Installing:
             bare_environment.make(folder, self.base, requirements, lambda command: task.run(command, self.hear),
                                   chosen.wheels, keep=COMPUTE_FILE)
             (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
-        pip = [python_of(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar",
-               "off"]
+        pip = [python_of(folder), "-I", "-m", "pip", "install", "--disable-pip-version-check", "--no-input",
+               "--progress-bar", "off"]
         todo = steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
         code, error = carry_out(todo, lambda words: task.run([*pip, *words], self.hear))
         if code:
