@@ -122,6 +122,20 @@ def test_an_installation_from_nothing_through_a_failure_and_another_device_to_re
     remove(folder)
 
 
+def test_wherever_pip_is_set_up_to_put_packages_this_environment_gets_them(local, made_before, tmp_path, monkeypatch):
+    (tmp_path / "pip.conf").write_text("[global]\nuser = true\n")
+    monkeypatch.setenv("PIP_CONFIG_FILE", str(tmp_path / "pip.conf"))
+    monkeypatch.setenv("PIP_USER", "1")
+    for name in ("PIP_TARGET", "PIP_PREFIX", "PIP_CONSTRAINT"):
+        monkeypatch.setenv(name, str(tmp_path / "elsewhere"))
+    task = BackgroundTask("index", lambda task: index.plan(local, installation.base_python(), "cpu", "pytorch",
+                                                           task.run))
+    task.start()
+    assert isinstance(follow(task)[-1], Done) and task.result.packages.keys() == {"tinytorch", "tinynets"}
+    assert isinstance(install(tmp_path / "env", local)[-1], Done)
+    assert verify(python_of(tmp_path / "env"), local) == [] and not (tmp_path / "elsewhere").exists()
+
+
 def test_an_environment_of_an_older_wildcap_is_brought_up_to_date(local, made_before, tmp_path):
     folder = tmp_path / "env"
     assert isinstance(install(folder, local)[-1], Done)

@@ -19,6 +19,9 @@ from collections.abc import Callable
 from ..contract import switchlight_api, unforeseen
 from ..contract.messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
 
+PLACES = frozenset({"PIP_USER", "PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_CONSTRAINT"})
+"""Environment variables of pip's that would have packages elsewhere than in the environment they are for, or others
+than a lock says."""
 GRACE_S = 1.0
 """How long a cancelled task's thread may take to end before it is waited for no longer."""
 
@@ -68,7 +71,7 @@ class BackgroundTask:
         Raises OSError when it cannot be started, and CancelledError where the task is cancelled before or meanwhile."""
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
         environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
-                       and name != switchlight_api.KEY_VARIABLE}
+                       and name not in PLACES | {switchlight_api.KEY_VARIABLE}}
         self._process = subprocess.Popen(
             [str(word) for word in command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **apart)
