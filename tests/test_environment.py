@@ -206,6 +206,11 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, made_befor
     assert plan.download == sum(wheel.stat().st_size for wheel in wheels)
     assert plan.disk == 3 * plan.download > 0
     assert index.check_space(plan, tmp_path / "not" / "there") > plan.needed
+    commands: list[list[str]] = []
+    work(task, lambda command: commands.append(list(map(str, command))) or BackgroundTask.run(task, command))
+    assert len(commands) == 2 and all("--require-hashes" in command for command in commands), (
+        "nothing that runs here comes unchecked, pip's own update neither")
+    assert str(local / "locks" / "pip.txt") in commands[0]
     huge = replace(plan, disk=1 << 60)
     with pytest.raises(Problem, match="are needed while"):
         index.check_space(huge, tmp_path)

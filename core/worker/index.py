@@ -52,7 +52,7 @@ def plan(requirements: Path, base: Path, compute: str, source: str, run: Callabl
         say(1, 3, "preparing to ask the package index")
         if wheels is None:
             # one that reads descriptions without downloading packages; an old one works, slowly
-            run([*pip, "--quiet", "--upgrade", "pip"])
+            run([*pip, "--quiet", *pip_steps.PINNED, "--require-hashes", "-r", requirements / "locks" / "pip.txt"])
         packages, report = {}, Path(folder) / "report.json"
 
         def ask(words: tuple[str, ...]) -> tuple[int, str]:
