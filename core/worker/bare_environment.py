@@ -20,7 +20,7 @@ from pathlib import Path
 from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from . import pip_source
-from .environment import answer, python_of
+from .environment import answer, empty, python_of
 
 Run = Callable[[list], tuple[int, str]]
 """Runs a command; its exit code and the last line with an error in it."""
@@ -32,10 +32,10 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
     its Python. `wheels` is a folder to take pip from in place of an index; with `wheel_only` pip comes from its wheel
     even where Python brings one. Raises Problem."""
     folder = Path(folder)
-    _empty(folder, keep)
+    empty(folder, keep)
     code, error = run([base, "-I", "-m", "venv", "--without-pip", folder])
     if code:
-        _empty(folder, keep)
+        empty(folder, keep)
         _by_hand(folder, base)
     python = python_of(folder)
     if answer(python, "import sys; print(sys.prefix != sys.base_prefix)") != "True":
@@ -61,17 +61,6 @@ def unpack_pip(folder: Path, wheel: bytes) -> None:
             file.extractall(said)
     except OSError as error:
         raise storage_problem(error, folder) from error
-
-
-def _empty(folder: Path, keep: str) -> None:
-    """Deletes what a broken or other environment has in its folder; the folder stays, and the file `keep` in it."""
-    for path in list(folder.iterdir()) if folder.is_dir() else ():
-        if path.name == keep:
-            continue
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
-        else:
-            path.unlink()
 
 
 def _by_hand(folder: Path, base: Path) -> None:
