@@ -44,6 +44,16 @@ def test_a_read_only_capture_is_delivered_elsewhere_and_looked_at_and_nothing_in
     assert not any(path.is_symlink() for path in folder.rglob("*"))
 
 
+def test_what_stands_in_for_folders_that_nobody_may_write_to_can_be_written_to(archive, tmp_path):
+    folders = [archive.root, *(path for path in archive.root.rglob("*") if path.is_dir())]
+    assert archive.maps in folders
+    for folder in folders:
+        folder.chmod(0o555)
+    with read_only.stand_in(archive, str(tmp_path / "out")) as copy:
+        assert all(path.stat().st_mode & 0o200 for path in (copy.root, copy.maps))
+    assert not list((tmp_path / "out").iterdir())
+
+
 def test_without_another_folder_it_is_refused_by_name(archive, capsys):
     before = contents(archive.root)
     assert main(["deliver", str(archive.root)]) == 2
