@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.contract.files import AWAY, replacing, storage_problem
+from core.contract.capture import Capture
+from core.contract.files import AWAY, replacing, replacing_folder, storage_problem
 from core.contract.messages import Problem
 from core.worker import read_only
 
@@ -69,6 +70,18 @@ def test_where_links_cannot_be_made_files_are_copied_and_where_nothing_can_it_is
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(Problem), read_only.stand_in(archive, str(tmp_path / "file")):
         pass
+
+
+def test_a_share_on_which_nobody_may_change_modes_takes_files_and_folders(tmp_path, monkeypatch):
+    """As one that is mounted by root for everybody: what is written there is root's."""
+    capture = Capture(tmp_path / "a.wildcap")
+    monkeypatch.setattr(os, "chmod", lambda *_, **__: (_ for _ in ()).throw(PermissionError(errno.EPERM, "not yours")))
+    capture.claim()
+    with replacing(capture.scan) as temporary:
+        temporary.write_text("scan")
+    with replacing_folder(capture.frames) as folder:
+        (folder / "00000.jpg").write_text("frame")
+    assert capture.scan.read_text() == "scan" and (capture.frames / "00000.jpg").read_text() == "frame"
 
 
 @pytest.mark.parametrize("code", sorted(AWAY))

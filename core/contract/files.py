@@ -84,7 +84,7 @@ def replacing_folder(path: Path):
 def place_file(temporary: Path, path: Path) -> None:
     """Gives a complete file its name. In a capture, one that is there and not as WildCap wrote it is kept aside."""
     root = None if path.name in ownership.BOOKS else ownership.root_of(path)
-    os.chmod(temporary, MODE)  # some libraries write files that only their owner may read
+    _set_mode(temporary)
     if root is not None:
         check_lease(root)
         if path.is_file() and not ownership.is_ours(root, path):
@@ -100,7 +100,7 @@ def place_folder(temporary: Path, path: Path) -> None:
     root, old = ownership.root_of(path), path.with_name(f".{path.name}.old")
     written = [file for file in temporary.rglob("*") if file.is_file()]
     for file in written:
-        os.chmod(file, MODE)
+        _set_mode(file)
     if root is None:
         shutil.rmtree(old, ignore_errors=True)
     else:
@@ -119,6 +119,13 @@ def place_folder(temporary: Path, path: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
     else:
         ownership.clear_replaced(root, old, path)
+
+
+def _set_mode(file: Path) -> None:
+    """The user's own: some libraries write files that only their owner may read. A share or a stick that is mounted for
+    everybody gives files another owner, who alone may do that, and a mode that everybody can read."""
+    with contextlib.suppress(OSError):
+        os.chmod(file, MODE)
 
 
 def _rename(path: Path, into: Path) -> None:
