@@ -87,7 +87,7 @@ def place_file(temporary: Path, path: Path) -> None:
     _set_mode(temporary)
     if root is not None:
         check_lease(root)
-        if path.is_file() and not ownership.is_ours(root, path):
+        if (path.is_file() or path.is_symlink()) and not ownership.is_ours(root, path):
             ownership.keep_aside(root, path)
         ownership.note_written(root, {ownership.path_inside(root, path): read_hash(temporary)})
     check_lease(root or path.parent)
@@ -105,8 +105,10 @@ def place_folder(temporary: Path, path: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
     else:
         check_lease(root)
-        if old.exists():  # of a process that was killed between the two renames
+        if os.path.lexists(old):  # of a process that was killed between the two renames
             ownership.take_back(root, old)
+        if path.is_symlink():  # what it leads to is elsewhere, and its owner's
+            ownership.keep_aside(root, path)
         ownership.note_temporary(root, old)
         ownership.note_written(root,
                                {ownership.path_inside(root, path / file.relative_to(temporary)): read_hash(file)
