@@ -135,6 +135,16 @@ def test_a_disk_that_does_not_answer_for_a_moment_costs_nobody_the_lease(capture
         write_json(capture.root / "texture.json", 1)
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has a disk that is always full")
+def test_a_lock_that_does_not_fit_on_the_disk_is_not_left_behind(capture, monkeypatch):
+    monkeypatch.setattr(lease, "open", lambda descriptor, mode: os.close(descriptor) or open("/dev/full", mode),
+                        raising=False)
+    with pytest.raises(Problem, match="The disk is full"), capture.locked():
+        pass
+    assert not capture.lock.exists()
+    capture.check_free()
+
+
 def test_the_holder_refreshes_and_gives_back_only_its_own(capture, soon):
     with capture.locked():
         before = capture.lock.stat().st_mtime_ns

@@ -125,8 +125,13 @@ def _make(lease: Lease) -> bool:
         descriptor = os.open(lease.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     except FileExistsError:
         return False
-    with open(descriptor, "wb") as file:
-        file.write(json.dumps(content).encode())
+    try:
+        with open(descriptor, "wb") as file:
+            file.write(json.dumps(content).encode())
+    except OSError:  # an empty one on a full disk would be taken for somebody who is just beginning
+        with contextlib.suppress(OSError):
+            lease.path.unlink()
+        raise
     return True
 
 
