@@ -80,6 +80,28 @@ def test_every_file_of_a_capture_has_the_users_mode(capture):
 # -- folders
 
 
+def test_every_file_is_on_the_disk_before_it_gets_its_name(capture, monkeypatch):
+    flushed, named = set(), set()
+    fsync, rename = os.fsync, os.replace
+
+    def flush(descriptor: int) -> None:
+        flushed.add(os.fstat(descriptor).st_ino)
+        fsync(descriptor)
+
+    def place(path, into) -> None:
+        files = Path(path).rglob("*") if Path(path).is_dir() else [Path(path)]
+        named.update(file.stat().st_ino for file in files if file.is_file())
+        assert named <= flushed
+        rename(path, into)
+
+    monkeypatch.setattr(os, "fsync", flush)
+    monkeypatch.setattr(os, "replace", place)
+    make_frames(capture, "00000.jpg", "00001.jpg")
+    with replacing(capture.scan) as temporary:
+        temporary.write_text("scan")
+    assert len(named) == 3
+
+
 def test_files_that_others_put_into_a_folder_of_ours_stay_where_they_are(capture):
     make_frames(capture, "00000.jpg", "00001.jpg")
     (capture.frames / "holiday.jpg").write_text("a picture")

@@ -51,8 +51,7 @@ def replacing(path: Path):
         if root is not None:
             ownership.note_temporary(root, temporary)
         yield temporary
-        with open(temporary, "rb+") as file:  # Windows flushes none that was opened to be read
-            os.fsync(file.fileno())
+        _flush(temporary)
         place_file(temporary, path)
     except OSError as error:
         raise storage_problem(error, path) from error
@@ -101,6 +100,7 @@ def place_folder(temporary: Path, path: Path) -> None:
     written = [file for file in temporary.rglob("*") if file.is_file()]
     for file in written:
         _set_mode(file)
+        _flush(file)
     if root is None:
         shutil.rmtree(old, ignore_errors=True)
     else:
@@ -121,6 +121,12 @@ def place_folder(temporary: Path, path: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
     else:
         ownership.clear_replaced(root, old, path)
+
+
+def _flush(file: Path) -> None:
+    """To the disk itself: what is renamed before that may be empty after a power cut, and on record as finished."""
+    with open(file, "rb+") as opened:  # Windows flushes none that was opened to be read
+        os.fsync(opened.fileno())
 
 
 def _set_mode(file: Path) -> None:
