@@ -79,8 +79,8 @@ class BackgroundTask:
         Raises OSError when it cannot be started, and CancelledError where the task is cancelled before or meanwhile."""
         self.check()
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
-                       and name not in PLACES | {switchlight_api.KEY_VARIABLE}}
+        environment = {name: value for name, value in switchlight_api.environment_without_key().items()
+                       if not name.startswith("PYTHON") and name not in PLACES}
         self._process = subprocess.Popen(
             [str(word) for word in command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **apart)

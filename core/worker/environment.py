@@ -13,6 +13,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+from ..contract import switchlight_api
 from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from .background import BackgroundTask
@@ -165,7 +166,8 @@ def answer(python: str | Path, code: str, timeout_s: float = 20) -> str:
     flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
     try:
         result = subprocess.run([str(python), "-I", "-c", code], capture_output=True, text=True,
-                                timeout=timeout_s, stdin=subprocess.DEVNULL, **flags)
+                                timeout=timeout_s, stdin=subprocess.DEVNULL,
+                                env=switchlight_api.environment_without_key(), **flags)
         return result.stdout.strip()
     except (OSError, subprocess.TimeoutExpired):
         return ""
