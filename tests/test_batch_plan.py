@@ -56,6 +56,20 @@ def test_a_rows_settings_lie_over_the_files_and_those_over_the_shared_ones(folde
     assert faces[1].settings == {"solve": {"steps": 9, "size": 256}, "seed": 4}, "one row's values reach no other"
 
 
+def test_a_name_that_a_disk_may_take_for_another_one_is_refused(folder, capsys):
+    """Both faces would get one capture on the disks of Windows and macOS."""
+    table, batch = folder / "shots.csv", folder / "batch"
+    table.write_text("video,name\nanna.mp4,Anna\nzoë b.mov,Zo\u00eb\n", encoding="utf-8")
+    assert main(["batch", "plan", str(table), str(batch)]) == 0
+    table.write_text("video,name\nanna.avi,ANNA\nzoë b.mov,Zoe\u0308\ncarl,\n", encoding="utf-8")
+    assert main(["batch", "plan", str(table), str(batch)]) == 2
+    told = capsys.readouterr().err
+    assert "Line 2: The name ANNA was planned before as Anna" in told and "Line 3: " in told
+    assert [face.name for face in read_batch(batch).faces] == ["Anna", "Zo\u00eb", "carl"]
+    faces, faults = plan(folder, "video,name\nanna.mp4,Zo\u00eb\nanna.avi,Zoe\u0308\n")
+    assert len(faces) == 1 and "is taken by Line 2" in faults[0].problem
+
+
 @pytest.mark.parametrize("row, said", [
     (",x,,,,", "names no video"), ("gone.mp4,,,,,", "no video or folder at"),
     ("anna.mp4,a/b,,,,", "cannot be the name"), ("anna.mp4,..,,,,", "cannot be the name"),

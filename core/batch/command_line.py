@@ -112,7 +112,8 @@ def _plan(options: argparse.Namespace) -> int:
     before = read_batch(root) if (root / NAME).is_file() else Batch(root, ())
     _refuse_strangers(root)
     batch = _with_options(before, options)
-    faces, faults = read_faces(options.shots, root, options.quality, command_settings.read_options(options, "run"))
+    faces, faults = read_faces(options.shots, root, options.quality, command_settings.read_options(options, "run"),
+                               before.faces)
     kept = [face for face in before.faces if face.name not in {new.name for new in faces}]
     if faces or kept:
         write_batch(replace(batch, faces=(*kept, *faces)))
