@@ -4,11 +4,13 @@
 
 import errno
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
 from core.__main__ import main
+from core.contract import sample_head
 from core.contract.capture import Capture
 from core.contract.files import AWAY, replacing, replacing_folder, storage_problem
 from core.contract.messages import Problem
@@ -53,6 +55,18 @@ def test_what_stands_in_for_folders_that_nobody_may_write_to_can_be_written_to(a
     with read_only.stand_in(archive, str(tmp_path / "out")) as copy:
         assert all(path.stat().st_mode & 0o200 for path in (copy.root, copy.maps))
     assert not list((tmp_path / "out").iterdir())
+
+
+def test_the_sample_head_of_an_installation_that_is_read_only_can_be_worked_on(tmp_path, monkeypatch):
+    shipped = tmp_path / "assets" / "sample_head"
+    shutil.copytree(sample_head.SHIPPED, shipped)
+    shutil.copyfile(sample_head.SHIPPED.parent / "head.obj", shipped.parent / "head.obj")
+    for folder in (shipped / "maps", shipped):
+        folder.chmod(0o555)
+    monkeypatch.setattr(sample_head, "SHIPPED", shipped)
+    capture = sample_head.copy_to(tmp_path)
+    assert capture.head.is_file() and (capture.maps / "diffuse_albedo.png").is_file()
+    assert all(folder.stat().st_mode & 0o200 for folder in (capture.root, capture.maps))
 
 
 def test_without_another_folder_it_is_refused_by_name(archive, capsys):
