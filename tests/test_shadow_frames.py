@@ -136,6 +136,18 @@ def test_what_softening_lightens_becomes_the_proposal(capture, tmp_path):
     assert columns[0] > 20 * columns[1]
 
 
+def test_smaller_softened_pictures_with_hard_edges_tell_the_same(capture, tmp_path):
+    """White letters on black cloth beside the face: the enlarged picture swings below black there."""
+    for i, view in enumerate(views()):
+        soft = images.linear_to_srgb(np.clip(seen(view, lit(0.25)), 0, 1))
+        soft[-40:] = 0
+        soft[-28:-12:8, 8:-8] = soft[-28:-12, 8:-8:8] = 1
+        small = soft[::2, ::2]
+        assert images.resize(small, view.width, view.height).mean(-1).min() < -0.13, "linear, + 0.01: below 0"
+        images.write_srgb(tmp_path / "soft" / f"{3 * i:04d}.png", small)
+    assert overlap(proposal(capture, dilate_px=0, softened=str(tmp_path / "soft"))) > 0.75
+
+
 def test_the_command_line_takes_the_folder(capture, tmp_path, monkeypatch):
     monkeypatch.setattr("core.worker.terminal.follow", lambda *arguments, **options: 0)
     capture.set_source(tmp_path)
