@@ -119,6 +119,28 @@ def test_sun_with_self_shadows_and_stripes_of_leaves_is_divided_out(capture):
     assert deviation(capture, 0.8) > 0.5
 
 
+def test_two_profiles_that_share_hardly_any_skin_are_delit(tmp_path):
+    """No point of the skin is seen twice, so those that one view alone shows tell the light."""
+    capture = profiles(tmp_path, (-80, 80))
+    run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
+    assert deviation(capture, 0.8) < 0.05
+
+
+def test_frames_of_the_back_of_the_head_are_refused(tmp_path):
+    capture = profiles(tmp_path, (170, 190))
+    with pytest.raises(Problem, match="no bare skin of the face"):
+        run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
+
+
+def profiles(folder, angles) -> Capture:
+    """A head under the sky alone, seen from two sides."""
+    capture = Capture(folder / "two.wildcap")
+    write_cameras(capture, angles)
+    meshes.write_obj(capture.head, template.load())
+    render_frames(capture, sun=0 * SUN_COLOUR)
+    return capture
+
+
 def test_quarter_of_the_skin_in_shadow_does_not_move_the_light():
     rng = np.random.default_rng(0)
     normals = fibonacci_sphere(4000)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contract.messages import Reporter
+from ..contract.messages import Problem, Reporter
 from ..face.head import Head
 from ..geometry.meshes import Mesh
 from ..geometry.raster import RayCaster, interpolate
@@ -20,6 +20,8 @@ from .surface import skin_weights, smooth_normals, vertex_colours
 
 MAX_ALBEDO = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed
 FIT_POINTS = 6000  # points of the skin that the light is fitted to
+FEWEST_POINTS = 200  # points that two views show below which those that one alone shows count as well
+UNKNOWNS = 10  # of the light in each colour: the sky's nine coefficients and the sun
 
 
 @dataclass(frozen=True)
@@ -62,14 +64,17 @@ class LitHead:
 
 def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     """Fits the light of these views to the head; half of the stage's progress. Raises Problem where the views hardly
-    see it."""
+    see it, or no bare skin of it."""
     normals = smooth_normals(head)
     colours, count, hair, seen_brows = vertex_colours(head, normals, views, report)
     transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done,
                                  of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
     skin, features = skin_weights(head.mesh)
     skin, features = skin * (1 - hair) * (1 - seen_brows), np.maximum(features, seen_brows)
-    light, reached = _fit(head, normals, transfer, colours, skin * (count >= min(2, len(views))), report)
+    told = (skin > 0.3) & (colours.min(1) > 1e-3)
+    often = told & (count >= min(2, len(views)))
+    light, reached = _fit(head, normals, transfer, colours,
+                          skin * (often if often.sum() >= FEWEST_POINTS else told), report)
     return LitHead(head, normals, transfer, skin, hair, features, light,
                    _best_lit(light, normals, transfer, reached, count))
 
@@ -77,7 +82,10 @@ def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
 def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.ndarray]:
     """The light from an even draw of skin vertices; the draw's posterior on all vertices [V] (0 where not drawn) and
     the figures."""
-    skin = np.flatnonzero((weights > 0.3) & (colours.min(1) > 1e-3))
+    skin = np.flatnonzero(weights)
+    if len(skin) < UNKNOWNS:
+        raise Problem("The selected frames show no bare skin of the face.",
+                      "Film the face from in front as well, or choose another delighter: Folder or None.")
     drawn = skin[:: max(1, len(skin) // FIT_POINTS)]
     origins = head.mesh.vertices[drawn] + 1e-3 * normals[drawn]
 
