@@ -12,7 +12,7 @@ import pytest
 
 from core.contract.capture import Capture
 from core.contract.files import write_json
-from core.contract.messages import Problem, Reporter
+from core.contract.messages import Problem, Progress, Reporter
 from core.contract.settings import from_json
 from core.delight import run
 from core.face import template
@@ -103,7 +103,10 @@ def deviation(capture: Capture, share: float) -> float:
 
 def test_light_of_the_sky_is_divided_out(capture):
     render_frames(capture, sun=0 * SUN_COLOUR)
-    run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
+    said = []
+    run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight", said.append))
+    shares = {kind: [m.done / m.of for m in said if isinstance(m, Progress) and kind in m.text] for kind in ("", "Fit")}
+    assert shares[""] == sorted(shares[""]) and shares["Fit"][-1] < 0.5, "the light is half of it, and none is undone"
     assert deviation(capture, 0.8) < 0.03 and deviation(capture, 0.95) < 0.08
     assert not list((capture.delit / "shadow").glob("*.png"))  # no sun, so nothing was in shadow
 

@@ -68,7 +68,7 @@ def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     normals = smooth_normals(head)
     colours, count, hair, seen_brows = vertex_colours(head, normals, views, report)
     transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done,
-                                 of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
+                                 of: report.progress(2 * of + done, 8 * of, "Casting rays at the sky"))
     skin, features = skin_weights(head.mesh)
     skin, features = skin * (1 - hair) * (1 - seen_brows), np.maximum(features, seen_brows)
     told = (skin > 0.3) & (colours.min(1) > 1e-3)
@@ -95,7 +95,7 @@ def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.n
         return free.astype(float)
 
     light, lit, inlier = fit_light(colours[drawn], normals[drawn], transfer[drawn], reaches, weights[drawn],
-                                   step=lambda done, of: report.progress(of + done / 2, 2 * of, "Fitting the light"))
+                                   step=lambda done, of: report.progress(3 * of + done, 8 * of, "Fitting the light"))
     expected = light.ambient(transfer[drawn]) + lit[:, None] * light.direct(normals[drawn])
     residual = np.abs(np.log(colours[drawn] / expected)).mean(1)
     report.figure("inlier_percent", round(100 * float(inlier.mean()), 1))
