@@ -80,13 +80,14 @@ def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
 
 
 def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.ndarray]:
-    """The light from an even draw of skin vertices; the draw's posterior on all vertices [V] (0 where not drawn) and
-    the figures."""
+    """The light from an even draw of skin vertices, and the figures; the posterior [V] that its sun reaches them, 0 on
+    as even a draw of the other vertices, nan on those that were not drawn."""
     skin = np.flatnonzero(weights)
     if len(skin) < UNKNOWNS:
         raise Problem("The selected frames show no bare skin of the face.",
                       "Film the face from in front as well, or choose another delighter: Folder or None.")
-    drawn = skin[:: max(1, len(skin) // FIT_POINTS)]
+    every = max(1, len(skin) // FIT_POINTS)
+    drawn = skin[::every]
     origins = head.mesh.vertices[drawn] + 1e-3 * normals[drawn]
 
     def reaches(direction: np.ndarray) -> np.ndarray:
@@ -103,14 +104,15 @@ def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.n
     report.figure("environment_sh", np.round(light.environment, 4).tolist())
     report.figure("sun_direction", np.round(light.sun, 3).tolist() if light.has_sun else None)
     report.figure("sun_to_sky", round(float(light.colour[1] / np.median(light.ambient(transfer[drawn])[:, 1])), 2))
-    reached = np.zeros(len(normals))
+    reached = np.full(len(normals), np.nan)
+    reached[np.flatnonzero(weights == 0)[::every]] = 0
     reached[drawn] = lit
     return light, reached
 
 
 def _best_lit(light, normals, transfer, reached, count) -> np.ndarray:
     """[3]: the colour of the best lit tenth of the skin, taken for the colour of the skin itself."""
-    seen = count > 0
+    seen = (count > 0) & np.isfinite(reached)  # without their sun, most vertices of a fine mesh would pass for shaded
     lit = (light.ambient(transfer) + reached[:, None] * light.direct(normals))[seen]
     tone = lit[lit.mean(1) >= np.quantile(lit.mean(1), 0.9)].mean(0)
     return tone * min(1.0, MAX_ALBEDO / tone.max())
