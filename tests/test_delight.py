@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pycolmap
@@ -17,6 +18,7 @@ from core.contract.messages import Problem, Progress, Reporter
 from core.contract.settings import from_json
 from core.delight import run
 from core.delight.lit_head import fit_lit_head
+from core.delight.surface import skin_weights
 from core.face import template
 from core.face.head import Head
 from core.geometry import meshes, raster
@@ -146,6 +148,15 @@ def test_the_tone_of_the_skin_does_not_depend_on_how_fine_the_head_is(capture):
     for shape in ((mesh.vertices, mesh.faces), trimesh.remesh.subdivide(mesh.vertices, mesh.faces)):
         tones.append(fit_lit_head(Head(Mesh(*shape)), views, Reporter("delight")).best_lit)
     assert np.abs(np.log(tones[1] / tones[0])).max() < 0.01  # 0.10 where what is not drawn counts as unlit
+
+
+def test_the_built_in_heads_masks_are_not_asked_of_a_head_with_other_uvs():
+    """The same triangles, as many, unwrapped anew: where lips were on the map is something else now."""
+    anew = replace(template.load(), uvs=1 - template.load().uvs)
+    skin, features = skin_weights(Head(template.load()))
+    assert features.max() > 0.9 and skin.min() < 0.1
+    skin, features = skin_weights(Head(anew))
+    assert features.max() == 0 and skin.min() == 1
 
 
 def profiles(folder, angles) -> Capture:

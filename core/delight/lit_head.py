@@ -69,7 +69,7 @@ def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     colours, count, hair, seen_brows = vertex_colours(head, normals, views, report)
     transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done,
                                  of: report.progress(2 * of + done, 8 * of, "Casting rays at the sky"))
-    skin, features = skin_weights(head.mesh)
+    skin, features = skin_weights(head)
     skin, features = skin * (1 - hair) * (1 - seen_brows), np.maximum(features, seen_brows)
     told = (skin > 0.3) & (colours.min(1) > 1e-3)
     often = told & (count >= min(2, len(views)))
