@@ -159,6 +159,17 @@ def test_the_built_in_heads_masks_are_not_asked_of_a_head_with_other_uvs():
     assert features.max() == 0 and skin.min() == 1
 
 
+def test_chosen_frames_of_which_none_has_a_camera_are_a_problem_and_what_was_there_stays(capture):
+    render_frames(capture, sun=0 * SUN_COLOUR)
+    settings = from_json({"delight": {"delighter": "none"}})
+    run(capture, settings, Reporter("delight"))
+    record = json.loads(capture.frames_json.read_text())
+    write_json(capture.frames_json, {"frames": [{**frame, "selected": False} for frame in record["frames"]]})
+    with pytest.raises(Problem, match="None of the frames that were chosen .* has a camera"):
+        run(capture, settings, Reporter("delight"))
+    assert len(list(capture.delit.glob("*.png"))) == 3
+
+
 def profiles(folder, angles) -> Capture:
     """A head under the sky alone, seen from two sides."""
     capture = Capture(folder / "two.wildcap")
