@@ -61,6 +61,16 @@ def test_the_filmed_texture_is_the_delit_one_with_its_light(tmp_path, painted):
     assert np.corrcoef(seen[sure][:, 0], light[sure][:, 0])[0, 1] > 0.97
 
 
+def test_without_its_frames_a_texture_is_not_compared_with_one_that_was_filmed_before(tmp_path, painted):
+    capture = capture_of(tmp_path / "gone", painted, (0, 30), light=np.full_like(painted, 0.7))
+    textured(capture)
+    assert capture.texture_filmed.is_file()
+    for path in capture.frames.glob("*.jpg"):
+        path.unlink()
+    textured(capture)
+    assert capture.texture.is_file() and not capture.texture_filmed.exists()
+
+
 def test_what_no_view_saw_has_no_confidence(tmp_path, painted):
     capture = capture_of(tmp_path / "left", painted, (40, 60, 80))
     found, confidence, _ = textured(capture)
