@@ -195,6 +195,9 @@ def test_softening_alone_is_shadow_not_gain_nor_noise():
     soft[100:200, 80:160] *= 1.5
     alpha = softening(raw, soft)
     assert alpha[110:190, 90:150].min() > 0.8 and alpha[:80].max() < 0.2
+    cut = np.pad(soft[40:, 40:200], ((40, 0), (40, 40), (0, 0)), constant_values=0.01)  # no background, saved as JPEG
+    alpha = softening(raw, cut)
+    assert alpha[110:190, 90:150].min() > 0.8 and alpha[210:, 50:190].max() < 0.2, "lit skin is not in shadow"
 
 
 def test_the_sun_s_shadow_is_told_by_the_filmed_texture_alone(monkeypatch):
