@@ -57,3 +57,18 @@ def test_what_the_artist_lets_the_cornea_shade_stays(close_up):  # noqa: F811
     cornea.visible_shadow = True
     bpy.ops.wildcap.assemble_material()
     assert cornea.visible_shadow
+
+
+def test_a_head_that_is_subdivided_keeps_its_skin(head):  # noqa: F811
+    """The close-up hides vertices by their numbers, which are those of the mesh and not of its subdivision: this makes
+    a quad of each corner that is shown."""
+    def faces():
+        return head.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons
+
+    bpy.ops.wildcap.close_up()
+    corners = sum(face.loop_total for face in faces())
+    bpy.ops.wildcap.close_up()
+    head.modifiers.new("Subdivision", 'SUBSURF').levels = 1
+    bpy.ops.wildcap.close_up()
+    assert [modifier.name for modifier in head.modifiers] == ["WildCap Lids on Eyes", "Subdivision"]
+    assert len(faces()) == corners > 3 * 24356
