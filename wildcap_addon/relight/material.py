@@ -8,6 +8,7 @@ keeping values.
 """
 
 from math import isclose
+from pathlib import Path
 
 import bpy
 
@@ -114,6 +115,8 @@ def _build(material, paths: dict, obj) -> None:
     uv.uv_map = obj.data.uv_layers[0].name
     for row, (name, file_name, data) in enumerate((*IMAGES, DISPLACEMENT)):
         if file_name not in paths:
+            if name in tree.nodes and not _has_picture(tree.nodes[name]):
+                tree.nodes.remove(tree.nodes[name])  # Cycles would take what is missing for a height of 0.3 m
             continue
         if file_name == DISPLACEMENT[1] and name not in tree.nodes:
             material.displacement_method = 'DISPLACEMENT'  # the surface itself moves, once the socket says so
@@ -141,6 +144,13 @@ def _build(material, paths: dict, obj) -> None:
             _link(tree, outputs["Factor" if socket == "Fac" and "Factor" in outputs else socket], target.inputs[name])
     tree.nodes.active = tree.nodes["WildCap Albedo"]  # what Solid shading shows
     material[KEY] = True
+
+
+def _has_picture(node) -> bool:
+    """Whether the picture of an image node is in the .blend or on the disk."""
+    image = node.image
+    return image is not None and (image.packed_file is not None or image.source != 'FILE'
+                                  or Path(bpy.path.abspath(image.filepath, library=image.library)).is_file())
 
 
 def _node(tree, name: str, kind: str, location):
