@@ -116,6 +116,19 @@ def test_a_relief_that_is_gone_moves_nothing(patch, tmp_path):
     assert material.node_tree.nodes["WildCap Displacement"].image.name == "mine.exr" and skin["Height"].is_linked
 
 
+def test_the_maps_upper_and_lower_border_do_not_mix(patch, tmp_path):
+    """They are the crown and the end of the neck: at the upper edge of a map that is red above and green below there is
+    no green."""
+    paint(patch, "diffuse_albedo.png", [[(1, 0, 0)] * 4] * 2 + [[(0, 1, 0)] * 4] * 2)
+    paint(patch, "normal.png", [[(0.5, 0.5, 1)] * 4] * 4)
+    skin = sockets(assembled())
+    skin["Subsurface"].default_value = skin["Specular Amount"].default_value = 0.0
+    white_world()
+    bpy.context.view_layer.objects.active.location.z = -1
+    red, green, _ = seen(tmp_path / "edge.exr", width=0.2)[:3].mean((0, 1))  # the edge is in the picture's middle
+    assert green < 0.01 * red and red > 0.1
+
+
 def test_oil_lies_where_skin_is_smoother_than_the_cheeks_and_reflects_as_its_film_does(patch, tmp_path):
     """A black patch without gloss of its own, all of it nose, forehead or cheek; at normal incidence under even
     light."""

@@ -118,11 +118,13 @@ def _build(material, paths: dict, obj) -> None:
             if name in tree.nodes and not _has_picture(tree.nodes[name]):
                 tree.nodes.remove(tree.nodes[name])  # Cycles would take what is missing for a height of 0.3 m
             continue
-        if file_name == DISPLACEMENT[1] and name not in tree.nodes:
+        is_new = name not in tree.nodes
+        if file_name == DISPLACEMENT[1] and is_new:
             material.displacement_method = 'DISPLACEMENT'  # the surface itself moves, once the socket says so
         node = _node(tree, name, 'ShaderNodeTexImage', (-540, 300 - 300 * row))
         node.image = head.load_image(paths[file_name], data)
-        node.interpolation = 'Cubic' if node.interpolation == 'Linear' and KEY not in material else node.interpolation
+        if is_new:  # the map's upper and lower border are crown and neck, which are not to mix
+            node.interpolation, node.extension = 'Cubic', 'EXTEND'
         _link(tree, uv.outputs["UV"], node.inputs["Vector"])
     normal = _node(tree, "WildCap Normal Map", 'ShaderNodeNormalMap', (-200, -300))
     normal.space = 'TANGENT'
