@@ -15,8 +15,10 @@ from pathlib import Path
 import bpy
 from mathutils import Matrix
 
+from ...core.contract import delivery_plan
 from ...core.contract.delivery_plan import PACKING, DeliveryPlan
 from ...core.contract.messages import Problem
+from ...core.contract.ownership import free_place
 from .. import captures, colours, head, node_trees
 from ..data_blocks import read_field
 
@@ -217,11 +219,8 @@ def _plain(original, plan: DeliveryPlan) -> bpy.types.Material:
     shader.inputs["Roughness"].default_value = original.roughness
     packed = _packed(original)
     if packed is not None:
-        path = plan.staged / "textures" / f"{plan.name}_{original.name.split()[-1].lower()}.png"
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(packed.packed_file.data)
         node = material.node_tree.nodes.new('ShaderNodeTexImage')
-        node.image = bpy.data.images.load(str(path))
+        node.image = bpy.data.images.load(str(_unpacked(packed, original, plan)))
         material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
     return material
 
@@ -234,6 +233,19 @@ def _packed(original) -> bpy.types.Image | None:
         if image is not None and image.packed_file is not None and image.packed_file.data[:4] == b"\x89PNG":
             return image
     return None
+
+
+def _unpacked(image: bpy.types.Image, original, plan: DeliveryPlan) -> Path:
+    """The file of a packed PNG among the delivery's own, named after the last word of its material's name, and no
+    other's in its place."""
+    last_word = delivery_plan.safe_name((original.name.split() or [""])[-1]).lower()
+    path = plan.staged / delivery_plan.TEXTURES / f"{plan.name}_{last_word}.png"
+    path.parent.mkdir(exist_ok=True)
+    data = bytes(image.packed_file.data)
+    if path.is_file() and path.read_bytes() != data:
+        path = free_place(path)
+    path.write_bytes(data)
+    return path
 
 
 def _new(name: str):
