@@ -195,6 +195,8 @@ def _skin(name: str, plan: DeliveryPlan, maps: list[dict], roughness: float, uv_
             continue
         node = tree.nodes.new('ShaderNodeTexImage')
         node.image = bpy.data.images.load(str(plan.staged / entry["file"]))
+        if plan.what == "head":  # all of its skin is within the picture, whose borders are crown and neck
+            node.extension = 'EXTEND'
         if entry["kind"] != "colour":
             colours.as_data(node.image)
         elif plan.colour == "srgb":
