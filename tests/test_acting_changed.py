@@ -94,3 +94,27 @@ def test_what_fails_after_the_maps_are_in_does_not_pass_for_an_artists_edit(head
     with pytest.raises(RuntimeError, match="no"):
         bpy.ops.wildcap.assemble_material()
     assert not addon("relight.material").is_edited(head)
+
+
+def test_an_undo_gives_the_iris_its_colour_back(head):  # noqa: F811
+    """In the picture, of which Blender's undo takes back no pixels; and the one before can be chosen again."""
+    name, material = head.name, head.data.materials[1].name
+
+    def told_and_shown() -> tuple[str, bool]:
+        image = bpy.data.materials[material].node_tree.nodes["WildCap Eye"].image
+        red, _, blue, _ = image.pixels[4 * (256 * 512 + 305):][:4]  # half way from the pupil to the iris' rim
+        return image["wildcap_iris"], bool(blue > red)
+
+    bpy.ops.wildcap.iris(iris='brown')
+    bpy.ops.ed.undo_push(message="brown")
+    images = len(bpy.data.images)
+    bpy.ops.wildcap.iris(iris='blue')
+    bpy.ops.ed.undo_push(message="blue")
+    assert told_and_shown() == ("blue", True) and len(bpy.data.images) == images
+    bpy.ops.ed.undo()
+    assert told_and_shown() == ("brown", False)
+    bpy.context.view_layer.objects.active = bpy.data.objects[name]
+    bpy.ops.wildcap.iris(iris='blue')
+    bpy.ops.wildcap.iris(iris='brown')
+    assert told_and_shown() == ("brown", False)
+    assert bpy.data.materials[material].node_tree.nodes["WildCap Eye"].image.name == f"{name} Eye"

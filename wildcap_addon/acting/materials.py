@@ -89,14 +89,27 @@ def _paint(material, name: str, iris: str | tuple) -> None:
         node.location = (-320, 280)
         shader = next(n for n in nodes if n.type == 'BSDF_PRINCIPLED')
         links.new(node.outputs["Color"], shader.inputs["Base Color"])
-        node.image = bpy.data.images.new(f"{name} Eye", SIZE_PX, SIZE_PX)
-    colour = IRISES.get(iris, iris)
-    told = iris if iris in IRISES else " ".join(f"{value:.3f}" for value in colour)
-    if node.image is not None and node.image.get("wildcap_iris") != told:
-        node.image.pixels.foreach_set(picture(colour).ravel())
-        node.image.update()
-        node.image.pack()
-        node.image["wildcap_iris"] = told
+        node.image = _drawn(f"{name} Eye", iris)
+    elif node.image is not None and node.image.get("wildcap_iris") != _told(iris):
+        before = node.image
+        before.user_remap(_drawn(before.name, iris))
+        if before.users == 0:
+            bpy.data.images.remove(before)
+            node.image.name = f"{name} Eye"
+
+
+def _drawn(name: str, iris: str | tuple) -> bpy.types.Image:
+    """A new picture of the eye, packed: Blender's undo does not know of pixels that change within one."""
+    image = bpy.data.images.new(name, SIZE_PX, SIZE_PX)
+    image.pixels.foreach_set(picture(IRISES.get(iris, iris)).ravel())
+    image.update()
+    image.pack()
+    image["wildcap_iris"] = _told(iris)
+    return image
+
+
+def _told(iris: str | tuple) -> str:
+    return iris if iris in IRISES else " ".join(f"{value:.3f}" for value in iris)
 
 
 def picture(iris: tuple[float, float, float]) -> np.ndarray:
