@@ -197,4 +197,4 @@ def _specular_amount(capture: Capture) -> float:
 
 def _scale(obj) -> float:
     """How large the head is against metres: scattering keeps its size on skin."""
-    return sum(obj.matrix_world.to_scale()) / 3
+    return sum(map(abs, obj.matrix_world.to_scale())) / 3  # negative for one that is mirrored
