@@ -32,6 +32,8 @@ LINKED = {".glb": ("base_color", "normal"), ".gltf": ("base_color", "normal"),
 """What each format's exporter writes as it is. glTF's would make new pictures of roughness and specular."""
 HAIR_IN = ".usdc"
 """The format that holds hair curves."""
+NAMES_ITS_SPACE = (5, 2, 0)
+"""The Blender from which on USD says in which space its colours are."""
 LIDS = ("eyesOpenLeft", "eyesOpenRight")
 SOCKETS = {"base_color": "Base Color", "roughness": "Roughness", "specular": "Specular IOR Level"}
 
@@ -114,14 +116,14 @@ def _hairs(plan: DeliveryPlan, source: bpy.types.Object, obj) -> list[bpy.types.
         copy.data.name, copy.parent, copy.data.surface = copy.name, obj, None
         copy.data.materials.clear()
         material, shader = _new(copy.name)
-        shader.inputs["Base Color"].default_value = (*_mean_colour(copy.data), 1)
+        shader.inputs["Base Color"].default_value = _exported((*_mean_colour(copy.data), 1), plan)
         copy.data.materials.append(material)
         copies.append(copy)
     return copies
 
 
 def _mean_colour(data: bpy.types.Curves) -> list[float]:
-    """The mean of the hairs' linear colours; Blender's grey where they have none."""
+    """The mean of the hairs' colours, in the scene's working space; Blender's grey where they have none."""
     attribute = data.attributes.get(captures.HAIR_COLOUR)
     if attribute is None or not attribute.data:
         return [0.8] * 3
@@ -217,7 +219,7 @@ def _plain(original, plan: DeliveryPlan) -> bpy.types.Material:
     material, shader = _new(f"{original.name} Delivered" if original is not None else "Plain")
     if original is None:
         return material
-    shader.inputs["Base Color"].default_value = original.diffuse_color
+    shader.inputs["Base Color"].default_value = _exported(original.diffuse_color, plan)
     shader.inputs["Roughness"].default_value = original.roughness
     packed = _packed(original)
     if packed is not None:
@@ -248,6 +250,13 @@ def _unpacked(image: bpy.types.Image, original, plan: DeliveryPlan) -> Path:
         path = free_place(path)
     path.write_bytes(data)
     return path
+
+
+def _exported(rgba: tuple, plan: DeliveryPlan) -> tuple[float, ...]:
+    """A colour of the working space as the exporter is to write it, which passes its numbers on: a file's are linear
+    light of sRGB's primaries, but for a USD that names the space that they are in."""
+    named = plan.format.suffix == ".usdc" and bpy.app.version >= NAMES_ITS_SPACE
+    return tuple(rgba) if named else (*colours.from_working(tuple(rgba)[:3]), rgba[3])
 
 
 def _new(name: str):

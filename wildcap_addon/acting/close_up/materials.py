@@ -34,9 +34,9 @@ def white(name: str) -> bpy.types.Material:
         return material
     tree = material.node_tree
     told = _told(tree, pictures.white())
-    pink = _mixed(tree, told["Green"], (*WHITE_COLOUR, 1),
-                  (*(a * b for a, b in zip(WHITE_COLOUR, PINK, strict=True)), 1))
-    tree.links.new(_mixed(tree, math(tree, 'MULTIPLY', told["Red"], 0.75), pink, (*VESSEL_COLOUR, 1)),
+    pink = _mixed(tree, told["Green"], materials.rgba(WHITE_COLOUR),
+                  materials.rgba(tuple(a * b for a, b in zip(WHITE_COLOUR, PINK, strict=True))))
+    tree.links.new(_mixed(tree, math(tree, 'MULTIPLY', told["Red"], 0.75), pink, materials.rgba(VESSEL_COLOUR)),
                    shader.inputs["Base Color"])
     _moist(shader, 0.35, (1.0, 0.45, 0.3), 0.0012, 0.0)  # its wet layer is the shell
     _bumped(tree, shader, told["Blue"], 0.25, 0.0001)
@@ -79,7 +79,7 @@ def flesh(name: str) -> bpy.types.Material:
     if shader is not None:
         tree = material.node_tree
         on_ball = add(tree, 'ShaderNodeAttribute', attribute_name="onto").outputs["Fac"]
-        tree.links.new(_mixed(tree, on_ball, (*FLESH, 1), (*FOLD, 1)), shader.inputs["Base Color"])
+        tree.links.new(_mixed(tree, on_ball, materials.rgba(FLESH), materials.rgba(FOLD)), shader.inputs["Base Color"])
         _uneven(tree, shader, 900.0, 0.3, 0.0005)
         _moist(shader, 0.4, (1.0, 0.4, 0.3), 0.0015, 0.8)
     return material
@@ -184,9 +184,10 @@ def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
         return existing, None
     material = bpy.data.materials.new(name)
     material[materials.KEY] = kind
-    material.diffuse_color = (*colour, 1)
+    material.diffuse_color = materials.rgba(colour)
     shader = next(node for node in node_trees.of(material).nodes if node.type == 'BSDF_PRINCIPLED')
-    shader.inputs["Base Color"].default_value, shader.inputs["Roughness"].default_value = (*colour, 1), roughness
+    shader.inputs["Base Color"].default_value = materials.rgba(colour)
+    shader.inputs["Roughness"].default_value = roughness
     shader.inputs["IOR"].default_value = IOR
     return material, shader
 
