@@ -14,7 +14,7 @@ import bpy
 
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
-from .. import captures, head, node_trees, status
+from .. import captures, data_blocks, head, node_trees, status
 from . import asset, node_group, regions
 
 KEY = "wildcap_skin"
@@ -45,9 +45,8 @@ def assemble(context, item) -> tuple[bpy.types.Material, str]:
     regions.write(obj.data)
     height = capture.delivery / DISPLACEMENT[1]
     _build(material, {path.name: path for path in (*maps, height) if path.is_file()}, obj)
-    _set(material,
-         {"Specular Amount": _specular_amount(capture), "Subsurface Scale": node_group.SCATTERING_M * _scale(obj)},
-         before)
+    _set(material, {"Specular Amount": _specular_amount(capture),
+                    "Subsurface Scale": node_group.SCATTERING_M * data_blocks.scale_of(obj)}, before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
     try:
         told = head.complete(obj, capture)
@@ -176,7 +175,7 @@ def _set_before(material, obj) -> dict[str, float]:
         return {}
     # of the group's version 1
     return (material[SET].to_dict() if SET in material
-            else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * _scale(obj)})
+            else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * data_blocks.scale_of(obj)})
 
 
 def _set(material, inputs: dict[str, float], before: dict[str, float]) -> None:
@@ -193,8 +192,3 @@ def _specular_amount(capture: Capture) -> float:
     """What makes the mean of cheeks and forehead a Specular IOR Level of one half, by the worker's figure."""
     figures = capture.read()["stages"].get("upscale", {}).get("figures", {})
     return 0.5 / (figures.get("specular_mean") or node_group.TYPICAL_SPECULAR)
-
-
-def _scale(obj) -> float:
-    """How large the head is against metres: scattering keeps its size on skin."""
-    return sum(map(abs, obj.matrix_world.to_scale())) / 3  # negative for one that is mirrored

@@ -24,6 +24,8 @@ OPAQUE_V = 0.08
 DEEP_M, DEEP_DARK = 0.035, 0.92
 """Metres behind the front teeth where the mouth is darkest in EEVEE, and how dark: without ray tracing it lights a
 mouth as if nothing were before it."""
+SIZE = "wildcap_size"
+"""Custom property of a material: the scale of the head by which its lengths were set."""
 FLESH, FOLD, GUMS, TONGUE = (0.50, 0.20, 0.17), (0.60, 0.39, 0.35), (0.44, 0.135, 0.125), (0.42, 0.15, 0.135)
 ENAMEL = (0.80, 0.735, 0.62)
 
@@ -149,6 +151,19 @@ def fill(obj, *materials) -> None:
     if not obj.data.materials:
         for material in materials:
             obj.data.materials.append(material)
+
+
+def resize(things, scale: float) -> None:
+    """Brings depths of scattering and relief in the materials of a close-up's objects to the size of their head, scale:
+    1 is life's. What the artist set grows along."""
+    for material in {slot.material for thing in things for slot in thing.material_slots if slot.material is not None}:
+        if materials.KEY not in material or material.node_tree is None:  # a lid's margin has the head's skin
+            continue
+        for node in material.node_tree.nodes:
+            length = node.inputs.get({'BSDF_PRINCIPLED': "Subsurface Scale", 'BUMP': "Distance"}.get(node.type, ""))
+            if length is not None:
+                length.default_value *= scale / material.get(SIZE, 1.0)
+        material[SIZE] = scale
 
 
 def _moist(shader, inside: float, radius: tuple[float, float, float], scale: float, coat: float) -> None:
