@@ -198,7 +198,7 @@ def test_values_animation_and_materials_stay_when_another_shape_comes_in_and_ove
     head = bpy.data.objects[name]
     keys = head.data.shape_keys
     assert addon("acting.mesh").has(head) and keys.key_blocks["jawOpen"].value == pytest.approx(0.4)
-    assert keys.animation_data.action is not None and len(keys.animation_data.drivers) == 2
+    assert keys.animation_data.action is not None and len(keys.animation_data.drivers) == 4
     eye = head.data.materials[1].node_tree.nodes["WildCap Eye"].image
     assert eye.packed_file is not None and tuple(eye.size) == (512, 512)
 

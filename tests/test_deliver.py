@@ -261,7 +261,8 @@ def test_a_head_with_face_units_keeps_their_names_their_moves_and_its_eyes(captu
     document, binary = glb(deliver(capture) / "face.glb")
     mesh = document["meshes"][0]
     names = mesh["extras"]["targetNames"]
-    assert names == [key.name for key in keys.key_blocks[1:]] and len(names) == 54 and not any(mesh.get("weights", []))
+    units = [key.name for key in keys.key_blocks[1:] if not key.name.startswith("eyesHalf")]
+    assert names == units and len(names) == 54 and not any(mesh.get("weights", []))
     assert [document["materials"][part["material"]]["name"].split()[-2:][0]
             for part in mesh["primitives"]][1:] == ["Eyes", "Mouth", "Teeth"]
     eyes = document["materials"][mesh["primitives"][1]["material"]]["pbrMetallicRoughness"]

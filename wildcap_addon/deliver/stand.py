@@ -35,6 +35,7 @@ HAIR_IN = ".usdc"
 NAMES_ITS_SPACE = (5, 2, 0)
 """The Blender from which on USD says in which space its colours are."""
 LIDS = ("eyesOpenLeft", "eyesOpenRight")
+DRIVEN = ("eyesHalfLeft", "eyesHalfRight")
 SOCKETS = {"base_color": "Base Color", "roughness": "Roughness", "specular": "Specular IOR Level"}
 
 
@@ -56,7 +57,7 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
             mesh.uv_layers.remove(mesh.uv_layers[head.HAIR_UVS])
         if plan.what == "head" and plan.preset.open_eyes:
             _open_eyes(obj)
-        _at_rest(mesh)
+        _at_rest(obj)
         mesh.transform(Matrix.Scale(FACTORS[plan.unit], 4), shape_keys=True)
         _materials(mesh, plan, packing)
         scene.collection.objects.link(obj)
@@ -157,12 +158,15 @@ def _open_eyes(obj) -> None:
     obj.data.update()
 
 
-def _at_rest(mesh) -> None:
-    """Shape keys at zero: what is delivered is the neutral head, and the keys."""
-    if mesh.shape_keys is not None:
-        mesh.shape_keys.animation_data_clear()
-        for key in mesh.shape_keys.key_blocks:
+def _at_rest(obj) -> None:
+    """Shape keys at zero: what is delivered is the neutral head, and the keys, but for those that only drivers move."""
+    keys = obj.data.shape_keys
+    if keys is not None:
+        keys.animation_data_clear()
+        for key in keys.key_blocks:
             key.value, key.mute = 0.0, False
+        for key in filter(None, map(keys.key_blocks.get, DRIVEN)):
+            obj.shape_key_remove(key)
 
 
 def _materials(mesh, plan: DeliveryPlan, packing: dict) -> None:
