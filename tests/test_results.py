@@ -52,6 +52,16 @@ def test_a_phrase_that_was_reworded_or_stands_there_twice_is_found():
             told.corrected(text, phrase, "a.md")
 
 
+def test_the_index_counts_who_loses_and_who_is_synthetic():
+    gains = {"scan_lamps": -2.0, "scan_below": 0.1, "bearded_below": -0.2, "very_light": -0.1, "light_overcast": 0.3}
+    assert index.worse_in_the_picture(gains) == (
+        "3 of 5 captures become worse in the picture, among them 1 of the 2 of the one real scan, whose own map holds "
+        "light.")
+    assert index.worse_in_the_picture({"tan": -1.0}) == "1 of 1 captures become worse in the picture."
+    assert index.the_synthetic(["bearded_below", "light", "scan_below", "very_light"]) == (
+        "The others are synthetic: 1 with strands, eyes and a phone's pipeline, 2 bald, by true cameras.")
+
+
 def test_a_page_tells_what_its_records_know(tmp_path):
     figures.write(tmp_path / "one.json", "demo", "make demo", {"views": 14})
     record = figures.read("one", tmp_path)
