@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from benchmarks import figures, pages, results
-from benchmarks.results import index, told
+from benchmarks.results import comparison, index, told
 from core.contract.messages import Problem
 
 from .conftest import ROOT
@@ -60,6 +60,15 @@ def test_the_index_counts_who_loses_and_who_is_synthetic():
     assert index.worse_in_the_picture({"tan": -1.0}) == "1 of 1 captures become worse in the picture."
     assert index.the_synthetic(["bearded_below", "light", "scan_below", "very_light"]) == (
         "The others are synthetic: 1 with strands, eyes and a phone's pipeline, 2 bald, by true cameras.")
+
+
+def test_the_comparison_tells_person_by_person_who_is_ahead_and_leads_over_its_best_rival():
+    gains = {"tan": 1.14, "very_light": -1.05, "dark": 0.64}
+    assert comparison.by_person(gains) == "tan +1.1, dark +0.6, very light -1.1"
+    text = " ".join(results.page("comparison").split())
+    scan = figures.read("comparison")["figures"]["scan"]["raw"]
+    lead = scan["wildcap"]["PSNR"] - max(row["PSNR"] for name, row in scan.items() if name != "wildcap")
+    assert f"the head scan, it leads by {lead:.1f} dB on raw frames" in text
 
 
 def test_a_page_tells_what_its_records_know(tmp_path):
