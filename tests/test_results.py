@@ -9,7 +9,8 @@ import sys
 import pytest
 
 from benchmarks import figures, pages, results
-from benchmarks.results import comparison, index, told
+from benchmarks.results import comparison, geometry, index, told
+from benchmarks.results import scan as scan_page
 from core.contract.messages import Problem
 
 from .conftest import ROOT
@@ -69,6 +70,18 @@ def test_the_comparison_tells_person_by_person_who_is_ahead_and_leads_over_its_b
     scan = figures.read("comparison")["figures"]["scan"]["raw"]
     lead = scan["wildcap"]["PSNR"] - max(row["PSNR"] for name, row in scan.items() if name != "wildcap")
     assert f"the head scan, it leads by {lead:.1f} dB on raw frames" in text
+
+
+def test_what_a_page_calls_the_worst_or_free_is_so_in_its_record():
+    def told_by(page, *records):
+        return " ".join(" ".join(body for _, body in page.sections(*map(figures.Figures.of, records))).split())
+
+    chain, scan, measured = (figures.read(name)["figures"] for name in ("whole_chain", "scan_albedo", "geometry"))
+    chain["rows"]["scan, network"] |= {"true_mask": {"psnr": 31.5, "ssim": 0.9}, "solved": {"psnr": 30.0, "ssim": 0.9}}
+    assert "costs 1.50 dB on the scan" in told_by(scan_page, scan, chain, measured)
+    scale = figures.read("head_scale")["figures"]
+    scale["others"]["worst"] = -0.042
+    assert "on nine synthetic heads at most 4.2 % off" in told_by(geometry, measured, scale)
 
 
 def test_a_page_tells_what_its_records_know(tmp_path):
