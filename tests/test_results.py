@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from benchmarks import figures, pages, results
+from benchmarks import figures, groomed, pages, results
 from benchmarks.results import comparison, geometry, index, told
 from benchmarks.results import scan as scan_page
 from core.contract.messages import Problem
@@ -82,6 +82,17 @@ def test_what_a_page_calls_the_worst_or_free_is_so_in_its_record():
     scale = figures.read("head_scale")["figures"]
     scale["others"]["worst"] = -0.042
     assert "on nine synthetic heads at most 4.2 % off" in told_by(geometry, measured, scale)
+
+
+def test_the_page_of_hair_says_where_it_falls_short_and_what_strokes_are_worth():
+    rows = {"bearded": {"brows": {"iou": 0.9, "degrees": 11.0, "usual_degrees": 14.0},
+                        "beard": {"iou": 0.4, "degrees": 31.0, "usual_degrees": 13.0}},
+            "bald": {"brows": {"iou": 0.8}}}
+    assert groomed.shortfalls(rows) == (
+        "Below the IoU that is wanted: the bearded person's beard (0.40); farther off: the bearded person's beard (31 "
+        "degrees). Hair that follows the strokes lies nearer to the true one than the usual directions alone in 1 of 2 "
+        "rows.")
+    assert "wanted: nothing; farther off: nothing" in groomed.shortfalls({"bald": rows["bald"]})
 
 
 def test_a_page_tells_what_its_records_know(tmp_path):
