@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pages of docs/results and the figures of hand-written texts are the records': what is edited by hand is found."""
 
+import json
 import re
 import shutil
 import sys
 
 import pytest
 
-from benchmarks import figures, groomed, pages, results
-from benchmarks.results import comparison, geometry, index, told
+from benchmarks import figures, groomed, open_eyes, pages, results
+from benchmarks.results import comparison, eyes, geometry, index, told
 from benchmarks.results import scan as scan_page
 from core.contract.messages import Problem
 
@@ -93,6 +94,27 @@ def test_the_page_of_hair_says_where_it_falls_short_and_what_strokes_are_worth()
         "degrees). Hair that follows the strokes lies nearer to the true one than the usual directions alone in 1 of 2 "
         "rows.")
     assert "wanted: nothing; farther off: nothing" in groomed.shortfalls({"bald": rows["bald"]})
+
+
+def test_the_page_of_eyes_says_who_is_in_no_mean():
+    measured, missed = ({column: value for column in open_eyes.COLUMNS} for value in (0.5, None))
+    everybody = {f"{name}, {side}": measured
+                 for name in ("bearded", "fringed", "stubbled") for side in ("left", "right")}
+    assert eyes.left_out(everybody) == "", "the fourth person's lids are closed"
+    rows = {**everybody, "fringed, left": missed, "fringed, right": missed}
+    assert eyes.left_out(rows) == "Taken for closed, and in no mean: fringed."
+    del rows["stubbled, left"]
+    assert eyes.left_out(rows).endswith("Filmed with open eyes, too, and not measured: stubbled.")
+
+
+def test_eyes_that_were_taken_for_closed_are_rows_without_figures(tmp_path):
+    for openness, rows in ((0.9, 2), (0.0, 0)):
+        (tmp_path / "cameras.json").write_text(json.dumps({"person": {"openness": openness}}), encoding="utf-8")
+        found = open_eyes.missed(tmp_path)
+        assert len(found) == rows and all(set(row) == set(open_eyes.COLUMNS) for row in found)
+    (tmp_path / "cameras.json").write_text('{"person": {"openness": 0.9}}', encoding="utf-8")
+    row = open_eyes.missed(tmp_path)[0]
+    assert (row["openness"], row["true openness"], row["rim, mm"]) == (0.0, 0.9, None)
 
 
 def test_a_page_tells_what_its_records_know(tmp_path):
