@@ -115,7 +115,7 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
             images.write_srgb(kept / f"{row}.png", albedo, bits=16)
             write_json(kept / f"{row}.json", {**_rounded(score(albedo, _looks(wild.root, truth))), **more})
             print(f"{name}: {row}", file=sys.stderr, flush=True)
-        rows[row] = json.loads((kept / f"{row}.json").readfigures.number(encoding="utf-8"))
+        rows[row] = json.loads((kept / f"{row}.json").read_text(encoding="utf-8"))
     return rows
 
 

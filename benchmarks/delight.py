@@ -10,10 +10,12 @@ Sets: faceolat (--data: laid out like ../shared/data/faceolat), portraits (synth
 per group of skin tone, two lights each), lps_sun, sample, or any folder laid out as benchmarks/albedo_score.py says. A
 capture is registered anew unless --capture names one. Rows: none, flat true tone, then on captures each delighter of
 the chain that needs no pictures, no account and no checkpoint, and everywhere each that can do a single photograph.
-  Figures (benchmarks/delight_measures.py) are means over the pictures: PSNR, SSIM, FLIP   over the facial skin after
-  one gain per channel; features: the distance in EfficientNet-Lite0's features, which is not LPIPS detail
-  correlation of log green between 1 and 3 px with the truth's shadow step        what is left of the light's step at
-  the true shadow's edge, where it exceeds 0.2 in natural log; `none` has all of it
+Figures (benchmarks/delight_measures.py) are means over the pictures:
+  PSNR, SSIM, FLIP   over the facial skin, after one gain per channel
+  features           the distance in EfficientNet-Lite0's features, which is not LPIPS
+  detail             correlation of log green between 1 and 3 px with the truth's
+  shadow step        what is left of the light's step at the true shadow's edge, where it exceeds 0.2 in natural log;
+                     `none` has all of it
 Pictures of real people are written only where --pictures says.
 """
 

@@ -54,7 +54,8 @@ def subjects_by_tone(count: int) -> dict[str, list[int]]:
     seed = FIRST_SEED
     while min(map(len, seeds.values())) < count:
         p = sample_parameters(seed)
-        skin = pigment.reflectance(np.float32([p.melanin]), np.float32([p.blood]), p.oxygen, p.scattering, p.slope)
+        skin = pigment.reflectance(np.float32([p.melanin]), np.float32([p.blood]), p.oxygen, p.scattering, p.slope,
+                                   p.chroma)
         angle = float(pigment.typology_angle(skin)[0])
         seeds[next(name for name, above in TONES if angle > above)].append(seed)
         seed += 1

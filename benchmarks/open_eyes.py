@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -55,11 +56,11 @@ def main() -> None:
     asked = parser.parse_args()
     rows = fit_alone(asked.eyes.resolve()) if asked.eyes else {}
     for name in asked.only:
-        capture = Capture(asked.folder.resolve() / f"{name}.wildcap")
-        if not capture.eyes.is_file():
-            print(f"{name}: the eyes were taken for closed")
+        capture, truth = Capture(asked.folder.resolve() / f"{name}.wildcap"), asked.folder.resolve() / name
+        if not capture.head.is_file():
+            print(f"{name} has no head and is left out.", file=sys.stderr)
             continue
-        for side, row in zip(SIDES, compare(capture, asked.folder.resolve() / name), strict=True):
+        for side, row in zip(SIDES, compare(capture, truth) if capture.eyes.is_file() else missed(truth), strict=False):
             rows[f"{name}, {side}"] = row
     print(markdown(["eye", *COLUMNS],
                    [[name, *(None if row[column] is None else f"{row[column]:.2f}" for column in COLUMNS)]
@@ -82,6 +83,14 @@ def compare(capture: Capture, truth: Path) -> list[dict]:
         rows.append(compare_eye(found[side], opened, true, side, (scale, turn, shift))
                     | {"iris, delta E": _plain(off), "true openness": _plain(person["openness"])})
     return rows
+
+
+def missed(truth: Path) -> list[dict]:
+    """The figures of the two eyes of a person whose eyes were taken for closed: none, but how open they are; no rows
+    where they are closed."""
+    openness = json.loads((truth / "cameras.json").read_text(encoding="utf-8"))["person"]["openness"]
+    row = {**dict.fromkeys(COLUMNS), "openness": 0.0, "true openness": _plain(openness)}
+    return [row, row] if openness else []
 
 
 def fit_alone(folder: Path) -> dict[str, dict]:

@@ -63,7 +63,7 @@ WORDS = ("PSNR after one gain per channel, and *detail*, the correlation with th
          "between the lights over the untouched photographs'. *Agreement*: PSNR of the mean squared difference between "
          "the answers to two lights, each pair "
          "at the truth's tone. *Slopes*: how far the answer follows a change of the light alone, and of the pigment "
-         "alone. ± is the spread over people.")
+         "alone. ± is the spread over people, with pairs over groups of skin tone.")
 
 
 @dataclass(frozen=True)

@@ -146,3 +146,14 @@ def test_people_of_a_record_stay_where_others_are_measured(tmp_path, monkeypatch
     assert people["tan"]["wild"]["psnr"] == 50.0 and people["tan"]["flash"]["psnr"] == 43.0, (
         "a set that was not made again keeps its figures"
     )
+
+
+def test_what_was_measured_before_is_read_and_not_measured_again(tmp_path):
+    """A person whose limit alone is kept: nothing is solved, and of the other places nothing is there."""
+    (tmp_path / "dark").mkdir()
+    (tmp_path / "dark" / "skin_tone.txt").write_text("0.3,0.2,0.15")
+    kept = tmp_path / "controlled" / "dark"
+    kept.mkdir(parents=True)
+    (kept / "limit.json").write_text('{"psnr": 41.5, "detail": 0.97}')
+    assert controlled.measure(tmp_path, "dark") == {"limit": {"psnr": 41.5, "detail": 0.97}}
+    assert controlled.measure(tmp_path, "nobody") == {}

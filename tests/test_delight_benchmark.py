@@ -26,7 +26,10 @@ from benchmarks.delight_sets import Photograph, Photographs, light_stage  # noqa
 from benchmarks.measures import pictures  # noqa: E402
 from core.contract.messages import Problem  # noqa: E402
 from core.contract.settings import Settings  # noqa: E402
+from core.face import template  # noqa: E402
 from core.imaging import images  # noqa: E402
+from core.synthetic.parameters import sample_parameters  # noqa: E402
+from core.synthetic.skin import make_skin  # noqa: E402
 
 FACEOLAT = Path(__file__).resolve().parents[2] / "shared" / "data" / "faceolat"
 
@@ -142,6 +145,14 @@ def test_portraits_are_of_people_that_no_training_sees(monkeypatch):
     seeds = delight_portraits.subjects_by_tone(1)
     assert list(seeds) == ["very light", "light", "intermediate", "tan", "brown", "dark"]
     assert min(map(min, seeds.values())) >= delight_portraits.FIRST_SEED
+
+
+def test_a_portraits_group_is_that_of_the_skin_as_it_is_painted():
+    """Subject 9148 is very light by melanin and blood alone, and light with its saturation, as its painted skin is."""
+    skin = make_skin(sample_parameters(9148), 128).diffuse[template.mask("skin", 128) > 0.5].mean(0)
+    assert tone_group(images.linear_to_srgb(skin)) == "light"
+    seeds = delight_portraits.subjects_by_tone(6)
+    assert 9148 in seeds["light"] and 9148 not in seeds["very light"]
 
 
 def test_a_portrait_is_made_once_and_is_its_albedo_in_some_light(tmp_path, monkeypatch):

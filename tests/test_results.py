@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pages of docs/results and the figures of hand-written texts are the records': what is edited by hand is found."""
 
+import json
 import re
 import shutil
 import sys
 
 import pytest
 
-from benchmarks import figures, pages, results
-from benchmarks.results import index, told
+from benchmarks import figures, groomed, open_eyes, pages, results
+from benchmarks.results import comparison, eyes, geometry, index, told
+from benchmarks.results import scan as scan_page
 from core.contract.messages import Problem
 
 from .conftest import ROOT
@@ -55,6 +57,69 @@ def test_a_phrase_that_was_reworded_or_stands_there_twice_is_found():
     for text in ("It was solved within 20 s.", f"{phrase}, {phrase}"):
         with pytest.raises(Problem, match="a.md"):
             told.corrected(text, phrase, "a.md")
+
+
+def test_the_index_counts_who_loses_and_who_is_synthetic():
+    gains = {"scan_lamps": -2.0, "scan_below": 0.1, "bearded_below": -0.2, "very_light": -0.1, "light_overcast": 0.3}
+    assert index.worse_in_the_picture(gains) == (
+        "3 of 5 captures become worse in the picture, among them 1 of the 2 of the one real scan, whose own map holds "
+        "light.")
+    assert index.worse_in_the_picture({"tan": -1.0}) == "1 of 1 captures become worse in the picture."
+    assert index.the_synthetic(["bearded_below", "light", "scan_below", "very_light"]) == (
+        "The others are synthetic: 1 with strands, eyes and a phone's pipeline, 2 bald, by true cameras.")
+
+
+def test_the_comparison_tells_person_by_person_who_is_ahead_and_leads_over_its_best_rival():
+    gains = {"tan": 1.14, "very_light": -1.05, "dark": 0.64}
+    assert comparison.by_person(gains) == "tan +1.1, dark +0.6, very light -1.1"
+    text = " ".join(results.page("comparison").split())
+    scan = figures.read("comparison")["figures"]["scan"]["raw"]
+    lead = scan["wildcap"]["PSNR"] - max(row["PSNR"] for name, row in scan.items() if name != "wildcap")
+    assert f"the head scan, it leads by {lead:.1f} dB on raw frames" in text
+
+
+def test_what_a_page_calls_the_worst_or_free_is_so_in_its_record():
+    def told_by(page, *records):
+        return " ".join(" ".join(body for _, body in page.sections(*map(figures.Figures.of, records))).split())
+
+    chain, scan, measured = (figures.read(name)["figures"] for name in ("whole_chain", "scan_albedo", "geometry"))
+    chain["rows"]["scan, network"] |= {"true_mask": {"psnr": 31.5, "ssim": 0.9}, "solved": {"psnr": 30.0, "ssim": 0.9}}
+    assert "costs 1.50 dB on the scan" in told_by(scan_page, scan, chain, measured)
+    scale = figures.read("head_scale")["figures"]
+    scale["others"]["worst"] = -0.042
+    assert "on nine synthetic heads at most 4.2 % off" in told_by(geometry, measured, scale)
+
+
+def test_the_page_of_hair_says_where_it_falls_short_and_what_strokes_are_worth():
+    rows = {"bearded": {"brows": {"iou": 0.9, "degrees": 11.0, "usual_degrees": 14.0},
+                        "beard": {"iou": 0.4, "degrees": 31.0, "usual_degrees": 13.0}},
+            "bald": {"brows": {"iou": 0.8}}}
+    assert groomed.shortfalls(rows) == (
+        "Below the IoU that is wanted: the bearded person's beard (0.40); farther off: the bearded person's beard (31 "
+        "degrees). Hair that follows the strokes lies nearer to the true one than the usual directions alone in 1 of 2 "
+        "rows.")
+    assert "wanted: nothing; farther off: nothing" in groomed.shortfalls({"bald": rows["bald"]})
+
+
+def test_the_page_of_eyes_says_who_is_in_no_mean():
+    measured, missed = ({column: value for column in open_eyes.COLUMNS} for value in (0.5, None))
+    everybody = {f"{name}, {side}": measured
+                 for name in ("bearded", "fringed", "stubbled") for side in ("left", "right")}
+    assert eyes.left_out(everybody) == "", "the fourth person's lids are closed"
+    rows = {**everybody, "fringed, left": missed, "fringed, right": missed}
+    assert eyes.left_out(rows) == "Taken for closed, and in no mean: fringed."
+    del rows["stubbled, left"]
+    assert eyes.left_out(rows).endswith("Filmed with open eyes, too, and not measured: stubbled.")
+
+
+def test_eyes_that_were_taken_for_closed_are_rows_without_figures(tmp_path):
+    for openness, rows in ((0.9, 2), (0.0, 0)):
+        (tmp_path / "cameras.json").write_text(json.dumps({"person": {"openness": openness}}), encoding="utf-8")
+        found = open_eyes.missed(tmp_path)
+        assert len(found) == rows and all(set(row) == set(open_eyes.COLUMNS) for row in found)
+    (tmp_path / "cameras.json").write_text('{"person": {"openness": 0.9}}', encoding="utf-8")
+    row = open_eyes.missed(tmp_path)[0]
+    assert (row["openness"], row["true openness"], row["rim, mm"]) == (0.0, 0.9, None)
 
 
 def test_a_page_tells_what_its_records_know(tmp_path):

@@ -6,7 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from core.synthetic.people.person import sample_person
+
 from ..figures import Figures, markdown
+from ..likenesses import LIKENESSES
 from ..open_eyes import ALONE, COLUMNS
 from ..pages import Sections, prose
 
@@ -30,9 +33,18 @@ def sections(record: Figures) -> Sections:
         it opens them. Real lids are not, so that row is no bound: it says what following the frames costs where there
         is nothing to follow. *Filmed* are people whose head came from their film, too: a third of the stubbled man's
         face is missing from his scan, so that his left eye lies on a face that is millimetres off.
-        """, markdown(["mean over eyes", *COLUMNS[:7]], table))),
+        """, markdown(["mean over eyes", *COLUMNS[:7]], table), *filter(None, [left_out(rows)]))),
         ("Eye by eye", markdown(["eye", *COLUMNS], [[name, *(_shown(row[column]) for column in COLUMNS)]
                                                     for name, row in {**fitted, **filmed}.items()]))]
+
+
+def left_out(rows: dict) -> str:
+    """Who is not in the means: people whose open eyes were taken for closed, and those who are not in the record."""
+    opened = [person.name for person in LIKENESSES if sample_person(person.seed).openness]
+    taken = [name for name in opened if rows.get(f"{name}, left", {}).get("rim, mm", 0) is None]
+    absent = [name for name in opened if f"{name}, left" not in rows]
+    return " ".join(f"{words}: {', '.join(names)}." for words, names in (
+        ("Taken for closed, and in no mean", taken), ("Filmed with open eyes, too, and not measured", absent)) if names)
 
 
 def _means(rows: dict) -> list[str | None]:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ..figures import Figures
-from ..groomed import WORDS, to_table
+from ..groomed import WORDS, shortfalls, to_table
 from ..pages import Sections
 
 TITLE = "Hair that is grown from pictures"
@@ -15,4 +15,4 @@ PICTURE = "![From left to right a frame, the true hairs, the grown hairs](../pic
 
 
 def sections(groomed: Figures) -> Sections:
-    return [("", WORDS), ("", to_table(groomed.people)), ("", PICTURE)]
+    return [("", WORDS), ("", to_table(groomed.people)), ("", shortfalls(groomed.people)), ("", PICTURE)]

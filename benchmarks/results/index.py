@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib import import_module
 
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
+from ..people import PEOPLE
 
 TITLE = "What was measured"
 RECORDS = ("state", "demo", "relit", "relit_people", "scan_albedo", "whole_chain", "costs", "comparison", "photographs",
@@ -90,10 +92,30 @@ def spread(state: Figures) -> str:
         mean), and {solved.psnr_shared.difference:+.2f} ± {solved.psnr_shared.error:.2f} dB on the map up to one shared
         light: from {least:+.2f} dB (`{worst}`) to {most:+.2f} dB (`{best}`). Where a person was filmed in several
         lights ({solved.agreement.people} of them) it adds {solved.agreement.difference:+.2f} dB to how well the albedos
-        agree. {sum(gain < 0 for gain in gains["psnr"].values())} of {len(gains["psnr"])} captures become worse in the
-        picture, most of them of the one real scan, whose own map holds light; the others are synthetic with strands,
-        eyes and a phone's pipeline ([state](state.md)).
+        agree. {worse_in_the_picture(gains["psnr"])} {the_synthetic(state.people.solved)} [The page](state.md).
         """)
+
+
+def worse_in_the_picture(gains: dict[str, float]) -> str:
+    """How many captures lose by the solve, and how many of these are the head scan's; gains: dB by capture."""
+    worse, scanned = [name for name, gain in gains.items() if gain < 0], [name for name in gains if is_scanned(name)]
+    of_scan = (f", among them {sum(map(is_scanned, worse))} of the {len(scanned)} of the one real scan, whose own map "
+               "holds light" if scanned else "")
+    return f"{len(worse)} of {len(gains)} captures become worse in the picture{of_scan}."
+
+
+def the_synthetic(people: Iterable[str]) -> str:
+    """How many people are of benchmarks/likenesses.py, and how many of benchmarks/people.py."""
+    made = [name for name in people if not is_scanned(name)]
+    bald = [name for name in made if any(f"{name}_".startswith(f"{person.name}_") for person in PEOPLE)]
+    kinds = [(len(made) - len(bald), "with strands, eyes and a phone's pipeline"),
+             (len(bald), "bald, by true cameras")]
+    return f"The others are synthetic: {', '.join(f'{count} {what}' for count, what in kinds if count)}."
+
+
+def is_scanned(name: str) -> bool:
+    """Whether a capture, or a person, is of the head scan (benchmarks/scan_captures.py)."""
+    return name.startswith("scan_")
 
 
 def flat_wins(rows: Figures) -> bool:

@@ -18,6 +18,7 @@ def sections(albedo: Figures, chain: Figures, geometry: Figures) -> Sections:
     cameras, truth, rows = geometry.lps_sun.cameras, geometry.lps_sun.cameras.against_truth, chain.rows
     head, icp = geometry.lps_sun.head.against_truth.by_cameras, geometry.lps_sun.head.against_truth.after_icp
     lost = rows["scan, network"].solve_off.psnr - rows["scan, network"].solved.psnr
+    proposed = rows["scan, network"].true_mask.psnr - rows["scan, network"].solved.psnr
     return [("", prose("""
         The subject is a real scan (CC BY, not part of this repository); 96 frames, path-traced.
         `python -m core run capture.mp4 CAPTURE --skin-tone ...`, then the commands above.
@@ -34,7 +35,7 @@ def sections(albedo: Figures, chain: Figures, geometry: Figures) -> Sections:
         """, markdown(["capture", "delighter", "solve off", "solved", "solved with the true shadow as mask"], [
             [row.capture, row.delighter, *(quality(row[key]) for key in ("solve_off", "solved", "true_mask"))]
             for row in rows.values()]), f"""
-        The proposed mask costs nothing against the true one (intersection over union on the scan
+        The proposed mask costs {proposed:.2f} dB on the scan against the true one (intersection over union on the scan
         {chain.mask_iou.scan:.2f}, on the sample {chain.mask_iou.sample:.2f}). The solve gains
         {rows["scan, none"].solved.psnr - rows["scan, none"].solve_off.psnr:.1f} dB on raw frames and
         {rows["sample, network"].solved.psnr - rows["sample, network"].solve_off.psnr:.1f} dB on the sample, and **loses
