@@ -73,7 +73,7 @@ def test_the_comparison_tells_person_by_person_who_is_ahead_and_leads_over_its_b
     gains = {"tan": 1.14, "very_light": -1.05, "dark": 0.64}
     assert comparison.by_person(gains) == "tan +1.1, dark +0.6, very light -1.1"
     text = " ".join(results.page("comparison").split())
-    scan = figures.read("comparison")["figures"]["scan"]["raw"]
+    scan = figures.read_record("comparison")["figures"]["scan"]["raw"]
     lead = scan["wildcap"]["PSNR"] - max(row["PSNR"] for name, row in scan.items() if name != "wildcap")
     assert f"the head scan, it leads by {lead:.1f} dB on raw frames" in text
 
@@ -82,10 +82,10 @@ def test_what_a_page_calls_the_worst_or_free_is_so_in_its_record():
     def told_by(page, *records):
         return " ".join(" ".join(body for _, body in page.sections(*map(figures.Figures.of, records))).split())
 
-    chain, scan, measured = (figures.read(name)["figures"] for name in ("whole_chain", "scan_albedo", "geometry"))
+    chain, scan, measured = (figures.read_record(name)["figures"] for name in ("whole_chain", "scan_albedo", "geometry"))
     chain["rows"]["scan, network"] |= {"true_mask": {"psnr": 31.5, "ssim": 0.9}, "solved": {"psnr": 30.0, "ssim": 0.9}}
     assert "costs 1.50 dB on the scan" in told_by(scan_page, scan, chain, measured)
-    scale = figures.read("head_scale")["figures"]
+    scale = figures.read_record("head_scale")["figures"]
     scale["others"]["worst"] = -0.042
     assert "on nine synthetic heads at most 4.2 % off" in told_by(geometry, measured, scale)
 
