@@ -127,8 +127,8 @@ def test_wherever_pip_is_set_up_to_put_packages_this_environment_gets_them(local
     monkeypatch.setenv("PIP_USER", "1")
     for name in ("PIP_TARGET", "PIP_PREFIX", "PIP_CONSTRAINT"):
         monkeypatch.setenv(name, str(tmp_path / "elsewhere"))
-    task = BackgroundTask("index", lambda task: index.plan_installation(local, installation.base_python(), "cpu", "pytorch",
-                                                           task.run))
+    task = BackgroundTask("index", lambda task: index.plan_installation(
+        local, installation.base_python(), "cpu", "pytorch", task.run))
     task.start()
     assert isinstance(follow(task)[-1], Done) and task.result.packages.keys() == {"tinytorch", "tinynets"}
     assert isinstance(install(tmp_path / "env", local)[-1], Done)

@@ -82,7 +82,8 @@ def test_what_a_page_calls_the_worst_or_free_is_so_in_its_record():
     def told_by(page, *records):
         return " ".join(" ".join(body for _, body in page.sections(*map(figures.Figures.of, records))).split())
 
-    chain, scan, measured = (figures.read_record(name)["figures"] for name in ("whole_chain", "scan_albedo", "geometry"))
+    chain, scan, measured = (figures.read_record(name)["figures"]
+                             for name in ("whole_chain", "scan_albedo", "geometry"))
     chain["rows"]["scan, network"] |= {"true_mask": {"psnr": 31.5, "ssim": 0.9}, "solved": {"psnr": 30.0, "ssim": 0.9}}
     assert "costs 1.50 dB on the scan" in told_by(scan_page, scan, chain, measured)
     scale = figures.read_record("head_scale")["figures"]
