@@ -56,7 +56,7 @@ TABLES = {
                                          "psnr_alone": Column("up to a light of its own, dB"),
                                          "light_alone": Column("that light of its own, in log", 3, 0),
                                          "agreement": Column("agreement, dB"),
-                                         "light_slope": Column("slope by light", 2, -1)},
+                                         "light_slope": Column("slope by light", 2, 0)},
     "Features kept": {"kept_brows": Column("brows", 2, 0), "kept_lips": Column("lips", 2, 0),
                       "kept_chin": Column("chin", 2, 0), "lost": Column("mean abs(1 - kept)", 2, -1),
                       "between_lights": Column("between lights", 2, -1)},
@@ -67,8 +67,8 @@ TABLES = {
                                      "coverage": Column("within one sigma", 3, 0)},
 }
 WORDS = {
-    "In the picture": "In the frames with a true albedo, on facial skin, after one gain per channel: PSNR, SSIM and "
-                      "FLIP; *detail* is the correlation with "
+    "In the picture": "In the frames with a true albedo, on the face with its brows, lips and beard, after one gain "
+                      "per channel: PSNR, SSIM and FLIP; *detail* is the correlation with "
     "the truth's log green between 1 and 3 px; *shadow step* is log(answer / truth), lit less dark, 4 to 12 px from "
     "the shadow's edge.",
     "Along the edges of shadows": "log(answer / truth) across the edges where the true light steps: the step; the line "
@@ -77,11 +77,11 @@ WORDS = {
     "Up to a light, and across lights": "On the map, against the texture of the true frames through the same "
                                         "registration. *Up to one shared light*: one grey "
     "second-order light (nine numbers) fitted to all captures of a person together is no error; what differs between "
-    "captures is. *That light* is its "
+    "captures is. Of a person with one capture it is that capture's own. *That light* is its "
     "standard deviation in natural log. *Agreement*: PSNR of the mean squared difference between the captures' albedos "
     "at one tone; a flat colour agrees "
     "perfectly, the true light tells what the registrations allow. *Slope by light*: how far the answer follows from "
-    "one capture to the other what was filmed.",
+    "one capture to the other what was filmed; 0 is best, and below it too much was taken out.",
     "Features kept": "Share of the truth's contrast that brows, lips and chin keep (1 is all); mean abs(1 - kept) of "
                      "brows, and of closed eyes, each capture "
     "apart; the deviation of kept between a person's captures over that of the filmed textures.",

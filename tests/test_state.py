@@ -225,6 +225,13 @@ def test_people_measured_before_by_the_same_code_stay_in_the_record():
     assert alone[DELIT]["anna"] == {**row, "captures": 1}, "of one capture nothing is kept that three told"
 
 
+def test_an_answer_that_takes_too_much_light_is_not_called_better():
+    slopes = {DELIT: {"anna": 0.1, "ben": 0.2}, SOLVED: {"anna": -0.4, "ben": -0.3}}
+    scores = {method: {name: {"light_slope": slope} for name, slope in row.items()} for method, row in slopes.items()}
+    page = dict(state.sections(scores, {}))["Up to a light, and across lights"]
+    assert "| solved | -0.50 ± 0.00 |" in page and "**" not in page
+
+
 def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
     filled(tmp_path, "anna", "A")
     captures = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
