@@ -48,8 +48,8 @@ from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import SkinTone
 
 from . import figures
-from .ablation_measures import measure, summary, table
-from .uv_problems import LEE_PERRY_SMITH, SHADOWS, MaskedUvProblem, problem, skin_weight
+from .ablation_measures import measure_regions, summary, table
+from .uv_problems import LEE_PERRY_SMITH, SHADOWS, MaskedUvProblem, make_problem, skin_weight
 
 SUBJECTS = ("9000", "9002", "9004", "9007", "9008", LEE_PERRY_SMITH.name if LEE_PERRY_SMITH.is_dir() else "9001")
 FACE_CROP, CELLS = 768, 96
@@ -117,7 +117,7 @@ def main() -> None:
         print("Skin tone, largest CIEDE2000 of the solved mean to the request over six tones, as delivered and by the "
               "sampling alone:", found["tone"])
     if options.json:
-        figures.write(options.json, "ablation", "python -m benchmarks.ablation OUT.json", found)
+        figures.write_record(options.json, "ablation", "python -m benchmarks.ablation OUT.json", found)
 
 
 def solve_all(options: argparse.Namespace, done: dict) -> None:
@@ -158,7 +158,7 @@ def _held_out(folder: Path) -> list[str]:
 
 def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], options: argparse.Namespace) -> dict:
     torch.set_num_threads(1)
-    given, found = problem(subject, shadows, options.size, options.kind), {}
+    given, found = make_problem(subject, shadows, options.size, options.kind), {}
     for row, seed in solves:
         began = time.monotonic()
         about = {"row": row, "seed": seed, "problem": [Path(subject).stem, shadows, options.size, options.kind]}
@@ -167,23 +167,50 @@ def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], op
         else:
             albedo = solve_row(given, row, seed, options.steps)
             about |= {"seconds": round(time.monotonic() - began, 1),
-                      **measure(albedo, given.albedo, given.face, given.regions())}
+                      **measure_regions(albedo, given.albedo, given.face, given.regions())}
         found[_key(row, subject, shadows, options, seed)] = about
     return found
 
 
 def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
-    """The linear albedo [S, S, 3] that one row's method finds; it is told the true skin tone."""
+    """Solves a problem by one row's method, which is told the true skin tone.
+
+    Parameters
+    ----------
+    uv_problem : solved
+    row : a key of ROWS
+    seed : of the noise
+    steps : of every row that does not say otherwise
+
+    Returns
+    -------
+    The albedo, linear [S, S, 3].
+    """
     if row == "the texture itself":
         return uv_problem.texture
     changes, cells, mask, with_prior = ROWS[row]
     recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": steps, **changes})
-    return solved(uv_problem, recipe, uv_problem.tone, seed, cells, mask, with_prior)
+    return solve_problem(uv_problem, recipe, uv_problem.tone, seed, cells, mask, with_prior)
 
 
-def solved(uv_problem: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS,
-           mask: str = "painted", with_prior: bool = True) -> np.ndarray:
-    """The linear albedo [S, S, 3] under a recipe and a requested tone."""
+def solve_problem(uv_problem: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS,
+                  mask: str = "painted", with_prior: bool = True) -> np.ndarray:
+    """Solves a problem under a recipe and a requested tone.
+
+    Parameters
+    ----------
+    uv_problem : solved
+    recipe : of the solve
+    tone : of the skin
+    seed : of the noise
+    cells : of V across the face
+    mask : what becomes of M: "painted", "empty" or "full"
+    with_prior : False: the texels follow the loss alone
+
+    Returns
+    -------
+    The albedo, linear [S, S, 3].
+    """
     size, prior = len(uv_problem.albedo), _prior()
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
@@ -197,14 +224,23 @@ def solved(uv_problem: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: in
         sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(seed))
         state = sampler.sample(start.observations, start.state)
     else:
-        state = texels_alone(start, start.recipe)
+        state = fit_texels(start, start.recipe)
     return maps.finish_maps(state, evidence, start).diffuse
 
 
-def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights,
-                 smooth: float = 0.0) -> State:
+def fit_texels(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights,
+               smooth: float = 0.0) -> State:
     """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's
-    ablation); `smooth`: weight of the albedo's L1 variation."""
+    ablation).
+
+    Parameters
+    ----------
+    start : begun from; its state changes, and is returned
+    recipe : of the lights; its phases last as long as the fit
+    updates : of Adam
+    fit : moves the lights after each
+    smooth : weight of the albedo's L1 variation
+    """
     recipe = replace(recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0,
                      updates=updates)
     o, state = start.observations[1], start.state
@@ -229,7 +265,7 @@ def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float], st
     the mean is brought to the request."""
     skin, found = skin_weight(len(uv_problem.albedo)), []
     for rescale in (OURS.rescale, "none"):
-        albedo = solved(uv_problem, replace(OURS, steps=steps, rescale=rescale), np.array(tone))
+        albedo = solve_problem(uv_problem, replace(OURS, steps=steps, rescale=rescale), np.array(tone))
         mean = images.linear_to_srgb((albedo * skin[..., None]).sum((0, 1)) / skin.sum())
         found.append(round(float(deltaE_ciede2000(rgb2lab(mean), rgb2lab(np.array(tone)))), 3))
     return found[0], found[1]
@@ -239,7 +275,7 @@ def draw(options: argparse.Namespace) -> None:
     """FOLDER/ablation.jpg: of two synthetic subjects the texture, the rows PICTURED and the truth."""
     lines = []
     for subject, shadows in (("9007", "leaves, hard"), ("9008", "edge, half soft")):
-        given = problem(subject, shadows, options.size, options.kind)
+        given = make_problem(subject, shadows, options.size, options.kind)
         solves = [solve_row(given, row, 0, options.steps) for row in PICTURED]
         pictures = [given.texture * (given.albedo.mean() / given.texture.mean()), *solves]
         lines.append(np.hstack([*pictures, given.albedo]))

@@ -30,10 +30,14 @@ from core.geometry import raster
 from core.geometry.views import read_views
 from core.imaging import images
 
-from .figures import markdown, write
+from .figures import markdown, write_record
 from .films import read_film
 from .measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
 
+FINEST = 1024
+"""Texels of a map's side that are looked up one by one: a texel is then a quarter of a millimetre, and no larger than a
+pixel of the frames. Finer ones are averaged, as a pixel does: else it shows one of its texels, and pores count as
+errors."""
 LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true tone": "the true tone everywhere"}
 
 
@@ -78,9 +82,21 @@ class HeadInView:
 
 
 def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, texture: Path | None = None) -> dict:
-    """The figures of a solved capture; `texture` replaces its albedo map (any picture in the head's UVs)."""
-    albedo = images.read_srgb(texture
-                              or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
+    """Scores a solved capture.
+
+    Parameters
+    ----------
+    capture : with its maps
+    truth : folder, laid out as this module says
+    pictures : folder that takes a picture of each frame, the truth beside ours
+    texture : any picture in the head's UVs, sRGB, in place of the albedo map
+
+    Returns
+    -------
+    The figures, and "frames_not_registered".
+    """
+    albedo = averaged(images.read_srgb(
+        texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists())))
     seen, missing = looks(capture, truth)
     if pictures:
         for look in seen:
@@ -88,6 +104,13 @@ def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, t
             images.write_srgb(pictures / f"{look.true.frame:04d}.jpg",
                               np.hstack([look.true.albedo * mask, look.picture(albedo) * mask]))
     return {"frames_not_registered": missing, **score_map(albedo, seen)}
+
+
+def averaged(albedo: np.ndarray) -> np.ndarray:
+    """A map, sRGB [S, S, 3], averaged in linear light to FINEST texels a side where it has more."""
+    if len(albedo) <= FINEST:
+        return albedo
+    return images.linear_to_srgb(images.resize(images.srgb_to_linear(albedo), FINEST, FINEST).clip(0, 1))
 
 
 def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
@@ -183,8 +206,8 @@ def main() -> None:
     print(json.dumps(scores, indent=1))
     if arguments.json:
         ours = scores["WildCap"]
-        write(arguments.json, "albedo_score", "python -m benchmarks.albedo_score CAPTURE TRUTH",
-              {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)})
+        write_record(arguments.json, "albedo_score", "python -m benchmarks.albedo_score CAPTURE TRUTH",
+                     {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)})
 
 
 if __name__ == "__main__":

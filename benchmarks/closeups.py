@@ -48,9 +48,17 @@ class CloseUp:
 Shots = Callable[[str], dict[str, CloseUp]]
 
 
-def run(module: str, description: str, shots: Shots, resolution: int, samples: int) -> None:
-    """The command of `module`, whose docstring is `description`: a row for each person, its pictures those of `shots`,
-    name -> CloseUp for the name of a person."""
+def run_closeups(module: str, description: str, shots: Shots, resolution: int, samples: int) -> None:
+    """The command that a module of close-ups is: a row of pictures for each person.
+
+    Parameters
+    ----------
+    module : its name in benchmarks
+    description : its docstring
+    shots : name of a person -> name of a picture -> what it shows
+    resolution : pixels of a side, where the command does not say
+    samples : of Cycles, likewise
+    """
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
@@ -104,8 +112,16 @@ def prepare(folder: Path, name: str, seed: int) -> Path:
     return capture.root
 
 
-def render(root: Path, shots: dict[str, CloseUp], resolution: int, samples: int) -> None:
-    """The renders of a capture that are not there yet."""
+def render_closeups(root: Path, shots: dict[str, CloseUp], resolution: int, samples: int) -> None:
+    """Renders those close-ups of a capture that are not there yet.
+
+    Parameters
+    ----------
+    root : the capture's folder, which takes renders/NAME.png
+    shots : name -> what it shows
+    resolution : pixels of a side
+    samples : of Cycles
+    """
     left = {name: shot for name, shot in shots.items() if not (root / "renders" / f"{name}.png").is_file()}
     if not left:
         return
@@ -128,10 +144,20 @@ def render(root: Path, shots: dict[str, CloseUp], resolution: int, samples: int)
                 bpy.ops.wildcap.close_up()
             if shot.iris:
                 bpy.ops.wildcap.iris(iris=shot.iris)
-            shoot(thing, shot, resolution, samples, root / "renders" / f"{name}.png")
+            shoot_closeup(thing, shot, resolution, samples, root / "renders" / f"{name}.png")
 
 
-def shoot(obj, shot: CloseUp, resolution: int, samples: int, path: Path) -> None:
+def shoot_closeup(obj, shot: CloseUp, resolution: int, samples: int, path: Path) -> None:
+    """Renders one close-up.
+
+    Parameters
+    ----------
+    obj : the head, with the hair, eyes and mouth that the picture shows
+    shot : what it shows
+    resolution : pixels of a side
+    samples : of Cycles; EEVEE takes EEVEE_SAMPLES
+    path : of the PNG
+    """
     import bpy
     from bl_ext.user_default.wildcap.wildcap_addon.relight import picture
 
@@ -141,7 +167,7 @@ def shoot(obj, shot: CloseUp, resolution: int, samples: int, path: Path) -> None
     for unit, value in shot.units.items():
         keys.key_blocks[unit].value = value
     keys.update_tag()
-    scene = picture.set_up(obj, shot.light, resolution, samples)
+    scene = picture.set_up_scene(obj, shot.light, resolution, samples)
     if shot.engine == "EEVEE":
         scene.render.engine = 'BLENDER_EEVEE_NEXT' if bpy.app.version < (5, 0, 0) else 'BLENDER_EEVEE'
         scene.eevee.taa_render_samples = EEVEE_SAMPLES
@@ -167,7 +193,7 @@ def aim(camera, obj, shot: CloseUp) -> None:
 def main() -> None:
     """One capture's renders: MODULE CAPTURE RESOLUTION SAMPLES."""
     module, root, resolution, samples = sys.argv[1:]
-    render(Path(root), importlib.import_module(module).shots(Path(root).stem), int(resolution), int(samples))
+    render_closeups(Path(root), importlib.import_module(module).shots(Path(root).stem), int(resolution), int(samples))
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ from core.solve.skin_tone import parse_skin_tone
 from core.solve.witnesses import confirm_marks
 
 from . import figures, light_models
-from .ablation import texels_alone
+from .ablation import fit_texels
 from .albedo_score import looks, score_map
 from .continued import run_stages
 from .people import PEOPLE, skin_tone
@@ -59,10 +59,10 @@ INPUTS = ("delit", "raw")
 OURS = "wildcap"
 SEEDS = {OURS: (0, 1)}
 LIGHTS: dict[str, Callable] = {
-    "regions 5": partial(light_models.regions, count=5),
-    "regions 10": partial(light_models.regions, count=10),
-    "environment": light_models.environment,
-    "environment, no prior": light_models.environment,
+    "regions 5": partial(light_models.light_by_regions, count=5),
+    "regions 10": partial(light_models.light_by_regions, count=10),
+    "environment": light_models.light_by_environment,
+    "environment, no prior": light_models.light_by_environment,
 }
 METHODS = (OURS, *LIGHTS, "over its blur", "texture")
 FREE = "environment, no prior"
@@ -95,12 +95,25 @@ def main() -> None:
                                if name != "scan"])} if set(found["subjects"]) - {"scan"} else {}
     found |= {"scan": means([found["subjects"]["scan"]])} if "scan" in subjects else {}
     if asked.json:
-        figures.write(asked.json, "comparison", "python -m benchmarks.comparison FOLDER --scan CAPTURE TRUTH", found)
+        figures.write_record(asked.json, "comparison", "python -m benchmarks.comparison FOLDER --scan CAPTURE TRUTH",
+                             found)
     print(table(found))
 
 
 def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
-    """Input -> method -> seed -> figures of one subject; each row's maps lie in work/INPUT_METHOD_SEED."""
+    """Scores all methods on one subject.
+
+    Parameters
+    ----------
+    source : a capture with texture and mask
+    truth : folder of the true albedo, and of the tone that all are given
+    work : takes each row's maps and scores; what is there is not solved again
+    size : of the maps, texels along a side
+
+    Returns
+    -------
+    Input -> method -> seed -> figures.
+    """
     torch.set_num_threads(1)
     found: dict[str, dict] = {given: {} for given in INPUTS}
     for given in INPUTS:
@@ -111,22 +124,43 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
         seen = None
         for method in METHODS:
             for seed in SEEDS.get(method, (0,)) if given == "delit" else (0,):
-                row = row_folder(work, given, method, seed)
+                row = find_row_folder(work, given, method, seed)
                 if not (row / "score.json").is_file():
                     seen = seen or looks(capture, truth)[0]
-                    _keep(row, *solved(capture, settings, method, seed), seen)
+                    _keep(row, *solve_by_method(capture, settings, method, seed), seen)
                 score = json.loads((row / "score.json").read_text(encoding="utf-8"))
                 found[given].setdefault(method, {})[str(seed)] = score
     return found
 
 
-def row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
-    """Where a row's diffuse_albedo.exr, shading.exr and score.json lie."""
+def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> Path:
+    """Where a row's diffuse_albedo.exr, shading.exr and score.json lie.
+
+    Parameters
+    ----------
+    work : folder of a subject's rows
+    input_name : one of INPUTS
+    method : one of METHODS
+    seed : of the noise
+    """
     return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
 
 
-def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """Diffuse albedo and shading, linear [S, S, 3], of one method under one input, and the seconds that it took."""
+def solve_by_method(capture: Capture, settings: Settings, method: str,
+                    seed: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """Solves a capture by one method.
+
+    Parameters
+    ----------
+    capture : with texture and mask
+    settings : of the solve
+    method : one of METHODS
+    seed : of the noise
+
+    Returns
+    -------
+    Diffuse albedo and shading, linear [S, S, 3], and the seconds that it took.
+    """
     began = time.monotonic()
     head = read_head(capture)
     evidence = read_evidence(capture, head, settings.solve.size)
@@ -142,7 +176,7 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
         start, recipe, move = LIGHTS[method](start, recipe)
         fit = {"fit": move}
     if method == FREE:
-        state = texels_alone(start, replace(recipe, decay=0.995), FREE_UPDATES, smooth=FREE_SMOOTH, **fit)
+        state = fit_texels(start, replace(recipe, decay=0.995), FREE_UPDATES, smooth=FREE_SMOOTH, **fit)
     else:
         sampler = Sampler(prior.of_tone(start.tone), recipe, seed_noise(seed), **fit)
         state = sampler.sample(start.observations, start.state)

@@ -29,8 +29,8 @@ from core.imaging import images
 from core.solve.recipes import OURS
 from core.solve.skin_tone import format_skin_tone
 
-from .figures import write
-from .uv_problems import plain_problem
+from .figures import write_record
+from .uv_problems import make_plain_problem
 
 SHADOWS = ("leaves", "self", "blinds")
 
@@ -47,7 +47,7 @@ def main() -> None:
     print("subject shadows  Spearman  error: confident half  the rest  ratio")
     for subject in options.subjects:
         shadows = SHADOWS[subject % len(SHADOWS)]
-        error, confidence, face = solved(subject, shadows, options.size, options.steps)
+        error, confidence, face = solve_problem(subject, shadows, options.size, options.steps)
         rho, sure, rest = judged(error[face], confidence[face])
         rows.append((rho, sure / rest))
         shown.append(np.hstack([np.clip(error * 5, 0, 1) * face, (1 - confidence) * face]))
@@ -55,16 +55,27 @@ def main() -> None:
     rho, ratio = np.mean(rows, 0)
     print(f"mean             {rho:8.3f} {'':31} {ratio:6.2f}")
     if options.json:
-        write(options.json, "confidence", "python -m benchmarks.confidence",
-              {"subjects": len(rows), "correlation": {"mean": rho, "best": max(each for each, _ in rows)},
-               "error_of_confident_half": ratio})
+        write_record(options.json, "confidence", "python -m benchmarks.confidence",
+                     {"subjects": len(rows), "correlation": {"mean": rho, "best": max(each for each, _ in rows)},
+                      "error_of_confident_half": ratio})
     if options.picture:
         images.write_srgb(options.picture, np.repeat(np.vstack(shown)[..., None], 3, 2))
 
 
-def solved(subject: int, shadows: str, size: int, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Error [S, S] and confidence [S, S] of one problem, and bool [S, S], the face."""
-    given = plain_problem(subject, shadows, size)
+def solve_problem(subject: int, shadows: str, size: int, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Solves a problem as the stage does.
+
+    Parameters
+    ----------
+    subject, shadows, size : as `make_plain_problem` has them
+    steps : of the solve
+
+    Returns
+    -------
+    Error of the albedo in sRGB [S, S], after the gain per channel (linear) that is best for the face, confidence [S, S]
+    in [0, 1], and bool [S, S], the face.
+    """
+    given = make_plain_problem(subject, shadows, size)
     settings = from_json({"delight": {"delighter": "none"},
                           "solve": {"size": size, "steps": steps, "skin_tone": format_skin_tone(given.tone),
                                     "checkpoint_every": 600}})

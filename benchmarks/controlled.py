@@ -40,7 +40,7 @@ from core.face.head import read_head
 from core.imaging import images
 
 from . import figures
-from .controlled_captures import as_albedo, by_the_stage, flash, studio, true_frames, under_even_light
+from .controlled_captures import as_albedo, by_the_stage, flash, studio, under_even_light, use_true_frames
 from .people import PEOPLE, skin_tone
 from .texture import looks_of, score
 
@@ -68,13 +68,13 @@ def main() -> int:
         parser.error(f"{folder} holds no capture of benchmarks/people.py.")
     for name in found if asked.pictures else ():
         images.write_srgb(asked.pictures / f"{name}.jpg", side_by_side(folder, name))
-    known = (figures.read(asked.json.stem, asked.json.parent)["figures"]["people"] if asked.json and asked.json.exists()
-             else {})
+    known = (figures.read_record(asked.json.stem, asked.json.parent)["figures"]["people"]
+             if asked.json and asked.json.exists() else {})
     everyone = figures.merged(known, found)
     people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
     summary = {"people": people, "mean": means(people)}
     if asked.json:
-        figures.write(asked.json, "controlled", COMMAND, summary)
+        figures.write_record(asked.json, "controlled", COMMAND, summary)
     print(table(summary))
     return 0
 
@@ -100,7 +100,7 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
                                     {})),
         "studio": ("studio",
                    lambda: by_the_stage(studio(_set(folder, name, "studio"), sets["studio"], settings), settings)),
-        "limit": ("wild", lambda: (as_albedo(true_frames(wild, truth, sets["wild"], settings), settings), {})),
+        "limit": ("wild", lambda: (as_albedo(use_true_frames(wild, truth, sets["wild"], settings), settings), {})),
     }
     there = {"wild": True, "solved": (wild.maps / "diffuse_albedo.png").is_file(),
              **{place: (folder / f"{name}_{place}" / "skin_tone.txt").is_file() for place in ("flash", "studio")}}

@@ -40,9 +40,9 @@ from core.contract.settings import Settings
 from core.imaging import images
 
 from . import figures
-from .delight_measures import flat_tone, mean_of, score, sheet, shortfalls, square, table, tone_group
-from .delight_portraits import portraits
-from .delight_sets import Photograph, Photographs, frames, light_stage, registered
+from .delight_measures import flat_tone, mean_of, score_picture, sheet, shortfalls, square, table, tone_group
+from .delight_portraits import make_portraits
+from .delight_sets import Photograph, Photographs, light_stage, registered, select_true_frames
 from .measures.pictures import with_gain
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -80,19 +80,19 @@ def main() -> None:
     if options.weights:
         importlib.import_module("core.delight.network").WEIGHTS = options.weights
     captures = dict(pair.split("=", 1) for pair in options.capture)
-    results = (figures.read(options.json.stem, options.json.parent)["figures"] if options.json
+    results = (figures.read_record(options.json.stem, options.json.parent)["figures"] if options.json
                and options.json.is_file() else {})
     for name in options.sets:
         title = Path(name).name
         with tempfile.TemporaryDirectory() as folder:
             try:
-                found = measure(_set(name, options, captures, Path(folder)), settings, not options.quick, options.rows,
-                                options.pictures and options.pictures / f"{title}.png")
+                found = measure_rows(_set(name, options, captures, Path(folder)), settings, not options.quick,
+                                     options.rows, options.pictures and options.pictures / f"{title}.png")
             except Problem as problem:
                 found = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
         results[title] = {**results.get(title, {}), **found}
         if options.json:
-            figures.write(options.json, "delight", "python -m benchmarks.delight [--data DIR]", results)
+            figures.write_record(options.json, "delight", "python -m benchmarks.delight [--data DIR]", results)
     print(table(results))
     if any(row.startswith("network") and "figures" in found for rows_ in results.values()
            for row, found in rows_.items()):
@@ -102,10 +102,22 @@ def main() -> None:
         print(json.dumps(results, indent=1))
 
 
-def measure(chosen: Photographs, settings: Settings, features: bool = True, only: list[str] | None = None,
-            picture: Path | None = None) -> dict[str, dict]:
-    """Row -> {pictures, refused, figures, groups, seconds_per_picture}, or {not_run: why}; `picture`: where to show
-    them beside each other."""
+def measure_rows(chosen: Photographs, settings: Settings, features: bool = True, only: list[str] | None = None,
+                 picture: Path | None = None) -> dict[str, dict]:
+    """Scores each row's answers to a set of photographs. One that a delighter refuses counts as it is.
+
+    Parameters
+    ----------
+    chosen : the photographs
+    settings : of the delighters
+    features : whether the feature distance is measured, too
+    only : what the names of the rows begin with that are asked for; None: all
+    picture : file that shows six photographs' answers beside each other
+
+    Returns
+    -------
+    Row -> {pictures, refused, figures, groups, seconds_per_picture}, or {not_run: why}.
+    """
     results, shown = {}, []
     spread = chosen.photographs[:: max(1, len(chosen.photographs) // 6)][:6]
     for row in rows(chosen, settings):
@@ -120,7 +132,7 @@ def measure(chosen: Photographs, settings: Settings, features: bool = True, only
                     predicted = photograph.srgb
                 # scores the same under every light
                 flat = id(photograph.truth) if row == FLAT and photograph.truth.shadow is None else None
-                scores.append(alike.get(flat) or score(predicted, photograph.srgb, photograph.truth, features))
+                scores.append(alike.get(flat) or score_picture(predicted, photograph.srgb, photograph.truth, features))
                 alike |= {flat: scores[-1]} if flat else {}
                 groups.setdefault(photograph.group or tone_group(flat_tone(photograph.truth)), []).append(scores[-1])
                 delit[photograph.name] = predicted
@@ -182,10 +194,10 @@ def _set(name: str, options: argparse.Namespace, captures: dict[str, str], work:
     if name == "faceolat":
         return light_stage(options.data, every)
     if name == "portraits":
-        return portraits(options.work, every=every)
+        return make_portraits(options.work, every=every)
     truth = {"lps_sun": SHARED / "lps_sun", "sample": SAMPLE}.get(name, Path(name))
     capture = Capture(Path(captures[name]).resolve()) if name in captures else registered(truth, options.work)
-    return frames(truth, capture, work, every)
+    return select_true_frames(truth, capture, work, every)
 
 
 def _shown(srgb: np.ndarray, photograph: Photograph) -> np.ndarray:

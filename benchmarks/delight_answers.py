@@ -87,15 +87,15 @@ def main() -> int:
     for name, person, capture, truth in known_captures(asked):
         kept = work / f"{name}.npz"
         if not kept.is_file():
-            keep(kept, capture, *truth())
+            keep_answers(kept, capture, *truth())
         with np.load(kept) as stored:
             judged[name] = Judged(person, *(stored[key].astype(np.float32) for key in ANSWERS))
         print(f"{name}: read", file=sys.stderr, flush=True)
     rows, chosen = score(judged)
     print(table(rows), "", choices(chosen), sep="\n")
     if asked.json:
-        figures.write(asked.json, "delight_answers", COMMAND,
-                      {"rows": rows, "chosen": chosen, "over_people": over_people(rows)})
+        figures.write_record(asked.json, "delight_answers", COMMAND,
+                             {"rows": rows, "chosen": chosen, "over_people": over_people(rows)})
     return 0
 
 
@@ -121,8 +121,21 @@ def _bare_truth(seed: int, facekit: Path | None) -> tuple[np.ndarray, np.ndarray
     return figure.seen, (template.mask("face", SIZE) > 0.5) & ~haired
 
 
-def keep(path: Path, capture: Capture, albedo: np.ndarray, known: np.ndarray) -> None:
-    """Asks the delighter and keeps its answers where the albedo is known."""
+def keep_answers(path: Path, capture: Capture, albedo: np.ndarray, known: np.ndarray) -> None:
+    """Asks the delighter and keeps its answers where the albedo is known.
+
+    Parameters
+    ----------
+    path : of the .npz: per answer the light, natural log [N, 3] less its mean, in cells of bare skin
+    capture : with cameras and the built-in head
+    albedo : the truth, linear [S, S, 3], in the head's UVs, of any size
+    known : bool [SIZE, SIZE], where that is one
+
+    Raises
+    ------
+    SystemExit
+        Where the capture has an own head.
+    """
     answers = ask(capture, Settings(device="cpu"), Reporter("delight", emit=lambda message: None))
     if not answers.head.head.built_in:
         raise SystemExit(f"{capture.root} has an own head: the true albedo is in the built-in one's UVs.")

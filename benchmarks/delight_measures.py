@@ -32,9 +32,21 @@ TONES = (("very light", 55), ("light", 41), ("intermediate", 28), ("tan", 10), (
 and Bernerd 2013)."""
 
 
-def score(predicted: np.ndarray, photograph: np.ndarray, true: AlbedoTruth, features: bool = True) -> dict[str, float]:
-    """FIGURES of one delit picture sRGB [H, W, 3] over the facial skin of its truth; nan what cannot be told.
-    `photograph`: what it was made from."""
+def score_picture(predicted: np.ndarray, photograph: np.ndarray, true: AlbedoTruth,
+                  features: bool = True) -> dict[str, float]:
+    """Scores one delit picture over the facial skin of its truth.
+
+    Parameters
+    ----------
+    predicted : sRGB [H, W, 3]
+    photograph : sRGB [H, W, 3], what it was made from
+    true : the truth, of that size
+    features : whether the feature distance is measured, too
+
+    Returns
+    -------
+    FIGURES; nan what cannot be told.
+    """
     box, mask = face_box(true.face), true.face
     predicted, photograph, albedo, mask = predicted[box], photograph[box], true.albedo[box], mask[box]
     evened = with_gain(predicted, albedo, mask)

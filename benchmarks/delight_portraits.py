@@ -17,7 +17,7 @@ from core.synthetic import pigment
 from core.synthetic.identities import subject_mesh
 from core.synthetic.olat import LightStage, light_stage
 from core.synthetic.parameters import adorned, sample_parameters
-from core.synthetic.portrait import relit, sight_of
+from core.synthetic.portrait import relight_sight, sample_sight
 from core.synthetic.sight import Sight
 from core.synthetic.skin import make_skin
 
@@ -30,9 +30,16 @@ SIZE, TEXELS = 384, 512
 PICTURES = ("srgb", "albedo", "skin", "shadow")
 
 
-def portraits(work: Path, subjects: int = 6, lights: int = 2, every: int = 1) -> Photographs:
-    """`lights` pictures of each of `subjects` people per group of skin tone; what was made before lies in the folder
-    `work`. Every n-th of each group."""
+def make_portraits(work: Path, subjects: int = 6, lights: int = 2, every: int = 1) -> Photographs:
+    """Portraits of synthetic subjects of each group of skin tone.
+
+    Parameters
+    ----------
+    work : folder that keeps what was made
+    subjects : of each group
+    lights : pictures of each subject
+    every : every n-th picture of a group is taken
+    """
     found = []
     for group, seeds in subjects_by_tone(subjects).items():
         taken = [(seed, light) for seed in seeds for light in range(lights)][::every]
@@ -60,7 +67,7 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
     if not path.is_file():
         print(f"\rportrait of subject {seed}", end="", file=sys.stderr, flush=True)
         stage, sight = portrait_parts(seed, SIZE)
-        made = relit(sight, stage, np.random.default_rng([seed, 41, light]))
+        made = relight_sight(sight, stage, np.random.default_rng([seed, 41, light]))
         with replacing(path) as temporary:
             np.savez_compressed(temporary,
                                 **{name: np.round(255 * np.clip(p, 0, 1)).astype(np.uint8) if name == "srgb"
@@ -76,4 +83,4 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
 def portrait_parts(seed: int, size: int) -> tuple[LightStage, Sight]:
     """The light stage of a subject, and the subject as its camera sees it in a picture of side `size`."""
     stage, skin = light_stage(subject_mesh(seed)), make_skin(adorned(sample_parameters(seed), seed), TEXELS)
-    return stage, sight_of(stage, skin, np.random.default_rng([seed, 40, 0]), size)
+    return stage, sample_sight(stage, skin, np.random.default_rng([seed, 40, 0]), size)

@@ -64,11 +64,20 @@ def light_stage(folder: Path, every: int = 1) -> Photographs:
     return Photographs(found)
 
 
-def frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photographs:
-    """The frames of a registered capture that have a truth (benchmarks/albedo_score.py says how it is laid out),
-    selected in a copy in the folder `work`.
+def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photographs:
+    """The frames of a registered capture that have a truth, selected in a copy.
 
-    Raises Problem where the capture is not registered or none of its frames has a truth.
+    Parameters
+    ----------
+    truth : folder, laid out as benchmarks/albedo_score.py says
+    capture : the registered one, which stays as it is
+    work : takes copy.wildcap
+    every : every n-th of these frames is taken; the copy selects all
+
+    Raises
+    ------
+    Problem
+        Where the capture is not registered or none of its frames has a truth.
     """
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")

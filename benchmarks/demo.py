@@ -54,8 +54,8 @@ def main() -> int:
     print(f"\nFinished after {(time.monotonic() - started) / 60:.1f} minutes.\nThe report: {capture.report}")
     if arguments.json:
         size = sum(path.stat().st_size for path in capture.root.rglob("*") if path.is_file())
-        figures.write(arguments.json, "demo", "make demo",
-                      {"views": rows["WildCap"]["views"], "rows": scores, "capture_gb": size / 1e9})
+        figures.write_record(arguments.json, "demo", "make demo",
+                             {"views": rows["WildCap"]["views"], "rows": scores, "capture_gb": size / 1e9})
     beaten = all(rows["WildCap"]["raw"]["psnr"] > rows[name]["raw"]["psnr"] for name in ("raw video", "flat true tone"))
     if not beaten:
         print("The result does not beat both floors.", file=sys.stderr)

@@ -33,7 +33,7 @@ def main() -> None:
     subprocess.run([str(figures.ROOT / "tests" / "gui" / "run.sh"), "engines"], cwd=figures.ROOT, check=True)
     found = json.loads(FOUND.read_text(encoding="utf-8"))
     if arguments.json:
-        figures.write(arguments.json, "engines", COMMAND, found)
+        figures.write_record(arguments.json, "engines", COMMAND, found)
     print(table(found))
 
 

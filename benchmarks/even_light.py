@@ -44,7 +44,8 @@ def main() -> int:
         found = {way: {tone: dict(zip(("red", "green", "blue"), given_back(way, albedo), strict=True))
                        for tone, albedo in TONES.items()} for way in WAYS}
     if arguments.json:
-        figures.write(arguments.json, "even_light", f"python -m benchmarks.even_light --json {arguments.json}", found)
+        figures.write_record(arguments.json, "even_light", f"python -m benchmarks.even_light --json {arguments.json}",
+                             found)
     print(table(found))
     return 0
 

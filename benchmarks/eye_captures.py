@@ -45,11 +45,19 @@ def main() -> None:
     parser.add_argument("--facekit", type=Path, help="ICT-FaceKit's folder: without it they are other heads")
     asked = parser.parse_args()
     for seed in asked.only:
-        photograph(asked.folder.resolve(), seed, EYES[seed], asked.facekit)
+        photograph_person(asked.folder.resolve(), seed, EYES[seed], asked.facekit)
 
 
-def photograph(folder: Path, seed: int, kind: str, facekit: Path | None) -> None:
-    """One of them, in a light of people_lights.KINDS."""
+def photograph_person(folder: Path, seed: int, kind: str, facekit: Path | None) -> None:
+    """Makes one person's capture, if it is not there.
+
+    Parameters
+    ----------
+    folder : takes SEED.wildcap, and what was rendered for it
+    seed : of the person
+    kind : of the light, a key of people_lights.KINDS
+    facekit : ICT-FaceKit's folder, of which heads are derived, too; None: other heads
+    """
     capture = Capture(folder / f"{seed}.wildcap")
     if capture.head.is_file():  # written last
         return

@@ -9,7 +9,7 @@ the squares of a chessboard do, Cycles first. The first and the fourth row are u
 fifth under Overcast, the third and the sixth under Sun.
 """
 
-from .closeups import LIGHTS, CloseUp, run
+from .closeups import LIGHTS, CloseUp, run_closeups
 from .people import PEOPLE
 
 ENGINES = ("CYCLES", "EEVEE")
@@ -34,4 +34,4 @@ def shots(name: str) -> dict[str, CloseUp]:
 
 
 if __name__ == "__main__":
-    run("eyes_closeups", __doc__, shots, resolution=192, samples=16)
+    run_closeups("eyes_closeups", __doc__, shots, resolution=192, samples=16)

@@ -97,7 +97,7 @@ class FarmTrial:
         for name, value in found.items():
             print(f"{name}: {value}")
         if record is not None:
-            figures.write(record, "farm", f"python -m benchmarks.farm FOLDER --captures {self.captures}", found)
+            figures.write_record(record, "farm", f"python -m benchmarks.farm FOLDER --captures {self.captures}", found)
         return (0 if found["finished"] == self.captures
                 and not (found["unequal"] or found["twice"] or found["unexplained"]) else 1)
 

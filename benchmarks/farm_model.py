@@ -70,19 +70,20 @@ def main() -> int:
                             help=f"{SAID[field.name]} ({field.default:g})")
     options = parser.parse_args()
     try:
-        known = figures.read("farm_model")["figures"] if (figures.PUBLISHED / "farm_model.json").is_file() else {}
+        published = (figures.PUBLISHED / "farm_model.json").is_file()
+        known = figures.read_record("farm_model")["figures"] if published else {}
         disk = weigh(Capture(options.capture)) if options.capture else known.get("disk_mb")
         starts = time_starts(options.starts) if options.starts else known.get("starts")
         if not disk or not starts:
             raise Problem("Neither the disk of a face nor the start of a task was measured yet.",
                           "Add --capture CAPTURE and --starts 5.")
         given = Assumptions(**{field.name: getattr(options, field.name) for field in fields(Assumptions)})
-        found = figures.plain(model(figures.read("costs")["figures"], disk, starts, given))
+        found = figures.plain(model_farm(figures.read_record("costs")["figures"], disk, starts, given))
     except Problem as problem:
         print(problem.problem, problem.remedy, sep="\n", file=sys.stderr)
         return 2
     if options.json:
-        figures.write(options.json, "farm_model", COMMAND, found)
+        figures.write_record(options.json, "farm_model", COMMAND, found)
     text = page(found)
     if options.page:
         with replacing(options.page) as temporary:
@@ -124,9 +125,21 @@ def time_starts(count: int) -> dict[str, dict[str, float]]:
     return found
 
 
-def model(costs: dict, disk: dict[str, float], starts: dict, assumptions: Assumptions) -> dict:
-    """All figures of the page. `costs` is what benchmarks/costs recorded. Raises Problem where its standard row is
-    not whole."""
+def model_farm(costs: dict, disk: dict[str, float], starts: dict, assumptions: Assumptions) -> dict:
+    """Works out all figures of the page.
+
+    Parameters
+    ----------
+    costs : what benchmarks/costs recorded
+    disk : MB of each entry of a finished capture, as `weigh` finds them
+    starts : what a task starts -> its median seconds, as `time_starts` finds them
+    assumptions : what nobody measured
+
+    Raises
+    ------
+    Problem
+        Where the standard row of the costs is not whole.
+    """
     row, cores = costs.get("standard", {}), costs["machine"]["cores"]
     if any("seconds" not in row.get(stage, {}) for stage in stages.NAMES):
         raise Problem("docs/figures/costs.json has no whole row 'standard'.",

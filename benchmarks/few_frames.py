@@ -30,7 +30,7 @@ from core.geometry.views import read_points
 from core.imaging import images
 
 from .films import read_film
-from .head_against_truth import compare
+from .head_against_truth import compare_surface
 
 FIVE = (0, 27, 51, 75, 95)
 
@@ -83,7 +83,8 @@ def main() -> None:
         photographs_of(args.video, numbers, Path(folder) / "photographs")
         truth_of(args.truth, numbers, Path(folder) / "truth")
         figures = reconstruct(capture, Path(folder) / "photographs", args.scan)
-        print(json.dumps({"stages": figures, "head": compare(capture, Path(folder) / "truth", args.mesh)}, indent=1))
+        head = compare_surface(capture, Path(folder) / "truth", args.mesh)
+        print(json.dumps({"stages": figures, "head": head}, indent=1))
 
 
 if __name__ == "__main__":

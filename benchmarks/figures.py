@@ -41,21 +41,32 @@ class Figures(dict):
             raise AttributeError(f"there is no figure {name!r} among {', '.join(self)}") from None
 
 
-def write(path: Path, benchmark: str, command: str, figures: dict, keep: bool = False) -> None:
-    """Writes a record; `benchmark` is the module's name, `command` as the docs have it (folders as CAPITALS).
+def write_record(path: Path, benchmark: str, command: str, figures: dict, keep: bool = False) -> None:
+    """Writes a record, with the commit (HEAD's, None outside of git), the day and the machine.
 
-    `keep`: figures of a record that is there stay where they were not measured anew, as of other captures or rows.
-    Raises ValueError for a figure that is no finite number, string, bool or None, Problem where `keep` finds another
-    file than a record. The commit is HEAD's, None outside of git.
+    Parameters
+    ----------
+    path : of the JSON file
+    benchmark : the module's name
+    command : as the docs have it, folders as CAPITALS
+    figures : nested
+    keep : figures of a record that is there stay where they were not measured anew, as of other captures or rows
+
+    Raises
+    ------
+    ValueError
+        For a figure that is no finite number, string, bool or None.
+    Problem
+        Where `keep` finds another file than a record.
     """
     path, figures = Path(path), plain(figures)
     if keep and path.is_file():
-        figures = merged(read(path.stem, path.parent)["figures"], figures)
+        figures = merged(read_record(path.stem, path.parent)["figures"], figures)
     here = {"commit": commit(), "date": datetime.date.today().isoformat(), "machine": machine_line()}
     write_json(path, {"benchmark": benchmark, "command": command, **here, "figures": figures})
 
 
-def read(name: str, folder: Path = PUBLISHED) -> dict:
+def read_record(name: str, folder: Path = PUBLISHED) -> dict:
     """The record `name` of a folder; "date" and "machine" are None in older ones. Raises Problem where it is missing or
     is no record."""
     path = Path(folder) / f"{name}.json"

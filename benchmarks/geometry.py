@@ -33,7 +33,7 @@ from core.contract.settings import Settings
 from core.imaging import images
 
 from .costs.stage import measure_stage
-from .figures import ROOT, read, write
+from .figures import ROOT, read_record, write_record
 from .geometry_table import published, table
 
 LAST = "texture"
@@ -60,9 +60,20 @@ def subjects(data: Path) -> dict[str, ScannedSubject]:
     return {name: subject for name, subject in found.items() if subject.source.exists()}
 
 
-def measure(name: str, subject: ScannedSubject, folder: Path, fresh: bool = False) -> dict:
-    """One capture's figures: run, compared with the truth where there is one, drawn. What stops it is told in
-    "stopped"."""
+def measure_capture(name: str, subject: ScannedSubject, folder: Path, fresh: bool = False) -> dict:
+    """Runs a capture, compares it with the truth where there is one, and draws it.
+
+    Parameters
+    ----------
+    name : of the capture
+    subject : what is captured
+    folder : takes NAME.wildcap and pictures/NAME.jpg
+    fresh : begin anew what is there
+
+    Returns
+    -------
+    The figures; "stopped" tells of the stage that failed, or is None.
+    """
     capture = Capture(folder / f"{name}.wildcap")
     if fresh:
         shutil.rmtree(capture.root, ignore_errors=True)
@@ -122,18 +133,18 @@ def _cameras(capture: Capture, subject: ScannedSubject, section: str) -> dict:
 
 
 def _surface(capture: Capture, subject: ScannedSubject, section: str) -> dict:
-    from .head_against_truth import compare
+    from .head_against_truth import compare_surface
 
     figures = capture.read()["stages"].get({"scan": "scan", "head": "registration"}[section], {}).get("figures", {})
     if subject.truth is None:
         return {"own": figures}
     return {"own": figures,
-            "against_truth": compare(capture, subject.truth, subject.mesh,
-                                     {"scan": "scan.ply", "head": "head.obj"}[section])}
+            "against_truth": compare_surface(capture, subject.truth, subject.mesh,
+                                             {"scan": "scan.ply", "head": "head.obj"}[section])}
 
 
 def _texture(capture: Capture, subject: ScannedSubject, section: str) -> dict:
-    from .texture import measure as measure_texture
+    from .texture import measure_rows as measure_texture
 
     figures = capture.read()["stages"].get("texture", {}).get("figures", {})
     return {"own": figures, **({"alone": measure_texture(capture, subject.truth)} if subject.truth else {})}
@@ -158,14 +169,15 @@ def main() -> None:
         if result.is_file() and not options.fresh and json.loads(result.read_text(encoding="utf-8"))["stopped"] is None:
             continue
         started = time.monotonic()
-        figures = measure(name, known[name], folder, options.fresh)
+        figures = measure_capture(name, known[name], folder, options.fresh)
         write_json(result, {**figures, "minutes": round((time.monotonic() - started) / 60, 1)})
     everything = {name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8")) for name in known
                   if (folder / f"{name}.json").is_file()}
     write_json(folder / "geometry.json", everything)
     if options.json:
-        others = read(options.json.stem, options.json.parent)["figures"] if options.json.is_file() else {}
-        write(options.json, "geometry", "python -m benchmarks.geometry FOLDER", {**others, **published(everything)})
+        others = read_record(options.json.stem, options.json.parent)["figures"] if options.json.is_file() else {}
+        write_record(options.json, "geometry", "python -m benchmarks.geometry FOLDER",
+                     {**others, **published(everything)})
     print(table(everything))
 
 

@@ -11,7 +11,7 @@ ROWS = {"average": "plain average (L2)", "blend": "blend", "aligned": "aligned b
 
 
 def table(figures: dict[str, dict]) -> str:
-    """The tables of {capture: figures of geometry.measure}; what was not measured is a dash or is said."""
+    """The tables of {capture: figures of geometry.measure_capture}; what was not measured is a dash or is said."""
     results = figures
     tables = [_cameras(results), _surfaces(results), _textures(results), _costs(results)]
     stopped = [f"- **{name}** stopped at {s['stage']}: {s['problem']} {s['remedy']}"

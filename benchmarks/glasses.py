@@ -74,7 +74,7 @@ def rendered(work: Path, hdri: Path | None) -> tuple[dict, list]:
             rng = np.random.default_rng([3, person, number])
             sights = [training.read(work, person, view) for view in range(SEEN)]
             pair = None if kind == "none" else glasses.sample_glasses(sights[0].landmarks, rng, kind)
-            pictures = [training.photographed(sight, pair, rng, panoramas) for sight in sights]
+            pictures = [training.photograph_sight(sight, pair, rng, panoramas) for sight in sights]
             told[kind].append([look(picture) for picture in pictures])
             shown.append((pictures[number % len(pictures)], told[kind][-1][number % len(pictures)]))
     return {kind: counted(captures) for kind, captures in told.items()}, shown
@@ -138,7 +138,7 @@ def main() -> None:
     record["rendered"], shown = rendered(asked.work, asked.hdri)
     print(json.dumps(record, indent=1))
     if asked.json:
-        figures.write(asked.json, "glasses", COMMAND, record)
+        figures.write_record(asked.json, "glasses", COMMAND, record)
     if asked.sheet:
         images.write_srgb(asked.sheet, sheet(shown))
 

@@ -93,7 +93,7 @@ def main() -> None:
     if options.sheet:
         images.write_srgb(options.sheet, np.concatenate(pictures))
     if options.json:
-        figures.write(options.json, "groomed", COMMAND, {"people": rows})
+        figures.write_record(options.json, "groomed", COMMAND, {"people": rows})
 
 
 def to_table(rows: dict[str, dict]) -> str:

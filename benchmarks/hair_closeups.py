@@ -8,7 +8,7 @@ A row for each person: the albedo with its painted brow under the first light, t
 skin below under all three, the eyes half open in the last.
 """
 
-from .closeups import LIGHTS, CloseUp, run
+from .closeups import LIGHTS, CloseUp, run_closeups
 
 HALF_OPEN = 0.5
 BROW = {"at": "eye", "above_m": 0.008, "way": (0.35, -1.0, 0.1), "lens_mm": 220.0}
@@ -21,4 +21,4 @@ def shots(_name: str) -> dict[str, CloseUp]:
 
 
 if __name__ == "__main__":
-    run("hair_closeups", __doc__, shots, resolution=256, samples=32)
+    run_closeups("hair_closeups", __doc__, shots, resolution=256, samples=32)

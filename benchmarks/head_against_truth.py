@@ -30,9 +30,20 @@ from core.synthetic.identities import subject_mesh
 from core.synthetic.sample import RESERVED
 
 
-def compare(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
-    """Median, 90th and 95th percentile in mm over the face's pixels, as placed by the cameras and after ICP beside
-    it."""
+def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
+    """Measures how far a capture's surface lies off the true one, over the face's pixels.
+
+    Parameters
+    ----------
+    capture : with cameras
+    truth : its folder, with cameras and face/
+    mesh : the true surface; None: the sample's subject
+    surface : file of the capture, OBJ or PLY
+
+    Returns
+    -------
+    Median, 90th and 95th percentile in mm, as placed by the cameras and after ICP beside it; the cameras' own in mm.
+    """
     pose, shared, theirs = pose_of_truth(capture, truth)
     frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
     ours = np.stack([v.centre for v in shared])
@@ -122,7 +133,7 @@ def main() -> None:
     parser.add_argument("mesh", type=Path, nargs="?")
     parser.add_argument("--surface", default="head.obj")
     args = parser.parse_args()
-    print(json.dumps(compare(Capture(args.capture), args.truth, args.mesh, args.surface), indent=1))
+    print(json.dumps(compare_surface(Capture(args.capture), args.truth, args.mesh, args.surface), indent=1))
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def measure(seed: int) -> tuple[float, float]:
     true = np.linalg.norm(left - right) / PUPILS_PER_LIDS * TEMPLATE_PUPILS_PER_LIDS
     origins, directions = [], []
     for azimuth in AZIMUTHS:
-        view = painted_head.camera(azimuth, 0.05 * np.sin(azimuth), scale=1.2)
+        view = painted_head.place_camera(azimuth, 0.05 * np.sin(azimuth), scale=1.2)
         face = faces.detect(painted_head.photograph(view, seed=seed, texels=512))
         if face is not None:
             origins.append(view.centre)

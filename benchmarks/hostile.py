@@ -81,7 +81,7 @@ def _run(arguments: argparse.Namespace, work: Path) -> int:
         rng = random.Random(f"{arguments.seed} {number}")
         kind = rng.choices(chosen, [kinds[name].weight for name in chosen])[0]
         place = work / "cases" / str(number)
-        case = hostile_cases.make(kinds[kind], place, stock, rng)
+        case = hostile_cases.make_case(kinds[kind], place, stock, rng)
         ended = hostile_run.run(case)
         faults = hostile_run.judge(case, ended)
         row = rows.setdefault(kind, Counter())
@@ -104,9 +104,9 @@ def _run(arguments: argparse.Namespace, work: Path) -> int:
     seconds = time.monotonic() - began
     print(f"{total['cases']} cases in {seconds / 60:.1f} minutes, seed {arguments.seed}.")
     if arguments.json:
-        figures.write(arguments.json, "hostile", "python -m benchmarks.hostile --count COUNT --seed SEED",
-                      {"rows": {name: dict(row) for name, row in rows.items()}, "all": dict(total),
-                       "seed": arguments.seed, "minutes": seconds / 60})
+        figures.write_record(arguments.json, "hostile", "python -m benchmarks.hostile --count COUNT --seed SEED",
+                             {"rows": {name: dict(row) for name, row in rows.items()}, "all": dict(total),
+                              "seed": arguments.seed, "minutes": seconds / 60})
     return 0 if total["cases"] and not total["faults"] else 1
 
 

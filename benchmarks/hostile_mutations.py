@@ -59,7 +59,7 @@ def replace_whole(path: Path, rng: random.Random) -> str:
     _put(path,
          {"noise": rng.randbytes(rng.randrange(1, 5000)), "text": b"Dear diary,\nno face today.\n" * 20,
           "a page": b"<!doctype html><html>404</html>",
-          "zeros": bytes(4096), "a picture": png(4, 4, rng.randbytes(4 * 13)),
+          "zeros": bytes(4096), "a picture": make_png(4, 4, rng.randbytes(4 * 13)),
           "a pickle": b"\x80\x04cos\nsystem\n(S'true'\ntR."}[what])
     return f"replaced by {what}"
 
@@ -92,7 +92,7 @@ def forge_png(path: Path, rng: random.Random) -> str:
     width, height = rng.choice([(30016, 30016), (60000, 60000), (2**31 - 1, 1), (0, 0), (1, 1), (10000, 10), (3, 5)])
     depth, colour = rng.choice([(8, 0), (8, 2), (16, 6), (1, 0), (8, 3)])
     rows = zlib.compress(bytes(min(width * 4 + 1, 4000) * min(height, 100)))
-    _put(path, png(width, height, rows, depth, colour, compressed=True))
+    _put(path, make_png(width, height, rows, depth, colour, compressed=True))
     return f"a PNG of {width} x {height}, {depth} bit, colour type {colour}"
 
 
@@ -204,8 +204,17 @@ def mutate(path: Path, rng: random.Random) -> tuple[str, str]:
     return way.__name__, way(path, rng)
 
 
-def png(width: int, height: int, rows: bytes, depth: int = 8, colour: int = 2, compressed: bool = False) -> bytes:
-    """A PNG's bytes, sound or not."""
+def make_png(width: int, height: int, rows: bytes, depth: int = 8, colour: int = 2, compressed: bool = False) -> bytes:
+    """A PNG's bytes, sound or not.
+
+    Parameters
+    ----------
+    width, height : as its header says, whatever `rows` has
+    rows : each with its filter type before it
+    depth : bits of a channel
+    colour : PNG's colour type; 2 is RGB
+    compressed : whether `rows` already are
+    """
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 

@@ -161,8 +161,8 @@ def _tell(
               f"{trial.number}  # {trial.kind}: {trial.faults[0]}")
     print(f"\n{rows['all']['trials']} trials in {seconds / 60:.1f} minutes.")
     if arguments.json:
-        figures.write(arguments.json, "kills", "python -m benchmarks.kills --count COUNT --seed SEED",
-                      {"rows": rows, "seed": arguments.seed, "minutes": seconds / 60, "own_disks": private})
+        figures.write_record(arguments.json, "kills", "python -m benchmarks.kills --count COUNT --seed SEED",
+                             {"rows": rows, "seed": arguments.seed, "minutes": seconds / 60, "own_disks": private})
     return 0 if rows["all"]["trials"] and rows["all"]["faultless"] == rows["all"]["trials"] else 1
 
 

@@ -124,8 +124,20 @@ class Undisturbed:
 
 def run_undisturbed(folder: Path, until: str = stages.NAMES[-1], delighter: str = "network",
                     tell: Callable[[str], None] = print) -> Undisturbed:
-    """Runs the chain up to a stage. Raises AssertionError where a stage does not end well, and the machine's own
-    errors."""
+    """Runs the chain up to a stage, and keeps the place before each and at the end.
+
+    Parameters
+    ----------
+    folder : takes before_STAGE and end
+    until : the last stage
+    delighter : its setting
+    tell : hears a line per stage
+
+    Raises
+    ------
+    AssertionError
+        Where a stage does not end well; and the machine's own errors.
+    """
     names = stages.NAMES[:stages.NAMES.index(until) + 1]
     found = Undisturbed(folder, {**SETTINGS, "delight": {"delighter": delighter}}, names)
     place = folder / "end"
@@ -144,16 +156,25 @@ def capture_at(place: Path) -> Capture:
     return Capture(place / "face.wildcap")
 
 
-def start(place: Path, moment: Moment | None = None, *, log_name: str = "told", limits: dict | None = None,
-          **job) -> Forked:
-    """Writes a job and starts a worker at it."""
+def start_job(place: Path, moment: Moment | None = None, *, log_name: str = "told", limits: dict | None = None,
+              **job) -> Forked:
+    """Writes a job and starts a worker at it.
+
+    Parameters
+    ----------
+    place : whose capture
+    moment : when the worker is struck; None: never
+    log_name : ending of the file beside the place that takes its output
+    limits : `term_s` and `most_bytes` of `fork_worker`
+    job : as `write_job` has it
+    """
     return fork_worker(write_job(capture_at(place), **job), place.with_name(f"{place.name}.{log_name}"), moment,
                        **(limits or {}))
 
 
 def run(place: Path, **job) -> Forked:
     """Runs a job to its end, which has to be a good one."""
-    worker = start(place, **job)
+    worker = start_job(place, **job)
     ended = worker.wait()
     assert isinstance(ended, Done), ended or worker.told.with_suffix(".err").read_text()
     return worker

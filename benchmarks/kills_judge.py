@@ -25,15 +25,21 @@ PASSING = ("preview/", "checkpoints/")
 """What they hold in the middle of a stage no other run need have had: it has to be readable."""
 
 
-def after_kill(
+def judge_kill(
     place: Path,
     known_contents: Mapping[str, Collection[str]],
     masks: Mapping[str, Collection[bytes]] | None = None,
     within: Collection[str] = (),
 ) -> list[str]:
-    """Faults of a place in which something was killed: `known_contents` are the complete contents that each file may
-    have (hashes), `masks` those of the masks that were being painted. `within`: folders in which files are new in every
-    run, of which only the user's are judged."""
+    """Finds the faults of a place in which something was killed.
+
+    Parameters
+    ----------
+    place : judged
+    known_contents : name in the capture -> hashes of the complete contents that it may have
+    masks : name -> contents that a mask may have which was being painted
+    within : folders in which files are new in every run, of which only the user's are judged
+    """
     root = capture_at(place).root
     found = find_lost(place, aside=True)
     for name, contents in (masks or {}).items():
@@ -53,13 +59,21 @@ def after_kill(
     return found
 
 
-def after_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mapping[str, Collection[bytes]] | None = None,
+def judge_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mapping[str, Collection[bytes]] | None = None,
                  unlike: Collection[str] = (), within: Collection[str] = ()) -> list[str]:
-    """Faults of a place in which the run that goes on has ended: every stage up to `last` has the undisturbed run's
-    bytes, all of the user's is in its place, and nothing else is left. `unlike`: stages whose bytes differ from run to
-    run; `within` as of `after_kill`."""
+    """Finds the faults of a place in which the run that goes on has ended: every stage has the undisturbed run's bytes,
+    all of the user's is in its place, and nothing else is left.
+
+    Parameters
+    ----------
+    place : judged
+    undisturbed : the run that it is compared with
+    last : the last stage that was run
+    masks, within : as `judge_kill` has them
+    unlike : stages whose bytes differ from run to run
+    """
     capture, expected = capture_at(place), undisturbed.end
-    found = after_kill(place, undisturbed.known, masks, within) + find_lost(place) + _left(place)
+    found = judge_kill(place, undisturbed.known, masks, within) + find_lost(place) + _left(place)
     for stage in stages.STAGES[:stages.NAMES.index(last) + 1]:
         if stage.name in unlike:
             continue

@@ -18,7 +18,7 @@ from core.contract import stages
 from core.contract.delivery_plan import PROVENANCE
 from core.contract.messages import Done, Failed
 
-from .kills_capture import GUESTS, ROOT, capture_at, delivery_folders, start
+from .kills_capture import GUESTS, ROOT, capture_at, delivery_folders, start_job
 from .kills_judge import tree
 from .kills_trials import KillTrial, wait_until
 from .kills_worker import Forked, Moment, in_fork, running_at
@@ -51,7 +51,7 @@ def saving(trial: KillTrial) -> None:
     worker = None
     if busy:
         wait_until(lambda: painted.is_dir() or addon.ended(), 60)
-        worker = start(trial.place, **trial.undisturbed.job(stage))
+        worker = start_job(trial.place, **trial.undisturbed.job(stage))
     trial.struck += addon.strike()
     if addon.code and addon.code > 0:
         trial.faults.append(f"the add-on could not save: {addon.told.with_suffix('.err').read_text()[-400:]}")
@@ -87,7 +87,7 @@ def _save_masks(root: Path, mask_kind: str, seed: int, painted: Path) -> None:
     half.rename(painted)
     stamp = ()
     for mask in masks:
-        stamp = keeping.store(mask, contract.Capture(root), mask_kind, stamp)
+        stamp = keeping.store_painting(mask, contract.Capture(root), mask_kind, stamp)
 
 
 def delivering(trial: KillTrial) -> None:
@@ -103,12 +103,12 @@ def delivering(trial: KillTrial) -> None:
     for _ in range(1 + (trial.rng.random() < 0.3)):
         moment = trial.moment("deliver", writing)
         trial.where += f", {moment}"
-        trial.struck += start(trial.place, moment, **job).strike()
+        trial.struck += start_job(trial.place, moment, **job).strike()
         trial.judge_kill(within=("exports/",))
         if target.is_dir() and _delivery(target) not in known:
             trial.fault("after the kill: the delivery is neither the old nor the new one")
         trial.faults += [f"after the kill: {fault}" for fault in _gone(target, target.with_name(f".{target.name}.old"))]
-    ended = start(trial.place, **job).wait()
+    ended = start_job(trial.place, **job).wait()
     if not isinstance(ended, Done):
         trial.fault(f"the delivery did not end well: {ended}")
     elif _delivery(target) != known[1]:
@@ -139,7 +139,7 @@ def colmap(trial: KillTrial) -> None:
     victim, after = trial.rng.choice(("COLMAP", "worker", "both")), trial.rng.uniform(0, COLMAP_S)
     trial.where = f"{victim}, {after:.3f} s after COLMAP's start"
     job = trial.undisturbed.job("cameras", cameras={})
-    worker = start(trial.place, **job)
+    worker = start_job(trial.place, **job)
     wait_until(lambda: running_at(trial.place) or worker.ended(), 60)
     time.sleep(after)
     running = running_at(trial.place)
@@ -155,7 +155,7 @@ def colmap(trial: KillTrial) -> None:
     trial.faults += [f"process {pid} outlived its worker" for pid in running_at(trial.place)]
     within = ("cameras/", "report/cameras")
     trial.judge_kill(within=within)
-    ended = start(trial.place, **{**job, "first": None}).wait()
+    ended = start_job(trial.place, **{**job, "first": None}).wait()
     if not isinstance(ended, Done):
         trial.fault(f"the resumed run did not end well: {ended}")
     elif (placed := in_fork(lambda: _placed(capture_at(trial.place).cameras))) < 3:

@@ -21,7 +21,7 @@ from core.worker.client import Worker
 from core.worker.job import write_job
 
 from . import kills_disk, kills_judge, same_maps
-from .kills_capture import ROOT, Undisturbed, capture_at, start
+from .kills_capture import ROOT, Undisturbed, capture_at, start_job
 from .kills_worker import Moment, fork_worker
 
 SHORT_TERM_S = 1.0
@@ -66,7 +66,7 @@ class KillTrial:
 
     def resume(self, stage: str, masks: dict | None = None) -> None:
         """The undisturbed worker that goes on, and what has to hold at the end."""
-        ended = start(self.place, **self.undisturbed.job(stage, resumed=True)).wait()
+        ended = start_job(self.place, **self.undisturbed.job(stage, resumed=True)).wait()
         if not isinstance(ended, Done):
             self.fault(f"the resumed run did not end well: {ended}")
         self.judge_end(stage, masks)
@@ -75,11 +75,19 @@ class KillTrial:
         self.faults.append(text)
 
     def judge_end(self, stage: str, masks: dict | None = None, unlike: tuple = (), unlike_folders: tuple = ()) -> None:
-        self.faults += kills_judge.after_resume(self.place, self.undisturbed, stage, masks, unlike, unlike_folders)
+        """Takes in the faults at the end of a run that went on.
+
+        Parameters
+        ----------
+        stage : the last one that was run
+        masks, unlike : as `kills_judge.judge_resume` has them
+        unlike_folders : its `within`
+        """
+        self.faults += kills_judge.judge_resume(self.place, self.undisturbed, stage, masks, unlike, unlike_folders)
 
     def judge_kill(self, masks: dict | None = None, within: tuple = ()) -> None:
         self.faults += [f"after the kill: {fault}"
-                        for fault in kills_judge.after_kill(self.place, self.undisturbed.known, masks, within)]
+                        for fault in kills_judge.judge_kill(self.place, self.undisturbed.known, masks, within)]
 
 
 def killed(trial: KillTrial, writing: bool) -> None:
@@ -89,7 +97,7 @@ def killed(trial: KillTrial, writing: bool) -> None:
     for number in range(1 + sum(trial.rng.random() < 0.25 for _ in range(MOST_KILLS - 1))):
         moment = trial.moment(stage, writing)
         trial.where += f", {moment}"
-        trial.struck += start(trial.place, moment, **trial.undisturbed.job(stage, resumed=number > 0)).strike()
+        trial.struck += start_job(trial.place, moment, **trial.undisturbed.job(stage, resumed=number > 0)).strike()
         trial.judge_kill()
     trial.resume(stage)
 
@@ -160,7 +168,7 @@ def asleep(trial: KillTrial) -> None:
     trial.begin(stage)
     moment, meanwhile = trial.moment(stage, writing=False), trial.rng.random() < 0.5
     trial.where += f", stopped {moment}, awakes {'meanwhile' if meanwhile else 'afterwards'}"
-    first = start(trial.place, moment, limits={"term_s": SHORT_TERM_S}, **trial.undisturbed.job(stage))
+    first = start_job(trial.place, moment, limits={"term_s": SHORT_TERM_S}, **trial.undisturbed.job(stage))
     if not first.strike(signal.SIGSTOP):
         trial.resume(stage)
         return

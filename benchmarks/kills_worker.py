@@ -152,7 +152,16 @@ class Forked:
 
 def fork_worker(job: Path, log: Path, moment: Moment | None = None, *, term_s: float = lease.TERM_S,
                 most_bytes: int | None = None) -> Forked:
-    """A worker at a job file. `term_s`: its lease's; `most_bytes`: of a single file that it writes."""
+    """Forks a worker at a job file.
+
+    Parameters
+    ----------
+    job : job.json, in its capture
+    log : takes its output
+    moment : when it is struck; None: never
+    term_s : of its lease, in seconds
+    most_bytes : of a single file that it writes; None: any
+    """
     def work() -> None:
         main = importlib.import_module("core.worker.__main__")
         main.NICE_VALUE = 0  # beside it nobody paints

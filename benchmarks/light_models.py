@@ -61,9 +61,21 @@ class RegionShader:
         return self.main(lights) + self.own(lights)
 
 
-def regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
-    """`start` under K = count region lights, the recipe, and what moves them. The regions begin as clusters of place
-    and lightness on the face."""
+def light_by_regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
+    """Puts soft regions with a light each in place of the grid; they begin as clusters of place and lightness on the
+    face.
+
+    Parameters
+    ----------
+    start : begun from
+    recipe : of the solve
+    count : K, of the regions
+    seed : of the clusters
+
+    Returns
+    -------
+    The start, the recipe, and what moves the lights.
+    """
     observations = {factor: replace(o, shader=RegionShader(o.shader.normal))
                     for factor, o in start.observations.items()}
     lights = RegionLights(start.state.lights.glob.clone(), torch.zeros(count, 3, 9), _clusters(start, count, seed))
@@ -120,7 +132,7 @@ class EnvironmentShader:
     total = main
 
 
-def environment(start: Start, recipe: Recipe):
+def light_by_environment(start: Start, recipe: Recipe):
     """`start` under one environment cubemap, even at first, the recipe, and what moves it."""
     observations = {factor: replace(o, shader=EnvironmentShader(o.shader.normal))
                     for factor, o in start.observations.items()}

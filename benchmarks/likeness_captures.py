@@ -35,18 +35,28 @@ SCALE, SAMPLES = 5 / 6, 4  # of 720 x 960; rays per pixel before denoising
 PACE = 6
 
 
-def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, description: str, frames: int,
-         room: bool) -> Capture:
-    """FOLDER/NAME (the truth, with the video) and FOLDER/NAME.wildcap (frames, true cameras and a head half a
-    millimetre off, where the room has nothing that cameras could be found by), made if they are not there; prints the
-    minutes."""
+def film_person(folder: Path, name: str, figure: Figure, light: scene.SceneLight, description: str, frames: int,
+                room: bool) -> Capture:
+    """Films a person, if the files are not there, and prints the minutes.
+
+    Parameters
+    ----------
+    folder : takes NAME, the truth with the video, and NAME.wildcap, the capture
+    name : of the capture
+    figure : the person
+    light : filmed in
+    description : of the light, for the record
+    frames : of the video
+    room : whether one is around the person, by which cameras can be found; without, the capture gets frames, true
+        cameras and a head half a millimetre off
+    """
     target, capture = folder / name, Capture(folder / f"{name}.wildcap")
     if (target / "skin_tone.txt").exists():  # written last
         return capture
     began, spent, seed = time.monotonic(), _spent(), figure.person.seed
     taken = phone.sample_phone(seed)
     cameras = scene.camera_path(seed, frames)
-    poses = motion.sway(frames, taken.sway_mm, taken.sway_degrees, np.random.default_rng([seed, 71]))
+    poses = motion.sample_sway(frames, taken.sway_mm, taken.sway_degrees, np.random.default_rng([seed, 71]))
     work = folder / "rendered" / name
     filmed.render(work, figure, light, scene.Shot(cameras, range(frames), SAMPLES, SCALE, poses, room))
     rendered = time.monotonic()
@@ -85,7 +95,7 @@ def _write_truth(target: Path, figure: Figure, light: scene.SceneLight, views: l
     faces = {}
     for frame in np.unique(np.linspace(1, len(views) - 2, TRUTHS).round().astype(int)).tolist():
         sun = poses[frame, :3, :3].T @ light.sun.direction if light.sun else None
-        found, name = truth.look(seen, views[frame], sun), f"{frame:04d}.png"
+        found, name = truth.trace_truth(seen, views[frame], sun, pose=poses[frame]), f"{frame:04d}.png"
         for folder in ("albedo", "bare", "face", "normal", *(["shadow"] if light.sun else []),
                        *(f"parts/{part}" for part in PARTS)):
             (target / folder).mkdir(parents=True, exist_ok=True)
@@ -147,7 +157,8 @@ def _flows(figure: Figure, cameras: np.ndarray, poses: np.ndarray) -> list[np.nd
     flows = []
     for k in range(len(views)):
         a, b = max(k - 1, 0), min(k + 1, len(views) - 1)
-        flows.append(motion.image_motion(caster, (views[a], views[k], views[b]), poses[[a, k, b]]) * 2 / (b - a) / PACE)
+        flow = motion.measure_image_motion(caster, (views[a], views[k], views[b]), poses[[a, k, b]])
+        flows.append(flow * 2 / (b - a) / PACE)
     return flows
 
 

@@ -25,8 +25,16 @@ SHOTS = (  # azimuth, height in degrees, distance and the point looked at in met
 
 def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = None,
                 beside: Path | None = None) -> None:
-    """One row a person; `beside`: a folder of photographs that make the last row. Pictures that are in `work` are not
-    rendered again."""
+    """Draws one row a person.
+
+    Parameters
+    ----------
+    out : of the JPEG
+    seeds : of the people
+    work : folder of the renders; what is there is not rendered again
+    facekit : ICT-FaceKit's folder, of which heads are derived, too; None: other heads
+    beside : folder of photographs that make the last row
+    """
     rows = []
     for seed in seeds:
         began = time.monotonic()

@@ -29,7 +29,7 @@ from pathlib import Path
 from core.synthetic.people.figure import make_figure
 
 from . import people
-from .likeness_captures import film
+from .likeness_captures import film_person
 from .likeness_sheet import write_sheet
 from .people_lights import FURTHER, KINDS
 
@@ -81,20 +81,28 @@ def main() -> None:
         write_sheet(asked.sheet, [person.seed for person in LIKENESSES], folder / "sheet", asked.facekit, asked.beside)
         return
     for person in (each for each in (*LIKENESSES, *HELD_BACK) if each.name in asked.only):
-        film_all(person, folder, asked.lights, asked.facekit)
+        film_likeness(person, folder, asked.lights, asked.facekit)
     for person in (each for each in people.PEOPLE if each.name in asked.only):
         for light in (light for light in LIGHTS if light in asked.lights):
             photograph_again(person, folder, light)
 
 
-def film_all(person: Likeness, folder: Path, lights: list[str], facekit: Path | None) -> None:
-    """A person in each of the lights."""
+def film_likeness(person: Likeness, folder: Path, lights: list[str], facekit: Path | None) -> None:
+    """Films a person in each of the lights.
+
+    Parameters
+    ----------
+    person : whose own light is among them
+    folder : as `film_person` has it
+    lights : "own", and keys of LIGHTS
+    facekit : ICT-FaceKit's folder, of which heads are derived, too; None: other heads
+    """
     figure = make_figure(person.seed, facekit=facekit)
     if "own" in lights:
-        film(folder, person.name, figure, KINDS[person.light](person.seed), person.light, OWN_FRAMES, room=True)
+        film_person(folder, person.name, figure, KINDS[person.light](person.seed), person.light, OWN_FRAMES, room=True)
     for light in (light for light in LIGHTS if light in lights):
-        film(folder, f"{person.name}_{light}", figure, FURTHER[LIGHTS[light]](person.seed), LIGHTS[light],
-             FURTHER_FRAMES, room=False)
+        film_person(folder, f"{person.name}_{light}", figure, FURTHER[LIGHTS[light]](person.seed), LIGHTS[light],
+                    FURTHER_FRAMES, room=False)
 
 
 def photograph_again(person: people.FilmedPerson, folder: Path, light: str) -> None:

@@ -62,13 +62,13 @@ def main() -> None:
     folder = asked.folder.resolve()
     path = asked.json or folder / "long_films.json"
     for count in asked.frames:
-        known = figures.read(path.stem, path.parent)["figures"] if path.is_file() else {}
+        known = figures.read_record(path.stem, path.parent)["figures"] if path.is_file() else {}
         if asked.again or str(count) not in known.get("frames", {}):
             found = {"frames": {**known.get("frames", {}), str(count): row(folder, count, asked.plain_times)}}
             found["frames"] = dict(sorted(found["frames"].items(), key=lambda item: int(item[0])))
-            figures.write(path, "long_films", "python -m benchmarks.long_films FOLDER",
-                          {**found, "growth": growth(found["frames"])})
-    print(table(figures.read(path.stem, path.parent)["figures"]))
+            figures.write_record(path, "long_films", "python -m benchmarks.long_films FOLDER",
+                                 {**found, "growth": growth(found["frames"])})
+    print(table(figures.read_record(path.stem, path.parent)["figures"]))
 
 
 def film(folder: Path, count: int) -> Path:
@@ -110,7 +110,7 @@ def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: 
     gain = TO / np.percentile(first[rows:-rows, columns:-columns].max(-1), METERED)
     for k in numbers:
         around = max(k - 1, 0), k, min(k + 1, len(views) - 1)
-        flow = motion.image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])
+        flow = motion.measure_image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])
         linear = motion.motion_blur(images.read_linear(work / f"{k:05d}.exr").astype(np.float32), flow, camera.shutter)
         yield phone.develop(linear, camera, np.full(3, gain), np.random.default_rng([SEED, 72, k]))
 
@@ -131,8 +131,8 @@ def row(folder: Path, count: int, plain_times: float) -> dict:
     print(count, ours, flush=True)
     found = {"ours": ours, "plain": None, "times": None, "processor_times": None}
     if plain_times and "problem" not in ours:
-        plain = found["plain"] = plain_cost(capture, Capture(folder / f"{count}_plain.wildcap"), truth, count,
-                                            plain_times * ours["seconds"])
+        plain = found["plain"] = measure_plain(capture, Capture(folder / f"{count}_plain.wildcap"), truth, count,
+                                               plain_times * ours["seconds"])
         if "over_s" not in plain:
             found |= {"times": plain["seconds"] / ours["seconds"],
                       "processor_times": plain["processor_s"] / ours["processor_s"]}
@@ -148,9 +148,22 @@ def _against_truth(capture: Capture, truth: Path, frames: int) -> dict:
             "focal_px": found["focal_px"]}
 
 
-def plain_cost(capture: Capture, beside: Capture, truth: Path, count: int, limit_s: float) -> dict:
-    """Plain pycolmap on a capture's frames, in a process of its own; its cameras are left in `beside`. {"over_s"} where
-    it was ended."""
+def measure_plain(capture: Capture, beside: Capture, truth: Path, count: int, limit_s: float) -> dict:
+    """Runs plain pycolmap on a capture's frames, in a process of its own.
+
+    Parameters
+    ----------
+    capture : with frames
+    beside : gets its cameras
+    truth : the film's folder
+    count : of the film's frames
+    limit_s : seconds after which it is ended
+
+    Returns
+    -------
+    {"seconds", "processor_s"} and the figures against the truth, or "registered" 0 where it failed; {"over_s"} where it
+    was ended.
+    """
     with replacing_folder(beside.root) as copy:
         (copy / "cameras").mkdir()
         (copy / "frames").symlink_to(capture.frames)

@@ -38,7 +38,7 @@ def main() -> None:
     counts = {kind: names if isinstance(names, int) else len(names) for kind, names in found.items()}
     print(figures.markdown(["what", "how many"], [[kind, count] for kind, count in counts.items()]))
     if asked.json:
-        figures.write(asked.json, "measure_code", COMMAND, counts)
+        figures.write_record(asked.json, "measure_code", COMMAND, counts)
 
 
 def look(paths: list[Path], root: Path = figures.ROOT) -> dict[str, list[str] | int]:

@@ -37,7 +37,7 @@ from core.synthetic.people.figure import make_figure
 
 from .cameras_against_truth import place_truth
 from .eye_captures import EYES
-from .figures import markdown, write
+from .figures import markdown, write_record
 from .likenesses import HELD_BACK, LIKENESSES
 
 COLUMNS = ("rim, mm", "rim's worst, mm", "centre, mm", "radius, mm", "gaze, degrees", "iris radius, mm",
@@ -66,7 +66,8 @@ def main() -> None:
                    [[name, *(None if row[column] is None else f"{row[column]:.2f}" for column in COLUMNS)]
                     for name, row in rows.items()]))
     if asked.json:
-        write(asked.json, "open_eyes", "python -m benchmarks.open_eyes FOLDER --eyes FOLDER", {"rows": rows}, keep=True)
+        write_record(asked.json, "open_eyes", "python -m benchmarks.open_eyes FOLDER --eyes FOLDER", {"rows": rows},
+                     keep=True)
 
 
 def compare(capture: Capture, truth: Path) -> list[dict]:
@@ -79,7 +80,7 @@ def compare(capture: Capture, truth: Path) -> list[dict]:
     rows = []
     for side, ball in enumerate(true.balls):
         off = None if colours is None else apart(np.array(colours[side]), true_iris(person, ball.radius))
-        rows.append(off_truth(found[side], opened, true, side, (scale, turn, shift))
+        rows.append(compare_eye(found[side], opened, true, side, (scale, turn, shift))
                     | {"iris, delta E": _plain(off), "true openness": _plain(person["openness"])})
     return rows
 
@@ -106,14 +107,26 @@ def fit_alone(folder: Path) -> dict[str, dict]:
         for name, told in (("", marks), (ALONE, (None, None))):
             fitted = eyeballs.fit(head, told, seen.opening)
             for side, eye in enumerate(fitted.records()):
-                rows[f"{seed}, {SIDES[side]}{name}"] = (off_truth(eye, fitted.opened.skin.vertices, true, side, still)
+                rows[f"{seed}, {SIDES[side]}{name}"] = (compare_eye(eye, fitted.opened.skin.vertices, true, side, still)
                                                         | {"true openness": _plain(person["openness"])})
     return rows
 
 
-def off_truth(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int, pose: tuple) -> dict:
-    """The figures of the left (0) or the right eye of an open head's vertices, but for its colour and how open it truly
-    is; pose: scale, rotation and translation from the truth's world to theirs."""
+def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int, pose: tuple) -> dict:
+    """Measures how far a fitted eye is off the true one.
+
+    Parameters
+    ----------
+    eye : the fitted eyeball
+    opened : [N, 3], vertices of the open head, in the eyeball's world
+    true : the true open head
+    side : 0 the left eye, 1 the right one
+    pose : scale, rotation [3, 3] and translation [3] from the truth's world to theirs
+
+    Returns
+    -------
+    A figure of each of COLUMNS; None for the iris' colour and the true openness.
+    """
     scale, turn, shift = pose
     ball = true.balls[side]
     rims = [_off(opened[rim], _curve(true, side, lid) @ (scale * turn).T + shift)

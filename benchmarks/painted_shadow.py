@@ -25,7 +25,7 @@ from core.contract.messages import Reporter
 from core.contract.settings import from_json
 from core.imaging import images
 
-from .figures import write
+from .figures import write_record
 
 CENTRE, RADIUS, EDGE = (690, 600), 70, 2.0  # texels of a 1024 map: column and row, the disc, the blur of its edge
 LEFT = (0.4, 0.6, 0.8)
@@ -47,18 +47,30 @@ def main() -> None:
     for added in (False, True):
         steps = {}
         for left in (1.0, *LEFT):
-            albedo = solved(1 - (1 - left) * cv2.GaussianBlur(disc, (0, 0), EDGE), disc, added, size).mean(-1)
+            albedo = solve_darkened(1 - (1 - left) * cv2.GaussianBlur(disc, (0, 0), EDGE), disc, added, size).mean(-1)
             steps[left] = np.log(albedo[inside].mean() / albedo[around].mean())
         for left in LEFT:
             share, mask = (steps[left] - steps[1.0]) / np.log(left), "added by the artist" if added else "proposed"
             found[f"{mask}, {left}"] = {"light": left, "mask": mask, "left": share}
             print(f"| {left} | {mask} | {100 * share:.0f} % |", flush=True)
     if arguments.json:
-        write(arguments.json, "painted_shadow", "python -m benchmarks.painted_shadow", {"rows": found})
+        write_record(arguments.json, "painted_shadow", "python -m benchmarks.painted_shadow", {"rows": found})
 
 
-def solved(darkening: np.ndarray, mask: np.ndarray, added: bool, size: int) -> np.ndarray:
-    """Linear albedo [size, size, 3] of the sample head whose texture is multiplied by `darkening` [1024, 1024]."""
+def solve_darkened(darkening: np.ndarray, mask: np.ndarray, added: bool, size: int) -> np.ndarray:
+    """Solves the sample head with a darkened texture.
+
+    Parameters
+    ----------
+    darkening : [1024, 1024], factor on the linear texture
+    mask : [1024, 1024] in [0, 1]
+    added : the mask is the artist's, and the proposal empty
+    size : of the maps, texels along a side
+
+    Returns
+    -------
+    The albedo, linear [size, size, 3].
+    """
     with tempfile.TemporaryDirectory() as folder:
         sample, capture = sample_head.copy_to(Path(folder)), Capture(Path(folder) / "darkened.wildcap")
         capture.root.mkdir()

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from core.imaging import images
-from core.synthetic.portrait import Portrait, relit
+from core.synthetic.portrait import Portrait, relight_sight
 from core.synthetic.sight import Sight
 
 from .delight_portraits import portrait_parts
@@ -48,11 +48,11 @@ def pairs(subjects: dict[str, list[int]], size: int = 384) -> Iterator[Pair]:
     for group, seeds in subjects.items():
         for seed in seeds:
             stage, sight = portrait_parts(seed, size)
-            first = relit(sight, stage, np.random.default_rng([seed, 41, 0]))
-            other = relit(sight, stage, np.random.default_rng([seed, 41, 1]))
+            first = relight_sight(sight, stage, np.random.default_rng([seed, 41, 0]))
+            other = relight_sight(sight, stage, np.random.default_rng([seed, 41, 1]))
             blotched = sight.albedo * blotches(sight, np.random.default_rng([seed, 45]))
             blotched = np.clip(blotched, 0.003, 0.9).astype(np.float32)
-            painted = relit(sight, stage, np.random.default_rng([seed, 41, 0]), albedo=blotched)
+            painted = relight_sight(sight, stage, np.random.default_rng([seed, 41, 0]), albedo=blotched)
             yield _pair(seed, "pigment", group, first, painted)
             yield _pair(seed, "light", group, first, other)
 

@@ -35,7 +35,7 @@ from core.synthetic.people.figure import PARTS as GROWN
 from core.synthetic.people.figure import make_figure
 from core.synthetic.people.truth import Scene
 
-from .figures import markdown, write
+from .figures import markdown, write_record
 from .films import read_film
 from .likenesses import LIKENESSES
 
@@ -76,8 +76,8 @@ def main() -> None:
         lines.append([name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in shares)])
     print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
     if asked.json:
-        write(asked.json, "parts", "python -m benchmarks.parts" + (" --frames FOLDER" if asked.frames else ""),
-              {"rows": rows}, keep=True)
+        write_record(asked.json, "parts", "python -m benchmarks.parts" + (" --frames FOLDER" if asked.frames else ""),
+                     {"rows": rows}, keep=True)
 
 
 def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -86,7 +86,7 @@ def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     scene = Scene(figure)
     for view in range(VIEWS):
         rng = np.random.default_rng([seed, 92, view])
-        yield snapshot.photograph(unlit.see(scene, unlit.random_view(figure, rng, SIZE), rng), rng)
+        yield snapshot.photograph(unlit.trace_unlit(scene, unlit.random_view(figure, rng, SIZE), rng), rng)
 
 
 def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -137,7 +137,15 @@ def _share(count: int, total: int) -> float | None:
 
 
 def write_sheet(out: Path, pictures: list[Path], network: ParseNet, brighter: float) -> None:
-    """The crops of photographs, and beside each its parts: in colours, and laid over it."""
+    """Draws the crops of photographs, and beside each its parts: in colours, and laid over it.
+
+    Parameters
+    ----------
+    out : of the sheet
+    pictures : files, and folders of them
+    network : reads the parts
+    brighter : factor on the pictures' sRGB values
+    """
     rows = []
     for path in [path for each in pictures for path in (sorted(each.iterdir()) if each.is_dir() else [each])
                  if path.suffix.lower() in ENDINGS]:

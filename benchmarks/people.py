@@ -87,7 +87,7 @@ def main() -> None:
         for place in arguments.places:
             capture = make(person, arguments.folder.resolve(), place)
             if place == "wild" and not arguments.no_solve:
-                solve(capture, arguments.folder / person.name, arguments.until, arguments.quality)
+                solve_person(capture, arguments.folder / person.name, arguments.until, arguments.quality)
 
 
 def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
@@ -114,7 +114,7 @@ def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
     opaque = meshes.joined([head, light.blockers]) if light.blockers else head
     for frame in np.unique(np.linspace(1, len(cameras) - 2, TRUTHS).round().astype(int)).tolist():
         view, sun = sample.view_of(cameras[frame], SCALE), light.sun.direction if light.sun else None
-        albedo, alpha, face, shadow = sample.frame_truth(head, opaque, skin, view, sun)
+        albedo, alpha, face, shadow = sample.trace_frame_truth(head, opaque, skin, view, sun)
         faces[frame] = albedo, face
         _write_truth(truth, frame, albedo, alpha, face, shadow if light.sun else None)
         total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
@@ -147,9 +147,22 @@ def write_maps(folder: Path, skin: Skin) -> None:
     images.write_data(folder / "normal.png", skin.normal / 2 + 0.5, bits=16)
 
 
-def solve(capture: Capture, truth: Path, until: str, quality: str) -> None:
+def solve_person(capture: Capture, truth: Path, until: str, quality: str) -> None:
     """Runs the chain from delight on, from the scan on where there is no head, as the worker would, as far as it is not
-    fresh. Raises SystemExit with what was wrong where a stage fails."""
+    fresh.
+
+    Parameters
+    ----------
+    capture : with frames and cameras
+    truth : folder with the skin's true tone, which is given
+    until : the last stage
+    quality : a preset
+
+    Raises
+    ------
+    SystemExit
+        With what was wrong, where a stage fails.
+    """
     values = {"solve": {"skin_tone": skin_tone(truth)}}
     names, settings = [stage.name for stage in STAGES], from_json(values, preset(quality))
     begin = "delight" if capture.head.is_file() else "scan"

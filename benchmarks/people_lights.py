@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.geometry.meshes import Mesh
-from core.synthetic.scene import SKY, AreaLamp, SceneLight, Sun, leaves
+from core.synthetic.scene import SKY, AreaLamp, SceneLight, Sun, strew_leaves
 
 HEIGHT = 64  # rows of a panorama
 GRASS, ROOM = (0.10, 0.13, 0.06), (0.11, 0.10, 0.09)
@@ -21,7 +21,7 @@ GRASS, ROOM = (0.10, 0.13, 0.06), (0.11, 0.10, 0.09)
 def noon(seed: int) -> SceneLight:
     """High sun behind a twig, blue sky, grass that shines back."""
     sun = Sun(_towards(np.random.default_rng([seed, 50]).choice([-1, 1]) * 32, 56))
-    return SceneLight(panorama(SKY, SKY, GRASS), sun, leaves(seed, sun))
+    return SceneLight(panorama(SKY, SKY, GRASS), sun, strew_leaves(seed, sun))
 
 
 def overcast(seed: int) -> SceneLight:
@@ -34,7 +34,7 @@ def window_bars(seed: int) -> SceneLight:
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
     sun = Sun(_towards(38 * side, 24), 3.4, 0.0093, (1.0, 0.9, 0.74))
     window = _patch(panorama(ROOM, ROOM, (0.07, 0.05, 0.04)), _towards(60 * side, 18), 34, (1.5, 1.75, 2.1))
-    return SceneLight(window, sun, bars(sun.direction))
+    return SceneLight(window, sun, make_bars(sun.direction))
 
 
 def mixed_lamps(seed: int) -> SceneLight:
@@ -73,10 +73,18 @@ def panorama(zenith, horizon, ground) -> np.ndarray:
     return np.where(height > 0, sky, np.asarray(ground)).astype(np.float32)
 
 
-def bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024,
-         reach: float = 0.25) -> Mesh:
-    """A window's upright and level bars between the head and the light that comes from a unit direction [3]; metres, in
-    a plane across it."""
+def make_bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024,
+              reach: float = 0.25) -> Mesh:
+    """A window's upright and level bars between the head and the light, in a plane across it.
+
+    Parameters
+    ----------
+    direction : [3], unit, where the light comes from
+    distance : of the plane from the head, in metres
+    period : of the upright bars, in metres; level ones have 1.6 of it
+    width : of a bar, in metres
+    reach : half a side of the plane, in metres
+    """
     side = np.cross(direction, [0, 0, 1.0])
     side /= np.linalg.norm(side)
     up, places = np.cross(side, direction), np.arange(-reach, reach, period)

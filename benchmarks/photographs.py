@@ -40,7 +40,7 @@ from .measures.features_kept import contrast_kept, contrasts, joint
 from .measures.pictures import detail, log_green
 from .measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, flat_colour
 from .measures.slopes import slope
-from .measures.table import Column, Scores, summarise, to_markdown, to_record
+from .measures.table import Column, Scores, format_table, summarise, to_record
 from .measures.tone import psnr_after_gain, to_decibels
 from .pairs import pairs
 
@@ -107,17 +107,28 @@ def main() -> int:
             text.append((TITLES[name], f"Not measured: {problem.problem} {problem.remedy}"))
             continue
         found = summarise(scores, COLUMNS)
-        text.append((TITLES[name], to_markdown(found, COLUMNS, "answer")))
+        text.append((TITLES[name], format_table(found, COLUMNS, "answer")))
         record[name] = to_record(found, scores)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
     if asked.json:
-        figures.write(asked.json, "photographs", COMMAND, record, keep=True)
+        figures.write_record(asked.json, "photographs", COMMAND, record, keep=True)
     return 0
 
 
-def answers_to(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, delighter: str) -> dict[str, np.ndarray]:
-    """Answer -> linear albedo [H, W, 3] for one photograph; lit bool [H, W]: the pixels of the face that show
-    something. A picture that the delighter refuses is taken as it is, as an artist would."""
+def answer_photograph(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, delighter: str) -> dict[str, np.ndarray]:
+    """All answers to one photograph. A picture that the delighter refuses is taken as it is, as an artist would.
+
+    Parameters
+    ----------
+    srgb : [H, W, 3]
+    albedo : [H, W, 3], linear, the truth
+    lit : bool [H, W], the pixels of the face that show something
+    delighter : a key of delight.PHOTOGRAPHERS
+
+    Returns
+    -------
+    Answer -> linear albedo [H, W, 3].
+    """
     linear = images.srgb_to_linear(srgb)
     try:
         answer = delight.PHOTOGRAPHERS[delighter](srgb, Settings().delight)[0]
@@ -133,7 +144,7 @@ def of_sitters(sitters: Iterator[LightSeries], delighter: str, pictures: Path | 
     """Answer -> person -> figures of COLUMNS."""
     scores: Scores = {}
     for sitter in sitters:
-        given = [answers_to(srgb, sitter.albedo, lit, delighter)
+        given = [answer_photograph(srgb, sitter.albedo, lit, delighter)
                  for srgb, lit in zip(sitter.srgb, sitter.lit, strict=True)]
         for answer in given[0]:
             scores.setdefault(answer, {})[sitter.name] = of_sitter(sitter, [each[answer] for each in given])
@@ -170,7 +181,7 @@ def of_pairs(subjects: int, delighter: str) -> Scores:
     """Answer -> group of skin tone -> the two slopes, means over the group."""
     found: dict[str, dict[str, dict[str, list[float]]]] = {}
     for pair in pairs(subjects_by_tone(subjects)):
-        given = [answers_to(srgb, albedo, pair.where, delighter)
+        given = [answer_photograph(srgb, albedo, pair.where, delighter)
                  for srgb, albedo in zip(pair.pictures, pair.albedos, strict=True)]
         causes = (pair.albedos if pair.kind == "pigment"
                   else tuple(images.srgb_to_linear(srgb) for srgb in pair.pictures))

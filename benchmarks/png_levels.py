@@ -42,7 +42,7 @@ def main() -> None:
                  for name, (path, bits) in PICTURES.items()}
     print(table(found))
     if options.json:
-        figures.write(options.json, "png_levels", "python -m benchmarks.png_levels CAPTURE", found)
+        figures.write_record(options.json, "png_levels", "python -m benchmarks.png_levels CAPTURE", found)
 
 
 def measured(path: Path, bits: int, into: Path) -> dict:
@@ -50,13 +50,26 @@ def measured(path: Path, bits: int, into: Path) -> dict:
     if path.is_dir():
         path = min(path.glob("*.png"))
     pixels = np.ascontiguousarray(images.read_data(path))
-    costs = {f"{name} {level}": encoded(pixels, bits, into, level, flag) for name, flag in FILTERS.items()
+    costs = {f"{name} {level}": measure_encoding(pixels, bits, into, level, flag) for name, flag in FILTERS.items()
              for level in LEVELS}
     return {"raw_mb": round(pixels.size * bits / 8e6, 1), **costs}
 
 
-def encoded(pixels: np.ndarray, bits: int, into: Path, level: int, flag: int | None) -> dict[str, float]:
-    """Seconds of the processor and megabytes of one way to write pixels [H, W, C]."""
+def measure_encoding(pixels: np.ndarray, bits: int, into: Path, level: int, flag: int | None) -> dict[str, float]:
+    """Writes pixels in one way.
+
+    Parameters
+    ----------
+    pixels : [H, W, C] in [0, 1]
+    bits : of a channel
+    into : the file
+    level : zlib's
+    flag : libpng's, of its filter; None: its own choice
+
+    Returns
+    -------
+    {"seconds", "mb"}: seconds of the processor, megabytes of the file.
+    """
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], f"uint{bits}")
     spec.attribute("png:compressionLevel", level)
     if flag is not None:

@@ -29,7 +29,7 @@ from core.imaging import images
 from core.solve.draft import restore_maps
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.network import denoise
-from core.solve.prior import WEIGHTS, ConditionedPrior, Prior, coordinates, load, make_condition, mean_at
+from core.solve.prior import WEIGHTS, ConditionedPrior, Prior, load, make_condition, make_coordinates, mean_at
 from core.solve.problem import Observation, State
 from core.solve.recipes import OURS
 from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas, seed_noise
@@ -38,7 +38,7 @@ from core.synthetic.skin import make_skin
 from core.training.patches import mean_map
 from core.training.skins import SCALES, carried_names, carried_skins, synthetic_skins
 
-from .figures import write
+from .figures import write_record
 
 COMMAND = ("python -m benchmarks.prior_figures samples OUT.png --work DIR --skins FOLDER; "
            "python -m benchmarks.prior_figures response")
@@ -82,9 +82,9 @@ def show_samples(options: argparse.Namespace) -> None:
     rng, side = np.random.default_rng(0), 1024 // COARSE
     face = np.argwhere(template.mask("face", side) > 0.5)
     corner = np.clip(face[rng.integers(len(face), size=options.count)] - PATCH // 2, 0, side - PATCH)
-    coords = torch.cat([coordinates(side, slice(r, r + PATCH), slice(c, c + PATCH)) for r, c in corner])
+    coords = torch.cat([make_coordinates(side, slice(r, r + PATCH), slice(c, c + PATCH)) for r, c in corner])
     tone = skins.tones[torch.from_numpy(rng.integers(len(skins.tones), size=options.count))]
-    drawn = unconditional(prior, coords, tone, options.steps)
+    drawn = draw_from_prior(prior, coords, tone, options.steps)
     albedo = (drawn[:, :3] + 1) / 2
     pairs, ratios = [], []
     for (row, column), sampled, skin_tone in zip(corner, albedo, tone, strict=True):
@@ -107,8 +107,9 @@ def show_samples(options: argparse.Namespace) -> None:
           f"median {np.median(ratios):.2f}, least {min(ratios):.2f}. Left of each pair the sample, right the training "
           "patch.")
     if options.json:
-        write(options.json, "prior_figures", COMMAND,
-              {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}}, keep=True)
+        write_record(options.json, "prior_figures", COMMAND,
+                     {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}},
+                     keep=True)
 
 
 def card_of(weights: Path) -> dict:
@@ -117,8 +118,20 @@ def card_of(weights: Path) -> dict:
 
 
 @torch.no_grad()
-def unconditional(prior: Prior, coords: torch.Tensor, tone: torch.Tensor, steps: int) -> torch.Tensor:
-    """Maps [N, 7, P, P] drawn from the prior alone at coords [N, 2, P, P] for skins of tone [N, 3]."""
+def draw_from_prior(prior: Prior, coords: torch.Tensor, tone: torch.Tensor, steps: int) -> torch.Tensor:
+    """Draws maps from the prior alone.
+
+    Parameters
+    ----------
+    prior : loaded
+    coords : [N, 2, P, P], where the windows lie
+    tone : [N, 3], linear, of the skins
+    steps : of the whole noise schedule
+
+    Returns
+    -------
+    [N, 7, P, P] in the network's range.
+    """
     told = make_condition(coords, prior.octaves, prior.mean_face, prior.spread, tone, torch.zeros(len(tone)))
     sigmas = [s for s in karras_sigmas(steps, 0.01, 80.0) if s <= FIRST_SIGMA]
     generator = torch.Generator().manual_seed(0)
@@ -139,20 +152,20 @@ def measure_response(options: argparse.Namespace) -> None:
         truth = skins[seed]
         other = skins[options.subjects[(i + 1) % len(options.subjects)]]
         conditioned = of_subject(prior, truth)
-        solved = given_diffuse(conditioned, truth, options.steps)
-        coords = coordinates(options.size, slice(0, options.size), slice(0, options.size))
+        solved = sample_given_diffuse(conditioned, truth, options.steps)
+        coords = make_coordinates(options.size, slice(0, options.size), slice(0, options.size))
         mean = mean_at(prior.mean_face, coords, conditioned.tone)[0]
         noise = torch.randn(1, *truth.shape, generator=torch.Generator().manual_seed(0))
         expected = conditioned.respond(truth[None], coords, noise)[0]
-        draft = given_diffuse(conditioned, truth, options.steps, "proximal")
-        again = restore_maps(conditioned, draft[None], coords, replace(OURS, guidance="proximal"), 0)[0]
+        draft = sample_given_diffuse(conditioned, truth, options.steps, "proximal")
+        again = restore_maps(conditioned, draft[None], coords, 0)[0]
         rows.append([errors(maps, truth, face) for maps in (solved, expected, again, draft, mean, other)])
         print(f"{seed}: "
               + "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}"
                           for name, (angle, gloss) in zip(NAMES, rows[-1], strict=True)), flush=True)
     means = np.mean(rows, 0)
     if options.json:
-        write(options.json, "prior_figures", COMMAND, keep=True, figures={"response": {name: {
+        write_record(options.json, "prior_figures", COMMAND, keep=True, figures={"response": {name: {
             f"{what}_of_{whose}": means[k][part] / means[of][part] for of, whose in ((-2, "mean_face"), (-1, "another"))
             for part, what in enumerate(("normals", "specular"))} for k, name in enumerate(NAMES[:-2])}})
     for k, name in enumerate(NAMES[:-2]):
@@ -175,8 +188,21 @@ def of_subject(prior: Prior, truth: torch.Tensor) -> ConditionedPrior:
     return prior.of_tone(SkinTone.from_linear(((truth[:3] + 1) / 2 * skin).sum((1, 2)) / skin.sum(), GIVEN))
 
 
-def given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: int, guidance: str = "dps") -> torch.Tensor:
-    """The map [7, S, S] that the solver samples under even light where the texture is the true albedo."""
+def sample_given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: int,
+                         guidance: str = "dps") -> torch.Tensor:
+    """The map that the solver samples under even light where the texture is the true albedo.
+
+    Parameters
+    ----------
+    prior : conditioned on the skin's tone
+    truth : [7, S, S] in the network's range
+    steps : of the sampling
+    guidance : "dps" or "proximal"
+
+    Returns
+    -------
+    [7, S, S], likewise.
+    """
     size = truth.shape[-1]
     albedo, everywhere = (truth[:3] + 1) / 2, torch.ones(size, size)
     found = {}
@@ -185,12 +211,12 @@ def given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: int, guid
         texture = torch.nn.functional.interpolate(albedo[None], (side, side), mode="area")[0]
         normal = torch.zeros(3, side, side)
         normal[2] = 1
-        coords = coordinates(side, slice(0, side), slice(0, side))
+        coords = make_coordinates(side, slice(0, side), slice(0, side))
         one = torch.ones(side, side)
         found[factor] = Observation(texture, one, one, coords, Shader(normal, 0 * one, (1, 1)), (0 * one).bool(),
                                     1024 / side)
     recipe = replace(OURS, steps=steps, phases=(), guidance=guidance)
-    coords = coordinates(size, slice(0, size), slice(0, size))
+    coords = make_coordinates(size, slice(0, size), slice(0, size))
     lights = Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 1, 1), torch.ones(3))
     start = mean_at(prior.prior.mean_face, coords, prior.tone)
     return Sampler(prior, recipe, seed_noise(0)).sample(found, State(0, None, start, lights)).denoised[0] * everywhere

@@ -53,7 +53,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     with extension(), tempfile.TemporaryDirectory() as work:
-        original, flat, returned = compare(Path(work), DELIVERED, asked.resolution, asked.samples)
+        original, flat, returned = compare_deliveries(Path(work), DELIVERED, asked.resolution, asked.samples)
     record = {f"{preset}_{kind}": {name: round(value, 3) for name, value in vars(back).items() if name != "picture"}
               for (preset, kind), back in returned.items()}
     print(table(figures.Figures.of(record)))
@@ -62,7 +62,7 @@ def main() -> None:
 
         write_small(asked.picture, np.hstack([original, flat, *(returned[key].picture for key in SHOWN)]))
     if asked.json:
-        figures.write(asked.json, "reimported", COMMAND, record)
+        figures.write_record(asked.json, "reimported", COMMAND, record)
 
 
 def table(record: figures.Figures) -> str:
@@ -73,10 +73,21 @@ def table(record: figures.Figures) -> str:
           str(back.shape_keys), str(back.maps)] for name, back in record.items()])
 
 
-def compare(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int, samples: int,
-            ) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], Returned]]:
-    """The original and the original without scattering, sRGB [H, W, 3] each, and what came back of each (preset,
-    format). The extension is enabled; `work` is empty."""
+def compare_deliveries(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int, samples: int,
+                       ) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], Returned]]:
+    """Delivers the sample head, imports each delivery, and renders it like the original. The extension is enabled.
+
+    Parameters
+    ----------
+    work : an empty folder
+    deliveries : (preset, format) of each
+    resolution : pixels of a side
+    samples : of Cycles
+
+    Returns
+    -------
+    The original and the original without scattering, sRGB [H, W, 3] each, and what came back of each delivery.
+    """
     import bpy
 
     from core.contract import sample_head
@@ -86,12 +97,12 @@ def compare(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int
     head, item = headless.open_head(capture.root)
     bpy.ops.wildcap.add_face_units()
     folders = {each: deliver(item, *each) for each in deliveries}
-    original, covered = render(picture.set_up(head, LIGHT, resolution, samples), work / "original.png")
+    original, covered = render(picture.set_up_scene(head, LIGHT, resolution, samples), work / "original.png")
     with without_scattering(head):
-        flat, _ = render(picture.set_up(head, LIGHT, resolution, samples), work / "flat.png")
+        flat, _ = render(picture.set_up_scene(head, LIGHT, resolution, samples), work / "flat.png")
     returned = {}
     for (preset, kind), folder in folders.items():
-        back, scene = bring_back(folder), picture.set_up(head, LIGHT, resolution, samples)
+        back, scene = bring_back(folder), picture.set_up_scene(head, LIGHT, resolution, samples)
         scene.collection.objects.unlink(head)
         for thing in back:
             scene.collection.objects.link(thing)
@@ -166,7 +177,7 @@ def render(scene, path: Path) -> tuple[np.ndarray, np.ndarray]:
 
     output = import_module(f"{ADDON}.relight.output")
     scene.render.film_transparent = True
-    output.still(scene, path, True)
+    output.render_still(scene, path, True)
     linear = images.read_linear(path.with_suffix(".exr"))
     return images.linear_to_srgb(np.clip(linear, 0, 1)), linear.max(-1) > 0  # nothing shines behind it
 

@@ -79,7 +79,7 @@ def main() -> int:
     work, results = arguments.work.resolve(), {}
     for subject in _subjects(arguments, work):
         name = subject.name
-        render(subject, work / name, arguments.lights, arguments.rows)
+        render_rows(subject, work / name, arguments.lights, arguments.rows)
         results[name] = score(work / name, arguments.lights, arguments.rows)
         write_json(work / f"{name}.json", results[name])
         print(f"{name}: {shortfall(mean_over_lights(results[name])) or 'as asked'}", file=sys.stderr)
@@ -92,7 +92,7 @@ def main() -> int:
     if arguments.json:
         source = ("--sample .demo/sample.wildcap" if arguments.sample
                   else f"--people FOLDER --rows {' '.join(arguments.rows)}")
-        figures.write(arguments.json, "relit", f"python -m benchmarks.relit WORK {source}", with_mean(means))
+        figures.write_record(arguments.json, "relit", f"python -m benchmarks.relit WORK {source}", with_mean(means))
     return 0
 
 
@@ -131,8 +131,16 @@ def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[RelitSubjec
             print(f"{person.name} has not been solved and is left out.", file=sys.stderr)
 
 
-def render(subject: RelitSubject, work: Path, lights: list[str], row_names: list[str]) -> None:
-    """work/renders/ROW_LIGHT.exr of all rows, and face.exr."""
+def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names: list[str]) -> None:
+    """Renders the pictures that are not newer than what they show.
+
+    Parameters
+    ----------
+    subject : with maps of its own and the true ones
+    work : takes renders/ROW_LIGHT.exr and face.exr
+    lights : presets, and pictures of surroundings
+    row_names : of the rows, besides the truth
+    """
     capture, truth = subject.capture, subject.maps
     renders, mask = work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)

@@ -42,9 +42,19 @@ class Worn:
     specular: np.ndarray
 
 
-def rows_of(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin: np.ndarray) -> dict[str, Worn]:
-    """The table's rows by name. raw, delit: textures, linear [S, S, 3]; skin [S, S]: weight of the texels whose mean
-    every albedo shares."""
+def make_rows(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin: np.ndarray) -> dict[str, Worn]:
+    """The table's rows, whose albedos share one mean.
+
+    Parameters
+    ----------
+    raw, delit : textures, linear [S, S, 3]
+    solved, true : maps
+    skin : [S, S], weight of the texels of that mean
+
+    Returns
+    -------
+    Name -> maps.
+    """
     even = np.full_like(solved.specular, (solved.specular * skin).sum() / skin.sum())
     flat = np.broadcast_to(np.float32([0, 0, 1]), solved.normal.shape)
     tone = (true.albedo * skin[..., None]).sum((0, 1)) / skin.sum()
@@ -92,14 +102,14 @@ def worn_by(capture: Capture, true: Worn, subject: Mesh) -> Worn:
 
 
 def read_rows(capture: Capture, true: Worn) -> dict[str, Worn]:
-    """`rows_of` a solved capture and its subject's true maps, the delivered maps where they are as new as the solved
-    ones."""
+    """`make_rows` of a solved capture and its subject's true maps; the delivered maps where they are as new as the
+    solved ones."""
     delivered = [capture.maps_4k / "diffuse_albedo.png", capture.maps / "diffuse_albedo.png"]
     newest = (capture.maps_4k if delivered[0].is_file() and delivered[0].stat().st_mtime >= delivered[1].stat().st_mtime
               else capture.maps)
     confidence = _sized(images.read_data(capture.texture_confidence)[..., 0], SIZE)
     raw, delit = (_sized(images.read_linear(path), SIZE) for path in (capture.texture_filmed, capture.texture))
-    return rows_of(raw, delit, read_worn(newest), true, confidence * template.mask("skin", SIZE))
+    return make_rows(raw, delit, read_worn(newest), true, confidence * template.mask("skin", SIZE))
 
 
 def write_row(folder: Path, capture: Capture, worn: Worn) -> None:

@@ -42,11 +42,11 @@ def main() -> None:
             thing = head.bring_in(bpy.context, item)
             material.assemble(bpy.context, item)
             if not (out / "face.exr").exists():
-                _render_mask(thing, picture.set_up(thing, left[0], job["resolution"], 16), job["mask"],
+                _render_mask(thing, picture.set_up_scene(thing, left[0], job["resolution"], 16), job["mask"],
                              out / "face.exr")
             for light in left:
                 source = Hdri(worlds / light) if light.endswith(".exr") else light
-                scene = picture.set_up(thing, source, job["resolution"], job["samples"])
+                scene = picture.set_up_scene(thing, source, job["resolution"], job["samples"])
                 _about_face(scene, out / "face.exr")
                 _render(scene, out / f"{row['name']}_{Path(light).stem}.exr", row["seed"])
 

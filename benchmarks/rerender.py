@@ -29,7 +29,7 @@ from core.imaging import images
 from . import figures
 from .ablation_measures import feature_distance
 from .albedo_score import AlbedoTruth, HeadInView
-from .comparison import LIGHTS, OURS, row_folder
+from .comparison import LIGHTS, OURS, find_row_folder
 from .measures.pictures import differences, face_box, with_gain
 from .people import PEOPLE
 
@@ -68,7 +68,7 @@ def main() -> None:
              "mean": {row: {figure: float(np.mean([rows[row][figure] for rows in people.values()])) for figure in cells}
                       for row, cells in next(iter(people.values())).items()}}
     if asked.json:
-        figures.write(asked.json, "rerender", "python -m benchmarks.rerender FOLDER", found)
+        figures.write_record(asked.json, "rerender", "python -m benchmarks.rerender FOLDER", found)
     print(table(found))
 
 
@@ -99,7 +99,7 @@ def delit_views(capture: Capture) -> list[DelitFrame]:
 def rendering(work: Path, row: str) -> np.ndarray:
     """Albedo times shading of a delit row, linear [S, S, 3]; the ceiling's is the texture that all rows were solved
     from."""
-    folder = row_folder(work, "delit", "texture" if row == CEILING else row)
+    folder = find_row_folder(work, "delit", "texture" if row == CEILING else row)
     return images.read_linear(folder / "diffuse_albedo.exr") * images.read_linear(folder / "shading.exr")
 
 

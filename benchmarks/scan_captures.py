@@ -72,8 +72,8 @@ def photograph(data: Path, folder: Path, name: str) -> Capture:
     work, cameras = folder / "rendered" / name, scene.camera_path(SEED, FRAMES)
     relief = 2 * images.read_data(data / NEEDED[3])[..., :3] - 1
     gloss = images.read_data(data / NEEDED[2])
-    skin = filmed.skin_part(work, head, albedo, gloss[..., 0] if gloss.ndim == 3 else gloss,
-                            relief / np.linalg.norm(relief, axis=-1, keepdims=True))
+    skin = filmed.write_skin(work, head, albedo, gloss[..., 0] if gloss.ndim == 3 else gloss,
+                             relief / np.linalg.norm(relief, axis=-1, keepdims=True))
     filmed.render_parts(work, SEED, {"skin": skin}, [], light,
                         scene.Shot(cameras, range(FRAMES), SAMPLES, SCALE, room=False))
     views = [sample.view_of(matrix, SCALE) for matrix in cameras]

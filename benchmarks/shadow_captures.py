@@ -30,7 +30,7 @@ from core.imaging import images
 from core.shadow_mask.lift import lift_shadows
 from core.synthetic.identities import subject_mesh
 from core.synthetic.light import SkyAndSun, bake, random_light
-from core.synthetic.painted_head import camera
+from core.synthetic.painted_head import place_camera
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 
@@ -106,15 +106,22 @@ def registered(mesh: Mesh, seed: int) -> Mesh:
 def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.random.Generator) -> None:
     """frames/ with frames.json, and cameras/, of a lit texture, linear [S, S, 3]."""
     caster = raster.RayCaster(mesh)
-    views = [camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE)
+    views = [place_camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE)
              for i, azimuth in enumerate(AZIMUTHS)]
-    write_views(capture, views, (picture(caster, view, texture, rng) for view in views))
+    write_views(capture, views, (render_picture(caster, view, texture, rng) for view in views))
 
 
 def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray],
                 selected: int | None = None) -> None:
-    """frames/ with frames.json, and cameras/: sRGB pictures [H, W, 3] with the known cameras that took them, which
-    share one lens; so many of them, evenly spread, are selected for the texture, or all."""
+    """Writes frames/ with frames.json, and cameras/: pictures with the known cameras that took them.
+
+    Parameters
+    ----------
+    capture : takes them
+    views : the cameras, which share one lens
+    pictures : sRGB [H, W, 3], one of each
+    selected : how many, evenly spread, are selected for the texture; None: all
+    """
     capture.claim()
     taken = np.linspace(0, len(views) - 1, selected or len(views)).round().astype(int)
     model = pycolmap.Reconstruction()
@@ -133,9 +140,22 @@ def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarr
     model.write_binary(str(capture.cameras))
 
 
-def picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator,
-            rays: int = 2) -> np.ndarray:
-    """sRGB [H, W, 3] before a dim, uneven background; `rays` along each side of a pixel."""
+def render_picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator,
+                   rays: int = 2) -> np.ndarray:
+    """A picture of a head before a dim, uneven background.
+
+    Parameters
+    ----------
+    caster : of the head
+    view : the camera
+    texture : lit, linear [S, S, 3]
+    rng : of background and noise
+    rays : along each side of a pixel
+
+    Returns
+    -------
+    sRGB [H, W, 3].
+    """
     face, bary, _ = raster.render_view(caster, view, rays)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)

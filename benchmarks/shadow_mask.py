@@ -28,7 +28,7 @@ from core.face import template
 from core.imaging import images
 
 from .continued import begin_at_delight, run_stages
-from .figures import write
+from .figures import write_record
 from .shadow_captures import KINDS, SIZE, lifted_truth, synthetic_capture
 
 HELD_OUT = (200, 201, 202, 203, 204, 205)
@@ -62,7 +62,7 @@ def main() -> None:
         row = _row(*_filmed(capture, truth, asked.work), capture.stem, delighter, asked)
         found[f"{capture.stem}, {delighter}"] = _figures(capture.stem, delighter, row)
     if asked.json:
-        write(asked.json, "shadow_mask", "python -m benchmarks.shadow_mask", {"rows": found}, keep=True)
+        write_record(asked.json, "shadow_mask", "python -m benchmarks.shadow_mask", {"rows": found}, keep=True)
 
 
 def scores(proposed: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:

@@ -52,7 +52,7 @@ def main() -> int:
         row["taken"] = min(1.0, (row["left_of_others"] / row["seen_spread"]) ** 2) if others else None
     print(table(rows))
     if asked.json:
-        figures.write(asked.json, "shadow_steps", COMMAND, {"rows": rows})
+        figures.write_record(asked.json, "shadow_steps", COMMAND, {"rows": rows})
     return 0
 
 

@@ -39,7 +39,7 @@ from core.synthetic.sample import RESERVED
 from core.training.seeds import HELD_OUT_SEED
 from core.training.tones import PHONES, photographed, scenes_of
 
-from .figures import write
+from .figures import write_record
 
 BRIGHTEST = 0.85  # a delit picture's tone has no brighter channel: more than skin reflects
 MOST = 400  # subjects looked at until each group has enough
@@ -75,8 +75,8 @@ def main() -> None:
         tone = np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")])
         captures[Path(folder).stem] = of_capture(Capture(folder), tone, known)
     if asked.json:
-        write(asked.json, "skin_tone", "python -m benchmarks.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
-              {"groups": summary(rows, subjects), "captures": captures}, keep=True)
+        write_record(asked.json, "skin_tone", "python -m benchmarks.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
+                     {"groups": summary(rows, subjects), "captures": captures}, keep=True)
 
 
 def expected(seed: int) -> str:

@@ -41,7 +41,7 @@ from core.training.skins import carried_names, clusters
 
 from . import figures, people
 from .measures.references import NOTHING, TRUE
-from .measures.table import Column, Scores, summarise, to_markdown, to_record
+from .measures.table import Column, Scores, format_table, summarise, to_record
 from .pages import Sections
 from .state_captures import DELIT, SIZE, SOLVED, Filmed, add_captures, captures_asked
 from .state_scores import in_uv, mean_of, of_person, small
@@ -104,7 +104,7 @@ def main() -> int:
         record["skins"] = reach_of_traits(asked.skins)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in sections(record)))
     if asked.json:
-        figures.write(asked.json, "split", COMMAND, record)
+        figures.write_record(asked.json, "split", COMMAND, record)
     return 0
 
 
@@ -113,7 +113,7 @@ def sections(record: dict) -> Sections:
     people, captures = {name for rows in record["people"].values() for name in rows}, record["captures"]
     found = summarise(record["people"], COLUMNS, DELIT)
     parts = [("", f"{WORDS} {len(captures)} captures of {len(people)} people."), ("The parts", PARTS),
-             ("All people", to_markdown(found, COLUMNS, "taken for albedo", DELIT)),
+             ("All people", format_table(found, COLUMNS, "taken for albedo", DELIT)),
              ("Capture by capture, up to the person's shared light, dB", capture_table(captures)),
              ("The scales that were found", scale_table(record["scales"]))]
     return parts + ([("How far traits reach", reach_table(record["skins"]))] if "skins" in record else [])

@@ -34,7 +34,7 @@ from core.imaging import images
 
 from . import figures, freeze, people, state_scores
 from .albedo_score import looks
-from .measures.table import Column, Scores, summarise, to_markdown, to_record
+from .measures.table import Column, Scores, format_table, summarise, to_record
 from .pages import write_page
 from .state_captures import DELIT, METHODS, SIZE, SOLVED, Filmed, find
 from .state_scores import Figures, in_pictures, in_uv, mean_of, of_person, small
@@ -128,7 +128,7 @@ def main() -> int:
     scores, by_capture = measure(captures)
     code = code_of(captures)
     if asked.json and asked.json.is_file():
-        scores, by_capture = with_earlier(figures.read(asked.json.stem, asked.json.parent)["figures"], scores,
+        scores, by_capture = merge_earlier(figures.read_record(asked.json.stem, asked.json.parent)["figures"], scores,
                                           by_capture, code)
     text = sections(scores, by_capture)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
@@ -137,7 +137,8 @@ def main() -> int:
     if asked.json:
         found = summarise(scores, {name: column for columns in TABLES.values() for name, column in columns.items()},
                           DELIT)
-        figures.write(asked.json, "state", COMMAND, {**to_record(found, scores), "captures": by_capture, "code": code})
+        figures.write_record(asked.json, "state", COMMAND,
+                             {**to_record(found, scores), "captures": by_capture, "code": code})
     return 0
 
 
@@ -145,7 +146,7 @@ def run_chain(capture: Capture, truth: Path, quality: str) -> None:
     """The chain to the solve as far as it is not fresh; a capture that cannot be taken so far is named, and the others
     go on."""
     try:
-        people.solve(capture, truth, "solve", quality)
+        people.solve_person(capture, truth, "solve", quality)
     except SystemExit as ended:
         print(f"{capture.root.stem}: {ended}", file=sys.stderr, flush=True)
 
@@ -188,22 +189,34 @@ def measuring() -> list[Path]:
     return [*sorted(Path(__file__).parent.glob("measures/*.py")), Path(state_scores.__file__)]
 
 
-def with_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]],
-                 code: dict[str, str]) -> tuple[Scores, dict]:
-    """What was measured now over what a record has of other people, if the same code made that; else that is left out,
-    and said."""
+def merge_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]],
+                  code: dict[str, str]) -> tuple[Scores, dict]:
+    """What was measured now, over what a record has of other people; the record is left out, and that is said, where
+    other code made it.
+
+    Parameters
+    ----------
+    record : its figures
+    scores : method -> person -> figures
+    by_capture : capture -> method -> figures
+    code : what `code_of` says
+
+    Returns
+    -------
+    Scores and figures by capture.
+    """
     if record.get("code") != code:
         print("The record's figures were made by other code, and are replaced.", file=sys.stderr)
         return scores, by_capture
-    everybody = figures.merged(record["people"], scores)
-    shown = {method: everybody[method] for method in METHODS if method in everybody}
-    return shown, {**record["captures"], **by_capture}
+    everybody = {method: {**record["people"].get(method, {}), **scores.get(method, {})} for method in METHODS}
+    return {method: rows for method, rows in everybody.items() if rows}, {**record["captures"], **by_capture}
 
 
 def seen_in_pictures(filmed: Filmed, answers: dict[str, np.ndarray]) -> dict[str, Figures]:
     """`in_pictures` of a capture, kept with what it was made from: the maps, the truth and the measures' own code."""
     sources = {"inputs": {path.name: hash_file(path) for path in filmed.inputs()},
-               "truth": hash_tree(filmed.truth / "albedo"), "methods": list(answers),
+               "truth": {name: hash_tree(filmed.truth / name) for name in ("albedo", "face", "shadow")},
+               "methods": list(answers),
                "code": {path.name: hash_file(path) for path in measuring()}}
     kept = filmed.work / f"{filmed.name}.json"
     if kept.is_file() and (stored := json.loads(kept.read_text(encoding="utf-8")))["sources"] == json.loads(
@@ -232,7 +245,7 @@ def sections(scores: Scores, by_capture: dict[str, dict[str, Figures]]) -> list[
     for title, columns in TABLES.items():
         found = summarise(scores, columns, DELIT)
         if found:
-            parts.append((title, f"{WORDS[title]}\n\n{to_markdown(found, columns, 'taken for albedo', DELIT)}"))
+            parts.append((title, f"{WORDS[title]}\n\n{format_table(found, columns, 'taken for albedo', DELIT)}"))
     return [*parts,
             ("Capture by capture",
              "PSNR in dB in the picture after one gain, and on the map up to the person's shared light; what the solve "

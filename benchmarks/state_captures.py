@@ -27,7 +27,7 @@ from core.face.head import Head, read_head
 from core.geometry.raster import interpolate
 from core.imaging import images
 
-from .controlled_captures import true_frames
+from .controlled_captures import use_true_frames
 from .measures.features_kept import BARE
 from .measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, flat_colour
 
@@ -42,7 +42,7 @@ PARTS = ("skin", "brows", "lips", "eyes")
 
 @dataclass(frozen=True)
 class Filmed:
-    """One capture with its truth; person: the name of the first capture, in order of names, of the same true head;
+    """One capture with its truth; person: the name of the first truth, in order of names, with the same true head;
     work: where what is made of it is kept."""
 
     name: str
@@ -69,7 +69,7 @@ class Filmed:
             hash_file(copy.root / name) != hash_file(self.capture.root / name) for name in same)
         if changed:
             copy.texture_confidence.unlink()
-        return true_frames(self.capture, self.truth, copy, Settings())
+        return use_true_frames(self.capture, self.truth, copy, Settings())
 
     def inputs(self) -> list[Path]:
         """The files that the figures of this capture depend on, but for the truth's pictures."""
@@ -141,13 +141,15 @@ def _dense(mask: np.ndarray) -> np.ndarray:
 
 
 def find(folder: Path, truths: Path, work: Path) -> list[Filmed]:
-    """The captures of a folder that have a texture and a truth, in order of their names."""
+    """The captures of a folder that have a texture and a truth, in order of their names. Who a person is, the truths
+    say: the name stays when a capture is finished later than others."""
+    first: dict[str, str] = {}
+    for truth in sorted(path.parent for path in truths.glob("*/albedo") if path.is_dir()):
+        first.setdefault(_true_head(truth), truth.name)
     pairs = [(path.stem, Capture(path), truths / path.stem) for path in sorted(folder.glob("*.wildcap"))]
     pairs = [(name, capture, truth) for name, capture, truth in pairs if capture.texture.is_file()
              and (truth / "albedo").is_dir()]
-    first: dict[str, str] = {}
-    return [Filmed(name, first.setdefault(_true_head(truth), name), capture, truth, work)
-            for name, capture, truth in pairs]
+    return [Filmed(name, first[_true_head(truth)], capture, truth, work) for name, capture, truth in pairs]
 
 
 def add_captures(parser: argparse.ArgumentParser) -> None:

@@ -41,15 +41,35 @@ from core.texture.blend import weighted_mean
 
 from .albedo_score import compare, mean_scores, read_truth
 from .continued import begin_at_delight, run_stages
-from .detail import FaceRays, centre_rays, look, marks, mean_of
+from .detail import FaceRays, cast_face_rays, centre_rays, marks, mean_of
 
 ROWS = ("average", "blend", "aligned", "perceptual", "delit")
 STEPS = 150
 
 
-def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: int = STEPS, size: int = 1024,
-            leave_out: int = 4, pictures: Path | None = None) -> dict:
-    """The figures of all rows. Raises Problem where the capture is not registered or no true frame belongs to it."""
+def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: int = STEPS, size: int = 1024,
+                 leave_out: int = 4, pictures: Path | None = None) -> dict:
+    """Scores the textures of a capture.
+
+    Parameters
+    ----------
+    capture : registered
+    truth : folder, laid out as benchmarks/albedo_score.py says
+    rows : of ROWS
+    steps : of the perceptual row's optimisation
+    size : texels along a side
+    leave_out : how many views are left out, one at a time; 0: none
+    pictures : folder that takes each row's texture
+
+    Returns
+    -------
+    Row -> figures; "leave_one_out", too.
+
+    Raises
+    ------
+    Problem
+        Where the capture is not registered or no true frame belongs to it.
+    """
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     head, report, results = read_head(capture), Reporter("texture"), {}
@@ -76,8 +96,8 @@ def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[st
     """Frame name -> what its rays meet, of the registered frames with a true albedo."""
     frames = read_frames(capture).by_name
     known = {true.frame: true for true in read_truth(truth)}
-    found = {view.name: look(caster, view, known[frames[view.name].video_frame]) for view in read_views(capture)
-             if frames[view.name].video_frame in known}
+    found = {view.name: cast_face_rays(caster, view, known[frames[view.name].video_frame])
+             for view in read_views(capture) if frames[view.name].video_frame in known}
     if not found:
         raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.",
                       "Check that the two belong together.")
@@ -140,8 +160,8 @@ def main() -> None:
     parser.add_argument("--leave-out", type=int, default=4, help="frames that are left out in turn; 0 for none")
     parser.add_argument("--pictures", type=Path, help="folder for the rows' textures")
     options = parser.parse_args()
-    print(json.dumps(measure(Capture(options.capture.resolve()), options.truth, tuple(options.rows), options.steps,
-                             options.size, options.leave_out, options.pictures), indent=1))
+    print(json.dumps(measure_rows(Capture(options.capture.resolve()), options.truth, tuple(options.rows), options.steps,
+                                  options.size, options.leave_out, options.pictures), indent=1))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ import numpy as np
 
 from core.contract.capture import Capture
 from core.imaging import images
-from core.synthetic.painted_head import camera, photograph
+from core.synthetic.painted_head import photograph, place_camera
 from core.synthetic.sample import write_video
 
 from . import figures
@@ -56,15 +56,15 @@ def main() -> int:
            "cameras": record["stages"].get("cameras", {}).get("figures", {}), "stopped": record.get("stopped")}
     print(said.stdout[-2000:], *findings, row, sep="\n")
     if arguments.json:
-        figures.write(arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row},
-                      keep=True)
+        figures.write_record(arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row},
+                             keep=True)
     return (0 if any("stood still" in text for text in [*findings, (record.get("stopped") or {}).get("problem", "")])
             else 1)
 
 
 def pictures(jaw: float):
     """The film's frames, sRGB [512, 384, 3]; jaw: how far it opens while the person talks."""
-    view = camera(0, 0.03, scale=SCALE)
+    view = place_camera(0, 0.03, scale=SCALE)
     checks = np.random.default_rng(2).random((40, 40, 3), np.float32) ** 2
     shirt = images.linear_to_srgb(images.resize(checks, view.width, view.width))
     y, x = np.mgrid[:view.height, :view.width]

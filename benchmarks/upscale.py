@@ -36,7 +36,7 @@ from core.face import template
 from core.geometry import meshes, raster
 from core.imaging import images
 from core.synthetic.identities import subject_mesh
-from core.synthetic.painted_head import camera
+from core.synthetic.painted_head import place_camera
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
@@ -46,8 +46,8 @@ from core.upscale.maps import HeadMaps
 from .ablation_measures import feature_distance
 from .costs.meter import GIB, peak, spending
 from .detail import moles
-from .figures import markdown, write
-from .shadow_captures import picture, write_views
+from .figures import markdown, write_record
+from .shadow_captures import render_picture, write_views
 
 SEEDS, FILMED = (900001, 900003, 900004, 900005, 900007, 900008), (900003,)
 """Reserved subjects: nothing is trained on them."""
@@ -89,7 +89,7 @@ def main() -> None:
 
         keyed = {part: {row.replace("lanczos", "Lanczos"): keys(values) for row, values in rows.items()}
                  for part, rows in found.items()}
-        write(arguments.json, "upscale", "python -m benchmarks.upscale", keyed, keep=True)
+        write_record(arguments.json, "upscale", "python -m benchmarks.upscale", keyed, keep=True)
 
 
 def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, float]]:
@@ -191,9 +191,9 @@ def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
     if not (capture.root / "truth.png").is_file():
         mesh, rng = subject_mesh(seed), np.random.default_rng([seed, 50])
         true = make_skin(sample_parameters(seed), 2048).diffuse
-        views = [camera(azimuth, 0.0, scale=CLOSE) for azimuth in (-45, -25, -8, 8, 25, 45)]
+        views = [place_camera(azimuth, 0.0, scale=CLOSE) for azimuth in (-45, -25, -8, 8, 25, 45)]
         caster = raster.RayCaster(mesh)
-        write_views(capture, views, (picture(caster, view, 0.8 * true, rng, rays=1) for view in views))
+        write_views(capture, views, (render_picture(caster, view, 0.8 * true, rng, rays=1) for view in views))
         meshes.write_obj(capture.head, mesh)  # the true head: an error of its place would be measured, not the detail
         with replacing_folder(capture.delit) as delit:
             for path in sorted(capture.frames.glob("*.jpg")):

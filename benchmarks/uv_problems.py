@@ -7,7 +7,7 @@ texture = albedo * (global SH + the rest) * shadow, blurred by a texel, with noi
 with its occlusion and a sun; the rest is what they cannot explain, scaled to 10 % of the light; shadow is what cast
 shadows leave of it, per channel. Of kind "delit" the shading is nearly flat already, 30 to 60 % of each shadow is left
 and the colour is off by a few percent over large regions, as a delighter leaves its frames. A
-`plain_problem` has a sky and a sun as they are, and noise.
+`make_plain_problem` has a sky and a sun as they are, and noise.
 """
 
 from __future__ import annotations
@@ -85,11 +85,15 @@ class MaskedUvProblem:
                 "outside": self.face & (self.shadow < 0.05) & ~band}
 
 
-def problem(subject: str, shadows: str, size: int, kind: str = "raw") -> MaskedUvProblem:
-    """`subject`: a seed of core/synthetic, "lee_perry_smith", or the path of a skin in our UVs (sRGB); `shadows` from
-    SHADOWS; `kind`: raw or delit.
+def make_problem(subject: str, shadows: str, size: int, kind: str = "raw") -> MaskedUvProblem:
+    """A problem; the same arguments give the same one.
 
-    The same arguments give the same problem.
+    Parameters
+    ----------
+    subject : a seed of core/synthetic, "lee_perry_smith", or the path of a skin in our UVs (sRGB)
+    shadows : a key of SHADOWS
+    size : texels along a side
+    kind : "raw", or "delit", with little of the light left
     """
     albedo = albedo_of(subject, size)
     seeds = tuple(hashlib.blake2b(f"{Path(subject).stem} {shadows}".encode(), digest_size=8).digest())
@@ -104,7 +108,7 @@ def problem(subject: str, shadows: str, size: int, kind: str = "raw") -> MaskedU
     return MaskedUvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
 
 
-def plain_problem(seed: int, shadows: str, size: int) -> MaskedUvProblem:
+def make_plain_problem(seed: int, shadows: str, size: int) -> MaskedUvProblem:
     """A subject of core/synthetic in a random light of that seed; `shadows`: self, leaves, blinds or edge."""
     rng, albedo = np.random.default_rng([seed, 7]), albedo_of(str(seed), size)
     shading, shadow, _ = bake(template.load(), size, random_light(rng), shadows, rng)

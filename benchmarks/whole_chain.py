@@ -35,7 +35,7 @@ from core.imaging import images
 from .albedo_score import score_capture
 from .continued import run_stages
 from .controlled_captures import as_albedo
-from .figures import write
+from .figures import write_record
 from .people import skin_tone
 from .shadow_captures import lifted_truth
 
@@ -62,9 +62,9 @@ def main() -> None:
         rows["delighters"] = {name: _row("delighter", capture, arguments.truth, of) for name, of in chosen.items()}
     print(json.dumps(rows, indent=1))
     if arguments.json:
-        write(arguments.json, "whole_chain",
-              "python -m benchmarks.whole_chain CAPTURE TRUTH --rows chain solve_off true_mask mask delighters",
-              _figures(capture, rows), keep=True)
+        write_record(arguments.json, "whole_chain",
+                     "python -m benchmarks.whole_chain CAPTURE TRUTH --rows chain solve_off true_mask mask delighters",
+                     _figures(capture, rows), keep=True)
 
 
 def _figures(capture: Capture, rows: dict) -> dict:

@@ -44,7 +44,7 @@ from core.upscale.maps import HeadMaps, read_maps
 from core.upscale.surface import HeadSurface, lay_out
 from core.upscale.whole_head import UNSEEN_CONFIDENCE, complete
 
-from .figures import write
+from .figures import write_record
 
 SEEDS = [9101, 9102, 9103, 9104, 9105, 9106]
 RINGS = (8.0, 11.0), (-6.0, -3.0), (22.0, 25.0)
@@ -69,7 +69,8 @@ def main() -> None:
         found[path.stem] = of_capture(Capture(path), asked.subject)
     print(json.dumps(found, indent=1))
     if asked.json:
-        write(asked.json, "whole_head", "python -m benchmarks.whole_head [--subject SEED] [CAPTURE]", found, keep=True)
+        write_record(asked.json, "whole_head", "python -m benchmarks.whole_head [--subject SEED] [CAPTURE]", found,
+                     keep=True)
 
 
 def whole(seed: int, surface: HeadSurface) -> dict:

@@ -38,4 +38,4 @@ def record(capture: Capture, stage: Stage, settings: Settings) -> None:
 
 def changed(capture: Capture, stage: Stage, settings: Settings) -> tuple[str, ...]:
     """The inputs and settings of a recorded stage that have changed since."""
-    return freshness.judge(capture.root, capture.read(), stage, settings).changed
+    return freshness.judge_stage(capture.root, capture.read(), stage, settings).changed

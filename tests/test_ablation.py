@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import ablation, uv_problems
-from benchmarks.ablation_measures import measure, summary, table
+from benchmarks.ablation_measures import measure_regions, summary, table
 from core.face import template
 from core.imaging import images
 from core.synthetic.light import SkyAndSun, bake
@@ -18,8 +18,8 @@ def cache(tmp_path, monkeypatch):
 
 
 def test_a_problem_is_its_albedo_under_light_and_shadow():
-    raw, delit = (uv_problems.problem("9002", "edge, half soft", 48, kind) for kind in ("raw", "delit"))
-    assert np.array_equal(raw.texture, uv_problems.problem("9002", "edge, half soft", 48).texture)
+    raw, delit = (uv_problems.make_problem("9002", "edge, half soft", 48, kind) for kind in ("raw", "delit"))
+    assert np.array_equal(raw.texture, uv_problems.make_problem("9002", "edge, half soft", 48).texture)
     regions = raw.regions()
     assert all(a.any() for a in regions.values()) and not (regions["shadow"] & regions["outside"]).any()
     assert (raw.mask[regions["shadow"]] == 1).all()
@@ -32,7 +32,7 @@ def test_a_problem_is_its_albedo_under_light_and_shadow():
 
 
 def test_a_plain_problem_repeats_and_masks_its_shadow():
-    given, again = (uv_problems.plain_problem(3, "leaves", 64) for _ in range(2))
+    given, again = (uv_problems.make_plain_problem(3, "leaves", 64) for _ in range(2))
     assert np.array_equal(given.texture, again.texture) and given.texture.min() >= 0
     shadow = given.regions()["shadow"]
     assert shadow.any() and (given.mask[shadow] == 1).all() and 0 < given.mask[given.face].mean() < 1
@@ -54,11 +54,11 @@ def test_measures_of_a_known_error():
     srgb = rng.uniform(0.3, 0.6, (64, 64, 3)).astype(np.float32)
     noise = rng.normal(0, 0.01, srgb.shape).astype(np.float32)
     everywhere = np.ones((64, 64), bool)
-    found = measure(0.5 * images.srgb_to_linear(srgb + noise), images.srgb_to_linear(srgb), everywhere,
-                    {"shadow": everywhere})["shadow"]
+    found = measure_regions(0.5 * images.srgb_to_linear(srgb + noise), images.srgb_to_linear(srgb), everywhere,
+                            {"shadow": everywhere})["shadow"]
     assert found["psnr"] == pytest.approx(40, abs=0.2)  # the gain does not count
-    same = measure(images.srgb_to_linear(srgb), images.srgb_to_linear(srgb), everywhere,
-                   {"shadow": everywhere})["shadow"]
+    same = measure_regions(images.srgb_to_linear(srgb), images.srgb_to_linear(srgb), everywhere,
+                           {"shadow": everywhere})["shadow"]
     assert same["ssim"] == 1 and same["flip"] == 0 and same.get("features", 0) == 0
     assert found["ssim"] < 1 and found["flip"] > 0
 

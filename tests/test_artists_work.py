@@ -145,7 +145,7 @@ def test_who_asked_for_one_face_does_not_delete_another(addon, capture, item):
     meant = asking._click
     try:
         asking._click = lambda operator, meant: clicked.append((operator, meant()))
-        asking.ask(("question",), lambda task: 1, "delete_face", lambda: False)
+        asking.find_answer(("question",), lambda task: 1, "delete_face", lambda: False)
         while addon("jobs").poll():
             pass
     finally:

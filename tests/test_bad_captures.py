@@ -21,7 +21,7 @@ from core.face.head import read_head
 from core.geometry.views import read_views
 from core.imaging import images
 from core.synthetic import painted_head
-from core.synthetic.painted_head import camera
+from core.synthetic.painted_head import place_camera
 
 
 def place(azimuth_deg, elevation_deg=0.0) -> np.ndarray:
@@ -64,7 +64,7 @@ def test_missing_sides_are_named():
 
 def test_three_photographs_give_cameras_and_say_that_they_are_rough(tmp_path):
     """Nothing but the face to go by: sixty degrees apart, before a wall without structure."""
-    views = [camera(azimuth, 0.02) for azimuth in (-38, 0, 38)]
+    views = [place_camera(azimuth, 0.02) for azimuth in (-38, 0, 38)]
     for i, view in enumerate(views):
         picture = painted_head.photograph(view, wall=False)
         images.write_srgb(tmp_path / "photos" / f"{i}.png", picture)
@@ -77,7 +77,7 @@ def test_three_photographs_give_cameras_and_say_that_they_are_rough(tmp_path):
 def test_a_mirrored_photograph_is_named(tmp_path):
     names = []
     for i, azimuth in enumerate((-18, -6, 6, 18)):
-        picture = painted_head.photograph(camera(azimuth, 0.02))
+        picture = painted_head.photograph(place_camera(azimuth, 0.02))
         names.append(f"{i}.png")
         images.write_srgb(tmp_path / names[-1], picture[:, ::-1] if i == 2 else picture)
     assert find_mirrored(names, [], tmp_path, Reporter("cameras")) == ["2.png"]
@@ -90,7 +90,7 @@ def test_the_two_sides_of_a_symmetric_face_are_not_taken_for_each_others_mirror_
     # from the right, and as if from the left
     for name, azimuth, flip in zip(names, (-30, -28, -33), (1, -1, -1), strict=True):
         images.write_srgb(tmp_path / name,
-                          painted_head.photograph(camera(azimuth, 0.02, scale=2), wall=False)[:, ::flip])
+                          painted_head.photograph(place_camera(azimuth, 0.02, scale=2), wall=False)[:, ::flip])
         found[name] = faces.detect(images.read_srgb(tmp_path / name))
     assert find_mirrored(names, [], tmp_path, Reporter("cameras")) == ["0.png"], "by the pictures alone it is one"
     assert find_mirrored(names, [], tmp_path, Reporter("cameras"), found) == []
@@ -98,7 +98,8 @@ def test_the_two_sides_of_a_symmetric_face_are_not_taken_for_each_others_mirror_
 
 def test_a_head_that_turns_before_a_still_camera_is_told(tmp_path):
     for i, turn in enumerate(np.linspace(-32, 32, 9)):
-        images.write_srgb(tmp_path / "photos" / f"{i}.png", painted_head.photograph(camera(0, 0.03), turned_deg=turn))
+        images.write_srgb(tmp_path / "photos" / f"{i}.png",
+                          painted_head.photograph(place_camera(0, 0.03), turned_deg=turn))
     report = solve(tmp_path / "photos", Capture(tmp_path / "face.wildcap"), features="plain")
     assert "The head turned while the camera stood still" in problems(report)
     assert report.figures["angular_coverage_deg"] == pytest.approx(64, abs=15)
@@ -114,7 +115,7 @@ def test_a_head_that_moved_and_does_not_tell_its_own_motion_is_refused(stood, wo
 
 
 def test_an_open_mouth_in_some_frames_is_told():
-    face = faces.detect(painted_head.photograph(camera(0)))
+    face = faces.detect(painted_head.photograph(place_camera(0)))
     rng = np.random.default_rng(0)
     found = {str(i): replace(face,
                              landmarks=face.landmarks + rng.normal(0, 0.3, face.landmarks.shape).astype(np.float32))
@@ -131,7 +132,8 @@ def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
     """Nothing matches, and where a single side is seen the depths are those of other heads: the face lies on the
     picture, and the report says what it is."""
     for i, azimuth in enumerate(azimuths):
-        images.write_srgb(tmp_path / "photos" / f"{i}.png", painted_head.photograph(camera(azimuth, 0.02), wall=False))
+        images.write_srgb(tmp_path / "photos" / f"{i}.png",
+                          painted_head.photograph(place_camera(azimuth, 0.02), wall=False))
     capture = Capture(tmp_path / "face.wildcap")
     report = solve(tmp_path / "photos", capture)
     assert report.figures["frames_registered"] == len(azimuths) and "overlap" not in problems(report)
@@ -144,6 +146,6 @@ def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
     assert width == pytest.approx(true_width, rel=0.08), "metres, by the distance of the pupils"
     for view, azimuth in zip(read_views(capture), azimuths, strict=True):
         there, here = (seen.project(template.landmark_points(mesh))[0]
-                       for seen, mesh in ((camera(azimuth, 0.02), truth), (view, head)))
+                       for seen, mesh in ((place_camera(azimuth, 0.02), truth), (view, head)))
         miss = np.linalg.norm(there - here, axis=1)[template.landmark_weights() > 0.2]
         assert np.median(miss) < 0.04 * np.ptp(there[:, 0]), "of the face's width"

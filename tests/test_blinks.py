@@ -18,7 +18,7 @@ from core.face.head import read_filmed_head, read_head  # noqa: E402
 from core.geometry import meshes  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.registration import eyeballs  # noqa: E402
-from core.synthetic.painted_head import camera  # noqa: E402
+from core.synthetic.painted_head import place_camera  # noqa: E402
 from core.synthetic.people import shape  # noqa: E402
 from core.texture import blinks  # noqa: E402
 from core.texture.projection import observe  # noqa: E402
@@ -40,7 +40,7 @@ def filmed(tmp_path, monkeypatch):
     head = read_filmed_head(capture)
     surface, found, observations = head.unfold(SIZE), {}, []
     for i, azimuth in enumerate(AZIMUTHS):
-        view = replace(camera(azimuth), name=f"{i}.png", path=tmp_path / f"{i}.png")
+        view = replace(place_camera(azimuth), name=f"{i}.png", path=tmp_path / f"{i}.png")
         images.write_srgb(view.path, np.full((view.height, view.width, 3), 0.5, np.float32))
         seen = [faces.Eye(*(view.project(edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)])[0]
                             for edge in lids.edges(head.mesh.vertices, side)),

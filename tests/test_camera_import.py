@@ -22,7 +22,7 @@ FRAME_WIDTH, FRAME_HEIGHT = 360, 480
 POINTS = np.random.default_rng(0).uniform(-0.07, 0.07, (50, 3))
 # tangential as OpenCV's p1, p2
 FOCAL, CENTRE, RADIAL, TANGENTIAL = 1900.0, (612.0, 790.0), (-0.06, 0.03, -0.01), (0.002, -0.0015)
-VIEWS = [painted_head.camera(azimuth, 0.04 * i) for i, azimuth in enumerate((-60, -25, 5, 40))]
+VIEWS = [painted_head.place_camera(azimuth, 0.04 * i) for i, azimuth in enumerate((-60, -25, 5, 40))]
 NAMES = [f"IMG_{i:04d}" for i in range(7, 11)]
 
 

@@ -199,7 +199,7 @@ def test_it_follows_another_shape_and_another_colour_and_what_was_set_stays(clos
     for number, side in enumerate(("Left", "Right")):
         centre = addon("acting.close_up.ball").of(close_up, number).centre
         assert ball_and_gaze(close_up, side)[0] == pytest.approx(centre, abs=1e-5)
-    scene = addon("relight.picture").set_up(close_up, "three_point", 64, 1)
+    scene = addon("relight.picture").set_up_scene(close_up, "three_point", 64, 1)
     assert objects <= set(scene.collection.objects)
 
 

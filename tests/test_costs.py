@@ -92,7 +92,7 @@ def test_a_process_alone_is_measured_to_its_end_or_its_limit():
 
 @pytest.mark.parametrize("record", ["costs", "solver_speed", "opendelight_cost", "blender_memory"])
 def test_a_record_is_made_by_a_command_that_exists(record, capsys):
-    word = figures.read(record)["command"].removeprefix("python -m benchmarks.costs ").split()[0]
+    word = figures.read_record(record)["command"].removeprefix("python -m benchmarks.costs ").split()[0]
     assert f"benchmarks.costs {word} " in costs.__doc__ and f"docs/figures/{record}.json" in costs.__doc__
     with pytest.raises(SystemExit) as ended:
         terminal.main([word, "--help"])
@@ -130,7 +130,7 @@ def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     assert not chain.measured("frames-120", options), "the scan failed"
     assert chain.measured("frames-120", options) and asked == [*whole[:3], *whole[2:]]
     assert chain.measured("frames-120", options) and len(asked) == len(whole) + 1, "all is there"
-    record = figures.read("costs", tmp_path)["figures"]
+    record = figures.read_record("costs", tmp_path)["figures"]
     assert record["frames-120"] == dict.fromkeys(whole, DONE) and record["together"]["frames-120"]["minutes"] == 2.1
     options.again = True
     assert chain.measured("frames-120", options) and len(asked) == len(whole) + 1, "nothing disturbed it"
@@ -156,7 +156,7 @@ def test_what_was_disturbed_is_measured_once_more_and_the_better_one_kept(tmp_pa
     kept = []
     for _ in range(5):
         assert chain.measured("standard", options)
-        kept.append(figures.read("costs", tmp_path)["figures"]["standard"]["cameras"]["others"])
+        kept.append(figures.read_record("costs", tmp_path)["figures"]["standard"]["cameras"]["others"])
     assert kept == [0.9, 0.9, 0.3, 0.0, 0.0] and capture.is_dir()
 
 

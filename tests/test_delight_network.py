@@ -246,4 +246,4 @@ def _prepared(seeds, work):
         plain = np.broadcast_to(np.float32([0, 0, 1]), (64, 64, 3))
         view = random_camera(sight.landmarks_of(stage), SIDE_PX, np.random.default_rng(seed))
         diffuse, gloss = np.full((64, 64, 3), 0.3, np.float32), np.full((64, 64), 0.03, np.float32)
-        sight.save(place / "0.npz", sight.look(stage, view, diffuse, gloss, plain, np.random.default_rng(seed)))
+        sight.save(place / "0.npz", sight.trace_sight(stage, view, diffuse, gloss, plain, np.random.default_rng(seed)))

@@ -22,8 +22,8 @@ POINTS = np.array([[[0, -0.1, 0.02], [0, -0.103, 0.021], [0, -0.106, 0.023]],
 def hairy(capture, addon):  # noqa: F811
     """The capture, with two hairs of 0.08 mm on its head."""
     head = bpy.context.view_layer.objects.active
-    addon("groom.curves").grow(bpy.context, head, "brows", POINTS, np.full((2, 3), 4e-5),
-                               np.array([[0.02, 0.01, 0.01], [0.04, 0.03, 0.03]]))
+    addon("groom.curves").grow_part(bpy.context, head, "brows", POINTS, np.full((2, 3), 4e-5),
+                                    np.array([[0.02, 0.01, 0.01], [0.04, 0.03, 0.03]]))
     return capture
 
 

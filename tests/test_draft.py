@@ -6,10 +6,10 @@ as the shipped one does."""
 import pytest
 import torch
 
-from benchmarks.prior_figures import errors, given_diffuse, of_subject, reflectance
+from benchmarks.prior_figures import errors, of_subject, reflectance, sample_given_diffuse
 from core.face import template
 from core.solve.draft import restore_maps
-from core.solve.prior import coordinates, load
+from core.solve.prior import load, make_coordinates
 from core.solve.recipes import Recipe
 from core.solve.sampler import Sampler, seed_noise
 
@@ -47,7 +47,7 @@ def test_what_the_albedo_tells_is_restored_and_the_albedo_stays():
     prior = Related()
     truth = prior.draw(torch.Generator().manual_seed(2))
     drawn = Sampler(prior, DRAFT, seed_noise(0)).sample({1: observation((truth[0, :3] + 1) / 2)}, start()).denoised
-    out = restore_maps(prior, drawn, coordinates(SIZE, slice(0, SIZE), slice(0, SIZE)), 0)
+    out = restore_maps(prior, drawn, make_coordinates(SIZE, slice(0, SIZE), slice(0, SIZE)), 0)
     assert torch.equal(out[:, :3], drawn[:, :3])
     left, before = ((maps - truth)[:, 3:].pow(2).mean().sqrt() for maps in (out, drawn))
     assert left < 1.1 * OWN and before > 1.35 * OWN
@@ -59,8 +59,8 @@ def test_the_shipped_prior_restores_a_held_out_subject(seed):
     size = 256
     truth, face = reflectance(seed, size), torch.from_numpy(template.mask("face", size) > 0.5)
     prior = of_subject(load(), truth)
-    drawn = given_diffuse(prior, truth, 30, "proximal")  # as many as a draft takes
-    coords = coordinates(size, slice(0, size), slice(0, size))
+    drawn = sample_given_diffuse(prior, truth, 30, "proximal")  # as many as a draft takes
+    coords = make_coordinates(size, slice(0, size), slice(0, size))
     out = restore_maps(prior, drawn[None], coords, 0)[0]
     assert torch.equal(out[:3], drawn[:3])
     before, after = errors(drawn, truth, face), errors(out, truth, face)

@@ -180,7 +180,7 @@ def test_a_cancelled_installation_says_so(local, tmp_path):
 
 def test_what_an_installation_brings_is_known_before_it_begins(local, made_before, tmp_path):
     def work(task, run=None):
-        return index.plan(local, installation.base_python(), "cpu", "pytorch", run or task.run, task.say)
+        return index.plan_installation(local, installation.base_python(), "cpu", "pytorch", run or task.run, task.say)
 
     task = BackgroundTask("index", work)
     task.start()

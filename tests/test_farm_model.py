@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from benchmarks import farm_model, figures
-from benchmarks.farm_model import Assumptions, entries, model, page, weigh
+from benchmarks.farm_model import Assumptions, entries, model_farm, page, weigh
 from core.contract import stages
 from core.contract.capture import Capture
 from core.contract.messages import Problem
@@ -30,7 +30,7 @@ def disk(size: float = 10.0) -> dict[str, float]:
 
 
 def test_the_sums_are_those_of_the_formulas():
-    found = model(costs(), disk(), STARTS, EVEN)
+    found = model_farm(costs(), disk(), STARTS, EVEN)
     totals, weight = found["totals"], 10.0 * len(disk())
     assert (
         found["seconds"] == 360.0
@@ -56,16 +56,16 @@ def test_the_sums_are_those_of_the_formulas():
 
 
 def test_twice_the_faces_cost_twice_as_much_and_repeats_cost_the_machines_alone():
-    once, twice = (model(costs(), disk(), STARTS, Assumptions(faces=faces))["totals"] for faces in (10, 20))
+    once, twice = (model_farm(costs(), disk(), STARTS, Assumptions(faces=faces))["totals"] for faces in (10, 20))
     assert {key: pytest.approx(2 * value) for key, value in once.items()} == twice
-    plain, again = (model(costs(), disk(), STARTS, Assumptions(repeats=share))["totals"] for share in (0.0, 0.5))
+    plain, again = (model_farm(costs(), disk(), STARTS, Assumptions(repeats=share))["totals"] for share in (0.0, 0.5))
     assert {key for key in plain if again[key] == pytest.approx(1.5 * plain[key])} == {
         "used_core_hours", "core_hours", "eur_cores", "gpu_hours", "core_hours_beside_gpu", "eur_with_gpu", "days"}
     assert all(again[key] == plain[key] for key in ("tb", "eur_disk", "artist_hours"))
 
 
 def test_a_task_reads_what_comes_before_it_and_writes_its_own():
-    tasks = model(costs(), disk(), STARTS, EVEN)["tasks"]
+    tasks = model_farm(costs(), disk(), STARTS, EVEN)["tasks"]
     # the film; frames, cameras, scan, head, landmarks
     assert (tasks["head"]["read_mb"], tasks["head"]["write_mb"]) == (100.0, 50.0)
     assert (
@@ -74,7 +74,7 @@ def test_a_task_reads_what_comes_before_it_and_writes_its_own():
         and tasks["deliver"]["write_mb"] == 10.0
     )
     assert tasks["mask"]["read_mb"] == 100.0 + 40.0 and tasks["deliver"]["read_mb"] > tasks["solve"]["read_mb"]
-    slow = model(costs(), disk(), STARTS, EVEN)["limits"]["storage"]
+    slow = model_farm(costs(), disk(), STARTS, EVEN)["limits"]["storage"]
     assert slow == pytest.approx(100.0 * 360.0 / sum(task["read_mb"] + task["write_mb"] for task in tasks.values()))
 
 
@@ -83,10 +83,10 @@ def test_other_numbers_of_frames_are_told_where_they_were_measured_to_their_end(
     rows = {"frames-300": dict.fromkeys(("frames", "cameras", "scan"), fast),
             "frames-30": dict.fromkeys(("frames", "cameras", "scan"), fast),
             "frames-120": {"frames": fast, "cameras": {"over_s": 480.0}}, "views-8": {"delight": fast}}
-    found = model(costs(**rows), disk(), STARTS, EVEN)["frames"]
+    found = model_farm(costs(**rows), disk(), STARTS, EVEN)["frames"]
     assert list(found) == ["30", "300"] and found["30"]["seconds"] == 7 * 36 + 3 * 6
-    assert "| 300 | 270 s |" in page(model(costs(**rows), disk(), STARTS, EVEN))
-    assert "With other numbers" not in page(model(costs(), disk(), STARTS, EVEN))
+    assert "| 300 | 270 s |" in page(model_farm(costs(**rows), disk(), STARTS, EVEN))
+    assert "With other numbers" not in page(model_farm(costs(), disk(), STARTS, EVEN))
 
 
 def test_a_capture_is_weighed_by_what_its_stages_write(tmp_path):
@@ -108,12 +108,12 @@ def test_costs_without_a_whole_standard_row_are_refused():
     whole = costs()
     whole["standard"] = {key: value for key, value in whole["standard"].items() if key != "upscale"}
     with pytest.raises(Problem, match="no whole row 'standard'"):
-        model(whole, disk(), STARTS, EVEN)
+        model_farm(whole, disk(), STARTS, EVEN)
 
 
 def test_the_page_is_what_the_record_and_todays_costs_give():
-    record = figures.read("farm_model")["figures"]
-    again = model(figures.read("costs")["figures"], record["disk_mb"], record["starts"],
+    record = figures.read_record("farm_model")["figures"]
+    again = model_farm(figures.read_record("costs")["figures"], record["disk_mb"], record["starts"],
                   Assumptions(**record["assumed"]))
     assert figures.plain(again) == record and farm_model.PAGE.read_text(encoding="utf-8") == page(record), (
         f"run `{farm_model.COMMAND.split(' --cap')[0]}`"
@@ -126,7 +126,8 @@ def test_the_command_uses_measurements_again_and_takes_other_assumptions(monkeyp
                         ["farm_model", "--faces", "200", "--json", str(tmp_path / "x.json"), "--page",
                          str(tmp_path / "x.md")])
     assert farm_model.main() == 0 and "# What 200 faces cost" in (tmp_path / "x.md").read_text(encoding="utf-8")
-    assert figures.read("x", tmp_path)["figures"]["disk_mb"] == figures.read("farm_model")["figures"]["disk_mb"]
+    written, published = figures.read_record("x", tmp_path), figures.read_record("farm_model")
+    assert written["figures"]["disk_mb"] == published["figures"]["disk_mb"]
     monkeypatch.setattr(figures, "PUBLISHED", tmp_path)
     assert farm_model.main() == 2 and "Add --capture CAPTURE" in capsys.readouterr().err
     monkeypatch.setattr(sys, "argv", ["farm_model", "--capture", str(tmp_path)])

@@ -48,9 +48,9 @@ def test_what_is_published_makes_the_same_tables(tmp_path):
     long = {**RESULTS,
             "bust": {**RESULTS["bust"], "head": {"own": {"median_mm": 0.217, "folds": [1, 2], "shapes": 40}},
                      "picture": "bust.jpg"}}
-    figures.write(tmp_path / "geometry.json", "geometry", "python -m benchmarks.geometry FOLDER",
-                  geometry_table.published(long))
-    assert geometry_table.table(figures.read("geometry", tmp_path)["figures"]) == geometry_table.table(long)
+    figures.write_record(tmp_path / "geometry.json", "geometry", "python -m benchmarks.geometry FOLDER",
+                         geometry_table.published(long))
+    assert geometry_table.table(figures.read_record("geometry", tmp_path)["figures"]) == geometry_table.table(long)
 
 
 def test_peak_memory_is_at_least_what_was_held():

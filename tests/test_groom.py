@@ -176,7 +176,7 @@ def test_one_undo_takes_hair_and_the_skin_below_back(capture, strands, addon):
 def test_hair_is_in_the_picture_and_goes_aside_with_its_head(strands, addon):
     bpy.ops.wildcap.grow_hair()
     hairs = addon("groom.curves").of(head())
-    scene = addon("relight.picture").set_up(head(), "overcast", 64, 1)
+    scene = addon("relight.picture").set_up_scene(head(), "overcast", 64, 1)
     assert set(hairs) <= set(scene.objects) and head() in set(scene.objects)
     addon("captures").put_aside(head())
     assert all(hair.hide_get() for hair in hairs)

@@ -17,7 +17,7 @@ from core.face.head import Head  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.registration import hair  # noqa: E402
-from core.synthetic.painted_head import camera, person  # noqa: E402
+from core.synthetic.painted_head import person, place_camera  # noqa: E402
 from core.texture import foreign, parts_shown  # noqa: E402
 from core.texture.projection import observe  # noqa: E402
 
@@ -28,7 +28,7 @@ SIZE, AZIMUTHS = 256, (-50, -20, 0, 20, 50)
 def views(tmp_path_factory):
     folder, found = tmp_path_factory.mktemp("frames"), []
     for i, azimuth in enumerate(AZIMUTHS):
-        view = replace(camera(azimuth), name=f"{i}.png", path=folder / f"{i}.png")
+        view = replace(place_camera(azimuth), name=f"{i}.png", path=folder / f"{i}.png")
         images.write_srgb(view.path, np.full((view.height, view.width, 3), (i + 1) / 10, np.float32))
         found.append(view)
     return found

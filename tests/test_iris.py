@@ -19,7 +19,7 @@ from core.face.head import Head  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.solve import iris  # noqa: E402
-from core.synthetic.painted_head import camera  # noqa: E402
+from core.synthetic.painted_head import place_camera  # noqa: E402
 from core.synthetic.people import eyes, shape  # noqa: E402
 
 SEED, SKIN = 4, np.array([0.42, 0.26, 0.19])
@@ -32,13 +32,13 @@ class Painted:
     def __init__(self, folder, colour, tone=SKIN, lit=(1.0, 0.8, 0.5), blink: int | None = None):
         closed = shape.person_mesh(SEED)
         self.opened = lids.open_lids(closed, 0.9, np.zeros(2))
-        self.picture = eyes.eye_picture(np.array(colour), self.opened.balls[0].radius, SEED, 512)
+        self.picture = eyes.paint_eyes(np.array(colour), self.opened.balls[0].radius, SEED, 512)
         self.albedo = np.tile(np.float32(tone), (256, 256, 1))
         self.head = self._filmed(closed, self.opened)
         shut = self._filmed(closed, lids.open_lids(closed, 0.0, np.zeros(2)))
         views = []
         for i, azimuth in enumerate(AZIMUTHS):
-            view = replace(camera(azimuth, 0.03, scale=2.5), name=f"{i}.png", path=folder / f"{i}.png")
+            view = replace(place_camera(azimuth, 0.03, scale=2.5), name=f"{i}.png", path=folder / f"{i}.png")
             images.write_srgb(view.path, self._photograph(view, shut if i == blink else self.head, np.array(lit)))
             views.append(view)
         self.views = views
@@ -110,7 +110,7 @@ def test_an_iris_that_no_frame_faces_has_no_colour(tmp_path):
 
 def test_the_iris_is_what_lids_and_pupil_leave_of_it():
     """Of an eyeball that looks into the camera, where the reader sees the lower half of the iris alone."""
-    view = camera(0, 0.0, scale=2.5)
+    view = place_camera(0, 0.0, scale=2.5)
     eye = Eyeball((0.0, 0.0, 0.0), 0.012, tuple(view.centre / np.linalg.norm(view.centre)), 0.9, 0.0059, 5)
     shape = (view.height, view.width, 3)
     (middle,), (depth,) = view.project(np.zeros((1, 3)))

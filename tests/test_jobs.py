@@ -95,7 +95,7 @@ def test_an_installation_is_polled_like_a_job_and_sets_the_python(addon, tmp_pat
             self.running = bool(self.waiting)
             return said
 
-    jobs.begin("", "install", Installation(), lambda: preferences.set_python(Path(sys.executable)))
+    jobs.start_worker("", "install", Installation(), lambda: preferences.set_python(Path(sys.executable)))
     assert jobs.poll() and jobs.of("").progress.text == "Collecting torch"
     assert not jobs.poll()
     assert preferences.python() == Path(sys.executable)

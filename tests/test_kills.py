@@ -66,7 +66,7 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
     undisturbed = Undisturbed(place.parent, {}, ("frames",), known=known)
     place.rename(place.parent / "end")
     undisturbed.copy(place.parent / "end", place)
-    assert kills_judge.after_kill(place, known) == [] and kills_judge.after_resume(place, undisturbed, "frames") == []
+    assert kills_judge.judge_kill(place, known) == [] and kills_judge.judge_resume(place, undisturbed, "frames") == []
     for name, content, fault in (
         ("frames/00000.jpg", b"a fra", "no complete content"), ("frames/00001.jpg", b"", "no complete content"),
         ("frames/retouched.psd", b"", "is changed"),
@@ -78,12 +78,12 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
         before = (root / name).read_bytes() if (root / name).exists() else None
         (root / name).parent.mkdir(exist_ok=True)
         (root / name).write_bytes(content)
-        assert [told for told in kills_judge.after_kill(place, known) if fault in told], name
+        assert [told for told in kills_judge.judge_kill(place, known) if fault in told], name
         (root / name).unlink() if before is None else (root / name).write_bytes(before)
-    told = kills_judge.after_kill(place, known, {"shadow_mask.png": (b"old", b"new")})
+    told = kills_judge.judge_kill(place, known, {"shadow_mask.png": (b"old", b"new")})
     assert told == ["shadow_mask.png is neither the old mask nor a new one"]
     (root / "notes" / "list.txt").rename(root / "list.txt")
-    assert "the user's notes/list.txt is gone" in kills_judge.after_kill(place, known)
+    assert "the user's notes/list.txt is gone" in kills_judge.judge_kill(place, known)
     (root / "list.txt").rename(root / "notes" / "list.txt")
 
 
@@ -98,12 +98,12 @@ def test_the_judge_finds_what_is_left_after_the_run_that_goes_on(place):
         path = capture_at(place).root / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"")
-        assert [told for told in kills_judge.after_resume(place, undisturbed, "frames") if fault in told], name
+        assert [told for told in kills_judge.judge_resume(place, undisturbed, "frames") if fault in told], name
         shutil.rmtree(place)
     undisturbed.copy(place.parent / "end", place)
     (capture_at(place).frames / "00000.jpg").write_bytes(b"another")
-    assert "frames/00000.jpg is not as in the undisturbed run" in kills_judge.after_resume(place, undisturbed, "frames")
-    assert "the stage cameras is not on record" in kills_judge.after_resume(place, undisturbed, "cameras")
+    assert "frames/00000.jpg is not as in the undisturbed run" in kills_judge.judge_resume(place, undisturbed, "frames")
+    assert "the stage cameras is not on record" in kills_judge.judge_resume(place, undisturbed, "cameras")
 
 
 @pytest.mark.parametrize("moment",

@@ -34,15 +34,15 @@ def floor(half: float = 0.1, sphere: float | None = None) -> Mesh:
 
 def test_an_open_surface_under_a_white_sky_is_shaded_one_whichever_way_it_faces():
     ball = trimesh.creation.icosphere(2, radius=0.1)
-    found = light.transfer(ball.vertices, ball.vertices / 0.1, RayCaster(Mesh(ball.vertices, ball.faces)),
-                           rays=512) @ WHITE_SKY
+    found = light.trace_transfer(ball.vertices, ball.vertices / 0.1, RayCaster(Mesh(ball.vertices, ball.faces)),
+                                 rays=512) @ WHITE_SKY
     assert np.allclose(found, 1, atol=0.03)
 
 
 def test_one_direction_of_the_sky_is_lambert_s_answer_to_it():
     ball = trimesh.creation.icosphere(2, radius=0.1)
     normals = ball.vertices / 0.1
-    found = light.transfer(ball.vertices, normals, RayCaster(Mesh(ball.vertices, ball.faces)), rays=512)
+    found = light.trace_transfer(ball.vertices, normals, RayCaster(Mesh(ball.vertices, ball.faces)), rays=512)
     assert np.allclose(found, sh_basis(normals) * per_function(LAMBERT), atol=0.03)
 
 

@@ -63,14 +63,14 @@ FREE = replace(OURS, phases=(("both", 0.0, 1.0),), updates=80)
 
 
 def test_an_environment_explains_a_lamp_and_no_shadow():
-    before, after = fitted(*light_models.environment(begun(lamp), FREE))
+    before, after = fitted(*light_models.light_by_environment(begun(lamp), FREE))
     assert before > 0.9 and after < 0.05
-    assert fitted(*light_models.environment(begun(bars), FREE))[1] > 0.5
+    assert fitted(*light_models.light_by_environment(begun(bars), FREE))[1] > 0.5
 
 
 def test_regions_explain_a_shadow_that_they_were_laid_on():
-    assert fitted(*light_models.regions(begun(bars), FREE, 5))[1] < 0.15
-    assert fitted(*light_models.regions(begun(lamp), FREE, 5))[1] < 0.1
+    assert fitted(*light_models.light_by_regions(begun(bars), FREE, 5))[1] < 0.15
+    assert fitted(*light_models.light_by_regions(begun(lamp), FREE, 5))[1] < 0.1
 
 
 def test_an_even_sky_is_an_even_irradiance_and_a_point_is_a_cosine():

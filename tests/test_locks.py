@@ -112,7 +112,7 @@ def test_a_lock_that_is_not_there_is_named():
     ("macosx_arm64-3.13", "apple", "pytorch", "")])
 def test_each_system_gets_the_torch_that_was_chosen(tmp_path, name, compute, source, torch):
     lock = locks.read(REQUIREMENTS, name)
-    steps = [step.words for step in pip_steps.steps(REQUIREMENTS, lock, compute, source, tmp_path)]
+    steps = [step.words for step in pip_steps.plan_steps(REQUIREMENTS, lock, compute, source, tmp_path)]
     assert "--require-hashes" in steps[0] and "--no-deps" in steps[0] and steps[0][-2] == "-r"
     taken = Path(steps[0][-1]).read_text(encoding="utf-8")
     assert ("torch==" in taken) == (not torch) and "numpy==" in taken
@@ -135,7 +135,7 @@ def test_each_system_gets_the_torch_that_was_chosen(tmp_path, name, compute, sou
 
 @pytest.mark.parametrize("name, compute, count", [("manylinux_x86_64-3.11", "cpu", 2), ("win_amd64-3.11", "cuda", 1)])
 def test_where_a_studios_index_lacks_pytorchs_build_its_own_is_taken(tmp_path, name, compute, count):
-    rest, torch = pip_steps.steps(REQUIREMENTS, locks.read(REQUIREMENTS, name), compute, "pip", tmp_path)
+    rest, torch = pip_steps.plan_steps(REQUIREMENTS, locks.read(REQUIREMENTS, name), compute, "pip", tmp_path)
     assert "--find-links" not in torch.words and not rest.otherwise
     assert len(torch.otherwise) == count and "--require-hashes" in torch.otherwise[0]
     assert re.fullmatch(r"torch==2.13.0( --hash=sha256:\w{64})+\n",
@@ -153,7 +153,7 @@ def test_where_a_studios_index_lacks_pytorchs_build_its_own_is_taken(tmp_path, n
 def test_a_folder_of_wheels_is_the_only_place_that_is_looked_in(tmp_path):
     lock = locks.read(REQUIREMENTS, "win_amd64-3.13")
     for compute, count in (("cuda", 2), ("cpu", 1)):
-        steps = pip_steps.steps(REQUIREMENTS, lock, compute, "folder", tmp_path, tmp_path)
+        steps = pip_steps.plan_steps(REQUIREMENTS, lock, compute, "folder", tmp_path, tmp_path)
         assert len(steps) == count
         for words in (words for step in steps for words in (step.words, *step.otherwise)):
             assert "--no-index" in words and words[words.index("--find-links") + 1] == str(tmp_path)

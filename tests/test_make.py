@@ -28,7 +28,7 @@ def job(addon, monkeypatch):
     monkeypatch.setattr(jobs, "start", start)
     monkeypatch.setattr(jobs, "of", lambda root: played.running if root else None)
     rendered = []
-    monkeypatch.setattr(addon("relight.output"), "still", lambda scene, path, wait: rendered.append(path.name))
+    monkeypatch.setattr(addon("relight.output"), "render_still", lambda scene, path, wait: rendered.append(path.name))
     played.rendered = rendered
     return played
 

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from benchmarks import figures
-from benchmarks.measures.table import Column, standard_error, summarise, to_markdown, to_record
+from benchmarks.measures.table import Column, format_table, standard_error, summarise, to_record
 
 COLUMNS = {"psnr": Column("PSNR, dB"), "flip": Column("FLIP", 3, -1), "step": Column("step", 2, 0),
            "unknown": Column("never measured")}
@@ -36,19 +36,20 @@ def test_a_standard_error_needs_two():
 
 
 def test_sure_differences_are_marked_though_people_differ_by_more():
-    text = to_markdown(summarise(SCORES, COLUMNS, "old"), COLUMNS, "method", "old")
+    text = format_table(summarise(SCORES, COLUMNS, "old"), COLUMNS, "method", "old")
     assert "| method | PSNR, dB | FLIP | step |" in text and "never measured" not in text
     assert "| old | 35.00 ± 12.91 | 0.150 ± 0.071 | 0.10 |" in text and "| new | 36.00 ± 12.86 | 0.100 | - |" in text
     assert "| new | **+1.00 ± 0.04** | -0.100 | - |" in text
-    turned = to_markdown(summarise(SCORES, COLUMNS, "new"), COLUMNS, "method", "new")
+    turned = format_table(summarise(SCORES, COLUMNS, "new"), COLUMNS, "method", "new")
     assert "| old | *-1.00 ± 0.04* | +0.100 | - |" in turned
 
 
 def test_nothing_has_no_sign():
-    assert "| old | 0.00 |" in to_markdown(summarise({"old": {"a": {"psnr": -0.001}}}, COLUMNS), COLUMNS, "method")
+    assert "| old | 0.00 |" in format_table(summarise({"old": {"a": {"psnr": -0.001}}}, COLUMNS), COLUMNS, "method")
 
 
 def test_a_record_holds_the_people_behind_the_cells(tmp_path):
-    figures.write(tmp_path / "table.json", "state", "command", to_record(summarise(SCORES, COLUMNS, "old"), SCORES))
-    read = figures.read("table", tmp_path)["figures"]
+    figures.write_record(tmp_path / "table.json", "state", "command",
+                         to_record(summarise(SCORES, COLUMNS, "old"), SCORES))
+    read = figures.read_record("table", tmp_path)["figures"]
     assert read["summary"]["new"]["psnr"]["difference"] == 1.0 and read["people"]["new"]["d"] == {"psnr": 50.9}

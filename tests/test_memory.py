@@ -124,7 +124,7 @@ def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, mo
             def plain(norm, convolution, x, mapped):
                 return convolution(torch.nn.functional.gelu(norm(x, mapped)))
 
-            monkeypatch.setattr("core.solve.network_blocks.Shaped.of", plain)
+            monkeypatch.setattr("core.solve.network_blocks.Shaped.convolve", plain)
         x, kept = torch.linspace(-1, 1, 5 * 32 * 32).reshape(1, 5, 32, 32).requires_grad_(), {}
 
         def pack(saved, kept=kept):

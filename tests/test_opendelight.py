@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.costs.opendelight import base, enhancer, write_random
+from benchmarks.costs.opendelight import base, enhancer, write_random_checkpoint
 from core import __main__ as terminal
 from core.contract.capture import Capture
 from core.contract.messages import CancelledError, Problem, Reporter
@@ -23,7 +23,7 @@ from core.delight.opendelight_checkpoint import BASE, ENHANCER, load
 from core.delight.opendelight_network import base_shapes, delight_crop, enhancer_shapes
 from core.face.faces import Face
 from core.imaging import images
-from core.synthetic.painted_head import camera, photograph
+from core.synthetic.painted_head import photograph, place_camera
 from core.worker.job import read_job
 
 from .plain_opendelight import Base, Enhancer
@@ -35,7 +35,7 @@ SMALL = {"width": 64, "depth": 2, "channels": 12, "unet": 4}
 @pytest.fixture(scope="module")
 def checkpoint(tmp_path_factory):
     folder = tmp_path_factory.mktemp("opendelight")
-    write_random(folder, **SMALL)
+    write_random_checkpoint(folder, **SMALL)
     return folder
 
 
@@ -121,14 +121,14 @@ def test_what_was_made_of_the_face_lands_on_the_face():
 
 @pytest.fixture(scope="module")
 def portrait():
-    return photograph(camera(0, scale=1.0))
+    return photograph(place_camera(0, scale=1.0))
 
 
 def frames(monkeypatch, folder, pictures):
     """The delighter's frames are these pictures; its crops are small, so that a test is quick."""
     for i, picture in enumerate(pictures):
         images.write_srgb(folder / f"{i:05d}.png", picture)
-    views = [replace(camera(0), name=f"{i:05d}.png", path=folder / f"{i:05d}.png") for i in range(len(pictures))]
+    views = [replace(place_camera(0), name=f"{i:05d}.png", path=folder / f"{i:05d}.png") for i in range(len(pictures))]
     monkeypatch.setattr(room, "read_views", lambda capture, selected_only: views)
     monkeypatch.setattr(room, "CROP_PX", 64)
 
@@ -205,7 +205,7 @@ def test_a_checkpoint_must_be_chosen():
 
 
 def test_a_width_that_has_no_heads_is_refused(tmp_path):
-    write_random(tmp_path, width=80, depth=1, channels=12, unet=4)
+    write_random_checkpoint(tmp_path, width=80, depth=1, channels=12, unet=4)
     with pytest.raises(Problem, match="no multiple of 64"):
         load(str(tmp_path))
 

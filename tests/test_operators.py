@@ -19,7 +19,7 @@ def operators(addon, monkeypatch, tmp_path):
     """All of the add-on's operators; whatever would start a process, a browser or a long render is kept from it."""
     for name in ("start", "start_tool"):
         monkeypatch.setattr(addon("jobs"), name, lambda *_, **__: SimpleNamespace())
-    for name in ("still", "stills", "frames"):
+    for name in ("render_still", "render_stills", "render_frames"):
         monkeypatch.setattr(addon("relight.output"), name, lambda *_: None)
     addon("preferences").get().captures = str(tmp_path / "captures")
     return sorted(name for name in dir(bpy.ops.wildcap) if not name.startswith("_"))

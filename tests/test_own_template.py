@@ -129,7 +129,7 @@ def test_parts_without_a_counterpart_follow_the_skin_around_them():
     start = np.concatenate([skin.vertices, ball.vertices])
     label = np.repeat([0, 1], [len(skin.vertices), len(ball.vertices)])
     moved = skin.vertices * 1.1 + [0.01, 0, 0]
-    final = carried.along(start, label, np.arange(len(skin.vertices)), moved, Reporter("x"))
+    final = carried.carry_along(start, label, np.arange(len(skin.vertices)), moved, Reporter("x"))
     assert np.allclose(final[:len(moved)], moved)
     assert np.linalg.norm(final[len(moved):].mean(0) - [0.01, 0, 0.0935]) < 0.001
     assert np.ptp(np.linalg.norm(final[len(moved):] - final[len(moved):].mean(0), axis=1)) < 1e-6

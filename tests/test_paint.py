@@ -21,7 +21,7 @@ def test_the_mask_painted_on_the_left_cheek_is_saved_on_the_left_cheek(addon, ca
     pixels[..., 3] = 1
     pixels[round(v * height), round(u * width)] = 1
     image.pixels.foreach_set(pixels.ravel())
-    mask_image.save(image, core_capture)
+    mask_image.save_image(image, core_capture)
 
     header = (capture / "shadow_mask.png").read_bytes()[24:26]
     assert header == b"\x08\x00", "8 bit grey"
@@ -42,9 +42,9 @@ def test_the_last_ten_masks_are_kept(addon, capture):
     for i in range(14):
         pixels = np.full(len(image.pixels), i / 14, np.float32)
         image.pixels.foreach_set(pixels)
-        mask_image.save(image, core_capture)
+        mask_image.save_image(image, core_capture)
     assert len(list((capture / "mask_history").iterdir())) == 10
-    mask_image.save(image, core_capture)
+    mask_image.save_image(image, core_capture)
     assert len(list((capture / "mask_history").iterdir())) == 10, "an unchanged mask is no new one"
 
 

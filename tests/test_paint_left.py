@@ -42,7 +42,7 @@ def test_a_head_that_is_excluded_while_it_is_painted_ends_the_painting_with_its_
     image = session.mask()
     image.pixels.foreach_set(np.ones(len(image.pixels), np.float32))
     excluded(True)
-    session.end(bpy.context)
+    session.end_painting(bpy.context)
     assert not session.active() and (capture / "shadow_mask.png").is_file()
     excluded(False)
     assert bpy.ops.wildcap.paint_mask() == bpy.ops.wildcap.finish_mask() == {'FINISHED'}
@@ -59,7 +59,7 @@ def test_the_watch_goes_on_whatever_ending_raises(excluded, addon, capture, monk
         raise RuntimeError("not in the view layer")
 
     with monkeypatch.context() as patched:
-        patched.setattr(session, "end", fail)
+        patched.setattr(session, "end_painting", fail)
         assert session._watch() == 4 * session.WATCH_S
     assert "not in the view layer" in problems.of(str(capture)).problem
     session._watch()

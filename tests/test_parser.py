@@ -37,7 +37,7 @@ def work(tmp_path_factory):
             rng = np.random.default_rng([seed, view])
             (folder / f"figure_{seed}").mkdir(exist_ok=True)
             unlit.save(folder / f"figure_{seed}" / f"{view}.npz",
-                       unlit.see(scene, unlit.random_view(scene.figure, rng), rng))
+                       unlit.trace_unlit(scene, unlit.random_view(scene.figure, rng), rng))
     return folder
 
 

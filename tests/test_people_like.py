@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 pytest.importorskip("OpenImageIO")
 pytest.importorskip("pycolmap")
 
 from core.face import lids, strands, template  # noqa: E402
-from core.geometry.meshes import vertex_normals  # noqa: E402
+from core.geometry.meshes import Mesh, vertex_normals  # noqa: E402
 from core.synthetic import sample, scene  # noqa: E402
 from core.synthetic.canvas import canvas  # noqa: E402
 from core.synthetic.identities import reserved_seeds, subject_mesh  # noqa: E402
@@ -39,7 +40,7 @@ def view(scale):
 
 @pytest.fixture(scope="module")
 def seen(ready):
-    return truth.look(ready, view(0.25), over=2)
+    return truth.trace_truth(ready, view(0.25), over=2)
 
 
 def test_the_identity_basis_leaves_two_millimetres_of_a_person():
@@ -99,7 +100,7 @@ def test_eyes_turn_where_they_look():
 
 
 def test_an_eye_is_dark_in_the_middle_coloured_around_it_and_white_outside():
-    picture = eyes.eye_picture(np.array([0.05, 0.08, 0.12]), 0.0155, 1, 256)
+    picture = eyes.paint_eyes(np.array([0.05, 0.08, 0.12]), 0.0155, 1, 256)
     y, x = (np.mgrid[0:256, 0:256] + 0.5) / 256 - 0.5
     angle = np.pi * (2 * np.hypot(x, y)).clip(0, 1) ** (1 / 0.6)
     rim = np.arcsin(eyes.IRIS_MM / 15.5)
@@ -160,7 +161,7 @@ def test_no_hair_hangs_before_the_face_or_flies():
     someone = replace(person.sample_person(910003), hair_length=0.26, curl=0.8)
     head = shape.person_mesh(someone.seed)
     opened = lids.open_lids(head, 0.9, np.zeros(2))
-    growths = figure.grown(replace(someone, beard="none"), head, opened, clothes.shirt(someone, head))
+    growths = figure.grow_hair(replace(someone, beard="none"), head, opened, clothes.shirt(someone, head))
     x, y, z = np.moveaxis(next(growth.points for growth in growths if growth.part == "hair"), -1, 0)
     before = (np.abs(x) < 0.045) & (y < 0.0) & (z < 0.0) & (z > -0.12)
     assert before.any(1).mean() < 0.0002
@@ -194,16 +195,37 @@ def test_hair_is_in_what_is_seen_and_not_in_the_bare_skin(someone, seen):
 
 
 def test_a_sun_behind_the_head_reaches_no_face(ready):
-    night, day = (truth.look(ready, view(0.1), np.array([0, y, 0.0]), over=1) for y in (1.0, -1.0))
+    night, day = (truth.trace_truth(ready, view(0.1), np.array([0, y, 0.0]), over=1) for y in (1.0, -1.0))
     assert night.shadow[night.face].mean() > 0.9 > 0.5 > day.shadow[day.face].mean()
+
+
+def test_the_shadow_of_what_stands_still_moves_over_a_head_that_sways(someone):
+    """A plate before half of the face, its edge at x = 0 in the world: a head that is 10 mm to the side has that edge
+    10 mm from its own middle, and one that is turned with all that is about it where it was."""
+    plate = Mesh(np.array([[0, -0.4, -0.3], [0.3, -0.4, -0.3], [0.3, -0.4, 0.3], [0, -0.4, 0.3]]),
+                 np.array([[0, 1, 2], [0, 2, 3]]))
+    shaven, sun, shift = replace(someone, strands=()), np.array([0, -1.0, 0]), np.eye(4)
+    shift[0, 3] = 0.01
+
+    def shadow(blockers, pose=None, towards_sun=sun):
+        found = truth.trace_truth(truth.Scene(shaven, blockers), view(0.25), towards_sun, 1, pose)
+        return found.shadow[found.face]
+
+    still, moved = shadow(plate), shadow(plate, shift)
+    assert np.array_equal(moved, shadow(plate.moved(plate.vertices - [0.01, 0, 0])))
+    assert (moved & ~still).sum() > 50 and not (still & ~moved).any(), "more of the face lies behind the plate"
+    turned = np.eye(4)
+    turned[:3, :3] = Rotation.from_euler("z", 20, degrees=True).as_matrix()
+    about = plate.moved(plate.vertices @ turned[:3, :3].T)
+    assert (shadow(about, turned) == still).mean() > 0.999
 
 
 def test_a_seed_is_one_person(someone):
     assert person.sample_person(SEED) == someone.person != person.sample_person(SEED + 1)
     assert np.array_equal(shape.person_mesh(SEED).vertices, someone.head.vertices)
     assert np.array_equal(figure.paint(someone.person, SIZE)[1], someone.seen)
-    shaven = figure.grown(replace(someone.person, beard="none", hair="none"), someone.head, someone.opened,
-                          someone.shirt)
+    shaven = figure.grow_hair(replace(someone.person, beard="none", hair="none"), someone.head, someone.opened,
+                              someone.shirt)
     assert all(np.array_equal(a.points, b.points)
                for a, b in zip(shaven, someone.strands, strict=False)), "each growth has a stream of its own"
 

@@ -11,7 +11,7 @@ import pytest
 from core.contract.messages import Reporter
 from core.face.parts import PARTS
 from core.imaging import images
-from core.synthetic.people import portraits
+from core.synthetic.people import portraits, relightable
 from core.synthetic.people.figure import make_figure
 from core.training import people
 
@@ -21,16 +21,16 @@ BEARDED = 1010
 
 @pytest.fixture(scope="module")
 def stage():
-    sitter = portraits.Sitter(make_figure(BEARDED, 256), np.random.default_rng(0))
+    sitter = relightable.Sitter(make_figure(BEARDED, 256), np.random.default_rng(0))
     return next(s for s in (sitter.stage(np.random.default_rng(seed)) for seed in range(9))
                 if share(s, "beard").sum() > 150 and share(s, "brows").sum() > 100)
 
 
-def share(stage: portraits.RelightableView, name: str) -> np.ndarray:
+def share(stage: relightable.RelightableView, name: str) -> np.ndarray:
     return stage.unlit.shares[..., PARTS.index(name)].astype(np.float32) / 255
 
 
-def contrast(picture: np.ndarray, stage: portraits.RelightableView) -> float:
+def contrast(picture: np.ndarray, stage: relightable.RelightableView) -> float:
     """How much darker brows and beard are than the skin, natural log of the mean channel."""
     log = np.log(np.maximum(picture.mean(-1), 1e-3))
     grown, skin = share(stage, "brows") + share(stage, "beard"), share(stage, "skin")
@@ -38,12 +38,12 @@ def contrast(picture: np.ndarray, stage: portraits.RelightableView) -> float:
 
 
 def test_a_sight_comes_back_as_it_was_kept(stage, tmp_path):
-    portraits.save(tmp_path / "0.npz", stage)
-    back = portraits.load(tmp_path / "0.npz")
-    assert all(np.array_equal(getattr(stage, f.name), getattr(back, f.name)) for f in fields(portraits.RelightableView)
-               if f.name != "unlit")
+    relightable.save(tmp_path / "0.npz", stage)
+    back = relightable.load(tmp_path / "0.npz")
+    assert all(np.array_equal(getattr(stage, f.name), getattr(back, f.name))
+               for f in fields(relightable.RelightableView) if f.name != "unlit")
     assert all(np.array_equal(getattr(stage.unlit, f.name), getattr(back.unlit, f.name))
-               for f in fields(portraits.Unlit))
+               for f in fields(relightable.Unlit))
 
 
 def test_light_does_not_know_the_pigment(stage):

@@ -35,7 +35,7 @@ def pictured(tmp_path_factory):
     work = tmp_path_factory.mktemp("rendered")
     filmed.render(work, someone, EVEN, scene.Shot(poses @ camera, [0, 1], SAMPLES, SCALE, poses, room=False))
     frames = [images.read_linear(work / f"{k:05d}.exr")[..., :3] for k in range(2)]
-    return frames, truth.look(truth.Scene(someone), sample.view_of(camera[0], SCALE), over=3)
+    return frames, truth.trace_truth(truth.Scene(someone), sample.view_of(camera[0], SCALE), over=3)
 
 
 def of(found, part, least=0.95):

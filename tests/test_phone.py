@@ -60,12 +60,13 @@ def test_sharpening_leaves_a_halo_of_half_the_amount():
 
 def test_noise_has_the_variance_of_photons_and_reading():
     grey = np.full((200, 200, 3), 0.25, np.float32)
-    assert phone.noisy(grey, 4e-4, 0.01, np.random.default_rng(1)).var() == pytest.approx(4e-4 * 0.25 + 1e-4, rel=0.02)
+    noisy = phone.add_noise(grey, 4e-4, 0.01, np.random.default_rng(1))
+    assert noisy.var() == pytest.approx(4e-4 * 0.25 + 1e-4, rel=0.02)
 
 
 def test_noise_reduction_takes_noise_and_keeps_an_edge():
-    noisy = phone.noisy(STEP.astype(np.float32), 4e-4, 0.002, np.random.default_rng(2))
-    out = phone.reduced(noisy, 1.0, 4e-4, 0.002)
+    noisy = phone.add_noise(STEP.astype(np.float32), 4e-4, 0.002, np.random.default_rng(2))
+    out = phone.reduce_noise(noisy, 1.0, 4e-4, 0.002)
     assert out[:, 5:25].std() < 0.55 * noisy[:, 5:25].std()
     assert out[:, 33:36].mean() - out[:, 28:31].mean() == pytest.approx(0.2, abs=0.01)
 
@@ -96,10 +97,10 @@ def test_motion_blur_is_a_box_as_long_as_the_way_during_the_exposure():
 
 
 def test_a_head_sways_by_the_millimetres_it_is_given():
-    poses = motion.sway(400, 1.5, 0.0, np.random.default_rng(4))
+    poses = motion.sample_sway(400, 1.5, 0.0, np.random.default_rng(4))
     assert np.allclose(poses[:, :3, 3].std(0), 0.0015, rtol=1e-6) and np.allclose(poses[:, :3, :3], np.eye(3))
     assert np.abs(np.diff(poses[:, :3, 3], axis=0)).max() < 0.0006, "slowly"
-    turned = motion.sway(400, 0.0, 1.0, np.random.default_rng(4))
+    turned = motion.sample_sway(400, 0.0, 1.0, np.random.default_rng(4))
     assert np.allclose(turned[:, :3, :3] @ motion.PIVOT + turned[:, :3, 3], motion.PIVOT)
 
 
@@ -110,7 +111,7 @@ def test_a_wall_moves_as_the_camera_does():
     position = np.array([[0.01 * k, -0.5, 0] for k in (-1, 0, 1)])
     cameras = scene.looking(position, position + [0, 1.0, 0], np.zeros(3))
     views = tuple(sample.view_of(camera, 0.25) for camera in cameras)
-    flow = motion.image_motion(raster.RayCaster(wall), views, np.tile(np.eye(4), (3, 1, 1)))
+    flow = motion.measure_image_motion(raster.RayCaster(wall), views, np.tile(np.eye(4), (3, 1, 1)))
     assert np.allclose(flow, [-scene.FOCAL * 0.25 * 0.02, 0], atol=0.05)
 
 

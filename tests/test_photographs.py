@@ -62,7 +62,7 @@ def test_a_refused_picture_is_taken_as_it_is(sitter, monkeypatch):
         raise Problem("No face was found.", "Choose another.")
 
     monkeypatch.setitem(photographs.delight.PHOTOGRAPHERS, "network", refuse)
-    given = photographs.answers_to(sitter.srgb[0], sitter.albedo, sitter.face, "network")
+    given = photographs.answer_photograph(sitter.srgb[0], sitter.albedo, sitter.face, "network")
     assert (given["network"] == given[NOTHING]).all()
 
 

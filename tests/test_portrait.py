@@ -22,7 +22,7 @@ def ball(radius: float = 0.1, centre=(0, 0, 0)) -> Mesh:
 @pytest.fixture(scope="module")
 def seen():
     stage = olat.light_stage(subject_mesh(9100))
-    return stage, portrait.sight_of(stage, make_skin(9100, 256), np.random.default_rng(5), 96)
+    return stage, portrait.sample_sight(stage, make_skin(9100, 256), np.random.default_rng(5), 96)
 
 
 def test_an_open_surface_under_even_light_gets_all_of_it():
@@ -45,8 +45,8 @@ def test_a_floor_takes_half_the_light_of_a_wall():
 
 def test_a_mirror_image_of_an_even_environment_is_even():
     stage = olat.light_stage(ball())
-    back = olat.mirrored(stage, np.flatnonzero(stage.normals[:, 1] < -0.8), 2 * np.ones((olat.LIGHTS, 3), np.float32),
-                         np.array([0, -1.0, 0]))
+    back = olat.mirror_environment(stage, np.flatnonzero(stage.normals[:, 1] < -0.8),
+                                   2 * np.ones((olat.LIGHTS, 3), np.float32), np.array([0, -1.0, 0]))
     assert back == pytest.approx(2, rel=0.05)
 
 
@@ -56,8 +56,8 @@ def test_a_lamp_half_hidden_by_an_edge_gives_half_its_light():
     wall = Mesh(np.array([[0, -1, 1.0], [-2, -1, 1.0], [-2, 1, 1.0], [0, 1, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]]))
     points, normals = np.array([[0, 0, 0], [0.5, 0, 0], [-0.5, 0, 0]]), np.repeat([[0, 0, 1.0]], 3, 0)
     points, normals = np.repeat(points, 200, 0), np.repeat(normals, 200, 0)
-    share = olat.sun_visibility(RayCaster(wall), points, normals, np.array([0, 0, 1.0]), 0.1, 16,
-                                np.random.default_rng(0))
+    share = olat.trace_sun(RayCaster(wall), points, normals, np.array([0, 0, 1.0]), 0.1, 16,
+                           np.random.default_rng(0))
     assert share.reshape(3, 200).mean(1) == pytest.approx([0.5, 1, 0], abs=0.03)
 
 
@@ -79,8 +79,8 @@ def test_the_sun_of_a_panorama_is_taken_out_with_all_its_light():
 
 def test_a_picture_is_its_albedo_times_its_shading(seen):
     stage, view = seen
-    made = portrait.relit(view, stage, np.random.default_rng(3))
-    again = portrait.relit(view, stage, np.random.default_rng(3))
+    made = portrait.relight_sight(view, stage, np.random.default_rng(3))
+    again = portrait.relight_sight(view, stage, np.random.default_rng(3))
     assert np.array_equal(made.srgb, again.srgb)
     on_head = made.head > 0.5
     clean = images.linear_to_srgb(made.albedo * made.shading)
@@ -90,7 +90,7 @@ def test_a_picture_is_its_albedo_times_its_shading(seen):
 
 def test_two_lights_show_one_albedo(seen):
     stage, view = seen
-    one, other = (portrait.relit(view, stage, np.random.default_rng(seed)) for seed in (6, 7))
+    one, other = (portrait.relight_sight(view, stage, np.random.default_rng(seed)) for seed in (6, 7))
     assert np.array_equal(one.albedo, other.albedo) and not np.allclose(one.shading, other.shading, atol=0.1)
 
 

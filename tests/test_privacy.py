@@ -93,9 +93,9 @@ def test_a_frame_that_changed_after_it_was_agreed_to_is_not_sent(tmp_path):
     frame.write_bytes(b"as it was shown")
     plan = consent.sending(capture, False, ["00000.jpg"])
     module = sys.modules[switchlight.__module__]
-    assert module.parcel(capture, "00000.jpg", plan.frames["00000.jpg"], False).data == b"as it was shown"
+    assert module.pack_frame(capture, "00000.jpg", plan.frames["00000.jpg"], False).data == b"as it was shown"
     before = frame.stat()
     frame.write_bytes(b"as it is now...")
     os.utime(frame, ns=(before.st_atime_ns, before.st_mtime_ns))
     with pytest.raises(Problem, match="00000.jpg changed after you agreed"):
-        module.parcel(capture, "00000.jpg", plan.frames["00000.jpg"], False)
+        module.pack_frame(capture, "00000.jpg", plan.frames["00000.jpg"], False)

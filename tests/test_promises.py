@@ -28,7 +28,7 @@ def test_a_promise_is_held_by_tests(promise):
 
 @pytest.mark.parametrize("benchmark", [hostile, kills], ids=["hostile", "kills"])
 def test_how_it_was_tried_is_what_the_record_says(benchmark):
-    record = figures.read(benchmark.__name__.rsplit(".", 1)[1])["figures"]
+    record = figures.read_record(benchmark.__name__.rsplit(".", 1)[1])["figures"]
     counted = "--count {} --seed {}".format(record["all"]["cases"] if "all" in record
                                             else record["rows"]["all"]["trials"], record["seed"])
     assert benchmark.table(record) in PAGE and counted in PAGE

@@ -76,7 +76,7 @@ def test_a_film_replaces_the_frames_and_one_that_is_stopped_leaves_the_last(addo
     shutil.rmtree(folder)
     # one that Esc stops before its first frame
     monkeypatch.setattr(output, "_render", lambda scene, wait, **what: None)
-    output.frames(bpy.data.scenes[output.SCENE], folder, "####.png", 2, False)
+    output.render_frames(bpy.data.scenes[output.SCENE], folder, "####.png", 2, False)
     output.drop()
     assert not folder.exists()
     monkeypatch.setattr(addon("relight.reel"), "can_film", lambda: False)
@@ -145,7 +145,7 @@ def test_a_render_that_cannot_be_put_in_place_is_told_and_frees_its_memory(addon
     with monkeypatch.context() as patched:
         patched.setattr(output, "busy", lambda: True)
         assert output._finish_or_show() == 0.1
-    output.stills(scene, [capture / "renders" / "sun.png"], False, lambda: None)
+    output.render_stills(scene, [capture / "renders" / "sun.png"], False, lambda: None)
     assert scene.render.use_persistent_data
     assert output._finish_or_show() is None and said in problems.of("").problem
     assert not scene.render.use_persistent_data and head.name not in scene.objects
@@ -155,7 +155,7 @@ def test_a_render_that_cannot_be_put_in_place_is_told_and_frees_its_memory(addon
     def refuse():
         raise addon("head").Problem("The sheet cannot be joined.", "Try again.")
 
-    output.stills(scene, [capture / "renders" / "sun.png"], False, refuse)
+    output.render_stills(scene, [capture / "renders" / "sun.png"], False, refuse)
     output._finish_or_show()
     assert problems.of("").problem == "The sheet cannot be joined."
 

@@ -80,8 +80,8 @@ def test_what_is_painted_may_be_lost_on_the_way(addon, capture, session):
     refuses("mask is not in this file", bpy.ops.wildcap.edit_mask, kind='INVERT')
     bpy.ops.object.mode_set(mode='OBJECT')
     bpy.data.objects.remove(addon("captures").head(bpy.context, addon("captures").active(bpy.context)))
-    refuses("head is not in this scene any more", session.begin, bpy.context, bpy.context.scene.wildcap.captures[0],
-            True)
+    refuses("head is not in this scene any more", session.begin_painting, bpy.context,
+            bpy.context.scene.wildcap.captures[0], True)
 
 
 def test_the_set_up_keeps_its_buttons_while_it_works(addon):

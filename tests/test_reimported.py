@@ -22,7 +22,7 @@ def test_a_file_that_blender_imports_looks_as_the_head_did(addon, tmp_path):
     scattering is what is lost."""
     deliveries = tuple(tuple(name.rsplit("_", 1)) for name in KEPT if name != "blender_usd"
                        or bpy.app.build_options.usd)
-    _, _, returned = reimported.compare(tmp_path, deliveries, resolution=128, samples=32)
+    _, _, returned = reimported.compare_deliveries(tmp_path, deliveries, resolution=128, samples=32)
     for key, back in returned.items():
         assert back.psnr_db > 29 and back.flat_psnr_db > 33, key
         assert back.off_mm < 0.01 and (back.shape_keys, back.maps) == KEPT["_".join(key)], key

@@ -185,7 +185,7 @@ def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_p
     model, cond = CONFIGS["noise, patches of 4, no wrapper, own mapping"]
     write(tmp_path, model, cond, weights_of(model, 3, False))
     x = torch.zeros(1, 7, 16, 16)
-    coords = prior.coordinates(64, slice(8, 24), slice(32, 48), centred=False)
+    coords = prior.make_coordinates(64, slice(8, 24), slice(32, 48), centred=False)
     with pytest.raises(Problem, match="fixed random map"):
         prior.load(tmp_path, dtype=torch.float32).of_tone()(x, 1.0, coords)
     noise = np.random.default_rng(0).normal(size=(3, 64, 64)).astype(np.float32)

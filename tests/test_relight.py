@@ -99,7 +99,7 @@ def test_lights_that_are_set_up_again_leave_nothing_of_those_before(addon, captu
     head, settings = bpy.context.view_layer.objects.active, addon("relight.picture").RenderSettings(16, 1)
     for _ in range(3):
         settings.scene(head, "three_point")
-        addon("relight.reel").turning(head, "sun", 'LIGHT', 4, settings)
+        addon("relight.reel").animate_turn(head, "sun", 'LIGHT', 4, settings)
     rigs = [thing for thing in bpy.data.objects if thing.name.startswith("WildCap Lights")]
     assert len(rigs) == 1 and len(bpy.data.lights) == 1 and not [a.name for a in bpy.data.actions if not a.users]
 

@@ -12,7 +12,7 @@ pytest.importorskip("flip_evaluator")
 
 from benchmarks import gallery, people, people_lights, relit  # noqa: E402
 from benchmarks.delight_measures import TONES, tone_group  # noqa: E402
-from benchmarks.relit_maps import Worn, read_worn, rows_of, worn_by, write_row  # noqa: E402
+from benchmarks.relit_maps import Worn, make_rows, read_worn, worn_by, write_row  # noqa: E402
 from core.contract.capture import Capture  # noqa: E402
 from core.face import template
 from core.geometry.meshes import write_obj  # noqa: E402
@@ -59,7 +59,7 @@ def test_a_panorama_is_bright_where_its_sky_and_window_are():
 
 def test_bars_stand_in_the_light_and_let_most_of_it_through():
     direction = np.array([0.5, -0.8, 0.33]) / np.linalg.norm([0.5, -0.8, 0.33])
-    mesh = people_lights.bars(direction)
+    mesh = people_lights.make_bars(direction)
     np.testing.assert_allclose(mesh.vertices @ direction, 0.6, atol=1e-9)  # a plane across it
     from core.geometry.raster import RayCaster
 
@@ -79,8 +79,8 @@ def test_exposure_takes_the_lights_colour_out_and_brings_the_face_to_its_level()
 def test_each_swapped_row_takes_one_true_map_and_no_other(maps):
     solved, true = maps
     skin = np.ones((SIZE, SIZE))
-    rows = rows_of(np.full((SIZE, SIZE, 3), 0.1, np.float32), np.full((SIZE, SIZE, 3), 0.2, np.float32), solved, true,
-                   skin)
+    rows = make_rows(np.full((SIZE, SIZE, 3), 0.1, np.float32), np.full((SIZE, SIZE, 3), 0.2, np.float32), solved, true,
+                     skin)
     assert set(rows) == {"truth", *relit.ROWS}
     taken = {name: [name for name in ("albedo", "normal", "specular") if getattr(row, name) is getattr(true, name)]
              for name, row in rows.items()}

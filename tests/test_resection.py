@@ -22,7 +22,7 @@ from core.cameras.world import agreeing_faces, find_head
 from core.contract.frame_records import FrameRecord
 from core.contract.messages import Reporter
 from core.face.faces import Face
-from core.synthetic.painted_head import FOCAL, HEIGHT, WIDTH, camera
+from core.synthetic.painted_head import FOCAL, HEIGHT, WIDTH, place_camera
 
 AZIMUTHS = (-45, -20, 0, 25, 50)
 IDENTITY = np.random.default_rng(3).normal(0, 0.8, len(template_landmarks().basis))
@@ -68,7 +68,7 @@ def off(result, views: dict) -> tuple[np.ndarray, np.ndarray]:
 @pytest.fixture(scope="module")
 def scene():
     rng = np.random.default_rng(0)
-    views = {f"{i}.jpg": camera(azimuth, 0.05 * np.sin(i)) for i, azimuth in enumerate(AZIMUTHS)}
+    views = {f"{i}.jpg": place_camera(azimuth, 0.05 * np.sin(i)) for i, azimuth in enumerate(AZIMUTHS)}
     return rng, views, {name: seen(view, 0.5, rng) for name, view in views.items()}
 
 
@@ -92,7 +92,7 @@ def test_an_unknown_focal_length_is_found(scene):
 
 def test_matches_refine_the_cameras_and_bring_in_a_profile(scene):
     rng, views, found = scene
-    views = views | {"9.jpg": camera(88, 0.05)}
+    views = views | {"9.jpg": place_camera(88, 0.05)}
     result = resect(group(views), found, matched(views, rng), Reporter("cameras"))
     centres, turns = off(result, views)
     assert result.by_matches == ["9.jpg"] and result.refined and result.tracks > 200
@@ -135,8 +135,8 @@ def test_cameras_that_are_nearly_right_are_made_right_with_the_face(scene):
     """Off by some pixels and a tenth of the focal length, with a profile that the net mistakes and one without a
     camera."""
     rng, views, found = scene
-    views = views | {"8.jpg": camera(-85, 0.05), "9.jpg": camera(88, 0.05)}
-    profile = seen(camera(-40, 0.05), 0.5, rng)
+    views = views | {"8.jpg": place_camera(-85, 0.05), "9.jpg": place_camera(88, 0.05)}
+    profile = seen(place_camera(-40, 0.05), 0.5, rng)
     report = Reporter("cameras")
     matches = matched(views, rng)
     start = model_of({name: view for name, view in views.items() if name != "9.jpg"}, 1.08 * FOCAL, rng, 0.002)
@@ -179,7 +179,7 @@ def test_a_told_focal_length_is_what_the_file_says_and_an_untold_one_beside_it_i
 def test_a_late_frame_gets_the_lens_that_was_told_of_it(scene):
     """Two settings of a zoom take pictures of one size."""
     rng, views, found = scene
-    late = {"8.jpg": camera(80, 0.05), "9.jpg": camera(88, 0.05)}
+    late = {"8.jpg": place_camera(80, 0.05), "9.jpg": place_camera(88, 0.05)}
     model = two_lenses(views, (FOCAL, 1.7 * FOCAL))
     told = dict.fromkeys(list(views)[:-2], FOCAL) | dict.fromkeys(list(views)[-2:], 1.7 * FOCAL)
     middle, zoomed = [WIDTH / 2, HEIGHT / 2], list(views)[-2:]
@@ -248,7 +248,7 @@ def test_tracks_hang_together_and_ambiguous_ones_go():
 
 
 def test_head_of_known_size_against_rays():
-    views = [camera(azimuth) for azimuth in (-30, -10, 10, 30)]
+    views = [place_camera(azimuth) for azimuth in (-30, -10, 10, 30)]
     origins = np.array([view.centre for view in views])
     directions = PERSON[None] - origins[:, None]
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)

@@ -30,6 +30,11 @@ def test_every_page_is_written_and_in_the_index():
     assert sorted([*(name for group in index.GROUPS.values() for name in group), "index"]) == sorted(results.NAMES)
 
 
+def test_the_index_is_one_page_and_a_page_says_what_it_shows():
+    assert len(results.page("index").splitlines()) <= 75
+    assert "\n\nBrows and beards as curves, against people whose every hair is known.\n\n" in results.page("hair")
+
+
 @pytest.mark.parametrize("name", TEXTS)
 def test_figures_of_texts_written_by_hand_are_the_records(name):
     text = (ROOT / name).read_text(encoding="utf-8")
@@ -68,7 +73,7 @@ def test_the_comparison_tells_person_by_person_who_is_ahead_and_leads_over_its_b
     gains = {"tan": 1.14, "very_light": -1.05, "dark": 0.64}
     assert comparison.by_person(gains) == "tan +1.1, dark +0.6, very light -1.1"
     text = " ".join(results.page("comparison").split())
-    scan = figures.read("comparison")["figures"]["scan"]["raw"]
+    scan = figures.read_record("comparison")["figures"]["scan"]["raw"]
     lead = scan["wildcap"]["PSNR"] - max(row["PSNR"] for name, row in scan.items() if name != "wildcap")
     assert f"the head scan, it leads by {lead:.1f} dB on raw frames" in text
 
@@ -77,10 +82,11 @@ def test_what_a_page_calls_the_worst_or_free_is_so_in_its_record():
     def told_by(page, *records):
         return " ".join(" ".join(body for _, body in page.sections(*map(figures.Figures.of, records))).split())
 
-    chain, scan, measured = (figures.read(name)["figures"] for name in ("whole_chain", "scan_albedo", "geometry"))
+    chain, scan, measured = (figures.read_record(name)["figures"]
+                             for name in ("whole_chain", "scan_albedo", "geometry"))
     chain["rows"]["scan, network"] |= {"true_mask": {"psnr": 31.5, "ssim": 0.9}, "solved": {"psnr": 30.0, "ssim": 0.9}}
     assert "costs 1.50 dB on the scan" in told_by(scan_page, scan, chain, measured)
-    scale = figures.read("head_scale")["figures"]
+    scale = figures.read_record("head_scale")["figures"]
     scale["others"]["worst"] = -0.042
     assert "on nine synthetic heads at most 4.2 % off" in told_by(geometry, measured, scale)
 
@@ -118,8 +124,8 @@ def test_eyes_that_were_taken_for_closed_are_rows_without_figures(tmp_path):
 
 
 def test_a_page_tells_what_its_records_know(tmp_path):
-    figures.write(tmp_path / "one.json", "demo", "make demo", {"views": 14})
-    record = figures.read("one", tmp_path)
+    figures.write_record(tmp_path / "one.json", "demo", "make demo", {"views": 14})
+    record = figures.read_record("one", tmp_path)
     told_of = pages.page_text("One", [record], [("", "Words."), ("More", "| a |\n| --- |")])
     assert told_of.startswith(f"{pages.MADE}\n\n# One\n\nMade by `make demo`, commit ")
     assert told_of.endswith("Words.\n\n## More\n\n| a |\n| --- |\n")

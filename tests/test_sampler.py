@@ -13,7 +13,7 @@ from core.contract.messages import Problem
 from core.solve import checkpoint
 from core.solve.light_fit import light_loss, update_lights
 from core.solve.lighting import Lights, Shader, constant_light
-from core.solve.prior import coordinates
+from core.solve.prior import make_coordinates
 from core.solve.problem import Observation, State
 from core.solve.recipes import RECIPES, Recipe
 from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas, noise_schedule, seed_noise
@@ -54,7 +54,7 @@ def observation(texture, alpha=None, cells=(4, 4), weight=None):
     normal = torch.nn.functional.normalize(torch.stack([x, -torch.ones_like(x), -y]), dim=0)
     ring = (torch.nn.functional.max_pool2d((alpha > 0).float()[None, None], 5, 1, 2)[0, 0] > 0) & (alpha < 0.5)
     weight = torch.ones(size, size) if weight is None else weight
-    coords = coordinates(size, slice(0, size), slice(0, size))
+    coords = make_coordinates(size, slice(0, size), slice(0, size))
     return Observation(texture, weight, torch.ones(size, size), coords, Shader(normal, alpha, cells), ring, 1024 / size)
 
 

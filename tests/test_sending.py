@@ -170,7 +170,7 @@ def test_the_key_is_told_to_the_worker_of_that_delighter_alone(addon, item, capt
     assert preferences.get().bl_rna.properties["switchlight_key"].subtype == 'PASSWORD'
     started = []
     monkeypatch.setattr(jobs, "Worker", lambda *arguments: started.append(arguments))
-    monkeypatch.setattr(jobs, "begin", lambda root, goal, worker, then: jobs.Job(goal, worker, then))
+    monkeypatch.setattr(jobs, "start_worker", lambda root, goal, worker, then: jobs.Job(goal, worker, then))
     monkeypatch.setattr(preferences, "python", lambda: tmp_path / "python")
     jobs.start(item, "reconstruct")
     offline = {} if bpy.app.online_access else {service.OFFLINE_VARIABLE: "1"}

@@ -51,7 +51,7 @@ def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypat
     if not bpy.app.online_access:
         pytest.skip("this Blender cannot go online")
     asked = []
-    monkeypatch.setattr(install, "look_up", lambda task, *how: asked.append(how[:3]) or plan_of(setup))
+    monkeypatch.setattr(install, "look_up_plan", lambda task, *how: asked.append(how[:3]) or plan_of(setup))
     setup("preferences").get().compute = 'cpu'
     assert install.WILDCAP_OT_install_solver.tell() is None
     assert jobs.of("").goal == "ask" and not bpy.ops.wildcap.install_solver.poll()
@@ -160,6 +160,6 @@ def test_the_set_up_offers_a_test_once_a_solver_answers_and_no_longer_when_it_do
 def test_the_chosen_python_is_tried_in_the_background(setup, tmp_path):
     operators, preferences = setup("setup.operators"), setup("preferences")
     task = operators.BackgroundTask("setup", lambda task: operators.try_out(task, tmp_path / "none"))
-    setup("jobs").begin("", "ask", task, lambda: setup("setup.checking").accept(tmp_path / "none"))
+    setup("jobs").start_worker("", "ask", task, lambda: setup("setup.checking").accept(tmp_path / "none"))
     follow(setup)
     assert "not a working Python" in setup("problems").of("").problem and preferences.python() is None

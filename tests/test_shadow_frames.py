@@ -30,7 +30,7 @@ from core.shadow_mask.frames import filtered, softening
 from core.shadow_mask.lift import lift_shadows
 from core.shadow_mask.occlusion import FULL_ALPHA, baked_occlusion
 from core.shadow_mask.tidy import over_brows
-from core.synthetic.painted_head import camera
+from core.synthetic.painted_head import place_camera
 from core.worker.job import read_job
 
 from .test_shadow_mask import SHADOW, SKIN, cheek, painted_blob
@@ -47,7 +47,8 @@ def head() -> Unfolded:
 
 @cache
 def views() -> tuple[View, ...]:
-    return tuple(replace(camera(azimuth, scale=0.6), name=f"{i:05d}.jpg") for i, azimuth in enumerate((-25, 0, 30, 45)))
+    return tuple(replace(place_camera(azimuth, scale=0.6), name=f"{i:05d}.jpg")
+                 for i, azimuth in enumerate((-25, 0, 30, 45)))
 
 
 def seen(view: View, texture: np.ndarray) -> np.ndarray:

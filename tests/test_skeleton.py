@@ -11,7 +11,7 @@ from core.cameras import colmap, skeleton
 from core.cameras.matches import read_matches
 from core.geometry.models import pose_of
 from core.imaging import images
-from core.synthetic.painted_head import camera, photograph
+from core.synthetic.painted_head import photograph, place_camera
 
 
 def film(turns):
@@ -124,7 +124,7 @@ def filmed(tmp_path_factory):
     """Eleven pictures of a person before a wall, five degrees from one to the next."""
     folder = tmp_path_factory.mktemp("filmed")
     for i in range(11):
-        images.write_srgb(folder / f"{i:05d}.jpg", photograph(camera(5 * i - 25, 0.05 * np.sin(i), scale=2)),
+        images.write_srgb(folder / f"{i:05d}.jpg", photograph(place_camera(5 * i - 25, 0.05 * np.sin(i), scale=2)),
                           quality=95)
     return folder
 

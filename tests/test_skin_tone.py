@@ -105,7 +105,7 @@ def test_who_types_the_estimated_tone_gives_the_solve_the_same():
 
 
 def test_a_prior_is_told_a_tone_and_stays_as_it_is():
-    ours, coords = prior.load(dtype=torch.float32), prior.coordinates(1024, slice(480, 512), slice(480, 512))
+    ours, coords = prior.load(dtype=torch.float32), prior.make_coordinates(1024, slice(480, 512), slice(480, 512))
     x = torch.randn(1, 7, 32, 32, generator=torch.Generator().manual_seed(0))
     before = dict(vars(ours))
     light, dark = (ours.of_tone(SkinTone((tone, 0.7 * tone, 0.5 * tone), GIVEN)) for tone in (0.6, 0.1))

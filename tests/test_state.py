@@ -157,6 +157,19 @@ def test_captures_of_one_true_head_are_one_person(tmp_path):
     assert people == [("anna", "anna"), ("anna_flash", "anna"), ("ben", "ben"), ("scan", "scan")]
 
 
+def test_a_person_keeps_the_name_when_another_capture_is_finished(tmp_path):
+    """Figures are kept by person: under another name a person would stand in the table twice."""
+    for name in ("anna", "anna_below"):
+        filled(tmp_path, name, "A")
+    first = Capture(tmp_path / "anna.wildcap")
+    first.texture.unlink()
+    before = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
+    first.texture.write_text("texture")
+    after = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
+    assert [(filmed.name, filmed.person) for filmed in before] == [("anna_below", "anna")]
+    assert [(filmed.name, filmed.person) for filmed in after] == [("anna", "anna"), ("anna_below", "anna")]
+
+
 def test_a_subjects_own_parts_come_before_the_built_in_heads(tmp_path):
     filled(tmp_path, "anna", "A")
     beard, brows = np.zeros((64, 64), np.float32), np.zeros((64, 64), np.float32)
@@ -192,16 +205,24 @@ def test_figures_in_pictures_are_kept_until_something_changes(tmp_path, monkeypa
     filmed.capture.texture.write_text("another texture")
     state.seen_in_pictures(filmed, {NOTHING: np.zeros(1)})
     assert len(calls) == 2
+    for k, name in enumerate(("face", "shadow")):
+        (filmed.truth / name).mkdir()
+        (filmed.truth / name / "0001.png").write_text("drawn anew")
+        state.seen_in_pictures(filmed, {NOTHING: np.zeros(1)})
+        assert len(calls) == 3 + k, "what is measured rests on it"
 
 
 def test_people_measured_before_by_the_same_code_stay_in_the_record():
     code, row = {"solve": "a", "measures": "b"}, {"psnr": 30.0}
     record = {"people": {DELIT: {"anna": row}}, "captures": {"anna": {DELIT: row}}, "code": code}
-    scores, by_capture = state.with_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}},
-                                            code)
+    scores, by_capture = state.merge_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}},
+                                             code)
     assert scores == {DELIT: {"anna": row, "ben": row}, SOLVED: {"ben": row}}
     assert list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
-    assert state.with_earlier(record, {}, {}, {**code, "solve": "c"}) == ({}, {})
+    assert state.merge_earlier(record, {}, {}, {**code, "solve": "c"}) == ({}, {})
+    record["people"][DELIT]["anna"] = {**row, "agreement": 25.0, "captures": 3}
+    alone, _ = state.merge_earlier(record, {DELIT: {"anna": {**row, "captures": 1}}}, {}, code)
+    assert alone[DELIT]["anna"] == {**row, "captures": 1}, "of one capture nothing is kept that three told"
 
 
 def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
@@ -226,7 +247,7 @@ def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path,
     def fail(capture, truth, until, quality):
         raise SystemExit("There is no head.")
 
-    monkeypatch.setattr(state.people, "solve", fail)
+    monkeypatch.setattr(state.people, "solve_person", fail)
     state.run_chain(Capture(tmp_path / "anna.wildcap"), tmp_path / "anna", "draft")
     assert capsys.readouterr().err == "anna: There is no head.\n"
 

@@ -89,7 +89,7 @@ def test_another_rigs_calibration_is_refused(studio, tmp_path):
 
 def test_cameras_that_are_some_pixels_off_are_refined_and_not_refused(tmp_path):
     rng = np.random.default_rng(1)
-    true = [painted_head.camera(azimuth, 0.04 * (i % 3), 1.0, scale=1.5)
+    true = [painted_head.place_camera(azimuth, 0.04 * (i % 3), 1.0, scale=1.5)
             for i, azimuth in enumerate(np.linspace(-48, 48, 8))]
     off = []
     for i, view in enumerate(true):
@@ -143,5 +143,6 @@ def test_blenders_cameras_are_written_as_they_are_read(addon, tmp_path):
     point = np.array([0.02, 0.03, -0.04])
     for read in read_cameras(tmp_path / "cameras.json"):
         across, up, _ = world_to_camera_view(scene, bpy.data.objects[read.name], Vector(point))
-        there = np.asarray(read.camera(1, 600, 800).img_from_cam((read.rotation @ point + read.translation)[None]))[0]
+        local = read.rotation @ point + read.translation
+        there = np.asarray(read.make_camera(1, 600, 800).img_from_cam(local[None]))[0]
         assert np.allclose(there, [600 * across, 800 * (1 - up)], atol=1e-3)

@@ -15,7 +15,7 @@ from core.contract.messages import Problem, Reporter
 from core.contract.settings import Settings
 from core.face import faces
 from core.imaging import images
-from core.synthetic.painted_head import camera, photograph
+from core.synthetic.painted_head import photograph, place_camera
 
 TURNS = -28, -14, 0, 14, 28
 
@@ -31,11 +31,12 @@ def film(folder, pictures) -> dict[str, faces.Face]:
 
 
 @pytest.mark.parametrize(("pictures", "stays"), [
-    pytest.param(lambda: [photograph(camera(0, 0.03), turned_deg=turn) for turn in TURNS], True, id="the head turns"),
-    pytest.param(lambda: [photograph(camera(turn, 0.03)) for turn in TURNS], False, id="the camera goes round"),
-    pytest.param(lambda: [photograph(camera(turn, 0.03), wall=False) for turn in TURNS], False,
+    pytest.param(lambda: [photograph(place_camera(0, 0.03), turned_deg=turn) for turn in TURNS], True,
+                 id="the head turns"),
+    pytest.param(lambda: [photograph(place_camera(turn, 0.03)) for turn in TURNS], False, id="the camera goes round"),
+    pytest.param(lambda: [photograph(place_camera(turn, 0.03), wall=False) for turn in TURNS], False,
                  id="a bare wall, which does not tell"),
-    pytest.param(lambda: [photograph(camera(0, 0.03), turned_deg=turn) for turn in (-3, 0, 3)], False,
+    pytest.param(lambda: [photograph(place_camera(0, 0.03), turned_deg=turn) for turn in (-3, 0, 3)], False,
                  id="nobody turns")])
 def test_a_camera_that_stood_still_is_seen_in_a_few_pictures(tmp_path, pictures, stays):
     found = film(tmp_path, pictures())

@@ -22,7 +22,7 @@ from core.contract.settings import from_json
 from core.face import template
 from core.face.faces import Face
 from core.geometry.models import pose_of
-from core.synthetic.painted_head import camera
+from core.synthetic.painted_head import place_camera
 
 AZIMUTHS = np.linspace(-40, 40, 17)
 NEIGHBOURS, WRONG, NOISE_PX, RAGGED_PX = 5, 0.2, 0.3, 2.0
@@ -33,7 +33,7 @@ def filmed(sway_m: float, sway_deg: float, count: int = 700, ragged: float = 0.0
     """The model of the cameras in the room's world, all matches, and where the head was: its rotations [N, 3, 3] and
     shifts [N, 3]. `ragged`: share of the head's points that are seen elsewhere in every frame, as hair is."""
     rng = np.random.default_rng(1)
-    views = [camera(azimuth, 0.05 * np.sin(i), scale=1.5) for i, azimuth in enumerate(AZIMUTHS)]
+    views = [place_camera(azimuth, 0.05 * np.sin(i), scale=1.5) for i, azimuth in enumerate(AZIMUTHS)]
     head = template.load().vertices
     head = head[(head[:, 1] < -0.01) & (head[:, 2] > -0.1)]
     head = head[rng.choice(len(head), count, replace=False)]

@@ -69,10 +69,10 @@ def test_a_point_in_the_sun_and_one_behind_the_head():
     view = sample.view_of(scene.camera_path(SEED, 60)[30])
     sun = scene.sun_of(SEED).direction
     skin = type("Skin", (), {"diffuse": np.full((sample.MAPS, sample.MAPS, 3), 0.4, np.float32)})
-    albedo, alpha, face, dark = sample.frame_truth(head, head, skin, view, sun, over=1)
+    albedo, alpha, face, dark = sample.trace_frame_truth(head, head, skin, view, sun, over=1)
     assert np.allclose(albedo[alpha == 1], 0.4, atol=1e-5) and 0.05 < face.mean() < 0.5
     assert 0.02 < dark[face].mean() < 0.7
-    _, _, _, night = sample.frame_truth(head, head, skin, view, -sun, over=1)
+    _, _, _, night = sample.trace_frame_truth(head, head, skin, view, -sun, over=1)
     assert night[face].mean() > 0.9  # lit from behind the face lies in its own shadow
 
 

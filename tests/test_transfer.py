@@ -131,7 +131,7 @@ def test_a_surface_that_faces_away_is_no_partner():
                  np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]))
     points, normals = outer.vertices * 0.98, vertex_normals(outer)
     middle = np.abs(outer.uvs[:, 1] - 0.5) < 0.4  # nearer to the inner sheet, which faces the other way
-    face, _ = surfaces.Surface(shell).partners(points[middle], normals[middle], 0.02)
+    face, _ = surfaces.Surface(shell).find_partners(points[middle], normals[middle], 0.02)
     assert (face >= 0).all() and (face < len(outer.faces)).all()
 
 
@@ -144,7 +144,7 @@ def test_the_reduced_scan_is_a_clean_surface_near_the_scan():
     mesh = scan.reduced(noisy, 0.005)
     _, uses = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
     assert uses.max() <= 2 and len(mesh.faces) < len(fine.faces) / 4 and mesh.vertices[:, 0].max() < 0.1
-    face, bary = surfaces.Surface(fine).nearest(mesh.vertices, vertex_normals(mesh), 0.01)
+    face, bary = surfaces.Surface(fine).find_nearest(mesh.vertices, vertex_normals(mesh), 0.01)
     gap = np.linalg.norm(raster.interpolate(fine.vertices, fine.faces, face, bary) - mesh.vertices, axis=1)[face >= 0]
     assert (face >= 0).mean() > 0.99 and np.median(gap) < 5e-4
 

@@ -32,7 +32,7 @@ def shot(root, azimuths=AZIMUTHS, points: int = 300, rise: float = 0.03) -> Capt
     capture.frames.mkdir(parents=True)
     mesh = painted_head.person()[0].mesh
     normals = meshes.vertex_normals(mesh)
-    views = [painted_head.camera(azimuth, rise * i, scale=SCALE) for i, azimuth in enumerate(azimuths)]
+    views = [painted_head.place_camera(azimuth, rise * i, scale=SCALE) for i, azimuth in enumerate(azimuths)]
     names = [f"{i:05d}.jpg" for i in range(len(views))]
     params = views[0].camera.params
     pinhole = params if len(params) == 4 else [*params[:1], *params[:3]]
@@ -108,7 +108,7 @@ def test_open_eyes_from_one_side_make_a_draft_with_eyeballs(tmp_path, monkeypatc
 
 
 def test_of_many_views_32_spread_over_all_are_asked(monkeypatch):
-    views, asked = [painted_head.camera(azimuth) for azimuth in np.linspace(-70, 70, 61)], []
+    views, asked = [painted_head.place_camera(azimuth) for azimuth in np.linspace(-70, 70, 61)], []
 
     def note(capture, chosen, subject, report):
         asked.extend(chosen)
@@ -187,5 +187,5 @@ def test_points_behind_the_skin_or_of_its_far_side_do_not_pull():
 def test_views_are_counted_by_how_far_they_lie_apart(azimuths, count):
     head = painted_head.person()[0].mesh
     middle = head.vertices.mean(0)
-    views = [painted_head.camera(azimuth, middle[2], 5.0, tuple(middle)) for azimuth in azimuths]
+    views = [painted_head.place_camera(azimuth, middle[2], 5.0, tuple(middle)) for azimuth in azimuths]
     assert quality.views_apart(views, head) == count

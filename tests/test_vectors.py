@@ -78,7 +78,7 @@ def test_vectors_coordinates():
     for key, wanted in v.items():
         kind, size, a, b = re.fullmatch(r"(coord|posenc)(\d+)(?:_f(\d+)|_rows_(\d+)_cols_\d+)?", key).groups()
         steps = [slice(0, None, int(n)) for n in re.findall(r"_(?:rows|cols)_(\d+)", key)] or [slice(None), slice(None)]
-        coords = prior.coordinates(int(size), *steps, centred=False)
+        coords = prior.make_coordinates(int(size), *steps, centred=False)
         close((prior.positional_encoding(coords, int(a)) if kind == "posenc" else coords)[0], wanted)
 
 
@@ -136,7 +136,7 @@ def test_vectors_miniloop(run):
     normal, weight = crop("in_obj_normal"), crop("in_face_mask")[0]
     shader = Shader(normal, v["in_light_support"][0, 0], (8, 8))
     o = Observation(crop("in_texture_linear_blurred"), weight, torch.ones_like(weight),
-                    prior.coordinates(40, rows, columns, centred=False), shader, v["in_tv_ring"][0, 0] > 0.5)
+                    prior.make_coordinates(40, rows, columns, centred=False), shader, v["in_tv_ring"][0, 0] > 0.5)
     reference = torch.cat([2 * crop("in_init_diff") - 1, crop("in_init_normal"), 2 * crop("in_init_spec") - 1])[None]
     recipe = replace(RECIPES["released"], steps=12, start=0.6, candidates=3,
                      phases=(("main", 0.0, 5 / 12), ("grid", 5 / 12, 10 / 12)),

@@ -13,7 +13,7 @@ from torch.utils._pytree import tree_leaves
 
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.network import UNet, UNetLayout
-from core.solve.prior import ConditionedPrior, Prior, ReleasedPrior, coordinates
+from core.solve.prior import ConditionedPrior, Prior, ReleasedPrior, make_coordinates
 from core.solve.problem import Observation, State
 from core.solve.recipes import RECIPES
 from core.solve.sampler import Sampler, seed_noise
@@ -53,7 +53,7 @@ def observed(size: int) -> Observation:
     alpha = (x > 0).float()
     ones = torch.ones(size, size)
     texture = torch.full((3, size, size), 0.3) * (1 - 0.5 * alpha)
-    return Observation(texture, ones, ones, coordinates(size, slice(0, size), slice(0, size)),
+    return Observation(texture, ones, ones, make_coordinates(size, slice(0, size), slice(0, size)),
                        Shader(normal, alpha, (4, 4)), alpha > 2, 4.0, ones, 0.1 * ones)
 
 

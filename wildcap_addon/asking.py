@@ -22,17 +22,25 @@ def forget(key: tuple) -> None:
     _answers.pop(key, None)
 
 
-def ask(key: tuple, work: Callable[[BackgroundTask], object], operator: str,
-        meant: Callable[[], bool] = lambda: True) -> None:
-    """Runs `work(task)` as a job that the tab shows, and then, where it is `meant` as before, the operator as if it
-    were clicked again."""
+def find_answer(key: tuple, work: Callable[[BackgroundTask], object], operator: str,
+                meant: Callable[[], bool] = lambda: True) -> None:
+    """Runs a job that the tab shows and that finds an answer; then the operator's dialog opens as if it were clicked
+    again.
+
+    Parameters
+    ----------
+    key : the question's, as `answer` takes it
+    work : work(task) finds the answer, in a thread
+    operator : its name after "wildcap."
+    meant : whether the artist still means it when the answer is there; else no dialog opens
+    """
     task = BackgroundTask("setup", work)
 
     def then() -> None:
         _answers[key] = task.result
         _click(operator, meant)
 
-    jobs.begin("", "ask", task, then)
+    jobs.start_worker("", "ask", task, then)
 
 
 def _click(operator: str, meant: Callable[[], bool]) -> None:

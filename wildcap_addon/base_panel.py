@@ -48,7 +48,15 @@ def narrow(context) -> bool:
 
 
 def draw_settings(layout, item, stage: Stage, without: tuple[str, ...] = ()) -> None:
-    """The fields of a stage's settings, in their order, folded away under its name: every one has a good default."""
+    """The fields of a stage's settings, in their order, folded away under its name: every one has a good default.
+
+    Parameters
+    ----------
+    layout : drawn into
+    item : the capture's, which holds the values
+    stage : of the chain
+    without : fields that stand elsewhere
+    """
     header, body = layout.panel(f"wildcap_{stage.name}", default_closed=True)
     header.label(text=stage.label)
     group = getattr(item, stage.name)

@@ -11,7 +11,19 @@ import numpy as np
 
 
 def read_field(collection, field: str, width: int = 1, kind=np.float32) -> np.ndarray:
-    """A field of all N members of a collection: [N], or [N, width]."""
+    """A field of all N members of a collection.
+
+    Parameters
+    ----------
+    collection : of Blender's properties
+    field : its name
+    width : how many numbers a member has
+    kind : their type, the field's own
+
+    Returns
+    -------
+    [N], or [N, width] where that is more than 1.
+    """
     values = np.empty((len(collection), width) if width > 1 else len(collection), kind)
     collection.foreach_get(field, values.ravel())
     return values

@@ -130,16 +130,21 @@ def _launch(item, goal: str, capture: Capture, then: Callable[[], None] | None, 
         prepare()
     path = write()
     settings = read_job(path).settings
-    job = begin(root, goal,
-                Worker(python, ROOT, path, capture.logs / "worker.log",
-                       preferences.worker_environment(settings.delight.delighter)), then)
+    job = start_worker(root, goal,
+                       Worker(python, ROOT, path, capture.logs / "worker.log",
+                              preferences.worker_environment(settings.delight.delighter)), then)
     job.settings = settings
     return job
 
 
-def begin(root: str, goal: str, worker: Worker | BackgroundTask, then: Callable[[], None] | None = None) -> Job:
-    """Starts a worker, or puts it in line behind the one that runs, and listens to it. Raises Problem when it
-    cannot."""
+def start_worker(root: str, goal: str, worker: Worker | BackgroundTask, then: Callable[[], None] | None = None) -> Job:
+    """Starts a worker, or puts it in line behind the one that runs, and listens to it. Raises Problem when it cannot.
+
+    Parameters
+    ----------
+    root : the capture's folder; "" for what is of no capture, which never waits
+    goal, worker, then : as Job has them
+    """
     waiting = root != "" and _busy()
     if not waiting:
         worker.start()

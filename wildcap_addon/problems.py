@@ -43,7 +43,15 @@ def draw(layout, problem: Problem | None, width: int) -> None:
 
 
 def draw_text(layout, text: str, width: int, icon: str = 'NONE') -> None:
-    """A text, translated as a whole, over as many lines as it needs."""
+    """A text, translated as a whole, over as many lines as it needs.
+
+    Parameters
+    ----------
+    layout : drawn into
+    text : English
+    width : of the region, in pixels
+    icon : before the first line
+    """
     column = layout.column(align=True)
     column.scale_y = 0.8
     lines = wrapped(iface_(text), width - (45 if icon != 'NONE' else 0))

@@ -182,7 +182,7 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
                                        description="Pictures of one turn; a video plays 24 per second")
     turn_file: bpy.props.EnumProperty(
         name="As", default='MP4', description="What renders/turntable gets",
-        items=[('MP4', "Video", "One MP4"), ('PNG', "Frames", "A PNG per frame")],
+        items=[('MP4', "Video", "One MP4"), ('PNG', "Pictures", "A PNG per frame")],
     )
 
 

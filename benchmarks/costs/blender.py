@@ -20,7 +20,7 @@ import time
 from importlib import import_module
 from pathlib import Path
 
-from ..figures import write
+from ..figures import write_record
 from ..render_capture import EXTENSION, extension
 from .meter import GIB, peak, resident, spending
 
@@ -40,7 +40,7 @@ def main(arguments: list[str]) -> None:
         with extension():
             found = measure(capture, options.resolution)
     if options.json:
-        write(options.json, "costs", "python -m benchmarks.costs blender CAPTURE", found)
+        write_record(options.json, "costs", "python -m benchmarks.costs blender CAPTURE", found)
 
 
 def measure(capture: Path, resolution: int) -> dict:

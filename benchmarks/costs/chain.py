@@ -65,7 +65,7 @@ def main(arguments: list[str]) -> None:
         parser.error(f"{problem.problem} {problem.remedy}")
     except KeyboardInterrupt:
         sys.exit("\nStopped; the same command goes on from here.")
-    print(table(figures.read(options.json.stem, options.json.parent)["figures"]))
+    print(table(figures.read_record(options.json.stem, options.json.parent)["figures"]))
     if failed:
         sys.exit(f"Not measured to the end: {', '.join(failed)}.")
 
@@ -74,7 +74,8 @@ def measured(name: str, options: argparse.Namespace) -> bool:
     """Measures a row's stages that the JSON does not have yet (or has disturbed, with options.again: the less disturbed
     one stays); False where one failed, which is printed. Raises Problem where it has nothing to start from."""
     row, found = (ROWS[name],
-                  figures.read(options.json.stem, options.json.parent)["figures"] if options.json.exists() else {})
+                  figures.read_record(options.json.stem, options.json.parent)["figures"] if options.json.exists()
+                  else {})
     here = machine()
     if other := [what for what, value in found.get("machine", {}).items() if value != here[what]]:
         raise Problem(f"{options.json} was measured on another machine ({', '.join(other)}).",
@@ -101,7 +102,7 @@ def measured(name: str, options: argparse.Namespace) -> bool:
         found["together"] = {whole: costs_of for whole in WHOLES if (costs_of := together(found, whole))}
         found["growth"] = {title: exponents for title, values, grown in GROWTH
                            if (exponents := growth(found, values, grown))}
-        figures.write(options.json, "costs", "python -m benchmarks.costs chain WORK --json OUT.json", found)
+        figures.write_record(options.json, "costs", "python -m benchmarks.costs chain WORK --json OUT.json", found)
         if "over_s" in cost:
             break
     if name != "standard":

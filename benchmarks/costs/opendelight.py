@@ -25,7 +25,7 @@ from torch.utils.flop_counter import FlopCounterMode
 from core.delight.opendelight_checkpoint import BASE, ENHANCER, load
 from core.delight.opendelight_network import delight_crop
 
-from ..figures import plain, write
+from ..figures import plain, write_record
 from .meter import peak, spending
 
 SIZE = 512
@@ -39,7 +39,7 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/opendelight_cost.json")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
-        write_random(Path(folder))
+        write_random_checkpoint(Path(folder))
         checkpoint = load(folder, options.device)
     before = _peak_gb(options.device)
     picture = torch.rand(1, 3, SIZE, SIZE, generator=torch.Generator().manual_seed(0)).to(options.device)
@@ -53,7 +53,7 @@ def main(arguments: list[str]) -> None:
                    "seconds_to_cancel": round(np.diff(steps).max(), 1)})
     print(f"{options.device}, {torch.get_num_threads()} threads, {before:.1f} GB before the first frame:", found)
     if options.json:
-        write(options.json, "costs", "python -m benchmarks.costs opendelight", found)
+        write_record(options.json, "costs", "python -m benchmarks.costs opendelight", found)
 
 
 def multiplications() -> float:
@@ -64,10 +64,19 @@ def multiplications() -> float:
     return counter.get_total_flops() / 2e12
 
 
-def write_random(folder: Path, width: int = 768, depth: int = 12, channels: int = 512, unet: int = 64,
-                 seed: int = 0) -> None:
-    """The two files of a checkpoint in a folder, with random values; the sizes that are not given are the published
-    ones."""
+def write_random_checkpoint(folder: Path, width: int = 768, depth: int = 12, channels: int = 512, unet: int = 64,
+                            seed: int = 0) -> None:
+    """Writes the two files of a checkpoint with random values; sizes that are not given are the published ones.
+
+    Parameters
+    ----------
+    folder : takes both
+    width : channels of a token of the base network
+    depth : its blocks
+    channels : of its decoder
+    unet : channels of the enhancer's first level
+    seed : of the values
+    """
     rng = torch.Generator().manual_seed(seed)
     for name, shapes in ((BASE, base(width, depth, channels)), (ENHANCER, enhancer(unet))):
         torch.save({key: _random(key, shape, rng) for key, shape in shapes.items()}, folder / name)

@@ -41,7 +41,7 @@ from core.solve.recipes import OURS
 from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import parse_skin_tone
 
-from ..figures import write
+from ..figures import write_record
 from .meter import GIB, peak, run_alone, spending
 
 AUTHORS = {"model": {"type": "image_v1", "input_channels": 7, "patch_size": 1, "mapping_out": 256,
@@ -106,7 +106,7 @@ def main(arguments: list[str]) -> None:
     if options.json:
         plain = rows.get("plain", {}).get("seconds_per_step")
         command = f"python -m benchmarks.costs solver --rows {shlex.join(options.rows)} --steps {options.steps}"
-        write(options.json, "costs", command, {
+        write_record(options.json, "costs", command, {
             "network": options.network, "device": options.device, "size": options.size,
             "python_gib": next(row["peak_gib"] - row["added_gib"] for row in rows.values()),
             "steps": {name: {**row, "to_plain": plain and row["seconds_per_step"] / plain} for name, row in rows.items()
@@ -133,14 +133,14 @@ def line(name: str, row: dict, plain: dict | None) -> str:
 
 def make(folder: str, source: str) -> None:
     """A capture that is ready to be solved: a copy of `source`, or where that is "" a synthetic subject's texture."""
-    from ..uv_problems import plain_problem  # its libraries are not the solver's
+    from ..uv_problems import make_plain_problem  # its libraries are not the solver's
 
     capture = Capture(Path(folder) / "a.wildcap")
     if source:
         shutil.copytree(source, capture.root,
                         ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "logs", "lock"))
         return
-    plain_problem(9000, "leaves", 512).write(capture)
+    make_plain_problem(9000, "leaves", 512).write(capture)
 
 
 def measured(row: SolverVariant, folder: Path, options: argparse.Namespace) -> dict:

@@ -30,12 +30,23 @@ def main(arguments: list[str]) -> None:
 
 def measure_stage(capture: Path, stage: str, source: Path | str = "", quality: str = "standard",
                   settings: dict | None = None, limit_s: float | None = None, float32: bool = False) -> dict:
-    """Runs a stage of a capture: {"seconds", "processor_s", "peak_mb", "load", "others"}; {"problem", "remedy"} where
-    it failed; {"over_s", "load"} where it was ended after `limit_s` seconds.
+    """Runs a stage of a capture in a process of its own, and measures it.
 
-    seconds: of the stage, the import of its libraries included; peak_mb: of the largest of its processes; the others:
-    benchmarks/costs/meter.py. float32: the networks compute in that though the processor multiplies bfloat16.
-    `settings` ({stage: {name: value}}) lie over the preset `quality`, and may lie out of their ranges.
+    Parameters
+    ----------
+    capture : its folder
+    stage : its name
+    source : what the stage frames reads
+    quality : a preset
+    settings : {stage: {name: value}} over the preset; may lie out of their ranges
+    limit_s : seconds after which it is ended; None: never
+    float32 : the networks compute in that though the processor multiplies bfloat16
+
+    Returns
+    -------
+    {"seconds", "processor_s", "peak_mb", "load", "others"}: seconds of the stage, the import of its libraries included;
+    peak_mb of the largest of its processes; the others as benchmarks/costs/meter.py says. {"problem", "remedy"} where
+    it failed; {"over_s", "load"} where it was ended.
     """
     job = json.dumps({"source": str(source), "quality": quality, "settings": settings or {}, "float32": float32})
     ran = meter.run_alone(["-m", __package__, "stage", str(capture), stage, job], limit_s)

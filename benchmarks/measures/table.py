@@ -66,10 +66,22 @@ def standard_error(differences: list[float]) -> float | None:
     return None if deviation is None else deviation / math.sqrt(len(differences))
 
 
-def to_markdown(summary: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str,
-                against: str | None = None) -> str:
+def format_table(summary: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str,
+                 against: str | None = None) -> str:
     """A line per method: mean +- spread over people; with `against`, a second table of the paired differences +- their
-    standard errors. A column that nobody has is left out."""
+    standard errors. A column that nobody has is left out.
+
+    Parameters
+    ----------
+    summary : of `summarise`
+    columns : measure -> its column
+    title : heading of the methods
+    against : the method that `summary` has differences from
+
+    Returns
+    -------
+    Markdown.
+    """
     shown = {name: column for name, column in columns.items() if any(name in row for row in summary.values())}
     tables = [markdown([title, *(column.label for column in shown.values())],
                        [[method, *(_mean_text(row.get(name), column) for name, column in shown.items())]
@@ -84,7 +96,7 @@ def to_markdown(summary: dict[str, dict[str, Cell]], columns: dict[str, Column],
 
 
 def to_record(summary: dict[str, dict[str, Cell]], scores: Scores) -> dict:
-    """What figures.write takes: per method the cells, and every person's figures behind them."""
+    """What figures.write_record takes: per method the cells, and every person's figures behind them."""
     return {"summary": {method: {name: {key: value for key, value in vars(cell).items() if value is not None}
                                  for name, cell in row.items()}
                         for method, row in summary.items()},

@@ -5,8 +5,8 @@
     python -m benchmarks.results [--check] [--captures FOLDER]
 
 Runs no benchmark: each leaves its record by its own --json (benchmarks/figures.py). NAME.py in here is the page
-docs/results/NAME.md: TITLE, SAYS (its line in the index), RECORDS, and `sections`, which takes the figures of these
-records in that order and gives headings with Markdown. told.py has the phrases with figures in the README and
+docs/results/NAME.md: TITLE, SAYS (what it shows, below the title), RECORDS, and `sections`, which takes the figures of
+these records in that order and gives headings with Markdown. told.py has the phrases with figures in the README and
 elsewhere. --check writes nothing and ends with code 1 where a text is not as the records have it.
 
 No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures:
@@ -65,9 +65,11 @@ def pages() -> dict[Path, str]:
 def page(name: str) -> str:
     """The text of docs/results/NAME.md."""
     module = import_module(f"{__name__}.{name}")
-    records = [figures.read(record) for record in module.RECORDS]
+    records = [figures.read_record(record) for record in module.RECORDS]
     sections = module.sections(*(figures.Figures.of(record["figures"]) for record in records))
-    return page_text(module.TITLE, [] if name == "index" else records, sections)
+    if name == "index":  # of the records of many pages
+        return page_text(module.TITLE, [], sections)
+    return page_text(module.TITLE, records, [("", module.SAYS), *sections])
 
 
 def strangers() -> list[str]:

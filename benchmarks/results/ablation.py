@@ -10,7 +10,7 @@ from ..pages import Sections, prose
 from .relit import OLDER
 
 TITLE = "What each part of the solver is worth"
-SAYS = "without the texel grid, the prior, the edge; other starts, grids, recipes, on problems in UV with known truth"
+SAYS = "Without the texel grid, the prior, the edge; other starts, grids, recipes, on problems in UV with known truth."
 RECORDS = ("ablation",)
 
 

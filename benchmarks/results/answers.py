@@ -9,8 +9,8 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "The delighter's answers"
-SAYS = ("how far the network and the fitted light are from the true light, and how far the fit is best believed, by "
-        "people who are left out of the choice")
+SAYS = ("How far the network and the fitted light are from the true light, and how far the fit is best believed, by "
+        "people who are left out of the choice.")
 RECORDS = ("delight_answers",)
 
 

@@ -8,7 +8,7 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "Blender while the solver runs"
-SAYS = "redraws and hold-ups while you paint and it solves, and Blender's own memory"
+SAYS = "Redraws and hold-ups while you paint and it solves, and Blender's own memory."
 RECORDS = ("window", "blender_memory")
 
 

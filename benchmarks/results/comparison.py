@@ -10,7 +10,7 @@ from ..pages import Sections, prose
 from .relit import OLDER
 
 TITLE = "Albedo against the truth, beside other light models"
-SAYS = "regions, one environment, no prior, or a blur divided out, instead of the paper's grid of lights"
+SAYS = "Regions, one environment, no prior, or a blur divided out, instead of the paper's grid of lights."
 RECORDS = ("comparison",)
 
 

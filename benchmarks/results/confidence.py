@@ -8,7 +8,7 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "Confidence"
-SAYS = "how far the map that says where the albedo may be wrong is right"
+SAYS = "How far the map that says where the albedo may be wrong is right."
 RECORDS = ("confidence",)
 
 

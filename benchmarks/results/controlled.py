@@ -10,7 +10,7 @@ from ..pages import Sections, prose
 from .relit import OLDER
 
 TITLE = "The gap to a controlled capture, and studio input"
-SAYS = "the same people under a flash in a dark room, and before sixteen fixed cameras in even light"
+SAYS = "The same people under a flash in a dark room, and before sixteen fixed cameras in even light."
 RECORDS = ("controlled",)
 
 

@@ -10,8 +10,8 @@ from ..figures import Figures, markdown
 from ..pages import Sections, prose
 
 TITLE = "Time and memory"
-SAYS = ("each stage's seconds and peak memory at three qualities, and how they grow with frames, views and texels; a "
-        "step of the solver, plain and as it is; an edited part")
+SAYS = ("Each stage's seconds and peak memory at three qualities, and how they grow with frames, views and texels; a "
+        "step of the solver, plain and as it is; an edited part.")
 RECORDS = ("costs", "solver_speed", "edited_part")
 
 

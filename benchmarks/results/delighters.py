@@ -9,7 +9,7 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "Delighters"
-SAYS = "the network, shading and others on real photographs, portraits of six tones, the scan and the sample"
+SAYS = "The network, shading and others on real photographs, portraits of six tones, the scan and the sample."
 RECORDS = ("delight",)
 
 

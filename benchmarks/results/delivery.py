@@ -8,7 +8,7 @@ from ..figures import Figures, markdown
 from ..pages import Sections, prose
 
 TITLE = "Other meshes, and the delivery"
-SAYS = "how near your own mesh comes, skins carried to our UVs, the scan's atlas"
+SAYS = "How near your own mesh comes, skins carried to our UVs, the scan's atlas."
 RECORDS = ("own_mesh", "carried_skins", "atlas")
 
 

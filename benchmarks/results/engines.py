@@ -9,7 +9,7 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "Cycles and EEVEE on the lit cheek"
-SAYS = "how far the two agree, with and without light under the skin"
+SAYS = "How far the two agree, with and without light under the skin."
 RECORDS = ("engines",)
 
 

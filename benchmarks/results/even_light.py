@@ -9,7 +9,7 @@ from ..figures import Figures
 from ..pages import Sections
 
 TITLE = "What skin gives back of its albedo"
-SAYS = "Cycles's two random walks, and the material that makes up for what is lost"
+SAYS = "Cycles's two random walks, and the material that makes up for what is lost."
 RECORDS = ("even_light",)
 
 

@@ -14,7 +14,7 @@ from ..open_eyes import ALONE, COLUMNS
 from ..pages import Sections, prose
 
 TITLE = "Open eyes"
-SAYS = "edges of the lids, eyeballs, gaze and irises, against people whose eyes are known"
+SAYS = "Edges of the lids, eyeballs, gaze and irises, against people whose eyes are known."
 RECORDS = ("open_eyes",)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from ..pages import Sections, prose
 
 TITLE = "The gallery"
-SAYS = "the sample and six people of six skin tones in five lights: every map, and four new lights"
+SAYS = "The sample and six people of six skin tones in five lights: every map, and four new lights."
 RECORDS = ()
 SHOWN = {"sample": "the sample, sun behind leaves", "very_light": "very light, noon sun behind leaves",
          "light": "light, overcast", "intermediate": "intermediate, a low sun through window bars",

@@ -9,7 +9,7 @@ from ..geometry import table
 from ..pages import Sections, prose
 
 TITLE = "Geometry and texture"
-SAYS = "cameras, scan, head and texture of the sample, the head scan and a bust, against the truth"
+SAYS = "Cameras, scan, head and texture of the sample, the head scan and a bust, against the truth."
 RECORDS = ("geometry", "head_scale")
 
 

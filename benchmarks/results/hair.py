@@ -9,7 +9,7 @@ from ..groomed import WORDS, shortfalls, to_table
 from ..pages import Sections
 
 TITLE = "Hair that is grown from pictures"
-SAYS = "brows and beards as curves, against people whose every hair is known"
+SAYS = "Brows and beards as curves, against people whose every hair is known."
 RECORDS = ("groomed",)
 PICTURE = "![From left to right a frame, the true hairs, the grown hairs](../pictures/hair.jpg)"
 

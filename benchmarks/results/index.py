@@ -12,7 +12,6 @@ from ..pages import Sections, prose
 from ..people import PEOPLE
 
 TITLE = "What was measured"
-SAYS = ""
 RECORDS = ("state", "demo", "relit", "relit_people", "scan_albedo", "whole_chain", "costs", "comparison", "photographs",
            "whole_head", "skin_tone", "confidence")
 GROUPS = {
@@ -24,33 +23,30 @@ GROUPS = {
     "Time and memory": ("costs", "png_levels", "blender"),
 }
 ELSEWHERE = """
-    - [promises](../promises.md): hostile files and kills at random moments; [farm](../farm.md) and
-      [growth](../growth.md): many faces; [cameras](../cameras.md), [scan and head](../scan_and_head.md),
-      [parts](../parts.md): figures beside their methods
+    - **Elsewhere**: [promises](../promises.md), [farm](../farm.md), [growth](../growth.md), [cameras](../cameras.md),
+      [scan and head](../scan_and_head.md), [parts](../parts.md)
     """
 
 
 def sections(*records: Figures) -> Sections:
     of = Figures(zip(RECORDS, records, strict=True))
     return [("", prose("""
-        Every page has the command, the commit and the day that made its figures, all on 2 cores of a shared machine
-        (25 GB; each page names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic
-        subjects only, and may be older than the figures beside them. Only the sample, as it is and relit, is by
-        delighter and solver as they are; the state of the albedo and *the delighter's answers* are by the delighter,
-        the state by a solver of the same day (masks that end at the face, M's border told in full); pages of older code
-        name their commit.
+        Every page has command, commit and day of its figures, all on 2 cores of a shared machine (25 GB; each page
+        names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only, and may be
+        older. Only the sample, as it is and relit, is by delighter and solver as they are; the state of the albedo and
+        the delighter's answers are by that delighter, the state by a solver of the same day (masks that end at the
+        face, M's border told in full).
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),
         ("Where we lose", losses(of)),
-        *((group, "\n".join(map(link, names))) for group, names in GROUPS.items()),
-        ("Elsewhere", prose(ELSEWHERE))]
+        ("Pages", "\n".join([*(list_pages(group, names) for group, names in GROUPS.items()), prose(ELSEWHERE)]))]
 
 
-def link(name: str) -> str:
-    """A line of the index."""
-    module = import_module(f"{__package__}.{name}")
-    return f"- [{module.TITLE}]({name}.md): {module.SAYS}"
+def list_pages(group: str, names: tuple[str, ...]) -> str:
+    """A group's item: its pages by their titles."""
+    links = (f"[{import_module(f'{__package__}.{name}').TITLE}]({name}.md)" for name in names)
+    return f"- **{group}**: {'; '.join(links)}"
 
 
 def over_people(summary: Figures, method: str) -> str:
@@ -94,10 +90,9 @@ def spread(state: Figures) -> str:
         Over {solved.psnr.people} people ({len(gains["psnr"])} captures) the solve adds {solved.psnr.difference:+.2f} ±
         {solved.psnr.error:.2f} dB to the delit texture in the picture (person by person, ± the standard error of the
         mean), and {solved.psnr_shared.difference:+.2f} ± {solved.psnr_shared.error:.2f} dB on the map up to one shared
-        light: capture by capture between {least:+.2f} dB (`{worst}`) and {most:+.2f} dB (`{best}`). Where a person was
-        filmed in several lights ({solved.agreement.people} of them) it adds {solved.agreement.difference:+.2f} dB to
-        how well the albedos agree. {worse_in_the_picture(gains["psnr"])} {the_synthetic(state.people.solved)} [The
-        page](state.md) tells the commit, and so the delighter and the solver.
+        light: from {least:+.2f} dB (`{worst}`) to {most:+.2f} dB (`{best}`). Where a person was filmed in several
+        lights ({solved.agreement.people} of them) it adds {solved.agreement.difference:+.2f} dB to how well the albedos
+        agree. {worse_in_the_picture(gains["psnr"])} {the_synthetic(state.people.solved)}
         """)
 
 
@@ -138,32 +133,30 @@ def losses(of: Figures) -> str:
           as near to the truth** in the picture as our albedo (over people {answers["flat colour"].psnr.mean:.2f} and
           {answers.solved.psnr.mean:.2f} dB, FLIP {answers["flat colour"].flip.mean:.3f} and
           {answers.solved.flip.mean:.3f}).
-        - **The delighter decides.** On a bearded man under seven lamps it leaves {lamps.network.light_slope.mean:.2f}
-          of a change of the light, and {lamps.network.psnr.mean:.1f} dB where a flat colour has
-          {lamps["flat colour"].psnr.mean:.1f} ([single photographs](photographs.md)). On the head scan the solve loses
-          {alone.solve_off.psnr - alone.solved.psnr:.1f} dB to the delit texture: it takes beard and cheeks for light
+        - **The delighter decides**: on a bearded man under seven lamps it leaves {lamps.network.light_slope.mean:.2f}
+          of a change of the light, {lamps.network.psnr.mean:.1f} dB where a flat colour has
+          {lamps["flat colour"].psnr.mean:.1f} ([photographs](photographs.md)). On the head scan the solve takes beard
+          and cheeks for light, and loses {alone.solve_off.psnr - alone.solved.psnr:.1f} dB to the delit texture
           ([scan](scan.md)).
-        - **Freer lights are ahead on delit synthetic people**: ten regions by
-          {delit["regions 10"].PSNR - delit.wildcap.PSNR:.1f} dB, one environment by
-          {delit.environment.PSNR - delit.wildcap.PSNR:.1f} dB ([comparison](comparison.md)).
-        - **Our relief and gloss do not help yet**: with them a relit head is
-          {relit.solved.psnr - relit.plain.psnr:+.2f} dB nearer to the truth ([relit](relit.md)); normals and specular
-          say no more than the mean face's ([prior](prior.md)).
-        - **Brows and lips lose contrast** ({answers.solved.kept_brows.mean:.2f} and
-          {answers.solved.kept_lips.mean:.2f} of the truth's is kept; [state](state.md#features-kept)), and edges of
-          hard shadows leave a faint outline, the paper's own failure case.
-        - **Dark skin comes out {dark.scene.lightness:.1f} L* too light** where nothing but the frames tells its tone
+        - **Freer lights win on delit synthetic people**: regions by
+          {delit["regions 10"].PSNR - delit.wildcap.PSNR:.1f} dB, one environment
+          by {delit.environment.PSNR - delit.wildcap.PSNR:.1f} ([page](comparison.md)).
+        - **Relief and gloss do not help yet**: {relit.solved.psnr - relit.plain.psnr:+.2f} dB on a relit head
+          ([relit](relit.md)); normals and specular say no more than the mean face's ([prior](prior.md)).
+        - **Brows and lips keep {answers.solved.kept_brows.mean:.2f} and {answers.solved.kept_lips.mean:.2f} of their
+          contrast** ([state](state.md#features-kept)); edges of hard shadows leave a faint outline, the paper's own
+          failure case.
+        - **Dark skin comes out {dark.scene.lightness:.1f} L* too light** where only the frames tell its tone
           ([skin tone](skin_tone.md)), and keeps highlights on raw frames ([comparison](comparison.md)).
-        - **The confidence map knows little**: a correlation of {of.confidence.correlation.mean:.2f} with the true
-          error, 0.4 was the aim ([confidence](confidence.md)).
+        - **The confidence map knows little**: it correlates by {of.confidence.correlation.mean:.2f} with the true
+          error, aim 0.4 ([page](confidence.md)).
         - **In even studio light the solve makes the texture worse** ([controlled](controlled.md)).
-        - **Of a scalp that nobody saw we make bare skin** ({scalp.completed:.0f} of 255 off where hair was; [whole
-          head](whole_head.md)); a cap, or a cloth of the skin's colour, is not told from hair or skin. Stubble is grown
-          like a beard ([hair](hair.md)). Under open lids the skin is completed from around, and shows when the head
-          blinks.
-        - **The prior is small**, trained on a shared CPU on synthetic skins and few real ones ([prior](prior.md)): on
-          the scan it takes a part of the fine detail with the shadow. The authors' own weights were not at hand: their
-          loader and loop are verified with random weights only ([how far](../authors_prior.md)).
+        - **A scalp that nobody saw becomes bare skin** ({scalp.completed:.0f} of 255 off where hair was;
+          [whole head](whole_head.md)); a cap, or a cloth of the skin's colour, is not told from hair or skin; stubble
+          is grown like a beard ([hair](hair.md)); under open lids skin is made up, which a blink shows.
+        - **The prior is small**, of synthetic skins and few real ones, trained on a shared CPU ([prior](prior.md)): on
+          the scan it takes fine detail with the shadow. The authors' own weights were not at hand: their loader and
+          loop are verified with random ones only ([how far](../authors_prior.md)).
         - **One real skin**: all but the head scan and two sets of photographs is synthetic, by the generators that
           trained the networks (other seeds: a test reads the manifests). No real phone, no real person filmed by us.
         """)

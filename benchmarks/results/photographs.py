@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 from ..figures import Figures
-from ..measures.table import summarise, to_markdown
+from ..measures.table import format_table, summarise
 from ..pages import Sections
 from ..photographs import COLUMNS, TITLES, WORDS
 
 TITLE = "Single photographs: the face that is kept and the light that is left"
-SAYS = "real people under many lights, beside answers that do nothing, give one colour, or know the light"
+SAYS = "Real people under many lights, beside answers that do nothing, give one colour, or know the light."
 RECORDS = ("photographs",)
 
 
 def sections(record: Figures) -> Sections:
-    return [("", WORDS), *((title, to_markdown(summarise(record[name].people, COLUMNS), COLUMNS, "answer"))
+    return [("", WORDS), *((title, format_table(summarise(record[name].people, COLUMNS), COLUMNS, "answer"))
                            for name, title in TITLES.items() if name in record)]

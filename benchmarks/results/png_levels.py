@@ -9,7 +9,7 @@ from ..pages import Sections, prose
 from ..png_levels import table
 
 TITLE = "What a PNG costs"
-SAYS = "seconds and megabytes by libpng's filter and zlib's level, and what we write"
+SAYS = "Seconds and megabytes by libpng's filter and zlib's level, and what we write."
 RECORDS = ("png_levels",)
 
 

@@ -8,7 +8,7 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "The prior"
-SAYS = "what it was trained on, that it does not copy, and that normals and specular do not follow from the diffuse"
+SAYS = "What it was trained on, that it does not copy, and that normals and specular do not follow from the diffuse."
 RECORDS = ("prior_training", "prior")
 
 

@@ -9,7 +9,7 @@ from ..pages import Sections, prose
 from ..reimported import table
 
 TITLE = "What comes back"
-SAYS = "each delivered file through Blender's own importer, rendered beside the head that it was made of"
+SAYS = "Each delivered file through Blender's own importer, rendered beside the head that it was made of."
 RECORDS = ("reimported",)
 
 

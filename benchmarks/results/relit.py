@@ -10,7 +10,7 @@ from ..relit import table
 from .sample import TITLE as SAMPLE
 
 TITLE = "Relit"
-SAYS = "the solved head and the true subject under six lights of which none lit a capture"
+SAYS = "The solved head and the true subject under six lights of which none lit a capture."
 RECORDS = ("relit", "relit_people")
 OLDER = """
     The solver of that commit held its lights back by pulls chosen by hand; today's

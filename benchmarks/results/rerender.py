@@ -10,7 +10,7 @@ from ..rerender import table
 from .relit import OLDER
 
 TITLE = "Face reconstruction, as in the paper's Table 1"
-SAYS = "albedo times shading against the frames it came from: a tie, which tells no light models apart"
+SAYS = "Albedo times shading against the frames it came from: a tie, which tells no light models apart."
 RECORDS = ("rerender",)
 
 

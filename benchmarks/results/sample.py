@@ -9,7 +9,7 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "The sample video"
-SAYS = "a synthetic face, the sun behind leaves, against its true albedo: what `make demo` says on your machine"
+SAYS = "A synthetic face, the sun behind leaves, against its true albedo: what `make demo` says on your machine."
 RECORDS = ("demo",)
 
 

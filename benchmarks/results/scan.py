@@ -10,7 +10,7 @@ from ..pages import Sections, prose
 from .relit import OLDER
 
 TITLE = "A head scan under hard sun through leaves"
-SAYS = "the one real skin: albedo, cameras and head against the truth, and what the solve adds to each delighter"
+SAYS = "The one real skin: albedo, cameras and head against the truth, and what the solve adds to each delighter."
 RECORDS = ("scan_albedo", "whole_chain", "geometry")
 
 

@@ -9,8 +9,8 @@ from ..figures import Figures, markdown
 from ..pages import Sections, prose
 
 TITLE = "Shadow masks"
-SAYS = ("the proposed mask against the true shadow, what a shadow that is masked exactly leaves in the albedo, and how "
-        "much of a step along a mask's border is light")
+SAYS = ("The proposed mask against the true shadow, what a shadow that is masked exactly leaves in the albedo, and "
+        "how much of a step along a mask's border is light.")
 RECORDS = ("shadow_mask", "painted_shadow", "shadow_steps")
 SCORES = {"true": "true", "masked": "masked", "iou": "IoU", "precision": "precision", "recall": "recall",
           "border_f": "border F"}

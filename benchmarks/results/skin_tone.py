@@ -8,7 +8,7 @@ from ..figures import Figures, markdown
 from ..pages import Sections, prose
 
 TITLE = "The skin tone"
-SAYS = "how far the estimate is off, from the frames alone and with a white card, by group of skin tone"
+SAYS = "How far the estimate is off, from the frames alone and with a white card, by group of skin tone."
 RECORDS = ("skin_tone",)
 WAYS = ("before", "scene", "measured")
 

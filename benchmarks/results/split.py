@@ -9,7 +9,7 @@ from ..figures import Figures
 from ..pages import Sections
 
 TITLE = "Skin or light"
-SAYS = "what telling them apart is worth, with one capture of a person and with several"
+SAYS = "What telling them apart is worth, with one capture of a person and with several."
 RECORDS = ("split",)
 
 

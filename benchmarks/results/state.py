@@ -9,7 +9,8 @@ from ..figures import Figures
 from ..pages import Sections
 
 TITLE = "The state of the albedo"
-SAYS = "people like people, by the measures that tell light from skin, beside answers that do nothing or know the light"
+SAYS = ("People like people, by the measures that tell light from skin, beside answers that do nothing or know the "
+        "light.")
 RECORDS = ("state",)
 
 

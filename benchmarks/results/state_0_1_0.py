@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from .. import state
 from ..figures import Figures
-from ..measures.table import Scores, summarise, to_markdown
+from ..measures.table import Scores, format_table, summarise
 from ..pages import Sections, prose
 from ..state_captures import DELIT, SOLVED
 
 TITLE = "The state of version 0.1.0"
-SAYS = "the same captures, heads and measures by the delighter and the solver of 0.1.0, and what has changed since"
+SAYS = "The same captures, heads and measures by the delighter and the solver of 0.1.0, and what has changed since."
 RECORDS = ("state_0_1_0", "state")
 COMPARED = {name: state.TABLES[table][name]
             for table, names in (("In the picture", ("psnr", "ssim", "flip", "detail", "shadow_step")),
@@ -32,8 +32,8 @@ def sections(before: Figures, now: Figures) -> Sections:
 def changes(before: Figures, now: Figures) -> str:
     """Today's texture and albedo less those of 0.1.0, person by person, of people with the same captures in both."""
     return "\n\n".join(
-        to_markdown(summarise(paired(before.people[method], now.people[method], method), COMPARED,
-                              f"{method}, 0.1.0"),
+        format_table(summarise(paired(before.people[method], now.people[method], method), COMPARED,
+                               f"{method}, 0.1.0"),
                     COMPARED, "taken for albedo", f"{method}, 0.1.0")
         for method in (DELIT, SOLVED))
 

@@ -45,7 +45,7 @@ class _Published:
     """`of.NAME` are the figures of docs/figures/NAME.json."""
 
     def __getattr__(self, name: str) -> figures.Figures:
-        return figures.Figures.of(figures.read(name)["figures"])
+        return figures.Figures.of(figures.read_record(name)["figures"])
 
 
 def told() -> dict[str, list[str]]:
@@ -54,7 +54,7 @@ def told() -> dict[str, list[str]]:
     installed, memory, cost = of.installation, of.blender_memory, of.opendelight_cost
     return {
         "README.md": in_readme(of),
-        "docs/cameras.md": in_cameras(of.geometry.lps_sun.cameras.against_truth, of.head_scale),
+        "docs/cameras.md": in_cameras(of.geometry.lps_sun, of.head_scale),
         "docs/scan_and_head.md": in_scan_and_head(of.geometry.lps_sun, of.sample_surfaces),
         "docs/guide/install.md": [
             f"it announces {installed.told_gb:.1f} GB, and **Remove Solver**, which says first what it frees, gives "
@@ -85,13 +85,16 @@ def in_readme(of: _Published) -> list[str]:
         f"| **WildCap** | {relit.solved.psnr:.2f} dB | {over_people(answers, 'solved')} dB |"]
 
 
-def in_cameras(truth: figures.Figures, scale: figures.Figures) -> list[str]:
+def in_cameras(sun: figures.Figures, scale: figures.Figures) -> list[str]:
+    truth, seconds = sun.cameras.against_truth, sun.stages.cameras.seconds
+
     def percent(share: float) -> str:
         return f"{100 * share:+.1f} %"
 
     return [
         f"median centre error {truth.centre_error_median_percent:.3f} % of the camera distance, at most "
-        f"{truth.centre_error_max_percent:.2f} %, rotations {truth.rotation_error_median_deg:.2f} degrees",
+        f"{truth.centre_error_max_percent:.2f} %, rotations {truth.rotation_error_median_deg:.2f} degrees, in "
+        f"{seconds:.0f} s",
         f"six synthetic heads it was set on: median {percent(scale.set_on.median)}, worst "
         f"{percent(scale.set_on.worst)}; three others: {percent(scale.others.median)}, "
         f"worst {percent(scale.others.worst)}",

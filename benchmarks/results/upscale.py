@@ -8,7 +8,7 @@ from ..figures import Figures, markdown
 from ..pages import Sections, prose
 
 TITLE = "Four times as many texels"
-SAYS = "the network against Lanczos, and what frames add that hold more than the texture"
+SAYS = "The network against Lanczos, and what frames add that hold more than the texture."
 RECORDS = ("upscale", "upscaler_training", "costs")
 ENLARGED = {"diffuse_psnr": "diffuse PSNR", "diffuse_ssim": "SSIM", "diffuse_flip": "FLIP",
             "diffuse_features": "features",

@@ -9,7 +9,7 @@ from ..pages import Sections, prose
 from .relit import OLDER
 
 TITLE = "The whole head, and the hair's masks"
-SAYS = "neck, ears and scalp that no camera saw; the masks of brows, lashes and beard, and the skin below"
+SAYS = "Neck, ears and scalp that no camera saw; the masks of brows, lashes and beard, and the skin below."
 RECORDS = ("whole_head", "completing")
 
 

@@ -54,7 +54,15 @@ class ActingHead:
 
 
 def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarray) -> ActingHead:
-    """The open head of one body [N, 3]; uvs [V, 2] are the head's, any one of each vertex."""
+    """The open head of one body.
+
+    Parameters
+    ----------
+    base : MakeHuman's body
+    builder : of heads from it
+    body : [N, 3], in decimetres, MakeHuman's axes
+    uvs : [V, 2], the head's, any one of each vertex
+    """
     polygons, inner, parent, extended = _split(base, builder)
     used = np.unique([i for p in polygons + inner for i in p])
     number = np.full(extended.shape[0], -1)

@@ -18,7 +18,7 @@ from ..imaging import images
 from .identities import identity_space
 from .makehuman import HeadBuilder, read_base
 from .marks import find_landmarks
-from .regions import draw_masks, face_outline, wanted_scale
+from .regions import choose_scale, draw_masks, face_outline
 from .unwrap import unwrap
 
 FACE_SHARE = 0.90  # asked of the unwrap; its energy leaves about two thirds of it
@@ -31,7 +31,7 @@ def main() -> None:
     face, bary, weight = find_landmarks(mean, components, builder.faces)
     points = (mean[builder.faces[face]] * bary[..., None]).sum(1)
     uvs, face_uvs = unwrap(mean, builder.faces, builder.mirror,
-                           wanted_scale(mean, builder.faces, face_outline(points), FACE_SHARE))
+                           choose_scale(mean, builder.faces, face_outline(points), FACE_SHARE))
     mesh = Mesh(mean, builder.faces, uvs, face_uvs)
     meshes.write_obj(ASSETS / "head.obj", mesh)
     mesh = meshes.read_obj(ASSETS / "head.obj")  # as everybody will read it, rounded

@@ -21,10 +21,20 @@ YAWS_DEG = (-35, -18, 0, 18, 35)  # turns of the head at which the net is asked
 
 def find_landmarks(mean: np.ndarray, components: np.ndarray, triangles: np.ndarray,
                    identities: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangle [468], barycentric [468, 3] and weight [468] (0 to 1) of each landmark on the mean head, left and right
-    made alike.
+    """Where each landmark lies on the mean head, left and right made alike.
 
     The first round sees plain heads, the second ones with brows and lips painted where the first found them.
+
+    Parameters
+    ----------
+    mean : [V, 3], in metres
+    components : [K, V, 3], in metres, the shapes of identities at one deviation
+    triangles : [F, 3]
+    identities : how many heads beside the mean are drawn and looked at
+
+    Returns
+    -------
+    Triangle [468], barycentric [468, 3] and weight [468] in [0, 1].
     """
     rng = np.random.default_rng(1)
     shapes = [mean] + [mean + np.tensordot(rng.normal(0, 0.7, len(components)), components, 1)

@@ -48,9 +48,21 @@ def distance_inside(points: np.ndarray, outline: np.ndarray) -> np.ndarray:
     return np.array([cv2.pointPolygonTest(polygon, (float(a), float(b)), True) for a, b in around(points)])
 
 
-def wanted_scale(vertices: np.ndarray, faces: np.ndarray, outline: np.ndarray, share: float = 0.70) -> np.ndarray:
-    """UV length per metre [F]: `share` of the unit square for the face, the rest for everything else, blended over 2 cm
-    outside the outline."""
+def choose_scale(vertices: np.ndarray, faces: np.ndarray, outline: np.ndarray, share: float = 0.70) -> np.ndarray:
+    """UV length per metre: a share of the unit square for the face, the rest for everything else, blended over 12 mm
+    outside the outline.
+
+    Parameters
+    ----------
+    vertices : [V, 3], in metres
+    faces : [F, 3]
+    outline : [P, 2], of the face, in `around`'s coordinates
+    share : of the square that the face is to cover
+
+    Returns
+    -------
+    [F].
+    """
     centres = vertices[faces].mean(1)
     inside = distance_inside(centres, outline)
     blend = np.clip(1 + inside / 0.012, 0, 1)

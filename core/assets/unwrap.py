@@ -17,8 +17,20 @@ from scipy.sparse.linalg import splu
 
 def unwrap(vertices: np.ndarray, faces: np.ndarray, mirror: np.ndarray, scale: np.ndarray,
            steps: int = 60) -> tuple[np.ndarray, np.ndarray]:
-    """UVs [T, 2] in the unit square, u = 0.5 the middle, and face_uvs [F, 3]. `scale` [F]: wanted UV length per metre;
-    `mirror` [V]: the mirrored vertex."""
+    """Lays the head out on the unit square.
+
+    Parameters
+    ----------
+    vertices : [V, 3], in metres, left and right alike
+    faces : [F, 3]
+    mirror : [V], the mirrored vertex of each
+    scale : [F], wanted UV length per metre
+    steps : of the minimisation at most
+
+    Returns
+    -------
+    UVs [T, 2] in [0, 1], u = 0.5 the middle, and face_uvs [F, 3].
+    """
     cut_faces, origin, twin, seam_left, seam_right, ring = _cut_open(vertices, faces, mirror)
     points = vertices[origin]
     fixed, start = _boundary(points, seam_left, seam_right, ring)

@@ -95,16 +95,29 @@ class Board:
 
 def run_local(batch: Batch, faces: Iterable[BatchFace], at_once: int, retry: bool, tell: Callable[[str], None],
               until: str | None = None) -> Tally:
-    """Runs what is to be done of these faces, `at_once` at a time, up to the task `until` (None: all). A face that has
-    stopped is left alone unless `retry`. The caller holds the batch's lease. Ends early by KeyboardInterrupt or the
-    file `stop`; what was finished is kept."""
+    """Runs what is to be done of these faces. The caller holds the batch's lease. Ends early by KeyboardInterrupt or
+    the file `stop`; what was finished is kept.
+
+    Parameters
+    ----------
+    batch : that they belong to
+    faces : to work on
+    at_once : how many at a time, 1 or more
+    retry : whether a face that has stopped is tried again
+    tell : takes lines about the faces
+    until : the last task's name, None: all
+
+    Returns
+    -------
+    How each face ended.
+    """
     faces = list(faces)
     board, ended = Board(batch, len(faces), tell), threading.Event()
     threads = max(1, (os.cpu_count() or 1) // at_once) if at_once > 1 else None
     forget_stop(batch.root)
     board.write(now=True)
     with ThreadPoolExecutor(at_once) as pool:
-        waiting = {pool.submit(run_face, batch, face, board, retry, ended.is_set, until, threads) for face in faces}
+        waiting = {pool.submit(_run_face, batch, face, board, retry, ended.is_set, until, threads) for face in faces}
         try:
             while waiting:
                 done, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
@@ -143,8 +156,8 @@ def forget_stop(root: Path) -> None:
         (root / STOP).unlink(missing_ok=True)
 
 
-def run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled: Callable[[], bool],
-             until: str | None = None, threads: int | None = None) -> None:
+def _run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled: Callable[[], bool],
+              until: str | None = None, threads: int | None = None) -> None:
     """One face's tasks, one after the other, as far as they go."""
     names = [group.name for group in GROUPS]
     last = names.index(until) if until else len(names) - 1
@@ -178,7 +191,17 @@ def _run(batch: Batch, face: BatchFace, group: StageGroup, board: Board, cancell
 
 def check_result(batch: Batch, face: BatchFace, group: StageGroup, final: Message) -> Message:
     """How a task has ended: not well where it is still, or again, to be done, for the next look would send it here
-    again, for ever."""
+    again, for ever.
+
+    Parameters
+    ----------
+    batch, face, group : whose task
+    final : the message that it ended with
+
+    Returns
+    -------
+    `final`, or a Failed in place of Done.
+    """
     if isinstance(final, Done) and derive_state(batch, face) == FaceState(TO_DO, group):
         return Failed("", f"The task {group.name} ended well, and its result is not what was asked for.",
                       "Look whether another program writes there.")

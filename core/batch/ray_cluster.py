@@ -41,10 +41,24 @@ connection."""
 
 def run_on_ray(batch: Batch, faces: Iterable[BatchFace], retry: bool, tell: Callable[[str], None], until: str | None,
                address: str | None, cores: int) -> Tally:
-    """Runs what is to be done of these faces on the cluster whose head node is at `address` (HOST:PORT or auto), or,
-    without one, on a cluster of this machine alone, up to the task `until` (None: all). Each task takes `cores` cores.
-    The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file `stop`; what was finished is kept.
-    Raises Problem where there is no Ray, no cluster, or no node that could work on the batch."""
+    """Runs what is to be done of these faces on a cluster. The caller holds the batch's lease. Ends early by
+    KeyboardInterrupt or the file `stop`; what was finished is kept.
+
+    Parameters
+    ----------
+    batch, faces, retry, tell, until : as `run_local` takes them
+    address : HOST:PORT of the cluster's head node, or auto; None: a cluster of this machine alone
+    cores : that each task takes
+
+    Returns
+    -------
+    How each face ended.
+
+    Raises
+    ------
+    Problem
+        Where there is no Ray, no cluster, or no node that could work on the batch.
+    """
     faces = list(faces)
     forget_stop(batch.root)
     with connect(address) as ray:

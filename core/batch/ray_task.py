@@ -59,9 +59,22 @@ def examine(root: str, version: str, record: str) -> str:
 
 
 def do_task(root: str, name: str, group_name: str, threads: int, stranger: str, say: Callable[[str], None]) -> dict:
-    """Runs a task of a face and returns how it ended. `say` hears of its progress, as lines of JSON. `stranger` is the
-    token of the lease that somebody had on the capture when the batch came to it, '' for nobody: whoever else has it is
-    a task of ours whose process or node has died, and is waited for."""
+    """Runs a task of a face.
+
+    Parameters
+    ----------
+    root : the batch's folder on the machine that runs it
+    name : of the face
+    group_name : of the task
+    threads : how many its libraries may start
+    stranger : token of the lease that somebody had on the capture when the batch came to it, '' for nobody: whoever
+        else has it is a task of ours whose process or node has died, and is waited for
+    say : hears of its progress, as lines of JSON
+
+    Returns
+    -------
+    The outcome: {"state", "words", "seconds", "host"}.
+    """
     began, stopped, outcome = time.monotonic(), [], {"state": STOPPED, "words": "", "host": socket.gethostname()}
     before = signal.signal(signal.SIGINT, lambda number, frame: stopped.append(number))  # as which Ray's cancel arrives
     try:

@@ -32,9 +32,24 @@ MOST_BYTES = 16 << 20
 
 
 def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[list[BatchFace], list[Problem]]:
-    """The faces of a table or a folder, captures in the batch's folder `root`, and what is wrong with the rows that
-    were left out. `shared` settings lie under each row's own. Raises Problem for a table that cannot be read, or has no
-    usable row."""
+    """The faces of a table or a folder.
+
+    Parameters
+    ----------
+    shots : the table, or the folder of videos
+    root : the batch's folder, in which the captures lie
+    quality : preset of the rows that name none
+    shared : settings {stage: {name: value}} that lie under each row's own
+
+    Returns
+    -------
+    The faces, and what is wrong with the rows that were left out.
+
+    Raises
+    ------
+    Problem
+        For a table or folder that cannot be read, or has no row.
+    """
     rows = _rows_of_folder(shots, root) if shots.is_dir() else _rows_of_table(shots)
     faces, faults, taken = [], [], {}
     for place, row in rows:

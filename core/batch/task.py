@@ -32,9 +32,20 @@ POLL_S = 0.1  # between two looks at the worker
 
 def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[Message], None] = lambda message: None,
              cancelled: Callable[[], bool] = lambda: False, threads: int | None = None) -> Message:
-    """Runs a task, sends what its worker says through `hear`, and returns the final message: Done, Cancelled or Failed.
-    `threads`: how many its libraries may start, where other tasks run beside it; None: as many as the worker takes by
-    itself."""
+    """Runs a task.
+
+    Parameters
+    ----------
+    batch, face, group : whose task
+    hear : takes what its worker says
+    cancelled : whether it is to end
+    threads : how many its libraries may start, where other tasks run beside it; None: as many as the worker takes by
+        itself
+
+    Returns
+    -------
+    The final message: Done, Cancelled or Failed.
+    """
     environment = {} if threads is None else {name: str(threads) for name in THREAD_VARIABLES}
     began, capture = time.monotonic(), face.capture
     try:

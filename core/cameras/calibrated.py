@@ -36,8 +36,20 @@ class Calibrated:
     rotation: np.ndarray
     translation: np.ndarray
 
-    def camera(self, number: int, width: int, height: int, picture: str = "") -> pycolmap.Camera:
-        """For a picture of this size. Raises Problem where its shape is not the calibration's."""
+    def make_camera(self, number: int, width: int, height: int, picture: str = "") -> pycolmap.Camera:
+        """COLMAP's camera for a picture of another size.
+
+        Parameters
+        ----------
+        number : the camera's in the model
+        width, height : of the picture, in pixels
+        picture : its name, for the Problem
+
+        Raises
+        ------
+        Problem
+            Where its shape is not the calibration's.
+        """
         params = np.array(self.params, float)
         lengths = PIXELS[self.model]
         if not self.width:

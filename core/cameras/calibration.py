@@ -53,7 +53,7 @@ def import_cameras(path: Path, frames: Frames, folder: Path, report: Reporter) -
     model = pycolmap.Reconstruction()
     for number, (record, calibrated) in enumerate(matched, 1):
         width, height = images.size(folder / record.name)
-        model.add_camera_with_trivial_rig(calibrated.camera(number, width, height, record.name))
+        model.add_camera_with_trivial_rig(calibrated.make_camera(number, width, height, record.name))
         pose = pycolmap.Rigid3d(np.concatenate([calibrated.rotation, calibrated.translation[:, None]], 1))
         model.add_image_with_trivial_frame(pycolmap.Image(name=record.name, camera_id=number, image_id=number), pose)
     left_out = len(frames.records) - len(matched)

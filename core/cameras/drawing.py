@@ -21,7 +21,19 @@ AXES = (((1.0, 0.2, 0.2), (0.1, 0, 0)), ((0.2, 0.9, 0.2), (0, -0.1, 0)), ((0.3, 
 
 def draw_cameras(model: pycolmap.Reconstruction, records: Sequence[FrameRecord], folder: Path,
                  height: int = 480) -> np.ndarray:
-    """sRGB [height, W, 3] in [0, 1]."""
+    """The world's axes in the frame that shows the face most from the front, and all cameras from above.
+
+    Parameters
+    ----------
+    model : the cameras, in the capture's world
+    records : of the frames
+    folder : that holds them
+    height : of the picture, in pixels
+
+    Returns
+    -------
+    [height, W, 3], sRGB in [0, 1].
+    """
     yaw = {record.name: abs(record.yaw_deg) if record.yaw_deg is not None else 999 for record in records}
     image = min((image for image in model.images.values() if image.has_pose),
                 key=lambda image: yaw.get(image.name, 999))

@@ -93,10 +93,9 @@ class Capture:
         except FileNotFoundError:
             return {"format": FORMAT, "source": "", "stages": {}}
         except (OSError, ValueError) as error:
-            raise Problem(
-                f"{self.json} cannot be read ({error}).",
-                "Restore it from a backup, or delete it to start this capture anew; pictures and masks stay.",
-            ) from error
+            raise Problem(f"{self.json} cannot be read ({error}).",
+                          "Restore it from a backup, or delete it to start this capture anew; pictures and masks "
+                          "stay.") from error
         if isinstance(record, dict) and is_number(record.get("format"), FORMAT + 1):
             raise Problem("This capture was made by a newer version of WildCap.",
                           "Update the extension to open it; nothing was changed.")
@@ -108,21 +107,18 @@ class Capture:
 
     @property
     def source(self) -> Path | None:
-        """The video, or the folder of photographs, that the capture is made from; it may be gone. None where none was
-        chosen."""
+        """The video or folder of photographs that it is made from, which may be gone; None where none was chosen."""
         return freshness.source_of(self.root, self.read())
 
     def refuse_inside(self, source: str | Path) -> None:
-        """Raises Problem for a source that is the capture or lies in it: what is written there could replace it, or be
-        read again."""
+        """Raises Problem for a source that is the capture or in it: it could be replaced, or our output be read."""
         place, root = (Path(os.path.realpath(path)) for path in (source, self.root))
         if place == root or place.is_relative_to(root):
             raise Problem(f"{source} lies in the capture {self.root}, which writes its own files there.",
                           "Keep the video or photographs elsewhere.")
 
     def set_source(self, source: str | Path) -> None:
-        """Records where the pictures come from, and what they hold: a video may be put away once its frames are
-        taken."""
+        """Records where the pictures come from and what they hold: the video may go once its frames are taken."""
         if str(source):
             self.refuse_inside(source)
         self.claim()
@@ -143,16 +139,23 @@ class Capture:
 
     def finish(self, stage: stages.Stage, conditions: dict, seconds: float, settings: Settings, figures: dict,
                version: str, findings: Collection[dict] = ()) -> None:
-        """Records that a stage ended well; `conditions` is what `conditions` gave before it began, `findings` are the
-        Reporter's."""
+        """Records that a stage ended well.
+
+        Parameters
+        ----------
+        stage, seconds : which one, and how long it took
+        conditions : what `conditions` gave before it began
+        settings : that it ran with
+        figures, findings : the Reporter's
+        version : of the WildCap that ran it
+        """
         record = self.read()
         chosen = convert_settings({stage.name: asdict(getattr(settings, stage.name))}, self._portable)[stage.name]
         record["format"] = FORMAT
         record["stages"][stage.name] = {
             **conditions, "seconds": round(seconds, 2), "finished": time.strftime("%Y-%m-%dT%H:%M:%S"),
-            "version": version,
-            "settings": chosen, "seed": settings.seed, "device": settings.compute_device, "figures": figures,
-            "findings": list(findings),
+            "version": version, "settings": chosen, "seed": settings.seed, "device": settings.compute_device,
+            "figures": figures, "findings": list(findings),
         }
         write_json(self.json, record)
 
@@ -162,10 +165,8 @@ class Capture:
     def stop(self, stage: str, problem: Problem, findings: Collection[dict] = ()) -> None:
         """Records why a stage could not end, for the report; gone as soon as that stage is begun again."""
         record = self.read()
-        write_json(self.json,
-                   {**record,
-                    "stopped": {"stage": stage, "problem": problem.problem, "remedy": problem.remedy,
-                                "findings": list(findings)}})
+        write_json(self.json, {**record, "stopped": {"stage": stage, "problem": problem.problem,
+                                                     "remedy": problem.remedy, "findings": list(findings)}})
 
     def forget(self, names: Collection[str]) -> None:
         """Marks stages as not done; their files stay until they are written again."""
@@ -187,7 +188,7 @@ class Capture:
         """Whether a stage is to do, done, stale or made by older code, and why (freshness.py)."""
         if not all(self.has(name) for name in stage.writes):
             return Verdict(freshness.TO_DO)
-        return freshness.judge(self.root, self.read(), stage, settings)
+        return freshness.judge_stage(self.root, self.read(), stage, settings)
 
     def require_source(self) -> Path:
         """The source. Raises Problem where it is gone or holds something else than it did: what is made of it could not

@@ -34,8 +34,16 @@ def keep_stamp(stamp: list) -> dict:
     return {STAMP: stamp} if any(isinstance(known, int) for _, _, known in stamp) else {}
 
 
-def matches(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
-    """Whether the inputs and settings of a stage that 0.1.0 finished are what they were then."""
+def is_unchanged(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
+    """Whether the inputs and settings of a stage that 0.1.0 finished are what they were then.
+
+    Parameters
+    ----------
+    root : the capture's folder
+    record : capture.json's content
+    stage : that 0.1.0 finished
+    settings : as they are now
+    """
     finished, made = record["stages"][stage.name], _code_and_data()[stage.name]
     chosen = asdict(getattr(settings, stage.name))
     parts: list = [{name: chosen.get(name, value) for name, value in finished.get("settings", {}).items()

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether a finished stage is still what its inputs, its settings and its code would give.
 
-When a stage begins, `describe_conditions` says what its result will depend on; capture.json keeps that, and `judge`
-compares it with what is there now. What differs is told apart: inputs and settings are the artist's doing, and such a
-stage is out of date; code that has changed is ours, and a stage that older code made stays as it is until the artist
-has it run again. Standard library only.
+When a stage begins, `describe_conditions` says what its result will depend on; capture.json keeps that, and
+`judge_stage` compares it with what is there now. What differs is told apart: inputs and settings are the artist's
+doing, and such a stage is out of date; code that has changed is ours, and a stage that older code made stays as it is
+until the artist has it run again. Standard library only.
 """
 
 from __future__ import annotations
@@ -46,19 +46,38 @@ class Verdict:
 
 
 def describe_conditions(root: Path, record: dict, stage: Stage, settings: Settings) -> dict:
-    """All that the result of a stage in the capture folder `root` depends on beside its settings, as capture.json's
-    entry of the stage keeps it."""
+    """All that the result of a stage depends on beside its settings.
+
+    Parameters
+    ----------
+    root : the capture's folder
+    record : capture.json's content
+    stage : that is about to begin
+    settings : for what they name outside of the capture
+
+    Returns
+    -------
+    {"code", "inputs"}, as capture.json's entry of the stage keeps them.
+    """
     return {"code": code_key(stage.module), "inputs": _hash_inputs(root, record, stage, settings)}
 
 
-def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict:
-    """The state of a stage whose outputs are there, or were slimmed away. `record` is capture.json's content."""
+def judge_stage(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict:
+    """The state of a stage whose outputs are there, or were slimmed away.
+
+    Parameters
+    ----------
+    root : the capture's folder
+    record : capture.json's content
+    stage : that is asked about
+    settings : as they are now
+    """
     finished = record["stages"].get(stage.name)
     if finished is None:
         return Verdict(TO_DO)
     version = str(finished.get("version", ""))
     if "inputs" not in finished:  # by WildCap 0.1.0, which kept one hash of everything
-        same = format_1.matches(root, record, stage, settings)
+        same = format_1.is_unchanged(root, record, stage, settings)
         if same and not stage.reads:
             same = not _other_source(record.get("source_stamp", []), root, record)
         return Verdict(OLDER, version=version) if same else Verdict(STALE, ("an input or a setting",), version)

@@ -90,11 +90,24 @@ def _refuse_stranger(path: Path) -> None:
 @contextlib.contextmanager
 def hold(root: Path, tell: Callable[[str], None] = lambda text: None, folder_kind: str = "capture",
          cancelled: Callable[[], bool] = lambda: False) -> Iterator[Lease]:
-    """Holds the lease of a capture's folder, or a batch's, which must be there. Raises Problem naming who works there.
+    """Holds the lease of a capture's folder, or a batch's, which must be there.
 
     A process of this machine that is at work is refused at once, and one that has ended is replaced at once. For one
-    that was stopped, or that lives on another machine, a term is waited for a refresh; `tell` hears of that. Raises
-    CancelledError where `cancelled` says so meanwhile.
+    that was stopped, or that lives on another machine, a term is waited for a refresh.
+
+    Parameters
+    ----------
+    root : the folder
+    tell : hears of the wait
+    folder_kind : "capture" or "batch", for the Problem
+    cancelled : whether the wait is to end
+
+    Raises
+    ------
+    Problem
+        Naming who works there.
+    CancelledError
+        Where `cancelled` says so.
     """
     lease = Lease(root / "lock", secrets.token_hex(8))
     while not _make(lease):

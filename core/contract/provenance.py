@@ -32,7 +32,19 @@ CHUNK_BYTES = 1 << 22  # read at once
 
 
 def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Callable[[], None]) -> dict:
-    """Everything but the delivered files; `tick` is called between two pieces of work and may raise to stop."""
+    """Everything but the delivered files.
+
+    Parameters
+    ----------
+    capture : that is delivered
+    plan : of the delivery
+    settings : that say whose prior was used
+    tick : is called between two pieces of work, and may raise to stop
+
+    Returns
+    -------
+    provenance.json's content.
+    """
     record = capture.read()
     return {
         "made_by": MADE_BY, "written": time.strftime("%Y-%m-%dT%H:%M:%S"),

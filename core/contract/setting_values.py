@@ -51,8 +51,20 @@ def check_value(name: str, field: dataclasses.Field, value):
 
 
 def value_from_text(name: str, field: dataclasses.Field, text: str, folder: Path | None = None):
-    """The value that a text means, by the type of the field; a path is made absolute from `folder` (None: the working
-    directory). Raises Problem."""
+    """The value that a text means, by the type of the field.
+
+    Parameters
+    ----------
+    name : of the setting, for the Problem
+    field : of the settings' dataclass
+    text : as it was typed
+    folder : from which a path is made absolute, None: the working directory
+
+    Raises
+    ------
+    Problem
+        For a text that means none of the setting's values.
+    """
     kind = type(field.default)
     if "path" in field.metadata:
         return absolute_path(text, folder)

@@ -65,13 +65,25 @@ def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
                       "pictures at half the credits (--preview).")
     report.log("SwitchLight does not say how many credits are left." if left is None
                else f"Your account has {service.amount(left)}.")
-    return send(account, [parcel(capture, name, content, plan.preview) for name, content in plan.frames.items()],
+    return send(account, [pack_frame(capture, name, content, plan.preview) for name, content in plan.frames.items()],
                 plan.preview, report, PATIENCE)
 
 
-def parcel(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
-    """A frame as it is sent: its file as it is, and as it was agreed to. Raises Problem where it has changed, and for a
-    kind that the service does not take."""
+def pack_frame(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
+    """A frame as it is sent: its file as it is, and as it was agreed to.
+
+    Parameters
+    ----------
+    capture : that consent was given for
+    name : of the frame
+    content : hash of the frame that was agreed to
+    preview : whether small pictures are asked for, at half the credits
+
+    Raises
+    ------
+    Problem
+        Where the frame has changed, and for a kind that the service does not take.
+    """
     path = capture.frames / name
     if path.suffix.lower() not in MEDIA_TYPES:
         raise Problem(f"SwitchLight does not accept pictures like {name}.",

@@ -17,8 +17,20 @@ left out where there is none."""
 
 
 def check_stages(capture: Capture, kind: str, settings: Settings, report: Reporter) -> None:
-    """Raises Problem naming a stage, of those that `kind` comes from, whose inputs or settings have changed since. What
-    older code made is delivered, and named in the log."""
+    """Refuses to deliver what is out of date. What older code made is delivered, and named in the log.
+
+    Parameters
+    ----------
+    capture : that is delivered
+    kind : what of it, a key of LAST
+    settings : by which its stages are judged
+    report : takes the log line
+
+    Raises
+    ------
+    Problem
+        Naming a stage, of those that `kind` comes from, whose inputs or settings have changed since.
+    """
     older = []
     last = stages.NAMES.index(LAST[kind])
     if kind == "head" and (capture.delivery / "displacement.exr").is_file():

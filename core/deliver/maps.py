@@ -80,7 +80,15 @@ class Sources:
 
 
 def write(picture: MapPicture, sources: Sources, path: Path, plan: DeliveryPlan) -> None:
-    """One file of the set, atomically. The picture's files must be there (Sources.has)."""
+    """Writes one file of the set.
+
+    Parameters
+    ----------
+    picture : which one; its files must be there (Sources.has)
+    sources : the maps of its UV tile
+    path : the file, in a folder that is not in place yet
+    plan : of the delivery: bits, colour space, direction of the normals
+    """
     bits = {"png8": 8, "png16": 16, "exr": 16}[plan.pictures]
     first = picture.channels[0]
     as_it_is = first.endswith((".r", ".x")) and len(picture.channels) == 3 and _file_of(first)

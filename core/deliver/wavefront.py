@@ -19,8 +19,16 @@ LINKS = {"base_color": "map_Kd", "normal": "norm", "roughness": "map_Pr", "specu
 
 
 def write(source: Path, path: Path, plan: DeliveryPlan, maps: list[dict], roughness: float) -> None:
-    """`path` and its .mtl from the capture's `source` (metres, Z up, face towards -Y); `maps` are the files that were
-    made."""
+    """Writes the OBJ, and the .mtl beside it.
+
+    Parameters
+    ----------
+    source : the capture's OBJ, in metres, Z up, face towards -Y
+    path : the OBJ to write, Y up
+    plan : of the delivery: its unit, and the names of mesh and materials
+    maps : {"file", "tile", "slot"} of each map that was made
+    roughness : in [0, 1], the materials' constant
+    """
     factor = {"m": 1.0, "cm": 100.0}[plan.unit]
     tiles = sorted({entry["tile"] for entry in maps})
     uvs, lines, now = [], [f"mtllib {path.stem}.mtl", f"o {plan.name}"], None

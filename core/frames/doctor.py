@@ -69,8 +69,20 @@ def blurred(records: list[FrameRecord], around: int = 10) -> np.ndarray:
 
 
 def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, report: Reporter) -> None:
-    """Reports a finding for each shortcoming of the kept frames; `dropped` names those left out as blurred. Raises
-    Problem where they show no face, or it is not clear whose face is meant."""
+    """Reports a finding for each shortcoming of the kept frames.
+
+    Parameters
+    ----------
+    records : of the frames that are kept
+    dropped : names of those left out as blurred
+    photographs : whether they are, and no film's frames
+    report : takes the findings
+
+    Raises
+    ------
+    Problem
+        Where they show no face, or it is not clear whose face is meant.
+    """
     with_face = [r for r in records if r.face_box]
     if not with_face:
         raise Problem("A face was found only in frames that are blurred and were left out.", FIND_FACE)

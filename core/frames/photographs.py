@@ -25,8 +25,20 @@ AS_JPEG = "Export them as JPEG or PNG."
 
 
 def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
-    """At most `most` photographs, evenly spread; those that cannot be read are left out, with a finding. Raises Problem
-    where there are none, or none can be read."""
+    """Photographs of a folder, evenly spread; those that cannot be read are left out, with a finding.
+
+    Parameters
+    ----------
+    folder : that holds them
+    most : how many at most
+    long_side : pixels; larger ones are shrunk to it
+    report : takes the findings
+
+    Raises
+    ------
+    Problem
+        Where there are none, or none can be read.
+    """
     files = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
     pictures = [p for p in files if p.suffix.lower() in PHOTOGRAPHS]
     unread = [UNREAD[p.suffix.lower()] for p in files if p.suffix.lower() in UNREAD]

@@ -39,8 +39,20 @@ LARGE_PX = 2560 * 1440
 
 
 def read_video(path: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
-    """At most `most` frames of a video, evenly spread in time. Raises Problem for what is not a video that can be
-    read."""
+    """Frames of a video, evenly spread in time.
+
+    Parameters
+    ----------
+    path : the video
+    most : how many at most
+    long_side : pixels; larger ones are shrunk to it
+    report : takes the findings
+
+    Raises
+    ------
+    Problem
+        For what is not a video that can be read.
+    """
     index = _index(path, report)
     wanted = evenly_in_time(index.times, most)
     given, corrupt = 0, 0

@@ -88,7 +88,7 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
         face, bary = np.flatnonzero(crossing)[face[inside]], bary[inside].astype(np.float64)
         points = raster.interpolate(patch.vertices, patch.faces, face, bary)
         t, b, n = surfaces.frames(normals, patch.faces, tangent, hand, face, bary)
-        there, at = source.surface.partners(points, n, farthest)
+        there, at = source.surface.find_partners(points, n, farthest)
         matched = there >= 0
         read = (source.mesh.uvs[source.mesh.face_uvs[there[matched]]] * at[matched, :, None]).sum(1)
         angle = _turn(source, there[matched], at[matched], t[matched], b[matched], n[matched])

@@ -31,8 +31,8 @@ def pictures_of(capture: Capture, folder: str, kind: str) -> list[tuple[View, Pa
 
     Raises Problem where none belongs to a registered frame.
     """
-    return match(read_views(capture), {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()},
-                 Path(folder), kind, bool(folder))
+    video_frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
+    return match_pictures(read_views(capture), video_frames, Path(folder), kind, bool(folder))
 
 
 def delit_views(capture: Capture) -> list[tuple[View, Path]]:
@@ -49,7 +49,20 @@ def read_picture(path: Path, view: View, kind: str) -> np.ndarray:
 
 
 def check_shape(path: Path, image: np.ndarray, view: View, kind: str) -> None:
-    """Raises Problem where a picture [H, W, ...] has another shape than its frame, or is too small to show the same."""
+    """Refuses a picture that cannot be its frame's.
+
+    Parameters
+    ----------
+    path : of the picture, for the Problem
+    image : [H, W, ...]
+    view : the frame's
+    kind : a word for these pictures, "delit"
+
+    Raises
+    ------
+    Problem
+        Where it has another shape than its frame, or is too small to show the same.
+    """
     height, width = image.shape[:2]
     if abs(width / height - view.width / view.height) > 0.01 or width * MOST_REDUCTION < view.width:
         raise Problem(f"{path} is {width} x {height}, but its frame is {view.width} x {view.height}.",
@@ -57,10 +70,23 @@ def check_shape(path: Path, image: np.ndarray, view: View, kind: str) -> None:
                       "cropping or turning them.")
 
 
-def match(views: list[View], video_frames: dict[str, int], path: Path, kind: str = "delit",
-          folder_chosen: bool = True) -> list[tuple[View, Path]]:
-    """Each registered view with its picture in the folder `path`, in frame order; `video_frames`: frame name -> number
-    in the video."""
+def match_pictures(views: list[View], video_frames: dict[str, int], path: Path, kind: str = "delit",
+                   folder_chosen: bool = True) -> list[tuple[View, Path]]:
+    """Each registered view with its picture, in frame order.
+
+    Parameters
+    ----------
+    views : the registered ones
+    video_frames : frame name -> number in the video
+    path : the folder of pictures
+    kind : a word for them, "delit"
+    folder_chosen : whether anybody named the folder
+
+    Raises
+    ------
+    Problem
+        Where there is no such folder, or none of its pictures belongs to a registered frame.
+    """
     if not folder_chosen or not path.is_dir():
         raise Problem(f"There is no folder {str(path)!r} with {kind} pictures." if folder_chosen
                       else f"No folder of {kind} pictures was chosen.",

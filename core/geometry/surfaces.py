@@ -39,27 +39,54 @@ class Surface:
         self._tree = cKDTree(corners.mean(1))
         self._caster = RayCaster(mesh)
 
-    def partners(self, points: np.ndarray, normals: np.ndarray, farthest: float,
-                 cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
-        """points [N, 3] with unit normals [N, 3] -> triangle int64 [N] (-1: no partner within `farthest` metres) and
-        barycentric [N, 3]."""
+    def find_partners(self, points: np.ndarray, normals: np.ndarray, farthest: float,
+                      cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
+        """The partners of points on another surface.
+
+        Parameters
+        ----------
+        points : [N, 3], in metres
+        normals : [N, 3], unit
+        farthest : metres within which a partner lies
+        cosine : of the two normals' angle; below it they do not face the same way
+
+        Returns
+        -------
+        Triangle int64 [N], -1 for no partner, and barycentric [N, 3].
+        """
         lift = NEAR_SHARE * farthest
-        face, bary, distance = self.along(points + lift * normals, -normals, normals, cosine)
+        face, bary, distance = self.cast_rays(points + lift * normals, -normals, normals, cosine)
         face = np.where(distance < 2 * lift, face, -1)
         missed = np.flatnonzero(face < 0)
-        face[missed], bary[missed] = self.nearest(points[missed], normals[missed], farthest, cosine)
+        face[missed], bary[missed] = self.find_nearest(points[missed], normals[missed], farthest, cosine)
         return face, bary
 
-    def along(self, origins: np.ndarray, directions: np.ndarray, normals: np.ndarray,
-              cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """First hits of rays [N, 3] as RayCaster.first_hits gives them, those left out (-1) where the surface does not
-        face the way of `normals`."""
+    def cast_rays(self, origins: np.ndarray, directions: np.ndarray, normals: np.ndarray,
+                  cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """First hits of rays, without those where the surface does not face the way of `normals`.
+
+        Parameters
+        ----------
+        origins : [N, 3], in metres
+        directions : [N, 3], unit
+        normals : [N, 3], unit
+        cosine : as in `find_partners`
+
+        Returns
+        -------
+        As RayCaster.first_hits; of what is left out only the triangle is -1.
+        """
         face, bary, distance = self._caster.first_hits(origins, directions)
         return np.where(self._agree(face, bary, normals, cosine), face, -1), bary, distance
 
-    def nearest(self, points: np.ndarray, normals: np.ndarray, farthest: float,
-                cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
-        """As `partners`, by distance alone."""
+    def find_nearest(self, points: np.ndarray, normals: np.ndarray, farthest: float,
+                     cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
+        """As `find_partners`, by distance alone.
+
+        Parameters
+        ----------
+        points, normals, farthest, cosine : as in `find_partners`
+        """
         face, bary = self._nearest_of(CANDIDATE_COUNTS[0], points, normals, farthest, cosine)
         missed = np.flatnonzero(face < 0)  # another sheet lies before the one that faces the same way
         face[missed], bary[missed] = self._nearest_of(

@@ -115,7 +115,7 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     head = model.mesh.moved(_finished(placed, aligned, fitted.vertices, report))
     quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), face_marks,
                     subject.follow)
-    quality.figures_of_views(report, fitted, views, head)
+    quality.report_views(report, fitted, views, head)
     quality.judge_views(head, fitted)
     quality.tell_draft(report, views, head)
     _finish(capture, settings, views, head, subject, report)

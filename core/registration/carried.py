@@ -22,7 +22,8 @@ ROUND_RADIUS_SHARE = 0.06
 """Deviation from a sphere, as a share of its radius, below which a part is a ball."""
 
 
-def along(start: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray, report: Reporter) -> np.ndarray:
+def carry_along(start: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray,
+                report: Reporter) -> np.ndarray:
     """The final vertices of a mesh whose skin was fitted: eyes, teeth and other parts go along.
 
     Parameters

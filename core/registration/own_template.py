@@ -75,7 +75,16 @@ class BuiltIn:
 
 
 def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report: Reporter) -> None:
-    """Writes own_head.obj, or removes that of another template where none is chosen."""
+    """Writes own_head.obj, or removes that of another template where none is chosen.
+
+    Parameters
+    ----------
+    capture : takes the files
+    settings : that name the artist's mesh
+    head : as registered, in metres
+    ours : the model and weights that it was registered with
+    report : takes the figures
+    """
     if not settings.registration.template:
         for path in (capture.own_head, capture.own_head_skin, capture.picture("registration", "own_template")):
             remove_file(path)
@@ -98,7 +107,18 @@ def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report:
 
 
 def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> FittedTemplate:
-    """Lays the artist's mesh over the head. Raises Problem where no face is found on it or the fit does not hold."""
+    """Lays the artist's mesh over the head.
+
+    Parameters
+    ----------
+    own : the artist's mesh, in any unit and pose
+    head, ours, report : as in `run`
+
+    Raises
+    ------
+    Problem
+        Where no face is found on it or the fit does not hold.
+    """
     whole, index = surfaces.welded(own.mesh)
     first = np.full(len(whole.vertices), -1)
     first[index[::-1]] = np.arange(len(index))[::-1]  # an old vertex of each welded one
@@ -109,7 +129,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     known = np.flatnonzero(np.isfinite(landmarks.points).all(1))
     seen = landmarks.points[known]
     # any side of the surface will do
-    at, bary = surfaces.Surface(whole, 0.004).nearest(seen, np.tile([0.0, -1.0, 0.0], (len(seen), 1)), 0.02, -1.0)
+    at, bary = surfaces.Surface(whole, 0.004).find_nearest(seen, np.tile([0.0, -1.0, 0.0], (len(seen), 1)), 0.02, -1.0)
     label = _components(whole)
     main = np.bincount(label[whole.faces[at[at >= 0], 0]]).argmax()
     used = np.flatnonzero(label == main)
@@ -149,10 +169,10 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     distances = dense.distances(vertices[drawn], vertex_normals(final)[drawn], 0.01)
     _require_laid(own, distances, int(drawn.sum()))
     everything = placed.apply(whole.vertices + np.tensordot(coefficients, shapes, 1))
-    everything = carried.along(everything, label, used, vertices, report)
+    everything = carried.carry_along(everything, label, used, vertices, report)
     counterpart = np.zeros(len(whole.vertices), bool)
     normals = vertex_normals(final)
-    near = surface.nearest(vertices, normals, PAINTED_M)[0] >= 0
+    near = surface.find_nearest(vertices, normals, PAINTED_M)[0] >= 0
     counterpart[used] = near & (_free_sky(final, normals) > OPEN_SKY_SHARES[0])
     return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances,
                           nonrigid.flipped_triangles(skin.moved(start), final), pictures)
@@ -188,7 +208,7 @@ def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, 
                         lambda share: report.progress(0.5 * share, 1, "fitting the head to the scan"))
     known = np.flatnonzero(follow > 0.1)
     source = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M)
-    face, bary = source.nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
+    face, bary = source.find_nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
     known, face, bary = known[face >= 0], face[face >= 0], bary[face >= 0]
     shift = ((head.vertices - over)[head.faces[face]] * bary[..., None]).sum(1)
     return start + carried.field(start[known], shift, start, report)
@@ -199,7 +219,7 @@ def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficien
     """How far each vertex of the placed skin is drawn to the head [V] in [0, 1]."""
     at = model.mesh.moved(placed.apply(model.shape(coefficients)))
     normals = vertex_normals(at)
-    face, bary = surface.nearest(at.vertices, normals, REACH_M[1])
+    face, bary = surface.find_nearest(at.vertices, normals, REACH_M[1])
     there = face >= 0
     distance = np.full(len(face), np.inf)
     nearest = raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there], bary[there])

@@ -116,8 +116,16 @@ def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follo
                            f"Film once more and bring {name} well into view, in sharp frames.")
 
 
-def figures_of_views(report: Reporter, fitted, views: list[View], head: Mesh) -> None:
-    """Figures of a fit (unscanned.FittedHead) to what the views show."""
+def report_views(report: Reporter, fitted, views: list[View], head: Mesh) -> None:
+    """Figures of a fit to what the views show.
+
+    Parameters
+    ----------
+    report : takes them
+    fitted : unscanned.FittedHead
+    views : that it was fitted to
+    head : as fitted, in metres
+    """
     for name, count in fitted.used.items():
         report.figure(f"constraints_by_{name}", count)
         report.figure(f"miss_of_{name}_mm", round(1e3 * fitted.miss_m[name], 2) if count else None)

@@ -100,8 +100,21 @@ def measure(start: Mesh, views: list[View], voxel: float, box: np.ndarray, devic
 
 def train(start: Mesh, photographs: list[UndistortedFrame], rasterize: Callable, device: str = "cuda",
           steps: int = STEPS, tick: Callable[[int, float], None] = lambda step, loss: None) -> list[DepthMap]:
-    """Depth maps of the trained surfels, one per photograph. `start`: a surface that is nearly right, its vertices as
-    dense as the surfels shall be."""
+    """Trains surfels until they look like the photographs.
+
+    Parameters
+    ----------
+    start : a surface that is nearly right, in metres, its vertices as dense as the surfels shall be
+    photographs : the frames
+    rasterize : gsplat's `rasterization_2dgs`, or a function with its signature
+    device : that torch computes on
+    steps : one photograph each
+    tick : is called with each step's number and loss
+
+    Returns
+    -------
+    Depth maps of the surfels, one per photograph.
+    """
     surfels = _surfels(start, photographs, device)
     optimiser = torch.optim.Adam(
         [{"params": [surfels[name]], "lr": rate} for name, rate in LEARNING_RATES.items()], eps=1e-15

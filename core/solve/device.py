@@ -15,7 +15,7 @@ from functools import cache
 
 import torch
 
-from .prior import WEIGHTS, coordinates, load
+from .prior import WEIGHTS, load, make_coordinates
 from .skin_tone import GIVEN, SkinTone
 
 TRIAL_TEXELS = 128
@@ -73,7 +73,7 @@ def run_pass(device: str) -> tuple[torch.Tensor, float]:
     noisy, weights = (torch.randn(1, 7, TRIAL_TEXELS, TRIAL_TEXELS, generator=generator).to(device) for _ in range(2))
     weights = weights / (7 * TRIAL_TEXELS * TRIAL_TEXELS) ** 0.5
     middle = slice(512 - TRIAL_TEXELS // 2, 512 + TRIAL_TEXELS // 2)
-    coords = coordinates(1024, middle, middle).to(device)
+    coords = make_coordinates(1024, middle, middle).to(device)
     for _ in range(2):  # the first one brings kernels and memory
         started = time.perf_counter()
         x = noisy.clone().requires_grad_(True)

@@ -16,8 +16,15 @@ from .evidence import Evidence
 
 def snap_to_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor,
                   check: Callable[[], None] = lambda: None) -> Evidence:
-    """The evidence with `place`'s alpha for its own; light [3, S, S], weight [S, S] and check as there. What is
-    protected stays out of M."""
+    """The evidence with `place`'s alpha for its own. What is protected stays out of M.
+
+    Parameters
+    ----------
+    evidence : of the capture
+    light : [3, S, S], linear, as `place` takes it but for the order of its axes
+    weight : [S, S] in [0, 1], how far a texel tells of light
+    check : may raise to cancel
+    """
     edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), (weight * evidence.covered).numpy(),
                  evidence.texel, check)
     alpha = torch.from_numpy(edge.alpha) * (1 - evidence.protected) * evidence.covered

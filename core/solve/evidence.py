@@ -20,7 +20,7 @@ from ..face.shown_parts import read_hidden_skin
 from ..geometry import raster
 from ..imaging import images
 from .lighting import Shader
-from .prior import coordinates
+from .prior import make_coordinates
 from .problem import Observation, blur_maps
 from .recipes import Recipe
 
@@ -178,7 +178,7 @@ def make_observations(evidence: Evidence, exposure: float, cell: float, multiple
                       else alpha + recipe.open * (1 - alpha) * (1 - protected))
         whole = size * REFERENCE_TEXELS // extent.side
         top, left = (start * whole // REFERENCE_TEXELS for start in (extent.top, extent.left))
-        coords = coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
+        coords = make_coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
         restraint = 1.0 if evidence.added is None else 1 - torch.from_numpy(_sized(evidence.added.numpy(), size))
         missing = 0.0 if evidence.missing is None else torch.from_numpy(_sized(evidence.missing.numpy(), size))

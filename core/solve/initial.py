@@ -17,7 +17,7 @@ from .edges import snap_to_edges
 from .evidence import Evidence, grid_cells, make_observations
 from .lighting import Lights, constant_light, fit_around_constant, fit_global, shading_basis
 from .marks import Mark, protect_marks
-from .prior import Prior, coordinates, mean_at
+from .prior import Prior, make_coordinates, mean_at
 from .problem import Observation, State
 from .problem import albedo as albedo_of
 from .recipes import OURS, Recipe, free_recipe, settle_recipe
@@ -212,7 +212,7 @@ def tint_face(face: torch.Tensor, tone: torch.Tensor, skin: torch.Tensor) -> tor
     """A face [7, R, R] in the form of the prior's mean face as x [1, 7, S, S], the mean of its skin [S, S] brought to
     the tone, linear [3]."""
     size = skin.shape[0]
-    out = mean_at(face.to(tone.device), coordinates(size, slice(0, size), slice(0, size)), tone[None])
+    out = mean_at(face.to(tone.device), make_coordinates(size, slice(0, size), slice(0, size)), tone[None])
     albedo = albedo_of(out)
     out[0, :3] = 2 * albedo * (tone / mean_tone(albedo, skin))[:, None, None] - 1
     return out

@@ -44,7 +44,8 @@ def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: Cond
     x : float32 [N, C, H, W], noised maps
     sigma : [N], the noise level that the network is told
     condition : with a mean and a spread D is the best estimate of a Gaussian of these where the network has nothing to
-    say levels : [N, C, 1, 1], the noise levels of the channels where they differ
+        say
+    levels : [N, C, 1, 1], the noise levels of the channels where they differ
 
     Returns
     -------

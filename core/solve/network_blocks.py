@@ -53,8 +53,8 @@ class Residual(nn.Module):
         nn.init.zeros_(self.main["6"].bias)
 
     def forward(self, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
-        y = Shaped.of(self.main["0"], self.main["2"], x, mapped)
-        return Shaped.of(self.main["4"], self.main["6"], y, mapped) + self.skip(x)
+        y = Shaped.convolve(self.main["0"], self.main["2"], x, mapped)
+        return Shaped.convolve(self.main["4"], self.main["6"], y, mapped) + self.skip(x)
 
 
 class Shaped(torch.autograd.Function):
@@ -63,7 +63,19 @@ class Shaped(torch.autograd.Function):
     in strips where texels do not depend on each other. The same numbers in less than half the memory."""
 
     @staticmethod
-    def of(norm: Norm, convolution: nn.Conv2d, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
+    def convolve(norm: Norm, convolution: nn.Conv2d, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
+        """convolution(gelu(norm(x))), in whichever way is to be had.
+
+        Parameters
+        ----------
+        norm, convolution : the layers
+        x : [N, C, H, W]
+        mapped : [N, M], the mapped noise level and conditions
+
+        Returns
+        -------
+        [N, C', H, W].
+        """
         # it learns, or nobody asks for a gradient
         if mapped.requires_grad or convolution.weight.requires_grad or not x.requires_grad:
             return convolution(functional.gelu(norm(x, mapped)))
@@ -71,6 +83,13 @@ class Shaped(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx, x: torch.Tensor, mapped: torch.Tensor, norm: Norm, convolution: nn.Conv2d) -> torch.Tensor:
+        """What torch.autograd.Function asks for.
+
+        Parameters
+        ----------
+        ctx : keeps what `backward` needs
+        x, mapped, norm, convolution : as in `convolve`
+        """
         ctx.save_for_backward(x, mapped)
         ctx.layers = norm, convolution
         inner = torch.empty_like(x)

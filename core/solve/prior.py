@@ -47,12 +47,7 @@ class Prior:
                  spread: torch.Tensor | None = None, tones: list | None = None, references: torch.Tensor | None = None):
         self.network = network.eval().requires_grad_(False)
         self.octaves, self.mean_face, self.spread, self.tones, self.references = (
-            octaves,
-            mean_face,
-            spread,
-            tones or [],
-            references,
-        )
+            octaves, mean_face, spread, tones or [], references)
         self.multiple = network.multiple
 
     @property
@@ -82,8 +77,8 @@ class Prior:
         blind = torch.zeros(1, device=self.device) if self.network.mapping_cond.in_features == 5 else None
         return make_condition(coords, self.octaves, self.mean_face, self.spread, tone, blind)
 
-    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor,
-                tone: torch.Tensor | None) -> torch.Tensor:
+    def _respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor,
+                 tone: torch.Tensor | None) -> torch.Tensor:
         """`ConditionedPrior.respond` for a skin of tone [1, 3]."""
         known = make_condition(coords, self.octaves, self.mean_face, self.spread, tone,
                                blind=torch.ones(1, device=self.device))
@@ -104,8 +99,8 @@ class ConditionedPrior:
         self._condition: Condition | None = None
 
     def __call__(self, x: torch.Tensor, sigma: float, coords: torch.Tensor) -> torch.Tensor:
-        """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `coordinates`, one texel apart
-        in the map's own scale."""
+        """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `make_coordinates`, one texel
+        apart in the map's own scale."""
         if self._coords is not coords:
             known = self.prior.condition_at(coords, self.tone)
             if known.mean is not None:  # it goes in as it is: kept as the network takes it, at half the memory
@@ -120,7 +115,7 @@ class ConditionedPrior:
 
         A sample's are one possibility; these are the mean of all, in one evaluation of the network.
         """
-        return self.prior.respond(maps, coords, noise, self.tone)
+        return self.prior._respond(maps, coords, noise, self.tone)
 
 
 class ReleasedPrior(Prior):
@@ -151,8 +146,8 @@ class ReleasedPrior(Prior):
         """It takes no tone: the same for everybody."""
         return ConditionedPrior(self, None)
 
-    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor,
-                tone: torch.Tensor | None) -> torch.Tensor:
+    def _respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor,
+                 tone: torch.Tensor | None) -> torch.Tensor:
         """The maps as they are: a released prior was not taught to answer in one evaluation."""
         return maps
 
@@ -181,8 +176,16 @@ def unpack_maps(levels: torch.Tensor, limits: torch.Tensor) -> torch.Tensor:
 
 def make_condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor,
                    tone: torch.Tensor, blind: torch.Tensor | None) -> Condition:
-    """What our network is told of maps at coords [N, 2, H, W] of skins of tone [N, 3]. blind [N] is 1 where the normals
-    and specular it gets are pure noise (`denoise`'s `levels` are BLIND_SIGMA there): they follow from the diffuse."""
+    """What our network is told of maps.
+
+    Parameters
+    ----------
+    coords : [N, 2, H, W], from `make_coordinates`
+    octaves, mean_face, spread : as `Prior` has them
+    tone : [N, 3] of the skins, linear RGB
+    blind : [N], 1 where the normals and specular it gets are pure noise (`denoise`'s `levels` are BLIND_SIGMA there):
+        they follow from the diffuse; None for a network that is not told
+    """
     texel = 512 * (coords[:, 0, 0, 1] - coords[:, 0, 0, 0]).abs()  # side of a texel in texels of a 1024 map
     scale = torch.cat([spread[:3] * tone, spread[3:].expand(len(tone), -1)], 1)
     mapping = torch.cat([texel.log2()[:, None], tone.clamp_min(1e-3).log() / 2 + 0.6], 1)  # logarithms of about -1 to 1
@@ -238,18 +241,20 @@ def build_network(config: dict) -> UNet:
     channels = {"coord": 2, "posenc": 2 + 4 * int(cond.get("pos_enc_freq", 0)), "noise": 3}[cond.get("type", "coord")]
     augmented = 9 if model.get("augment_wrapper", True) else 0
     return UNet(UNetLayout(model["input_channels"], channels, model["mapping_out"], model["depths"], model["channels"],
-                           model.get("self_attn_depths"),
-                           model.get("patch_size", 1), augmented + model.get("mapping_cond_dim", 0),
-                           model.get("sigma_data", 1.0),
+                           model.get("self_attn_depths"), model.get("patch_size", 1),
+                           augmented + model.get("mapping_cond_dim", 0), model.get("sigma_data", 1.0),
                            model.get("norm", "group"), model.get("skip_stages", 0), model.get("has_variance", False)))
 
 
-def coordinates(size: int, rows: slice, columns: slice, centred: bool = True) -> torch.Tensor:
-    """UV coordinates [1, 2, h, w] in [-1, 1] of a window of a size x size map: channel 0 grows with the column, 1 with
-    the row.
+def make_coordinates(size: int, rows: slice, columns: slice, centred: bool = True) -> torch.Tensor:
+    """UV coordinates [1, 2, h, w] in [-1, 1] of a window of a map: channel 0 grows with the column, 1 with the row.
 
-    Ours are those of texel centres, so that they agree between scales; the released code's (`centred=False`) those of
-    the upper left corners.
+    Parameters
+    ----------
+    size : of the map, in texels along a side
+    rows, columns : of the window
+    centred : those of texel centres, as ours are, so that they agree between scales; else those of the upper left
+        corners, as in the released code
     """
     line = 2 * (torch.arange(size) + (0.5 if centred else 0.0)) / size - 1
     return torch.stack(torch.meshgrid(line[columns], line[rows], indexing="xy"))[None]
@@ -267,11 +272,8 @@ def _load_ours(path: Path) -> Prior:
     with safe_open(path, "pt") as file:
         tensors = {name: file.get_tensor(name).float()
                    for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    mean_face, spread, references = (
-        tensors.pop("mean_face"),
-        tensors.pop("spread"),
-        unpack_maps(tensors.pop("references"), tensors.pop("references_range")),
-    )
+    mean_face, spread, references = (tensors.pop("mean_face"), tensors.pop("spread"),
+                                     unpack_maps(tensors.pop("references"), tensors.pop("references_range")))
     network = build_network(card)
     network.load_state_dict(tensors)
     return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, card["tones"], references)

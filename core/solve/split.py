@@ -202,7 +202,13 @@ def model_covariances(rows: Places, columns: Places) -> Covariances:
 
 def find_scales(together: Covariances, log_ratio: np.ndarray, typical: Scales = TYPICAL_SCALES,
                 check: Callable[[], None] = lambda: None) -> Scales:
-    """The most probable scales, by a search along one of them after the other."""
+    """The most probable scales, by a search along one of them after the other.
+
+    Parameters
+    ----------
+    together, log_ratio, typical : as in `log_probability`
+    check : may raise to cancel
+    """
     best, most = typical, log_probability(together, log_ratio, typical, typical)
     for step in (2.0, 1.4, 1.2):
         moved = True

@@ -10,7 +10,7 @@ import numpy as np
 
 from .canvas import Canvas
 from .regions import lid_lines, regions
-from .spots import splat, strew
+from .spots import splat_spots, strew
 
 # albedo, linear sRGB
 LIPSTICKS = np.array([[0.30, 0.02, 0.03], [0.45, 0.10, 0.12], [0.20, 0.01, 0.04], [0.50, 0.16, 0.10],
@@ -27,9 +27,16 @@ class Scars(NamedTuple):
     ridge: np.ndarray
 
 
-def scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator) -> Scars:
-    """Thin lines of 4 to 20 mm, old ones pale, young ones red, sunken or raised; `expected` of them on the bare skin of
-    face and neck."""
+def paint_scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator) -> Scars:
+    """Thin lines of 4 to 20 mm on the bare skin of face and neck, old ones pale, young ones red, sunken or raised.
+
+    Parameters
+    ----------
+    on : what is painted on
+    ground : of the same head, GROUND texels wide: where they begin
+    expected : their mean number
+    rng : draws them
+    """
     nothing = np.zeros(len(on.position), np.float32)
     if expected <= 0:
         return Scars(nothing, nothing, nothing)
@@ -43,7 +50,7 @@ def scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator)
         line = begin + (along * way + bow) * rng.uniform(4, 20) / max(np.linalg.norm(way), 1e-6)
         _, nearest = on.tree.query(line)  # lays it onto the surface
         line, width = on.position[nearest], rng.uniform(0.3, 0.9)
-        mark = splat(on, line, width * np.sin(np.linspace(0.15, np.pi - 0.15, len(line))), np.ones(len(line)))
+        mark = splat_spots(on, line, width * np.sin(np.linspace(0.15, np.pi - 0.15, len(line))), np.ones(len(line)))
         young = rng.random() ** 2
         stain -= mark * (0.8 - 0.5 * young) * np.float32(rng.uniform(0.5, 1.2))
         flush += mark * np.float32(1.4 * young - 0.3)
@@ -55,14 +62,26 @@ def lid_distance(on: Canvas) -> np.ndarray:
     """Closeness [N] in [0, 1] to the line where the lids meet: 1 on it, 0 from about 2 mm on."""
     if "lid line" not in on.cache:
         lids = lid_lines(on)
-        on.cache["lid line"] = splat(on, lids, np.full(len(lids), 1.0), np.ones(len(lids)))
+        on.cache["lid line"] = splat_spots(on, lids, np.full(len(lids), 1.0), np.ones(len(lids)))
     return on.cache["lid line"]
 
 
-def made_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float,
-            rng: np.random.Generator) -> np.ndarray:
-    """The albedo [N, 3] under make-up: each of lipstick, eye shadow, liner and blusher is worn or not, up to `amount`
-    in [0, 1]."""
+def put_on_make_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float,
+                   rng: np.random.Generator) -> np.ndarray:
+    """Each of lipstick, eye shadow, liner and blusher is worn or not, at random.
+
+    Parameters
+    ----------
+    diffuse : [N, 3], linear albedo
+    area : `regions` of the canvas
+    lids : [N], `lid_distance` of the canvas
+    amount : in [0, 1], strength at most; 0 is none
+    rng : what is worn, how strong and of which colour
+
+    Returns
+    -------
+    [N, 3], linear albedo.
+    """
     if amount <= 0:
         return diffuse
     worn = amount * (rng.random(4) < [0.8, 0.5, 0.5, 0.6]) * rng.uniform(0.4, 1.0, 4)

@@ -95,15 +95,28 @@ def canvas(size: int) -> Canvas:
 
 
 def make_canvas(mesh: Mesh, size: int, landmarks: np.ndarray, mask: Callable[[str], np.ndarray]) -> Canvas:
-    """Of any head in metres (face towards -Y) with UVs, its MediaPipe landmarks [468, 3] in metres and masks [S, S] by
-    name."""
+    """The canvas of any head.
+
+    Parameters
+    ----------
+    mesh : in metres, its face towards -Y, with UVs
+    size : texels along a side
+    landmarks : [468, 3], MediaPipe's, in metres
+    mask : name -> [size, size] in [0, 1]
+    """
     return _canvas(mesh, size, *raster.rasterize_uv(mesh, size), landmarks, mask)
 
 
-def window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
-    """A square window, `side` texels wide, of the built-in template's canvas of `size`: what is painted on it is what
-    the whole would show there, but for what is laid onto the nearest texel from outside (hairs and scars that begin
-    beyond its border)."""
+def make_window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
+    """A square window of the built-in template's canvas: what is painted on it is what the whole would show there, but
+    for what is laid onto the nearest texel from outside (hairs and scars that begin beyond its border).
+
+    Parameters
+    ----------
+    size : texels along a side of the whole, a multiple of MASK_SIZE
+    row, column : of the window's first texel, from the top left; multiples of size / MASK_SIZE
+    side : of the window in texels, likewise
+    """
     mesh = template.load()
     face, bary = raster.rasterize_uv(mesh, size, (row, row + side))
     columns, factor = slice(column, column + side), size // MASK_SIZE

@@ -12,9 +12,21 @@ from .canvas import Canvas
 from .spots import strew
 
 
-def brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
-    """How much of each texel brow hair covers, [N] in [0, 1]; `region` on the ground is where it grows, `density` 1 is
-    a usual brow."""
+def grow_brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+    """How much of each texel brow hair covers.
+
+    Parameters
+    ----------
+    on : what is painted on
+    ground : of the same head, where hairs root
+    region : [M] in [0, 1] on the ground, where brows grow
+    density : 1 is a usual brow
+    rng : of single hairs
+
+    Returns
+    -------
+    [N] in [0, 1], on `on`.
+    """
     # a sparse brow is a narrow one
     roots, texel = strew(ground, 1.2 * density * np.clip(region * 2.2 - 1.3 + 0.8 * min(density, 1.2), 0, 1), rng)
     outer = np.abs(roots[:, 0:1]) / np.abs(ground.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
@@ -25,10 +37,23 @@ def brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: n
     return _strokes(on, roots, direction, rng.uniform(4.5, 8, len(roots)), 0.11, np.full(len(roots), -0.25), rng)
 
 
-def stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float,
-            rng: np.random.Generator) -> np.ndarray:
-    """Cover [N] of beard hair of `length` mm (0.3: shaven yesterday) at `density` hairs per mm^2 in the full of
-    `region` [N] on the ground."""
+def grow_stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float,
+                 rng: np.random.Generator) -> np.ndarray:
+    """How much of each texel beard hair covers.
+
+    Parameters
+    ----------
+    on : what is painted on
+    ground : of the same head, where hairs root
+    region : [M] in [0, 1] on the ground, where a beard grows
+    density : hairs per mm^2 in the full of the region
+    length : in mm; 0.3 is shaven yesterday
+    rng : of single hairs
+
+    Returns
+    -------
+    [N] in [0, 1], on `on`.
+    """
     roots, texel = strew(ground, density * np.clip(region * 1.3 - 0.15, 0, 1) ** 1.5, rng)
     aside = np.sign(roots[:, 0:1]) * 0.25 + rng.normal(0, 0.35, (len(roots), 1))
     down = aside * _along(ground.normal[texel], [1.0, 0, 0]) - _along(ground.normal[texel], [0, 0, 1.0])
@@ -41,8 +66,20 @@ def beard_shadow(albedo: np.ndarray, amount: np.ndarray) -> np.ndarray:
     return albedo * (1 - amount[:, None] * np.array([0.42, 0.30, 0.22], np.float32))
 
 
-def cropped(on: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
-    """Cover [N] of very short hair on the scalp; `region` [N] on this canvas."""
+def grow_cropped_hair(on: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+    """How much of each texel very short hair of the scalp covers.
+
+    Parameters
+    ----------
+    on : what is painted on
+    region : [N] in [0, 1] on it, the scalp
+    density : mean cover in [0, 1] in the full of the region
+    rng : of the grain
+
+    Returns
+    -------
+    [N] in [0, 1].
+    """
     cover, there = np.zeros_like(region), region > 0.01
     grain = octaves(on.position[there], [0.6, 1.1], rng)
     patchy = octaves(on.position[there], [9.0], rng)

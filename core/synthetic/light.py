@@ -88,10 +88,21 @@ def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str,
     return spread(shading), spread(shadow), spread(normals)
 
 
-def transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster,
-             rays: int = TRANSFER_RAYS) -> np.ndarray:
-    """[N, 9]: shading of points [N, 3] per coefficient of the sky's radiance, blocked where the mesh is in the way; an
-    open surface under radiance 1 gets 1."""
+def trace_transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster,
+                   rays: int = TRANSFER_RAYS) -> np.ndarray:
+    """Shading of points per coefficient of the sky's radiance, blocked where the mesh is in the way.
+
+    Parameters
+    ----------
+    points : [N, 3] on it, in metres
+    normals : [N, 3], unit
+    caster : of the mesh
+    rays : of each point
+
+    Returns
+    -------
+    [N, 9]; an open surface under radiance 1 gets 1.
+    """
     return radiance_transfer(caster, points, normals, rays)
 
 
@@ -116,15 +127,27 @@ def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray,
     if shadows != "self":
         away = rng.uniform(0.25, 1.0)  # metres to what throws the shadow
         at = points[None, facing] + away * directions[:, None]
-        seen[:, facing] *= 1 - in_the_way(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
+        seen[:, facing] *= 1 - draw_sheet(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
     share = np.zeros(len(points))
     share[facing] = seen[:, facing].mean(0)
     return share
 
 
-def in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
-    """How far an opaque sheet with holes covers (x, y) [...] in metres, in a plane across the sunlight; edges are
-    `blur` metres wide, the distance between two of the sun's rays there, so that few rays make an even penumbra."""
+def draw_sheet(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
+    """How far an opaque sheet with holes, drawn at random, covers places in a plane across the sunlight.
+
+    Parameters
+    ----------
+    x, y : [...], the places, in metres
+    blur : width of the sheet's edges, in metres; where rays are cast, the distance between two of them there, so that
+        few make an even penumbra
+    kind : edge or blinds; leaves otherwise
+    rng : of the sheet
+
+    Returns
+    -------
+    [...] in [0, 1]; 1 where it is opaque.
+    """
     turn, shift = rng.uniform(0, np.pi), rng.uniform(-0.05, 0.05)
     along = (x - x.mean()) * np.cos(turn) + (y - y.mean()) * np.sin(turn) + shift
     if kind == "edge":
@@ -143,9 +166,9 @@ def in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.ran
 
 @lru_cache(maxsize=2)
 def sky_transfer() -> np.ndarray:
-    """`transfer` of the built-in head's vertices [V, 9]; computed once per process."""
+    """`trace_transfer` of the built-in head's vertices [V, 9]; computed once per process."""
     mesh = template.load()
-    return transfer(mesh.vertices, vertex_normals(mesh), raster.RayCaster(mesh))
+    return trace_transfer(mesh.vertices, vertex_normals(mesh), raster.RayCaster(mesh))
 
 
 def _transfer_of(mesh: Mesh, caster: raster.RayCaster) -> np.ndarray:
@@ -153,4 +176,4 @@ def _transfer_of(mesh: Mesh, caster: raster.RayCaster) -> np.ndarray:
     same = template.load()
     if mesh.vertices.shape == same.vertices.shape and np.array_equal(mesh.vertices, same.vertices):
         return sky_transfer()
-    return transfer(mesh.vertices, vertex_normals(mesh), caster)
+    return trace_transfer(mesh.vertices, vertex_normals(mesh), caster)

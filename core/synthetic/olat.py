@@ -4,8 +4,8 @@
 a matrix product.
 
 One light at a time (Debevec et al. 2000): light is linear, so skin under an environment is the sum over the lights,
-weighted by its radiance. What is as hard as the sun falls between the lights; `sun_visibility` casts its rays at every
-pixel instead.
+weighted by its radiance. What is as hard as the sun falls between the lights; `trace_sun` casts its rays at every pixel
+instead.
 """
 
 from __future__ import annotations
@@ -54,11 +54,20 @@ def transport(stage: LightStage, vertices: np.ndarray) -> np.ndarray:
     return np.maximum(cosine, 0) * stage.visible[vertices] * np.float32(4 / LIGHTS)
 
 
-def mirrored(stage: LightStage, vertices: np.ndarray, environment: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """float32 [N, 3]: the environment [LIGHTS, 3] as a lobe of exponent GLOSS about the mirrored view shows it, blocked
-    by the head; `eye` [3] in metres.
+def mirror_environment(stage: LightStage, vertices: np.ndarray, environment: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    """What glossy skin shows of an environment, blocked by the head: a lobe of exponent GLOSS about the mirrored view.
+    Times Fresnel's reflectance it adds to the diffuse colour.
 
-    Times Fresnel's reflectance it is what glossy skin adds to its diffuse colour.
+    Parameters
+    ----------
+    stage : the head
+    vertices : int [N], of its mesh
+    environment : [LIGHTS, 3], linear radiance from DIRECTIONS
+    eye : [3], where the camera is, in metres
+
+    Returns
+    -------
+    float32 [N, 3], linear radiance.
     """
     normals = stage.normals[vertices]
     towards = (eye - stage.mesh.vertices[vertices]).astype(np.float32)
@@ -71,10 +80,25 @@ def mirrored(stage: LightStage, vertices: np.ndarray, environment: np.ndarray, e
     return (lobe * stage.visible[vertices]) @ environment.astype(np.float32) / np.maximum(weight, 1e-6)
 
 
-def sun_visibility(caster: RayCaster, points: np.ndarray, normals: np.ndarray, sun: np.ndarray, radius: float,
-                   rays: int, rng: np.random.Generator) -> np.ndarray:
-    """The share [N] of a disc of light about the unit direction `sun`, `radius` in radians, that points see past the
-    head: a denser cone of rays, turned at random per point, so that few rays give an even penumbra."""
+def trace_sun(caster: RayCaster, points: np.ndarray, normals: np.ndarray, sun: np.ndarray, radius: float,
+              rays: int, rng: np.random.Generator) -> np.ndarray:
+    """The share of a disc of light that points see past the head: a denser cone of rays, turned at random per point, so
+    that few rays give an even penumbra.
+
+    Parameters
+    ----------
+    caster : of the head
+    points : [N, 3], in metres
+    normals : [N, 3], unit
+    sun : [3], unit direction to the disc's middle
+    radius : of the disc, in radians
+    rays : of each point
+    rng : turns the cones
+
+    Returns
+    -------
+    float32 [N] in [0, 1]; 0 where the surface turns away.
+    """
     right = np.cross(sun, [0.0, 0.0, 1.0] if abs(sun[2]) < 0.9 else [1.0, 0.0, 0.0])
     right /= np.linalg.norm(right)
     up = np.cross(right, sun)

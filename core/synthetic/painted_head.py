@@ -54,10 +54,18 @@ def speaking(seed: int, jaw: float) -> tuple[raster.RayCaster, np.ndarray]:
     return raster.RayCaster(mesh), meshes.vertex_normals(mesh)
 
 
-def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035),
-           scale: float = 1.0) -> View:
-    """A camera that looks at the head; `height` above the eyes and `distance` in metres; `scale` of its picture's
-    size."""
+def place_camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035),
+                 scale: float = 1.0) -> View:
+    """A camera that looks at the head, which it shows alike large from any distance.
+
+    Parameters
+    ----------
+    azimuth_deg : where it stands; 0 is in front, positive on the person's left
+    height : above the eyes, in metres
+    distance : from the head's axis, in metres; the focal length goes with it
+    target : [3], what it looks at, in metres
+    scale : of the picture's size, WIDTH x HEIGHT at 1
+    """
     a = np.radians(azimuth_deg)
     centre, target = np.array([np.sin(a) * distance, -np.cos(a) * distance, height]), np.array(target)
     z = (target - centre) / np.linalg.norm(target - centre)
@@ -73,14 +81,28 @@ def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, targ
 def studio(scale: float = 1.0) -> list[View]:
     """Sixteen fixed cameras a metre away in two rows, over 100 degrees from side to side: the layout of multi-view
     studios as NeRSemble's."""
-    return [camera(azimuth, height, 1.0, scale=scale) for height in (-0.15, 0.25)
+    return [place_camera(azimuth, height, 1.0, scale=scale) for height in (-0.15, 0.25)
             for azimuth in np.linspace(-50, 50, 8)]
 
 
 def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: bool = False, seed: int = SEED,
                texels: int = 256, jaw: float = 0.0) -> np.ndarray:
-    """sRGB [H, W, 3]. `even`: light from everywhere. `turned_deg`: how far the person has turned the head to their
-    left; light and wall stay. `jaw`: how far it is open, in [0, 1]. Without `wall` the background is plain grey."""
+    """The person before a wall.
+
+    Parameters
+    ----------
+    view : the camera
+    turned_deg : how far the head is turned to the person's left; light and wall stay
+    wall : off, the background is plain grey
+    even : light from everywhere
+    seed : the person
+    texels : along a side of its albedo
+    jaw : how far it is open, in [0, 1]
+
+    Returns
+    -------
+    sRGB [H, W, 3].
+    """
     caster, normals, albedo = person(seed, texels)
     if jaw:
         caster, normals = speaking(seed, jaw)

@@ -48,13 +48,22 @@ TABLE = 512  # entries per axis; cv2.remap rounds to 1/32 of an entry
 
 def reflectance(melanin: np.ndarray, blood: np.ndarray, oxygen: float = 0.75, scattering: float = 1.0,
                 slope: float = 2.4, chroma: float = 1.0) -> np.ndarray:
-    """Diffuse albedo, linear sRGB float32 [..., 3], of melanin and blood volume fractions [...] (clipped to the model's
-    range).
+    """Diffuse albedo of melanin and blood, both clipped to the model's range.
 
-    `oxygen` is the saturated share of the blood, `scattering` a factor on the dermis's scattering (denser collagen is
-    lighter), `slope` the exponent by which melanin absorbs more towards blue: 3.33 for melanosomes alone (yellower),
-    less steep as seen through skin, `chroma` a power on the channels' ratios to luminance: cameras and artists show
-    skin more saturated than a spectrometer does.
+    Parameters
+    ----------
+    melanin : [...], volume fraction in the epidermis
+    blood : [...], volume fraction in the dermis
+    oxygen : saturated share of the blood
+    scattering : factor on the dermis's scattering; denser collagen is lighter
+    slope : exponent by which melanin absorbs more towards blue: 3.33 for melanosomes alone (yellower), less steep as
+        seen through skin
+    chroma : power on the channels' ratios to luminance; cameras and artists show skin more saturated than a
+        spectrometer does
+
+    Returns
+    -------
+    Linear sRGB, float32 [..., 3].
     """
     melanin, blood = np.asarray(melanin, np.float32), np.asarray(blood, np.float32)
     x = _position(blood, BLOOD_RANGE).reshape(1, -1)

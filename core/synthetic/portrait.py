@@ -3,8 +3,7 @@
 """Portraits under any light, with their truth: a subject on the light stage, an environment, suns and lamps with what
 stands before them, a camera.
 
-`relit` makes as many pictures of one sight as there are lights; `portrait` is one of a subject by seed, for tests and
-benchmarks.
+`relight_sight` makes as many pictures of one sight as there are lights.
 """
 
 from __future__ import annotations
@@ -17,10 +16,10 @@ import numpy as np
 from ..imaging import images
 from .environments import Environment, background_radiance, made_environment, panorama_environment
 from .fitted_light import FittedLight, LampOnHead, fitted_light
-from .light import in_the_way
-from .olat import BASIS, DIRECTIONS, LightStage, mirrored, transport
+from .light import draw_sheet
+from .olat import BASIS, DIRECTIONS, LightStage, mirror_environment, transport
 from .response import curve, develop, expose
-from .sight import MASKS, Sight, landmarks_of, look, random_camera
+from .sight import MASKS, Sight, landmarks_of, random_camera, trace_sight
 from .skin import Skin
 
 F0 = 0.08  # reflectance at normal incidence per Specular IOR Level of Blender's Principled BSDF
@@ -48,24 +47,41 @@ class Portrait:
     fitted: FittedLight
 
 
-def sight_of(stage: LightStage, skin: Skin, rng: np.random.Generator, size: int) -> Sight:
-    """A subject through a random camera."""
+def sample_sight(stage: LightStage, skin: Skin, rng: np.random.Generator, size: int) -> Sight:
+    """A subject through a random camera.
+
+    Parameters
+    ----------
+    stage : the head
+    skin : its maps
+    rng : of camera, eyes and lamps
+    size : pixels along a side
+    """
     camera = random_camera(landmarks_of(stage), size, rng)
-    return look(stage, camera, skin.diffuse, F0 * skin.specular, skin.normal, rng, open_eyes=rng.random() < 0.7)
+    return trace_sight(stage, camera, skin.diffuse, F0 * skin.specular, skin.normal, rng, open_eyes=rng.random() < 0.7)
 
 
-def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: list[np.ndarray] = (),
-          albedo: np.ndarray | None = None) -> Portrait:
-    """One picture of a sight under a random light. `albedo` [P, 3] replaces the sight's."""
+def relight_sight(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: list[np.ndarray] = (),
+                  albedo: np.ndarray | None = None) -> Portrait:
+    """One picture of a sight under a random light.
+
+    Parameters
+    ----------
+    sight : what is seen
+    stage : of the same head
+    rng : of light, background, hair and camera
+    panoramas : as `read_panoramas` gives them; they may light it
+    albedo : [P, 3], linear, in place of the sight's
+    """
     albedo = sight.albedo if albedo is None else albedo
     environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
                    and rng.random() < 0.6 else made_environment(rng))
     carried = transport(stage, sight.vertices)
     ambient, shine = _under(environment, sight, stage, carried)
-    lamps, colours, blocked = _lamps(environment, sight, rng)
+    lamps, colours, reaches = _lamps(environment, sight, rng)
     softness = np.exp(rng.uniform(np.log(0.2), np.log(2.5))) * sight.size / 256
     diffuse, specular = ambient, shine * _fresnel(sight)
-    for lamp, colour, reach in zip(lamps, colours, blocked, strict=True):
+    for lamp, colour, reach in zip(lamps, colours, reaches, strict=True):
         diffuse = diffuse + _softened(sight, np.maximum(sight.normal @ lamp, 0) * reach, softness) * colour
         specular = specular + (_highlight(sight, lamp, rng.uniform(0.3, 0.5)) * reach)[:, None] * colour
     radiance = sight.picture(albedo * diffuse + specular)
@@ -81,7 +97,7 @@ def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: 
     picture, hair = _haired(picture, sight, rng) if haired else (picture, np.zeros_like(head))
     truth = sight.picture(albedo)
     shading = images.srgb_to_linear(picture) / np.maximum(truth, 0.004)
-    shadow, strong = _shadow(sight, lamps, colours, blocked, ambient)
+    shadow, strong = _shadow(sight, lamps, colours, reaches, ambient)
     bare = 1 - hair
     return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None],
                     (images.srgb_to_linear(even) / np.where(head[..., None] > 0, sight.picture(plain), 1)
@@ -96,7 +112,7 @@ def _under(environment: Environment, sight: Sight, stage: LightStage,
     """Shading by the environment and its mirror image, [P, 3] each; `carried` is the light transport of the vertices
     seen."""
     lit = np.concatenate([carried @ environment.radiance,
-                          mirrored(stage, sight.vertices, environment.radiance, sight.eye)], 1)
+                          mirror_environment(stage, sight.vertices, environment.radiance, sight.eye)], 1)
     ambient, shine = np.split(sight.at_pixels(lit), 2, 1)
     # the stage's vertices know no pores: these turn to its bright side
     relief = 1 + 0.5 * ((sight.normal - sight.smooth) @ _brightest(environment))[:, None]
@@ -123,7 +139,7 @@ def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> 
         lamps.append(lamp)
         colours.append(colour.astype(np.float32))
         reach.append(sight.reach[k]
-                     * (1 - gobo(sight.position, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng)))
+                     * (1 - cast_gobo(sight.position, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng)))
     return lamps, colours, reach
 
 
@@ -135,16 +151,28 @@ def with_lips(tone: np.ndarray, albedo: np.ndarray, lips: np.ndarray) -> np.ndar
     return (tone + lips[..., None] * (own - tone)).astype(np.float32)
 
 
-def gobo(position: np.ndarray, lamp: np.ndarray, radius: float, kind: str,
-         rng: np.random.Generator) -> np.ndarray | float:
-    """The share [P] of a lamp's light that leaves, blinds or an edge before it take away from places [P, 3] in
-    metres."""
+def cast_gobo(position: np.ndarray, lamp: np.ndarray, radius: float, kind: str,
+              rng: np.random.Generator) -> np.ndarray | float:
+    """What leaves, blinds or an edge before a lamp take away of its light.
+
+    Parameters
+    ----------
+    position : [P, 3], in metres
+    lamp : [3], unit direction to it
+    radius : of the lamp, in radians; above 0.03 counts as that
+    kind : one of GOBOS
+    rng : of the gobo
+
+    Returns
+    -------
+    [P] in [0, 1]; 0 alone for none.
+    """
     if kind == "none":
         return 0.0
     right = np.cross(lamp, [0.0, 0.0, 1.0] if abs(lamp[2]) < 0.9 else [1.0, 0.0, 0.0])
     right /= np.linalg.norm(right)
     away = rng.uniform(0.1, 0.8)
-    return in_the_way(position @ right, position @ np.cross(right, lamp), max(2 * away * min(radius, 0.03), 4e-4), kind,
+    return draw_sheet(position @ right, position @ np.cross(right, lamp), max(2 * away * min(radius, 0.03), 4e-4), kind,
                       rng)
 
 

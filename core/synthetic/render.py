@@ -60,7 +60,15 @@ def add_camera(scene: bpy.types.Scene, job: dict) -> bpy.types.Object:
 
 def render_frames(scene: bpy.types.Scene, camera: bpy.types.Object, job: dict,
                   place: Callable[[int], None] = lambda number: None) -> None:
-    """The job's frames that do not exist yet; `place` puts what moves where it is in a frame."""
+    """Renders the job's frames that do not exist yet.
+
+    Parameters
+    ----------
+    scene : with everything in it
+    camera : moves to where it is in each frame
+    job : what was written for it (sample.py)
+    place : number of a frame -> None, puts what else moves where it is in it
+    """
     for number in job["frames"]:
         path = Path(job["out"]) / f"{number:05d}{job['suffix']}"
         if path.exists():

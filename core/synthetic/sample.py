@@ -77,7 +77,7 @@ def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: b
     """
     work.mkdir(parents=True, exist_ok=True)
     sun = scene.sun_of(seed)
-    light = light or scene.SceneLight(scene.SKY, sun, scene.leaves(seed, sun) if leaves else None)
+    light = light or scene.SceneLight(scene.SKY, sun, scene.strew_leaves(seed, sun) if leaves else None)
     meshes.write_obj(work / "head.obj", subject_mesh(seed))
     if light.blockers:
         meshes.write_obj(work / "leaves.obj", light.blockers)
@@ -103,7 +103,16 @@ def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: b
 
 
 def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> None:
-    """The video and its truth from rendered frames."""
+    """Writes the video and its truth from rendered frames.
+
+    Parameters
+    ----------
+    out : folder of both
+    work : folder of the frames, NNNNN.png
+    seed : the subject
+    skin : its maps, MAPS texels wide
+    frames : their number
+    """
     out.mkdir(parents=True, exist_ok=True)
     cameras = scene.camera_path(seed, frames)
     write_json(out / "cameras.json",
@@ -111,10 +120,10 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
                 "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
     write_video(out / "capture.mp4", (images.read_srgb(work / f"{k:05d}.png") for k in range(frames)))
     head, sun = subject_mesh(seed), scene.sun_of(seed)
-    opaque = joined([head, scene.leaves(seed, sun)])
+    opaque = joined([head, scene.strew_leaves(seed, sun)])
     total, count = np.zeros(3), 0
     for frame in truth_frames(frames):
-        albedo, alpha, face, shadow = frame_truth(head, opaque, skin, view_of(cameras[frame]), sun.direction)
+        albedo, alpha, face, shadow = trace_frame_truth(head, opaque, skin, view_of(cameras[frame]), sun.direction)
         name = f"{frame:04d}.png"
         for folder in ("albedo", "face", "shadow"):
             (out / folder).mkdir(exist_ok=True)
@@ -142,12 +151,23 @@ def view_of(matrix: np.ndarray, scale: float = 1.0) -> View:
     return View("", Path(), camera, rotation, -rotation @ matrix[:3, 3], True)
 
 
-def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None,
-                over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun
-    (unit direction, or None) does not reach.
+def trace_frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None,
+                      over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """What is true of a frame.
 
-    `opaque` is all that throws shadows, the head included; `over`: rays along a pixel's side.
+    Parameters
+    ----------
+    head : with UVs, in metres
+    opaque : all that throws shadows, the head included
+    skin : of it, MAPS texels wide
+    view : the camera, in the head's axes
+    sun : [3], unit direction to it; None: there is no shadow
+    over : rays along a pixel's side
+
+    Returns
+    -------
+    Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun does
+    not reach.
     """
     caster = raster.RayCaster(head)
     face, bary, _ = raster.render_view(caster, view, over)

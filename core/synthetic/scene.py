@@ -81,11 +81,17 @@ def sun_of(seed: int) -> Sun:
     return Sun(np.array([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)]))
 
 
-def leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: float = 0.15) -> Mesh:
-    """A loose twig between head and sun: pointed leaves of 2 to 5 cm, strewn over a disc of radius `reach` across the
-    beam.
+def strew_leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: float = 0.15) -> Mesh:
+    """A loose twig between head and sun: pointed leaves 2.4 to 5.6 cm long, strewn over a disc across the beam.
 
-    From `distance` metres the sun blurs their edges over 2 mm: hard shadows, as at noon under a tree.
+    Parameters
+    ----------
+    seed : of the twig
+    sun : whose beam it is
+    distance : from the head, in metres; at 0.4 the sun blurs their edges over 2 mm: hard shadows, as at noon under a
+        tree
+    count : of leaves
+    reach : radius of the disc, in metres
     """
     rng = np.random.default_rng([seed, 21])
     side, up = _across(sun.direction)

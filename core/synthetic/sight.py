@@ -21,7 +21,7 @@ from ..contract.files import replacing
 from ..face import template
 from ..geometry import raster
 from ..geometry.views import View
-from .olat import LightStage, sun_visibility
+from .olat import LightStage, trace_sun
 
 LAMPS, RAYS = 4, 8
 EYES = ((33, 133), (362, 263))  # corners among MediaPipe's landmarks
@@ -104,10 +104,20 @@ def landmarks_of(stage: LightStage) -> np.ndarray:
     return template.landmark_points(stage.mesh)
 
 
-def look(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, relief: np.ndarray,
-         rng: np.random.Generator, open_eyes: bool = True) -> Sight:
-    """A head through a camera. diffuse [M, M, 3] linear albedo, gloss [M, M] reflectance at normal incidence, relief
-    [M, M, 3] tangent-space normals."""
+def trace_sight(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, relief: np.ndarray,
+                rng: np.random.Generator, open_eyes: bool = True) -> Sight:
+    """A head through a camera.
+
+    Parameters
+    ----------
+    stage : the head
+    view : a square one
+    diffuse : [M, M, 3], linear albedo
+    gloss : [M, M], reflectance at normal incidence
+    relief : [M, M, 3], unit, tangent space, OpenGL Y+
+    rng : of the lamps and the eyes
+    open_eyes : whether they are drawn onto the lids
+    """
     mesh, caster = stage.mesh, raster.RayCaster(stage.mesh)
     face, bary, _ = raster.render_view(caster, view)
     hit = face >= 0
@@ -126,7 +136,7 @@ def look(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, 
     if open_eyes:
         _open_eyes(stage, view, hit, albedo, shine, masks, rng)
     lamps, radius = _random_lamps(rng)
-    reach = np.stack([sun_visibility(caster, position, smooth, lamp, r, RAYS, rng)
+    reach = np.stack([trace_sun(caster, position, smooth, lamp, r, RAYS, rng)
                       for lamp, r in zip(lamps, radius, strict=True)])
     y, x = np.mgrid[0:view.height, 0:view.width]
     rays = view.rays(np.stack([x.ravel(), y.ravel()], -1) + 0.5).reshape(view.height, view.width, 3)

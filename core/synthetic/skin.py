@@ -19,7 +19,7 @@ from .canvas import Canvas, canvas
 from .parameters import SkinParameters, sample_parameters
 from .regions import creases, lid_lines, regions
 from .relief import normals
-from .spots import patches, splat, strew
+from .spots import splat_patches, splat_spots, strew
 
 GROUND = 512  # size of the canvas on which marks are strewn, whatever the size of the maps
 
@@ -47,9 +47,16 @@ def make_skin(parameters: SkinParameters | int, size: int = 1024) -> Skin:
 
 def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas,
                traits: tuple[np.ndarray, np.ndarray] | None = None, hair: bool = True) -> Skin:
-    """make_skin on any canvas; `ground` is a canvas of the same head (GROUND texels wide) on which marks are strewn.
-    traits: what is added to the logarithms of melanin and blood [N] each; hair: whether brows, lashes, beard and scalp
-    are painted."""
+    """`make_skin` on any canvas.
+
+    Parameters
+    ----------
+    parameters : of the subject
+    on : what is painted on
+    ground : of the same head, GROUND texels wide, where marks are strewn
+    traits : added to the logarithms of melanin and of blood, [N] each
+    hair : whether brows, lashes, beard and scalp are painted
+    """
     area = regions(on)
     melanin, blood = _pigments(parameters, on, area)
     if traits is not None:
@@ -61,13 +68,13 @@ def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas,
     melanin = melanin * np.exp(stain)
     height = height + dome
     p = parameters
-    scar = adornment.scars(on, ground, p.scars, np.random.default_rng([p.adorn_seed, 10]))
+    scar = adornment.paint_scars(on, ground, p.scars, np.random.default_rng([p.adorn_seed, 10]))
     melanin, blood, height = melanin * np.exp(scar.stain), blood * np.exp(scar.flush), height + scar.ridge
 
     diffuse = pigment.reflectance(melanin, blood, p.oxygen, p.scattering, p.slope, p.chroma)
     diffuse = diffuse * (1 - 0.07 * np.clip(hollow, 0, 1))[:, None]
-    diffuse = adornment.made_up(diffuse, area, adornment.lid_distance(on), p.make_up,
-                                np.random.default_rng([p.adorn_seed, 11]))
+    diffuse = adornment.put_on_make_up(diffuse, area, adornment.lid_distance(on), p.make_up,
+                                       np.random.default_rng([p.adorn_seed, 11]))
     specular = _specular(parameters, on, area, hollow, dry)
     if hair:
         cover, diffuse = _hair(parameters, on, ground, area, diffuse)
@@ -118,7 +125,7 @@ def _relief(p: SkinParameters, on: Canvas, ground: Canvas,
                       * here["chin"]) * here["bald"] * (1 - 0.7 * here["neck"])
     points, texel = strew(ground, density, rng)
     size = p.pores * rng.lognormal(0, 0.3, len(points)) * (0.7 + 0.5 * here["nose"] + 0.35 * here["cheeks"])[texel]
-    pores = splat(on, points, 0.16 * size, np.clip(0.9 * size, 0, 1.4))
+    pores = splat_spots(on, points, 0.16 * size, np.clip(0.9 * size, 0, 1.4))
     micro = octaves(on.position, [0.75, 1.5], rng)
     ridged = 0.8 - np.abs(noise(on.position, 1.1, rng))  # the skin's own mesh of fine lines
     waves = on.soft(lambda at: octaves(at, [14.0, 7.0], rng, smooth=True))
@@ -131,7 +138,7 @@ def _relief(p: SkinParameters, on: Canvas, ground: Canvas,
         deep = depth * p.wrinkles * np.clip((p.age - begins) / 30, 0, 1.2)
         if deep > 0.01:
             ends = np.sin(np.linspace(0.05, np.pi - 0.05, len(curve))) ** 0.5
-            folds = np.maximum(folds, splat(on, curve, np.full(len(curve), width / 2), deep * ends))
+            folds = np.maximum(folds, splat_spots(on, curve, np.full(len(curve), width / 2), deep * ends))
     height = height - folds * (1 - 0.5 * lips)
     lines = _lip_lines(on, lips, rng)
     height = height - 0.10 * lines
@@ -154,15 +161,15 @@ def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, n
     room = here["bald"] * (1 - here["ears"])
     sunny = np.clip(here["cheeks"] + here["nose"] + 0.35 * here["forehead"] + 0.05, 0, 1)
     points, _ = strew(ground, 0.22 * p.freckles * sunny * room, rng)
-    freckles = splat(on, points, rng.lognormal(np.log(0.40), 0.35, len(points)),
-                     p.freckle_contrast * _contrast(p) * rng.uniform(0.3, 1.0, len(points)))
+    freckles = splat_spots(on, points, rng.lognormal(np.log(0.40), 0.35, len(points)),
+                           p.freckle_contrast * _contrast(p) * rng.uniform(0.3, 1.0, len(points)))
     points, _ = strew(ground, p.moles * room / float((ground.area * room).sum()), rng)
     radius = np.clip(rng.lognormal(np.log(0.75), 0.45, len(points)), 0.4, 2.5)
     # a dark stain needs more melanin on light skin; raised ones are often paler
     raised = (rng.random(len(points)) < 0.4) * np.minimum(radius, 1.5) * rng.uniform(0.15, 0.45, len(points))
     strength = rng.uniform(0.45, 1.0, len(points)) * np.log(0.55 / np.minimum(p.melanin, 0.4))
-    stain, _ = patches(on, points, radius, strength, rng)
-    _, dome = patches(on, points, radius, raised, rng)
+    stain, _ = splat_patches(on, points, radius, strength, rng)
+    _, dome = splat_patches(on, points, radius, raised, rng)
     return np.maximum(freckles, stain), dome
 
 
@@ -171,16 +178,16 @@ def _hair(p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndar
     """Cover of all hair [N], and the diffuse albedo with it."""
     rng, here = np.random.default_rng([p.hair_seed, 4]), regions(ground)
     colour, brow_colour = np.asarray(p.hair_colour, np.float32), np.asarray(p.brow_colour, np.float32)
-    eyebrow = hairs.brows(on, ground, here["brows"], p.brow_density, rng)
+    eyebrow = hairs.grow_brows(on, ground, here["brows"], p.brow_density, rng)
     lids = lid_lines(ground)
-    eyebrow = np.maximum(eyebrow, splat(on, lids, np.full(len(lids), 0.4), np.full(len(lids), 0.6)))  # lashes
+    eyebrow = np.maximum(eyebrow, splat_spots(on, lids, np.full(len(lids), 0.4), np.full(len(lids), 0.6)))  # lashes
     beard = np.zeros_like(eyebrow)
     if p.beard > 0:
-        beard = hairs.stubble(on, ground, here["beard"], 0.75 * p.beard, p.beard_length, rng)
+        beard = hairs.grow_stubble(on, ground, here["beard"], 0.75 * p.beard, p.beard_length, rng)
         patchy = on.soft(lambda at: 1 + 0.2 * octaves(at, [8.0], rng, smooth=True))
         darkness = np.clip(1.3 - 2.5 * colour.mean(), 0, 1)  # fair hair casts no shade
         diffuse = hairs.beard_shadow(diffuse, np.clip(area["beard"] * p.beard * 0.7 * darkness * patchy, 0, 1))
-    scalp = hairs.cropped(on, area["scalp"], p.scalp_hair, rng)
+    scalp = hairs.grow_cropped_hair(on, area["scalp"], p.scalp_hair, rng)
     shade = np.exp(0.2 * noise(on.position, 1.2, rng))[:, None]
     other = (1 - (1 - beard) * (1 - scalp))[:, None]
     diffuse = diffuse * (1 - other) + colour * shade * other

@@ -30,11 +30,22 @@ def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tupl
     return here + (steps * share).sum(1), texel
 
 
-def splat(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, blend=np.maximum) -> np.ndarray:
-    """Bell-shaped spots [N]: `strength` [M] at the points [M, 3], falling to nothing at twice `radius` [M] mm; `blend`
-    where they overlap.
+def splat_spots(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray,
+                blend=np.maximum) -> np.ndarray:
+    """Bell-shaped spots. A radius below the texel's size becomes the texel's size, with the strength lowered by the
+    same share of area.
 
-    A radius below the texel's size becomes the texel's size, with the strength lowered by the same share of area.
+    Parameters
+    ----------
+    on : what they lie on
+    points : [M, 3], in mm
+    radius : [M], in mm; they end at twice that
+    strength : [M], in the middle
+    blend : ufunc, where they overlap
+
+    Returns
+    -------
+    float32 [N].
     """
     out = np.zeros(len(on.position), np.float32)
     if len(points):
@@ -46,9 +57,23 @@ def splat(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarr
     return out
 
 
-def patches(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, rng: np.random.Generator,
-            ragged: float = 0.25) -> tuple[np.ndarray, np.ndarray]:
-    """Flat spots with a ragged edge (a mole's stain) and their dome: two arrays [N] of `strength` [M] at most."""
+def splat_patches(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, rng: np.random.Generator,
+                  ragged: float = 0.25) -> tuple[np.ndarray, np.ndarray]:
+    """Flat spots with a ragged edge (a mole's stain), and their dome.
+
+    Parameters
+    ----------
+    on : what they lie on
+    points : [M, 3], in mm
+    radius : [M], in mm
+    strength : [M], from 0
+    rng : of the edge and the grain
+    ragged : twice the deviation of the edge, in radii
+
+    Returns
+    -------
+    Stain and dome, float32 [N] each: the strength in the middle, that of the stain within its grain.
+    """
     stain, dome = np.zeros(len(on.position), np.float32), np.zeros(len(on.position), np.float32)
     if len(points):
         texel, point, distance = on.near(points, radius * 1.6 + 0.3)

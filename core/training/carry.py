@@ -35,8 +35,25 @@ TILE = 256
 
 
 def carry(folder: Path, out: Path, mesh: Path | None, size: int, report: Reporter) -> dict:
-    """Carries every picture of `folder`; returns what carried.json holds. Raises Problem where there is no head or no
-    picture."""
+    """Carries every picture of a folder into our UVs.
+
+    Parameters
+    ----------
+    folder : of the colour maps, and of the mesh
+    out : folder that is made anew
+    mesh : OBJ of the head whose UVs the maps are in; None: the first of the folder
+    size : texels along a side of what is made
+    report : hears of progress
+
+    Returns
+    -------
+    What carried.json holds.
+
+    Raises
+    ------
+    Problem
+        Where there is no picture or no head mesh with UVs.
+    """
     heads = [mesh] if mesh else sorted(folder.glob("*.obj"))
     pictures = sorted(path for path in folder.iterdir() if path.suffix.lower() in PICTURES) if folder.is_dir() else []
     if not heads or not pictures:

@@ -14,9 +14,16 @@ from ..contract.messages import Log, Reporter
 from .descent import TrainingRun
 
 
-def parser(training: str, description: str, configs: dict, out: Path) -> argparse.ArgumentParser:
-    """The options of every training; `training` is its name in `python -m core train NAME`, `out` where its weights go
-    by default."""
+def make_parser(training: str, description: str, configs: dict, out: Path) -> argparse.ArgumentParser:
+    """The options of every training.
+
+    Parameters
+    ----------
+    training : its name in `python -m core train NAME`
+    description : of --help
+    configs : by name, of which --config chooses
+    out : where its weights go by default
+    """
     options = argparse.ArgumentParser(f"python -m core train {training}", description=description,
                                       formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--config", default="cpu", choices=tuple(configs))
@@ -47,8 +54,20 @@ def add_sights(options: argparse.ArgumentParser, sight_kind: str) -> None:
 def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, train: Callable[..., dict],
               export: Callable[[Path, Path], dict],
               prepare: Callable[[str, Path, Reporter], None] | None = None) -> int:
-    """Trains, or exports an earlier training: those options that no TrainingRun has are `train`'s keyword arguments.
-    Returns the exit code. `prepare` answers to --prepare, where a training has that option."""
+    """Trains, or exports an earlier training.
+
+    Parameters
+    ----------
+    options : of the training
+    arguments : of the command line; None: this process's
+    train : takes by keyword the run, the report and those options that no TrainingRun has
+    export : (work folder, out) -> card
+    prepare : (configuration, work folder, report) answers to --prepare, where a training has that option
+
+    Returns
+    -------
+    The exit code.
+    """
     flags = vars(options.parse_args(arguments))
     report = Reporter("train",
                       emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None)

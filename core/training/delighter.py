@@ -107,7 +107,7 @@ def train_delighter(config: str, out: Path, report: Reporter, run: descent.Train
                         People(data["people"], t["views"], work, hdri), t),
         lambda batch, step, share: sum(losses(network, batch, device).values()),
         lambda average: {kind + name: value for kind, batch in unseen.items()
-                         for name, value in figures(average, config, batch, device).items()})
+                         for name, value in measure_figures(average, config, batch, device).items()})
     descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
@@ -140,10 +140,21 @@ def _fast(device: str) -> bool:
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, batch: PortraitBatch, device: str) -> dict[str, float]:
-    """The averaged network on held-out portraits: deviation of the log-albedo about its mean over the skin, with and
-    without geometry, beside that of the picture as it is (natural log units), and the intersection over union of the
-    shadows."""
+def measure_figures(average: dict, config: str, batch: PortraitBatch, device: str) -> dict[str, float]:
+    """The averaged network on held-out portraits, with and without geometry, beside the picture as it is.
+
+    Parameters
+    ----------
+    average : its weights
+    config : one of CONFIGS
+    batch : the portraits; those whose geometry is known count
+    device : on which it runs
+
+    Returns
+    -------
+    geometry, picture, none: mean absolute error of the log-albedo about its own mean over the skin, natural log;
+    iou_geometry, iou_picture: intersection over union of the shadows.
+    """
     network = DelightNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last)
@@ -208,7 +219,7 @@ class _DelighterSteps(Dataset):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = command_line.parser("delighter", __doc__, CONFIGS, WEIGHTS)
+    options = command_line.make_parser("delighter", __doc__, CONFIGS, WEIGHTS)
     command_line.add_skins(options)
     command_line.add_sights(options, "people")
     options.add_argument("--start", type=Path, metavar="FILE", help="weights to begin with, in place of random ones")

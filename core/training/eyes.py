@@ -30,7 +30,7 @@ from ..synthetic.people.figure import make_figure
 from ..synthetic.people.person import sample_person
 from . import command_line, descent
 from .seeds import named_subjects, panorama_names
-from .snapshots import Echoed, Jitter, export_parsing, jittered, recipe_of, require_figures, spoilt
+from .snapshots import Echoed, Jitter, export_parsing, jitter_crop, recipe_of, require_figures, spoilt
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "eyes.safetensors"
 _MODEL = {"widths": [32, 48, 64, 96], "depths": [1, 1, 1, 2]}
@@ -82,7 +82,7 @@ def train_eyes(config: str, out: Path, report: Reporter, run: descent.TrainingRu
     state = descent.resumed(work, descent.beginning(config, data, network))
     objective = descent.Objective(Echoed(Eyes(data["seeds"], t["poses"], work, run.hdri), t),
                                   lambda batch, step, share: loss(network, batch, device),
-                                  lambda average: figures(average, config, unseen, device))
+                                  lambda average: measure_figures(average, config, unseen, device))
     descent.descend(network, state, objective, recipe_of(t, run.minutes), work, device, report)
     return export(work, out)
 
@@ -117,8 +117,19 @@ class Eyes:
         self.panoramas = read_panoramas(panoramas)
 
     def draw(self, count: int, echo: int, rng: np.random.Generator, augment: bool = True) -> list[tuple]:
-        """`echo` batches of `count` crops each, (layers [N, CHANNELS, SIDE, SIDE], shares [N, len(CLASSES), SIDE,
-        SIDE]): the same photographs, cropped and spoilt in other ways."""
+        """Batches of the same photographs, cropped and spoilt in other ways.
+
+        Parameters
+        ----------
+        count : N, crops of each batch
+        echo : number of batches
+        rng : of all of it
+        augment : off: cropped as the eyes' corners say, and not spoilt
+
+        Returns
+        -------
+        Of each batch layers [N, CHANNELS, SIDE_PX, SIDE_PX] and shares [N, len(CLASSES), SIDE_PX, SIDE_PX].
+        """
         ready = [seed for seed in self.seeds if is_prepared(seed, self.poses, self.work)]
         batches: list[list[tuple]] = [[] for _ in range(echo)]
         for _ in range(count):
@@ -126,16 +137,29 @@ class Eyes:
             sight = eye_sights.load(path)
             picture, ball = eye_sights.photograph_eye(sight, rng, self.panoramas)
             for batch in batches:
-                batch.append(example(picture, ball, sight, rng, augment))
+                batch.append(make_example(picture, ball, sight, rng, augment))
         return [tuple(torch.from_numpy(np.stack(arrays)) for arrays in zip(*batch, strict=True)) for batch in batches]
 
 
-def example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, rng: np.random.Generator,
-            augment: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """A photograph as the network sees it, and the shares of its classes."""
+def make_example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, rng: np.random.Generator,
+                 augment: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """A photograph as the network sees it.
+
+    Parameters
+    ----------
+    picture : sRGB [S, S, 3]
+    ball : [S, S, 2] in [0, 1], shares of white and iris
+    sight : of this eye
+    rng : of the crop and the spoiling
+    augment : whether there are any
+
+    Returns
+    -------
+    Layers float32 [CHANNELS, SIDE_PX, SIDE_PX] and shares of the classes [len(CLASSES), SIDE_PX, SIDE_PX].
+    """
     move = to_eye_crop(sight.corners, sight.left)
     if augment:
-        move = jittered(move, SIDE_PX, JITTER, rng)
+        move = jitter_crop(move, SIDE_PX, JITTER, rng)
     seen = cut(picture, move, SIDE_PX)
     if augment:
         seen = spoilt(seen, rng)
@@ -158,9 +182,20 @@ def loss(network: ParseNet, batch: tuple, device: str) -> torch.Tensor:
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, batch: tuple, device: str) -> dict[str, float]:
-    """The averaged network on photographs of held-out figures: intersection over union of the ball and of its iris,
-    where a class is what most of a pixel is."""
+def measure_figures(average: dict, config: str, batch: tuple, device: str) -> dict[str, float]:
+    """The averaged network on photographs of held-out figures, where a class is what most of a pixel is.
+
+    Parameters
+    ----------
+    average : its weights
+    config : one of CONFIGS
+    batch : as `Eyes.draw` gives it
+    device : on which it runs
+
+    Returns
+    -------
+    Intersection over union of the ball and of its iris.
+    """
     network = ParseNet(**CONFIGS[config]["model"], parts=len(CLASSES))
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()
@@ -188,7 +223,7 @@ def _path(work: Path, seed: int, number: int) -> Path:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = command_line.parser("eyes", __doc__, CONFIGS, WEIGHTS)
+    options = command_line.make_parser("eyes", __doc__, CONFIGS, WEIGHTS)
     command_line.add_sights(options, "figures")
     return command_line.carry_out(options, arguments, train_eyes, export, prepare_figures)
 

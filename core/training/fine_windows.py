@@ -23,7 +23,7 @@ from ..contract.messages import Reporter
 from ..face import template
 from ..geometry import raster
 from ..imaging import images
-from ..synthetic.canvas import canvas, window_canvas
+from ..synthetic.canvas import canvas, make_window_canvas
 from ..synthetic.parameters import adorned, sample_parameters
 from ..synthetic.skin import GROUND, paint_skin
 
@@ -47,7 +47,16 @@ class Degradation:
 
 
 def prepare(seeds: list[int], views: int, work: Path, report: Reporter, workers: int) -> None:
-    """Paints `views` windows of each seed's skin into `work`, those that are missing (some seconds each)."""
+    """Paints windows of skins, those that are missing (some seconds each).
+
+    Parameters
+    ----------
+    seeds : the subjects
+    views : windows of each
+    work : folder in which they are kept
+    report : hears of progress
+    workers : processes
+    """
     wanted = [(seed, i) for seed in seeds for i in range(views) if not _path(work, seed, i).is_file()]
     if not wanted:
         return
@@ -133,7 +142,7 @@ def _paint(work: Path, window: tuple[int, int]) -> None:
     row, column = where[rng.integers(len(where))] * FACTOR - rng.integers(SIDE // 4, 3 * SIDE // 4, 2)
     row, column = (int(np.clip(at // FACTOR * FACTOR, 0, SIZE - SIDE)) for at in (row, column))
     parameters = replace(adorned(sample_parameters(seed), seed), scars=0.0)
-    skin = paint_skin(parameters, window_canvas(SIZE, row, column, SIDE), canvas(GROUND))
+    skin = paint_skin(parameters, make_window_canvas(SIZE, row, column, SIDE), canvas(GROUND))
     inner = slice(MARGIN, SIDE - MARGIN)
     maps = np.concatenate([images.linear_to_srgb(skin.diffuse), skin.normal, skin.specular[..., None]],
                           -1)[inner, inner]

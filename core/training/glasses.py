@@ -64,7 +64,21 @@ class Bands:
 
 
 def train(figures: int, pictures: int, work: Path, out: Path, hdri: Path | None, report: Reporter) -> dict:
-    """Writes the plane to `out` and its card beside it, which is returned. `pictures` are drawn of each figure."""
+    """Writes the plane and its card.
+
+    Parameters
+    ----------
+    figures : number of those learnt from
+    pictures : number of each figure's, every other one with glasses
+    work : folder of the figures' sights
+    out : .npz; its card is written beside it
+    hdri : folder of panoramas that may light them
+    report : hears of progress
+
+    Returns
+    -------
+    The card.
+    """
     learnt, held_out = seeds(figures)
     prepare(learnt + held_out, work, report)
     panoramas = read_panoramas(hdri)
@@ -105,7 +119,7 @@ def prepare(of: list[int], work: Path, report: Reporter) -> None:
             rng = np.random.default_rng([seed, 94, number])
             view = _before(figure, rng)
             depth = raster.render_view(scene.whole, view)[2]
-            unlit.save(_path(work, seed, number).with_suffix(".unlit.npz"), unlit.see(scene, view, rng, 1))
+            unlit.save(_path(work, seed, number).with_suffix(".unlit.npz"), unlit.trace_unlit(scene, view, rng, 1))
             with replacing(_path(work, seed, number)) as temporary, open(temporary, "wb") as file:
                 np.savez_compressed(file, depth=depth.astype(np.float32), landmarks=unlit.landmarks_of(figure),
                                     translation=view.translation, params=view.camera.params)
@@ -121,9 +135,21 @@ def read(work: Path, seed: int, number: int) -> BareSight:
         return BareSight(sight, depth, stored["landmarks"], view)
 
 
-def photographed(sight: BareSight, pair: glasses.Glasses | None, rng: np.random.Generator,
-                 panoramas: list[np.ndarray] = ()) -> np.ndarray:
-    """An sRGB photograph [S, S, 3] of a sight, with a pair of glasses or without."""
+def photograph_sight(sight: BareSight, pair: glasses.Glasses | None, rng: np.random.Generator,
+                     panoramas: list[np.ndarray] = ()) -> np.ndarray:
+    """A photograph of a sight, with a pair of glasses or without.
+
+    Parameters
+    ----------
+    sight : what is seen
+    pair : as it sits on that head; None: none
+    rng : of the light and the camera
+    panoramas : as `read_panoramas` gives them; they may light it
+
+    Returns
+    -------
+    sRGB [S, S, 3].
+    """
     def worn(radiance: np.ndarray, light: float) -> np.ndarray:
         return glasses.put_on(radiance, sight.view, sight.depth, pair, light, rng) if pair else radiance
 
@@ -131,14 +157,23 @@ def photographed(sight: BareSight, pair: glasses.Glasses | None, rng: np.random.
 
 
 def draw(of: list[int], pictures: int, work: Path, panoramas: list[np.ndarray], salt: int) -> Bands:
-    """The bands of `pictures` photographs of each figure in which the net finds the face, half of them with glasses."""
+    """The bands of those photographs in which the net finds the face.
+
+    Parameters
+    ----------
+    of : seeds of the figures
+    pictures : number of each figure's, every other one with glasses
+    work : folder of the figures' sights
+    panoramas : as `read_panoramas` gives them; they may light it
+    salt : part of each picture's seed; another gives other pictures
+    """
     rows: list[tuple] = []
     for seed in of:
         for number in range(pictures):
             rng = np.random.default_rng([salt, seed, number])
             sight = read(work, seed, number // 2 % VIEWS)
             pair = glasses.sample_glasses(sight.landmarks, rng) if number % 2 else None
-            srgb = photographed(sight, pair, rng, panoramas)
+            srgb = photograph_sight(sight, pair, rng, panoramas)
             face = faces.detect(srgb)
             if face is not None and abs(face.yaw_deg) <= MOST_YAW_DEG:
                 rows.append((band(srgb, face.landmarks), pair is not None, seed))

@@ -87,7 +87,7 @@ def train_parser(config: str, out: Path, report: Reporter, run: descent.Training
     state = descent.resumed(work, descent.beginning(config, data, network))
     objective = descent.Objective(Echoed(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step,
                                   share: loss(network, batch, device),
-                                  lambda average: figures(average, config, unseen, device))
+                                  lambda average: measure_figures(average, config, unseen, device))
     descent.descend(network, state, objective, recipe_of(t, run.minutes), work, device, report)
     return export(work, out)
 
@@ -112,9 +112,20 @@ def loss(network: ParseNet, batch: SnapshotBatch, device: str) -> torch.Tensor:
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, batch: SnapshotBatch, device: str) -> dict[str, float]:
-    """The averaged network on photographs of held-out figures: intersection over union of each part, where a part is
-    what most of a pixel is."""
+def measure_figures(average: dict, config: str, batch: SnapshotBatch, device: str) -> dict[str, float]:
+    """The averaged network on photographs of held-out figures, where a part is what most of a pixel is.
+
+    Parameters
+    ----------
+    average : its weights
+    config : one of CONFIGS
+    batch : the photographs
+    device : on which it runs
+
+    Returns
+    -------
+    Intersection over union by part.
+    """
     network = ParseNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()
@@ -138,7 +149,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = command_line.parser("parser", __doc__, CONFIGS, WEIGHTS)
+    options = command_line.make_parser("parser", __doc__, CONFIGS, WEIGHTS)
     command_line.add_sights(options, "figures")
     return command_line.carry_out(options, arguments, train_parser, export, prepare_figures)
 

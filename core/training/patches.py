@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from ..face import template
-from ..solve.prior import coordinates, mean_at
+from ..solve.prior import make_coordinates, mean_at
 from ..synthetic import pigment
 from .skins import SCALES, SIZE, Skins, shrink
 
@@ -55,8 +55,15 @@ class Windows:
                        for m in skins.maps[SCALES[-1]]]
 
     def draw(self, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> PatchBatch:
-        """`count` random windows: a third of each scale, three quarters of them on the face; mirrored and re-toned when
-        `augment`."""
+        """Random windows: a third of each scale, three quarters of them on the face.
+
+        Parameters
+        ----------
+        count : N
+        patch : side P in texels of a window's own scale
+        rng : of all of it
+        augment : whether they are mirrored and re-toned
+        """
         drawn = [self._one(patch, rng, augment) for _ in range(count)]
         return PatchBatch(*(torch.stack(parts) for parts in zip(*drawn, strict=True)))
 
@@ -76,7 +83,7 @@ class Windows:
         known = torch.ones_like(clean)
         if area is not None:
             known = torch.cat([area[window].float().expand(3, -1, -1), torch.zeros(4, patch, patch)])
-        coords = coordinates(side, *window)[0]
+        coords = make_coordinates(side, *window)[0]
         if augment:
             clean, tone = self._toned(maps.numpy(), index, rng)
             if rng.random() < 0.5:  # the UV layout is symmetric about u = 0.5

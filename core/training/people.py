@@ -18,15 +18,24 @@ import numpy as np
 
 from ..contract.messages import Reporter
 from ..synthetic.environments import read_panoramas
-from ..synthetic.people import portraits
+from ..synthetic.people import portraits, relightable
 from ..synthetic.people.figure import make_figure
-from .portraits import PortraitBatch, example, stacked
+from .portraits import PortraitBatch, make_example, stacked
 
 TEXELS = 512  # of a figure's maps: pixels of a crop are larger than theirs
 
 
 def prepare_people(seeds: list[int], views: int, work: Path, report: Reporter, processes: int = 2) -> None:
-    """Makes the sights of these figures that the work folder lacks."""
+    """Makes the sights of these figures that the work folder lacks.
+
+    Parameters
+    ----------
+    seeds : the figures
+    views : sights of each
+    work : folder in which they are kept
+    report : hears of progress
+    processes : that make them
+    """
     jobs = [(seed, views, work) for seed in seeds if not is_prepared(seed, views, work)]
     if not jobs:
         return
@@ -51,14 +60,14 @@ class People:
         ready = [seed for seed in self.seeds if is_prepared(seed, self.views, self.work)]
         drawn = []
         for _ in range(pairs):
-            stage = portraits.load(_path(self.work, ready[rng.integers(len(ready))], int(rng.integers(self.views))))
+            stage = relightable.load(_path(self.work, ready[rng.integers(len(ready))], int(rng.integers(self.views))))
             colours = portraits.colours_of(stage, rng)
             for _ in range(2):
                 lit = portraits.portray(stage, colours, rng, self.panoramas)
                 picture = stage.here.shape
                 normal = lit.fitted.normal @ stage.unlit.rotation.T
                 parts = [pixels.reshape(*picture, 3) for pixels in (lit.fitted.ambient, lit.fitted.sunlit, normal)]
-                drawn.append(example(lit, (*parts, stage.here.astype(np.float32)), rng))
+                drawn.append(make_example(lit, (*parts, stage.here.astype(np.float32)), rng))
         return stacked(drawn)
 
 
@@ -69,7 +78,7 @@ def _path(work: Path, seed: int, view: int) -> Path:
 def _prepare_one(job: tuple[int, int, Path]) -> None:
     seed, views, work = job
     cv2.setNumThreads(1)
-    sitter = portraits.Sitter(make_figure(seed, TEXELS), np.random.default_rng([seed, 92]))
+    sitter = relightable.Sitter(make_figure(seed, TEXELS), np.random.default_rng([seed, 92]))
     _path(work, seed, 0).parent.mkdir(parents=True, exist_ok=True)
     for view in range(views):
-        portraits.save(_path(work, seed, view), sitter.stage(np.random.default_rng([seed, 93, view])))
+        relightable.save(_path(work, seed, view), sitter.stage(np.random.default_rng([seed, 93, view])))

@@ -27,7 +27,7 @@ from ..synthetic import sight
 from ..synthetic.environments import read_panoramas
 from ..synthetic.identities import subject_mesh
 from ..synthetic.olat import LightStage, light_stage
-from ..synthetic.portrait import Portrait, relit, sight_of
+from ..synthetic.portrait import Portrait, relight_sight, sample_sight
 from ..synthetic.skin import Skin
 from .skins import Skins, carried_skins, synthetic_skins
 
@@ -53,8 +53,18 @@ class PortraitBatch:
 
 def prepare(seeds: list[int], views: int, work: Path, report: Reporter, skins: Path | None = None,
             names: list[str] = (), processes: int = 2) -> None:
-    """Makes the sights of these subjects that the work folder lacks; `names` are carried skins of the folder `skins`
-    that some of them wear."""
+    """Makes the sights of these subjects that the work folder lacks.
+
+    Parameters
+    ----------
+    seeds : the subjects
+    views : sights of each
+    work : folder in which they are kept
+    report : hears of progress
+    skins : folder of carried skins
+    names : those of them that some subjects wear
+    processes : that make them; 1: this one
+    """
     missing = [seed for seed in seeds if not (work / f"subject_{seed}" / f"{views - 1}.npz").is_file()]
     jobs = [(seed, views, work, skins, list(names)) for seed in missing]
     if processes < 2:
@@ -77,7 +87,8 @@ class Portraits:
 
     def draw(self, pairs: int, rng: np.random.Generator, augment: bool = True) -> PortraitBatch:
         """`pairs` sights under two lights each."""
-        return stacked([example(portrait, geometry, rng) for portrait, geometry in self.portraits(pairs, rng, augment)])
+        return stacked([make_example(portrait, geometry, rng)
+                        for portrait, geometry in self.portraits(pairs, rng, augment)])
 
     def portraits(self, pairs: int, rng: np.random.Generator, augment: bool):
         for _ in range(pairs):
@@ -88,7 +99,7 @@ class Portraits:
                 albedo = np.clip(albedo * np.exp(rng.normal(0, 0.12) + rng.normal(0, 0.04, 3)), 0.003,
                                  0.9).astype(np.float32)
             for _ in range(2):
-                lit = relit(seen, self._stage(seed), rng, self.panoramas, albedo)
+                lit = relight_sight(seen, self._stage(seed), rng, self.panoramas, albedo)
                 parts = (
                     lit.fitted.ambient,
                     lit.fitted.sunlit,
@@ -111,7 +122,7 @@ def stacked(examples: list[tuple[np.ndarray, ...]]) -> PortraitBatch:
     return PortraitBatch(*(torch.from_numpy(np.stack(arrays)) for arrays in zip(*examples, strict=True)))
 
 
-def example(
+def make_example(
     portrait: Portrait, geometry_maps: tuple[np.ndarray, ...], rng: np.random.Generator
 ) -> tuple[np.ndarray, ...]:
     """What a batch holds of a portrait. geometry_maps: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the
@@ -161,7 +172,7 @@ def _prepare_one(job: tuple) -> None:
     with replacing(place / "visible.npy") as temporary, open(temporary, "wb") as file:
         np.save(file, np.packbits(stage.visible, axis=1))
     for view in range(views):
-        sight.save(place / f"{view}.npz", sight_of(stage, skin, np.random.default_rng([seed, 51, view]), SIDE_PX))
+        sight.save(place / f"{view}.npz", sample_sight(stage, skin, np.random.default_rng([seed, 51, view]), SIDE_PX))
 
 
 def _skin(skins: Skins, index: int) -> Skin:

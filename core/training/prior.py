@@ -203,7 +203,7 @@ def _held_out_loss(average: dict, statistics: dict, config: str, batch: PatchBat
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = command_line.parser("prior", __doc__, CONFIGS, WEIGHTS)
+    options = command_line.make_parser("prior", __doc__, CONFIGS, WEIGHTS)
     command_line.add_skins(options)
     return command_line.carry_out(options, arguments, train_prior, export)
 

@@ -39,7 +39,7 @@ def disagreement(error: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
 
 
 def mean_deviation(error: torch.Tensor, weight: torch.Tensor) -> float:
-    """Mean over the maps of the mean absolute error about each map's own mean, summed over the channels."""
+    """Mean over the maps of the mean absolute error about each map's own mean, over all channels."""
     _, error = split_tone(error, weight)
     total = weight.sum((2, 3), keepdim=True).clamp_min(1)
     return ((error.abs() * weight).sum((2, 3), keepdim=True) / total).mean().item()

@@ -72,8 +72,16 @@ def synthetic_skins(seeds: list[int], cache: Path, report: Reporter) -> Skins:
 
 
 def carried_skins(folder: Path, names: list[str], mean: torch.Tensor, cache: Path, report: Reporter) -> Skins:
-    """The skins NAME.png of a folder that `train carry` made, without the shading that was baked into them; mean as of
-    `patches.mean_map`."""
+    """Skins that `train carry` brought into our UVs, without the shading that was baked into them.
+
+    Parameters
+    ----------
+    folder : of NAME.png (sRGB) and known.png
+    names : of the skins
+    mean : [7, S, S], the mean face as `patches.mean_map` makes it
+    cache : folder in which they are kept without shading
+    report : hears of progress
+    """
     paths = []
     for i, name in enumerate(names):
         source = Path(folder) / f"{name}.png"

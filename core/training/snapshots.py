@@ -53,7 +53,15 @@ class SnapshotBatch:
 
 
 def prepare(seeds: list[int], views: int, work: Path, report: Reporter) -> None:
-    """Makes the sights of these figures that the work folder lacks."""
+    """Makes the sights of these figures that the work folder lacks.
+
+    Parameters
+    ----------
+    seeds : the figures
+    views : sights of each
+    work : folder in which they are kept
+    report : hears of progress
+    """
     missing = [seed for seed in seeds if not is_prepared(seed, views, work)]
     for i, seed in enumerate(missing):
         report.progress(i, len(missing), f"figure {i + 1} of {len(missing)}")
@@ -72,14 +80,22 @@ class Snapshots:
         self.panoramas = read_panoramas(panoramas)
 
     def draw(self, count: int, echo: int, rng: np.random.Generator, augment: bool = True) -> list[SnapshotBatch]:
-        """`echo` batches of `count` crops each: the same photographs, cropped and spoilt in other ways."""
+        """Batches of the same photographs, cropped and spoilt in other ways.
+
+        Parameters
+        ----------
+        count : crops of each batch
+        echo : number of batches
+        rng : of all of it
+        augment : off: cropped as the landmarks say, neither mirrored nor spoilt
+        """
         ready = [seed for seed in self.seeds if is_prepared(seed, self.views, self.work)]
         batches: list[list[tuple]] = [[] for _ in range(echo)]
         for _ in range(count):
             sight = unlit.load(_path(self.work, ready[rng.integers(len(ready))], int(rng.integers(self.views))))
             srgb, shares = photograph(sight, rng, self.panoramas)
             for batch in batches:
-                batch.append(example(srgb, shares, sight.landmarks, rng, augment))
+                batch.append(make_example(srgb, shares, sight.landmarks, rng, augment))
         return [SnapshotBatch(*(torch.from_numpy(np.stack(arrays)) for arrays in zip(*batch, strict=True)))
                 for batch in batches]
 
@@ -102,15 +118,29 @@ class Echoed(Dataset):
         return self.drawn[1][turn]
 
 
-def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator,
-            augment: bool = True) -> tuple[np.ndarray, ...]:
-    """A photograph as the network sees it, the shares of its parts, and where they are known."""
+def make_example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator,
+                 augment: bool = True) -> tuple[np.ndarray, ...]:
+    """A photograph as the network sees it.
+
+    Parameters
+    ----------
+    srgb : [H, W, 3]
+    shares : [H, W, len(PARTS)] in [0, 1], of its parts
+    landmarks : [468, 2], in pixels
+    rng : of the crop and the spoiling
+    augment : whether there are any, and mirror images
+
+    Returns
+    -------
+    Layers float32 [CHANNELS, SIDE_PX, SIDE_PX], shares [len(PARTS), SIDE_PX, SIDE_PX], and 1 where these are known [1,
+    SIDE_PX, SIDE_PX].
+    """
     if augment and rng.random() < 0.5:
         srgb, shares = srgb[:, ::-1], shares[:, ::-1]
         landmarks = landmarks * [-1, 1] + [srgb.shape[1], 0]
     move = to_crop(landmarks)  # of the bridge, the chin and the box, which a mirror leaves what they are
     if augment:
-        move = jittered(move, SIDE_PX, JITTER, rng)
+        move = jitter_crop(move, SIDE_PX, JITTER, rng)
     known = inside(srgb.shape, move)
     if augment and rng.random() < 0.35:
         known = known * _ended(rng)
@@ -123,8 +153,20 @@ def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np
     return network_input(picture, known), np.ascontiguousarray(parts.transpose(2, 0, 1)), known[None].astype(np.float32)
 
 
-def jittered(move: np.ndarray, side: int, spread: Jitter, rng: np.random.Generator) -> np.ndarray:
-    """A map [2, 3] to a crop of `side` pixels as if the landmarks that it goes by lay a little elsewhere."""
+def jitter_crop(move: np.ndarray, side: int, spread: Jitter, rng: np.random.Generator) -> np.ndarray:
+    """A map to a crop as if the landmarks that it goes by lay a little elsewhere.
+
+    Parameters
+    ----------
+    move : [2, 3], from picture to crop, in pixels
+    side : of the crop, in pixels
+    spread : how far elsewhere
+    rng : of the shift, the scale and the turn
+
+    Returns
+    -------
+    [2, 3], as `move` is.
+    """
     turn, scale = np.radians(rng.normal(0, spread.turn_deg)), np.exp(rng.normal(0, spread.scale))
     c, s = scale * np.cos(turn), scale * np.sin(turn)
     about = np.array([[c, s], [-s, c]])
@@ -175,11 +217,24 @@ def _prepare_one(seed: int, views: int, work: Path) -> None:
     _path(work, seed, 0).parent.mkdir(parents=True, exist_ok=True)
     for view in range(views):
         rng = np.random.default_rng([seed, 91, view])
-        unlit.save(_path(work, seed, view), unlit.see(scene, unlit.random_view(figure, rng), rng))
+        unlit.save(_path(work, seed, view), unlit.trace_unlit(scene, unlit.random_view(figure, rng), rng))
 
 
 def require_figures(training: str, data: dict, prepared: Callable[[int], bool], work: Path) -> None:
-    """Raises Problem where `work` has none of the figures that are learnt from, or of those kept from it."""
+    """Refuses to learn from nothing.
+
+    Parameters
+    ----------
+    training : its name in `python -m core train NAME`
+    data : with "seeds", who is learnt from, and "held_out_seeds", who is kept from it
+    prepared : of a seed, whether its sights are all there
+    work : folder of the sights
+
+    Raises
+    ------
+    Problem
+        Where none of those learnt from, or none of those kept from it, is prepared.
+    """
     if not all(any(map(prepared, data[kind])) for kind in ("seeds", "held_out_seeds")):
         raise Problem(f"There are no figures in {work} yet.",
                       f"Wait for `train {training} --prepare`, or train without --growing.")
@@ -194,8 +249,26 @@ def recipe_of(options: dict, minutes: float | None) -> descent.TrainingRecipe:
 
 def export_parsing(training: str, work: Path, out: Path, config: dict, words: tuple[str, str],
                    prepared: Callable[[int], bool]) -> dict:
-    """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from;
-    words: of whom the photographs are, and what its figures of held-out people mean."""
+    """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from.
+
+    Parameters
+    ----------
+    training : its name in `python -m core train NAME`
+    work : its folder
+    out : safetensors; the card is written beside it
+    config : of CONFIGS, with which it was trained
+    words : of whom the photographs are, and what its figures of held-out people mean
+    prepared : of a seed, whether its sights are all there
+
+    Returns
+    -------
+    The card.
+
+    Raises
+    ------
+    Problem
+        Where the folder holds no training.
+    """
     state = descent.read_state(work)
     whom, what = words
     named, panoramas = state["data"], state["data"]["panoramas"]

@@ -86,7 +86,7 @@ def train_upscaler(config: str, out: Path, report: Reporter, run: descent.Traini
                                     betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"],
                                     save_every=180)
     objective = descent.Objective(_UpscalerSteps(FineWindows(data["seeds"], t["views"], work), t), loss,
-                                  lambda average: figures(average, config, held_out, device))
+                                  lambda average: measure_figures(average, config, held_out, device))
     descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
@@ -101,9 +101,21 @@ def _error(network: Rcan, pairs: tuple[torch.Tensor, torch.Tensor], device: str,
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor], device: str) -> dict[str, float]:
-    """The averaged network's mean absolute error on held-out patches as a share of bicubic resampling's: diffuse,
-    normal, specular."""
+def measure_figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor],
+                    device: str) -> dict[str, float]:
+    """The averaged network on held-out patches.
+
+    Parameters
+    ----------
+    average : its weights
+    config : one of CONFIGS
+    pairs : small [N, 7, P, P] and large [N, 7, 4 P, 4 P], in the network's channels
+    device : on which it runs
+
+    Returns
+    -------
+    diffuse, normal, specular: mean absolute error as a share of bicubic resampling's.
+    """
     network = Rcan(**CONFIGS[config]["model"]).to(device, memory_format=torch.channels_last)
     network.load_state_dict(average)
     parts = [tuple(x[i:i + 4] for x in pairs) for i in range(0, len(pairs[0]), 4)]
@@ -148,5 +160,5 @@ class _UpscalerSteps(Dataset):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = command_line.parser("upscaler", __doc__, CONFIGS, WEIGHTS)
+    options = command_line.make_parser("upscaler", __doc__, CONFIGS, WEIGHTS)
     return command_line.carry_out(options, arguments, train_upscaler, export)

@@ -82,7 +82,7 @@ def _own(capture: Capture, folder: Path, solved: SolvedHead, size: int, report: 
         report.progress(i + 0.6, len(numbers) + 1, f"baking tile {number}")
         diffuse = images.linear_to_srgb(baking.bake(images.read_linear(maps / "diffuse_albedo.exr"), at))
         images.write_srgb(folder / f"own_diffuse_albedo{suffix}", diffuse, bits=16)
-        drawing.own_map(capture, number, diffuse)
+        drawing.draw_own_map(capture, number, diffuse)
         del diffuse
         report.progress(i + 0.75, len(numbers) + 1, f"baking tile {number}")
         images.write_data(folder / f"own_normal{suffix}",
@@ -121,7 +121,7 @@ def _scan(capture: Capture, folder: Path, solved: SolvedHead, full: Mesh, settin
     height = scan.displacement(solved.mesh, full, size,
                                lambda done: report.progress(7 + 3 * done, 10, "measuring the displacement"))
     images.write_data(folder / "displacement.exr", height)
-    drawing.scan_sheet(capture, mesh, colours, albedo, views)
+    drawing.draw_scan_sheet(capture, mesh, colours, albedo, views)
     figures = {"triangles": len(mesh.faces), "packing_percent": round(100 * float(at.covered.mean()), 1),
                "stretch_p95": round(float(np.percentile(atlas.stretch(mesh), 95)), 2),
                "albedo_known_percent": round(100 * float(at.known.sum() / max(at.covered.sum(), 1)), 1),

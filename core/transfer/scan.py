@@ -156,7 +156,7 @@ def displacement(head: Mesh, scan: Mesh, size: int, tick: Callable[[float], None
         points = raster.interpolate(head.vertices, head.faces, face[inside], bary[inside].astype(np.float64))
         n = raster.interpolate(normals, head.faces, face[inside], bary[inside].astype(np.float64))
         n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-9)
-        hit, _, distance = surface.along(points + FAR_M * n, -n, n)
+        hit, _, distance = surface.cast_rays(points + FAR_M * n, -n, n)
         there = (hit >= 0) & (distance < 2 * FAR_M)
         heights = np.where(there, FAR_M - np.where(there, distance, 0), 0)
         out[row:end][inside], known[row:end][inside] = heights, there

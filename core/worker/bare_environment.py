@@ -28,9 +28,27 @@ Run = Callable[[list], tuple[int, str]]
 
 def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | None = None, wheel_only: bool = False,
          keep: str = "") -> Path:
-    """Makes an environment anew in `folder`, of which the file `keep` alone stays, from the Python `base`, and gives
-    its Python. `wheels` is a folder to take pip from in place of an index; with `wheel_only` pip comes from its wheel
-    even where Python brings one. Raises Problem."""
+    """Makes an environment anew.
+
+    Parameters
+    ----------
+    folder : for it; what is there goes
+    base : the Python to make it from
+    requirements : the folder of requirements and locks
+    run : runs a command
+    wheels : the folder to take pip from in place of an index, or None
+    wheel_only : takes pip from its wheel even where Python brings one
+    keep : the one file in the folder that stays, '' for none
+
+    Returns
+    -------
+    The environment's Python.
+
+    Raises
+    ------
+    Problem
+        Where none can be made, or pip does not work in it.
+    """
     folder = Path(folder)
     _empty(folder, keep)
     code, error = run([base, "-m", "venv", "--without-pip", folder])

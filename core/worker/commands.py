@@ -11,8 +11,20 @@ from pathlib import Path
 
 def add_command(commands, name: str, carry_out: Callable[[argparse.Namespace], int], help: str,
                 *paths: str) -> argparse.ArgumentParser:
-    """Adds `name PATH ...` to subparsers; carry_out takes the options, paths in small letters among them, and gives the
-    exit code. Returns the parser for what else it has."""
+    """Adds `name PATH ...` to subparsers.
+
+    Parameters
+    ----------
+    commands : the subparsers
+    name : of the command
+    carry_out : takes the options, paths in small letters among them, and gives the exit code
+    help : of the command
+    paths : in capitals, as the help shows them
+
+    Returns
+    -------
+    The parser, for what else the command has.
+    """
     parser = commands.add_parser(name, help=help)
     for path in paths:
         parser.add_argument(path.lower(), metavar=path, type=Path)

@@ -38,11 +38,27 @@ class InstallationPlan:
         return self.download + self.disk
 
 
-def plan(requirements: Path, base: Path, compute: str, source: str, run: Callable[[list[str]], tuple[int, str]],
-         say: Callable[[float, float, str], None] = lambda *_: None, wheels: Path | None = None) -> InstallationPlan:
-    """What an installation would bring (see installation.py). `base` is the Python to make it from, `run` runs a
-    command and gives its exit code and last error, `say` takes how far it is. Raises Problem when there is no solver
-    for this machine, or the index cannot be reached or lacks a package."""
+def plan_installation(requirements: Path, base: Path, compute: str, source: str,
+                      run: Callable[[list[str]], tuple[int, str]],
+                      say: Callable[[float, float, str], None] = lambda *_: None,
+                      wheels: Path | None = None) -> InstallationPlan:
+    """What an installation would bring (see installation.py).
+
+    Parameters
+    ----------
+    requirements : the folder of requirements and locks
+    base : the Python to make it from
+    compute : 'cpu', 'cuda' or 'apple'
+    source : one of pip_steps.SOURCES
+    run : runs a command; its exit code and last error
+    say : takes how far it is: done, of how much, doing what
+    wheels : the folder of 'folder'
+
+    Raises
+    ------
+    Problem
+        When there is no solver for this machine, or the index cannot be reached or lacks a package.
+    """
     lock = pip_steps.lock_of(base, requirements)
     wheels = Path(wheels) if source == "folder" else None
     with tempfile.TemporaryDirectory(prefix="wildcap_index_", ignore_cleanup_errors=True) as folder:
@@ -62,7 +78,7 @@ def plan(requirements: Path, base: Path, compute: str, source: str, run: Callabl
                                                                      entry["download_info"]["url"])
             return code, error
 
-        todo = pip_steps.steps(requirements, lock, compute, source, Path(folder), wheels)
+        todo = pip_steps.plan_steps(requirements, lock, compute, source, Path(folder), wheels)
         code, error = pip_steps.carry_out(todo, ask,
                                           lambda done: say(2 + done / len(todo), 3, "asking the package index"))
         if code:

@@ -21,7 +21,7 @@ from ..contract.messages import Problem
 from . import bare_environment, locks
 from .background import BackgroundTask
 from .environment import COMPUTE_FILE, answer, python_of, required, verify
-from .pip_steps import carry_out, compute_of, lock_of, steps
+from .pip_steps import carry_out, compute_of, lock_of, plan_steps
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class _Installing:
             (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
         pip = [python_of(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar",
                "off"]
-        todo = steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
+        todo = plan_steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
         code, error = carry_out(todo, lambda words: task.run([*pip, *words], self.hear))
         if code:
             raise _failure(error, folder, self.log)

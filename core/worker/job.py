@@ -36,13 +36,28 @@ class JobRequest:
 
 def write_job(capture: Capture, *, source: str | Path = "", first: str | None = None, last: str | None = None,
               settings: dict | None = None, quality: str = "standard", tool: str = "") -> Path:
-    """Writes the capture's job.json and returns its path.
+    """Writes the capture's job.json.
 
-    `first` (a stage's name) begins with that stage and forces it and those after it; None begins with the first one and
-    skips what is fresh. `last` ends the job, None: the last stage. `settings` ({stage: {name: value}}, seed, device)
-    lie over the preset `quality`. `tool` names one of stages.TOOLS that runs in place of the chain. Raises Problem for
-    an unknown name or value, when the folder cannot be written, for file names that are no text, and while another
-    worker is at the capture: job.json is the record of what that one was asked.
+    Parameters
+    ----------
+    capture : that is worked on
+    source : a video or a folder of photographs, '': the one the capture has
+    first : name of the stage to begin with, which is forced with those after it; None: the first one, skipping what is
+        fresh
+    last : name of the stage that ends the job, None: the last one
+    settings : {stage: {name: value}}, seed and device, over the preset
+    quality : the preset
+    tool : one of stages.TOOLS, to run in place of the chain, or ''
+
+    Returns
+    -------
+    The path of job.json.
+
+    Raises
+    ------
+    Problem
+        For an unknown name or value, when the folder cannot be written, for file names that are no text, and while
+        another worker is at the capture: job.json is the record of what that one was asked.
     """
     chosen = convert_settings(settings or {}, lambda path: write_portable(path, capture.root))
     job = {"capture": ".", "source": write_portable(source, capture.root) if str(source) else "", "from": first,

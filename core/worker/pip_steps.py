@@ -56,10 +56,19 @@ class PipStep:
     otherwise: tuple[tuple[str, ...], ...] = ()
 
 
-def steps(requirements: Path, lock: locks.Lock, compute: str, source: str, scratch: Path,
-          wheels: Path | None = None) -> list[PipStep]:
-    """What pip is to do in turn. `compute`: 'cpu', 'cuda' or 'apple'; `source`: one of SOURCES; `wheels`: the folder of
-    'folder'; files that pip is to read are written to the folder `scratch`."""
+def plan_steps(requirements: Path, lock: locks.Lock, compute: str, source: str, scratch: Path,
+               wheels: Path | None = None) -> list[PipStep]:
+    """What pip is to do in turn.
+
+    Parameters
+    ----------
+    requirements : the folder of requirements and locks
+    lock : of the Python and the machine
+    compute : 'cpu', 'cuda' or 'apple'
+    source : one of SOURCES
+    scratch : the folder for files that pip is to read
+    wheels : the folder of 'folder'
+    """
     system = {"win_amd64": "win32", "macosx_arm64": "darwin"}.get(lock.platform, "linux")
     where = ("--no-index", "--find-links", str(wheels)) if source == "folder" else ()
     checked, whole = (*PINNED, "--require-hashes", *where), str(Path(requirements) / "locks" / f"{lock.name}.txt")

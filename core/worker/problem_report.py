@@ -48,8 +48,25 @@ COMMON = {"root", "user", "admin", "frames", "video", "capture", "photographs", 
 
 
 def write(target: Path, root: Path, python: Path | None, capture: Capture | None = None, **versions: str) -> Path:
-    """Writes the zip; `root` holds core/, `python` is the worker's (None: there is none), `versions` those of the host.
-    Raises Problem for a file that is there already, and where it cannot be written."""
+    """Writes the zip.
+
+    Parameters
+    ----------
+    target : the zip; its ending is added where it lacks one
+    root : the folder that holds core/
+    python : the worker's, None: there is none
+    capture : that the problem is with, or None
+    versions : of the host's programs, by name
+
+    Returns
+    -------
+    The path of the zip.
+
+    Raises
+    ------
+    Problem
+        For a file that is there already, and where it cannot be written.
+    """
     target = Path(target)
     if target.suffix.lower() != ".zip":
         target = target.with_name(f"{target.name}.zip")

@@ -56,7 +56,7 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None,
             _check_slimmed(job)
             if job.tool is not None:
                 stage = job.tool.name
-                run_tool(job.tool, job, emit, cancelled)
+                _run_tool(job.tool, job, emit, cancelled)
                 return Done(round(time.monotonic() - started, 2))
             if job.force:
                 job.capture.forget([stage.name for stage in job.chain])
@@ -79,7 +79,19 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None,
 
 def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> str:
     """Runs one stage, records it, and rebuilds the report, unless the stage is finished: done, or made by older code,
-    which is not ours to replace. Returns the state it was found in. Raises whatever the stage raises."""
+    which is not ours to replace. Raises whatever the stage raises.
+
+    Parameters
+    ----------
+    stage : to run
+    job : with the capture and the settings
+    emit : takes the messages
+    cancelled : whether it is to end
+
+    Returns
+    -------
+    The state that the stage was found in.
+    """
     capture, settings = job.capture, job.settings
     state = capture.state(stage, settings)
     if state in FINISHED:
@@ -88,7 +100,7 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
         return state
     with at_work(stage, capture, emit, cancelled) as reporter:
         try:
-            bring_back(stage, job, emit, cancelled)
+            _bring_back(stage, job, emit, cancelled)
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
             capture.forget([stage.name])
             settings = _with_device(stage, settings, reporter)
@@ -107,16 +119,17 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
     return state
 
 
-def run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
+def _run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
     """Runs one of stages.TOOLS and sends its figures. Raises whatever it raises."""
     started = time.monotonic()
     with at_work(tool, job.capture, emit, cancelled) as reporter:
-        bring_back(tool, job, emit, cancelled)
+        _bring_back(tool, job, emit, cancelled)
         _room(tool).run(job.capture, _with_device(tool, job.settings, reporter), reporter)
     emit(StageDone(tool.name, round(time.monotonic() - started, 2), False, reporter.figures))
 
 
-def bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
+def _bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None],
+                cancelled: Callable[[], bool]) -> None:
     """Has made again what a stage or tool reads and was slimmed away, with the settings that it was made with. Where
     the same comes out, it is as if it had never gone; where not, for the code is another or what it is made from has
     changed, it counts as new. Raises whatever the stages raise."""

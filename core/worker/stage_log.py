@@ -21,7 +21,19 @@ from ..contract.stages import Stage
 @contextlib.contextmanager
 def at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], cancelled: Callable[[], bool]):
     """The reporter of a stage or tool; what is printed meanwhile, and the traceback of what stops it, go to its log.
-    Raises Problem where an input is missing."""
+
+    Parameters
+    ----------
+    step : the stage or tool
+    capture : that has the log
+    emit : takes the messages
+    cancelled : whether it is to end
+
+    Raises
+    ------
+    Problem
+        Where an input is missing.
+    """
     missing = [name for name in step.reads if not capture.has(name)]
     if missing:
         raise Problem(f"{step.label} needs {missing[0]}, which this capture does not have.",

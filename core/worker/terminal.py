@@ -20,8 +20,19 @@ POLL_S = 0.1  # between two looks at the job
 
 
 def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str]) -> int:
-    """Runs a job with this Python and prints what it says; returns the exit code: 0, 2 for a problem, 130 after Ctrl-C.
-    `environment` is the worker's own, beside ours."""
+    """Runs a job with this Python and prints what it says.
+
+    Parameters
+    ----------
+    root : the folder that holds core/
+    capture : that is worked on
+    job : the job file
+    environment : variables of the worker's own, beside ours
+
+    Returns
+    -------
+    The exit code: 0, 2 for a problem, 130 after Ctrl-C.
+    """
     if read_job(job).settings.delight.delighter == "switchlight" and os.environ.get(switchlight_api.KEY_VARIABLE):
         environment = {**environment, switchlight_api.KEY_VARIABLE: os.environ[switchlight_api.KEY_VARIABLE]}
     worker = Worker(Path(sys.executable), root, job, capture.logs / "worker.log", environment)

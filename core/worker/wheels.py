@@ -20,8 +20,26 @@ from . import locks, pip_steps
 
 def download(requirements: Path, name: str, compute: str, source: str, folder: Path,
              run: Callable[[list], tuple[int, str]]) -> list[Path]:
-    """Brings the wheels of the lock `name` into `folder`, and gives them. `compute` and `source` as in pip_steps; `run`
-    runs a command and gives its exit code and its last error. Wheels that are there already stay. Raises Problem."""
+    """Brings the wheels of a lock into a folder. Those that are there already stay.
+
+    Parameters
+    ----------
+    requirements : the folder of requirements and locks
+    name : of the lock
+    compute : 'cpu', 'cuda' or 'apple'
+    source : 'pytorch' or 'pip', as in pip_steps.SOURCES
+    folder : for the wheels
+    run : runs a command; its exit code and last error
+
+    Returns
+    -------
+    All wheels of the folder.
+
+    Raises
+    ------
+    Problem
+        Where the folder is none, or a wheel cannot be had.
+    """
     lock = locks.read(requirements, name)
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
@@ -31,7 +49,7 @@ def download(requirements: Path, name: str, compute: str, source: str, folder: P
     with tempfile.TemporaryDirectory(prefix="wildcap_wheels_") as scratch:
         own_pip = pip_steps.PipStep(("--no-deps", "--require-hashes", "-r",
                                      str(Path(requirements) / "locks" / "pip.txt")))
-        steps = [*pip_steps.steps(requirements, lock, compute, source, Path(scratch)), own_pip]
+        steps = [*pip_steps.plan_steps(requirements, lock, compute, source, Path(scratch)), own_pip]
         code, error = pip_steps.carry_out(steps, lambda words: run([*pip, *words]))
     if code:
         raise Problem(f"Not all wheels for {name} could be downloaded "

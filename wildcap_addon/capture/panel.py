@@ -13,6 +13,12 @@ from . import strip
 class WILDCAP_UL_captures(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property):
         # the active head decides
+        """A capture's name, and how far a batch has come with it.
+
+        Parameters
+        ----------
+        context, layout, data, item, icon, active_data, active_property : as Blender gives them; `item` is the capture's
+        """
         layout.prop(item, "name", text="", emboss=False,
                     icon='CHECKMARK' if item == captures.active(context) else 'USER')
         face_state = batches.state_of(captures.root(item))

@@ -38,9 +38,22 @@ def of(obj) -> list[bpy.types.Object]:
     return [hairs[part] for part in TITLES if part in hairs]
 
 
-def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bool:
-    """The hairs of a part on the head: points [M, K, 3] in its axes, radius [M, K], colour [M, 3] linear. False where
-    somebody combed the ones that are there: then only their material is seen to."""
+def grow_part(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bool:
+    """Puts the hairs of a part on the head; those that somebody combed only follow the skin.
+
+    Parameters
+    ----------
+    context : Blender's
+    obj : the head
+    part : a key of TITLES
+    points : [M, K, 3], metres in the head's axes, from the root on
+    radius : [M, K], metres
+    colour : [M, 3], linear
+
+    Returns
+    -------
+    False where the hairs stay as they were combed.
+    """
     hair = next((child for child in of(obj) if child[captures.HAIR_KEY] == part), None)
     if hair is not None and is_combed(hair):
         follow(hair, obj)

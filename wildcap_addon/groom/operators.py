@@ -50,7 +50,7 @@ class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
             kept = np.random.default_rng(0).permutation(len(points)) < round(self.share * len(points))
             factor = self.beard_mm / BEARD_MM if part == "beard" else self.length
             points = points[:, :1] + factor * (points - points[:, :1])
-            if not curves.grow(context, obj, part, points[kept], self.thickness * radius[kept], colour[kept]):
+            if not curves.grow_part(context, obj, part, points[kept], self.thickness * radius[kept], colour[kept]):
                 combed.append(curves.TITLES[part])
         show_skin_below(captures.folder(item))
         if combed:

@@ -20,12 +20,30 @@ from ...core.contract.messages import Problem
 from . import mask_image
 
 
-def store(mask: np.ndarray, capture: Capture, mask_kind: str, stamp: tuple) -> tuple:
-    """Writes a mask [H, W], rows from the top, if it differs from the capture's. `stamp` is that of what this
-    session wrote last; returns the new one. Raises Problem when it cannot be written."""
+def store_painting(mask: np.ndarray, capture: Capture, mask_kind: str, stamp: tuple) -> tuple:
+    """Writes the mask that is being painted if it differs from the capture's; what this session did not write goes to
+    the history first.
+
+    Parameters
+    ----------
+    mask : [H, W] in [0, 1], rows from the top
+    capture : whose it is
+    mask_kind : 'SHADOW' or 'PROTECT'
+    stamp : size and time of the file that this session wrote last; () before the first
+
+    Returns
+    -------
+    The new stamp.
+
+    Raises
+    ------
+    Problem
+        Where it cannot be written.
+    """
     path = mask_image.file_of(capture, mask_kind)
     try:
-        return _stamp(path) if mask_image.store(mask, capture, mask_kind, keep=_stamp(path) != tuple(stamp)) else stamp
+        written = mask_image.store_mask(mask, capture, mask_kind, keep=_stamp(path) != tuple(stamp))
+        return _stamp(path) if written else stamp
     except OSError as error:  # a file server that is away for a moment: the next look tries again
         raise storage_problem(error, path) from error
 
@@ -34,8 +52,8 @@ _pixels: np.ndarray | None = None  # of the last look; a session has one Saving 
 
 
 class Saving(threading.Thread):
-    """One `store` of an image's mask aside. Its thread touches nothing of Blender's; `result` is for the main thread,
-    once it has ended."""
+    """One `store_painting` of an image's mask aside. Its thread touches nothing of Blender's; `result` is for the main
+    thread, once it has ended."""
 
     def __init__(self, image: bpy.types.Image, capture: Capture, mask_kind: str, stamp: tuple):
         global _pixels
@@ -49,12 +67,12 @@ class Saving(threading.Thread):
     def run(self) -> None:
         pixels, *rest = self._arguments
         try:
-            self._stamp = store(mask_image.from_top(pixels), *rest)
+            self._stamp = store_painting(mask_image.from_top(pixels), *rest)
         except Problem as error:
             self._problem = error
 
     def result(self) -> tuple:
-        """Waits, and gives the stamp. Raises Problem as `store` does."""
+        """Waits, and gives the stamp. Raises Problem as `store_painting` does."""
         self.join()
         if self._problem is not None:
             raise self._problem

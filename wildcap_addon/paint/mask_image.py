@@ -131,15 +131,33 @@ def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
         bpy.data.images.remove(other)
 
 
-def save(image: bpy.types.Image, capture: Capture, mask_kind: str = 'SHADOW', keep: bool = True) -> bool:
-    """As `store`, of an image."""
-    return store(mask_values(image), capture, mask_kind, keep)
+def save_image(image: bpy.types.Image, capture: Capture, mask_kind: str = 'SHADOW', keep: bool = True) -> bool:
+    """As `store_mask`, of an image.
+
+    Parameters
+    ----------
+    image : shows the mask
+    capture, mask_kind, keep : as `store_mask` has them
+
+    Returns
+    -------
+    False where nothing was written.
+    """
+    return store_mask(mask_values(image), capture, mask_kind, keep)
 
 
-def store(mask: np.ndarray, capture: Capture, mask_kind: str, keep: bool) -> bool:
-    """Writes a mask [H, W] to its file (8 bit grey), atomically, and with `keep` the mask that was there to
-    mask_history. Knows no bpy: a thread may do it.
+def store_mask(mask: np.ndarray, capture: Capture, mask_kind: str, keep: bool) -> bool:
+    """Writes a mask to its file (8 bit grey), atomically. Knows no bpy: a thread may do it.
 
+    Parameters
+    ----------
+    mask : [H, W] in [0, 1], rows from the top
+    capture : whose it is
+    mask_kind : 'SHADOW' or 'PROTECT'
+    keep : whether the mask that was there goes to mask_history
+
+    Returns
+    -------
     False, and nothing is written, where the file holds that mask already, or there is nothing to protect and never was.
     """
     path = file_of(capture, mask_kind)

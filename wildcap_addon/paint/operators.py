@@ -34,7 +34,7 @@ class WILDCAP_OT_paint_mask(CaptureOperator, bpy.types.Operator):
                 "Moles, scars and make-up that the solver must not take for shadow; it wins over the shadow mask")])
 
     def work(self, context):
-        session.begin(context, captures.require(context), self.on == 'SHEET', self.mask)
+        session.begin_painting(context, captures.require(context), self.on == 'SHEET', self.mask)
 
 
 class WILDCAP_OT_finish_mask(BaseOperator, bpy.types.Operator):
@@ -49,7 +49,7 @@ class WILDCAP_OT_finish_mask(BaseOperator, bpy.types.Operator):
         return cls.allowed(session.active(), "No mask is being painted: click Paint on the Head, under Masks, first")
 
     def work(self, context):
-        session.end(context)
+        session.end_painting(context)
 
 
 class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):

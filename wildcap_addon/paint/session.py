@@ -95,14 +95,23 @@ def push_undo(context) -> None:
             bpy.ops.image.invert(invert_r=False, invert_g=False, invert_b=False, invert_a=False)
 
 
-def begin(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') -> None:
-    """Enters Texture Paint on the head or on the sheet, the mask as its tinted stencil and the mask brush in hand."""
+def begin_painting(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') -> None:
+    """Enters Texture Paint, the mask as the tinted stencil and the mask brush in hand. Raises Problem without head or
+    texture.
+
+    Parameters
+    ----------
+    context : Blender's
+    item : the capture's
+    use_sheet : paint on the flat sheet, not on the head
+    mask_kind : 'SHADOW' or 'PROTECT'
+    """
     global _session
     if _session is not None and _session.which == mask_kind:
         places.follow_name(_session)
         places.turn(context, _session, use_sheet)
         return
-    end(context)
+    end_painting(context)
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
     texture = head.load_image(capture.texture_png) if capture.texture_png.is_file() else None
@@ -131,7 +140,7 @@ def begin(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') -> None:
     _start_watching()
 
 
-def end(context) -> None:
+def end_painting(context) -> None:
     """Saves the mask and puts everything back. Safe to call when the artist has left the mode by other ways."""
     global _ended
     session = _session
@@ -184,8 +193,8 @@ def save() -> None:
     wait()
     image = bpy.data.images.get(_session.mask) if _session else None
     if image is not None:
-        _session.written = keeping.store(mask_image.mask_values(image), Capture(_session.root), _session.which,
-                                         _session.written)
+        _session.written = keeping.store_painting(mask_image.mask_values(image), Capture(_session.root), _session.which,
+                                                  _session.written)
 
 
 def keep_up(stroking: bool) -> None:
@@ -237,7 +246,7 @@ def _watch() -> float | None:
         if bpy.context.mode == 'OBJECT':
             root = _session.root
             try:
-                end(bpy.context)
+                end_painting(bpy.context)
             except Exception as error:  # nobody is above a timer: without this, Blender would drop it
                 problems.show(root, error if isinstance(error, Problem) else unforeseen.explain(error, "painting"))
                 return WATCH_S * 4

@@ -50,7 +50,7 @@ def render(obj: bpy.types.Object, folder: Path, wait: bool, settings: picture.Re
     paths, sheet = [folder / f"{name}.png" for name in presets], folder / NAME
     output.make_room(sheet)
     strips = captions.draw([*rows, about], COLUMNS * size, max(size // 14, 8))
-    output.stills(scene, paths, wait, lambda: _save(_joined(paths, strips, size), sheet))
+    output.render_stills(scene, paths, wait, lambda: _save(_joined(paths, strips, size), sheet))
     return sheet
 
 

@@ -22,9 +22,23 @@ FRAMES_PER_SECOND = 24
 def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolution: int = 640,
                  samples: int = 32) -> list[Path]:
     """Brings in the head, assembles its material and renders renders/NAME.png and the linear renders/NAME.exr for each
-    light: a preset, one of Blender's worlds by its name, or a picture. Returns the PNGs.
+    light. Empties the open file first.
 
-    Empties the open file first. Raises Problem when the capture has no head or no maps, or there is no such light.
+    Parameters
+    ----------
+    capture_folder : with head and maps
+    names : of lights: a preset, one of Blender's worlds by its name, or a picture
+    resolution : pixels of a side
+    samples : of Cycles
+
+    Returns
+    -------
+    The PNGs.
+
+    Raises
+    ------
+    Problem
+        Where the capture has no head or no maps, or there is no such light.
     """
     chosen = [light_of(name) for name in names]
     obj, item = open_head(capture_folder)
@@ -34,7 +48,18 @@ def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolu
 
 def render_contact_sheet(capture_folder: Path, resolution: int = 512, samples: int = 32,
                          view: str = colours.VIEWS[0]) -> Path:
-    """As `render_relit`, in all presets, joined to renders/contact_sheet.png, which is returned."""
+    """As `render_relit`, in all presets, joined in one picture.
+
+    Parameters
+    ----------
+    capture_folder, samples : as `render_relit` has them
+    resolution : pixels of a side of each picture
+    view : the view transform
+
+    Returns
+    -------
+    renders/contact_sheet.png.
+    """
     obj, item = open_head(capture_folder)
     return contact_sheet.render(obj, captures.folder(item).renders, True,
                                 RenderSettings(resolution, samples, view=view))
@@ -44,8 +69,23 @@ def render_turntable(
     capture_folder: Path, name: str | Hdri = ALL[0], turns: str = 'HEAD', frames: int = 48, film: bool = False,
     resolution: int = 512, samples: int = 32,
 ) -> Path:
-    """The 'HEAD' or the 'LIGHT' once around, to renders/turntable/, which is returned: PNG frames, or one film. Raises
-    Problem as `render_relit` does."""
+    """The head or its light once around.
+
+    Parameters
+    ----------
+    capture_folder, resolution, samples : as `render_relit` has them
+    name : of the light, likewise
+    turns, frames, film : as Turn has them
+
+    Returns
+    -------
+    renders/turntable/, with PNG frames or one film.
+
+    Raises
+    ------
+    Problem
+        As `render_relit` and `turntable` do.
+    """
     light = light_of(name)
     obj, item = open_head(capture_folder)
     return turntable(obj, captures.folder(item).renders, light, Turn(turns, frames, film),
@@ -89,11 +129,11 @@ def turntable(obj, renders: Path, light: str | Hdri, turn: Turn, settings: Rende
     if turn.turns == 'LIGHT' and isinstance(light, str) and not lights.preset(light).lamps:
         raise Problem("This light is the same from every side: turning it changes nothing.",
                       "Choose another light, or turn the head.")
-    scene = reel.turning(obj, light, turn.turns, turn.frames, settings)
+    scene = reel.animate_turn(obj, light, turn.turns, turn.frames, settings)
     if turn.film:
         reel.as_film(scene, FRAMES_PER_SECOND)
     folder = renders / "turntable"
-    output.frames(scene, folder, "turntable.mp4" if turn.film else "####.png", turn.frames, wait)
+    output.render_frames(scene, folder, "turntable.mp4" if turn.film else "####.png", turn.frames, wait)
     return folder
 
 
@@ -128,5 +168,5 @@ def render_light(obj, folder: Path, light: str | Hdri, settings: RenderSettings,
     The PNG's path.
     """
     path = folder / f"{light if isinstance(light, str) else light.path.stem}.png"
-    output.still(settings.scene(obj, light), path, wait)
+    output.render_still(settings.scene(obj, light), path, wait)
     return path

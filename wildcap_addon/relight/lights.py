@@ -76,10 +76,18 @@ def preset(name: str) -> LightingPreset:
     return PRESETS[NAMED_BEFORE.get(name, name)]
 
 
-def build(scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float, turn: float = 0.0) -> None:
-    """Replaces the lamps and the world of `scene` by those of a preset or of a picture. `frame` [4, 4] is the head's
-    place without scale, `radius` its size in scene units; `turn` turns the light about the head, in radians,
-    counter-clockwise from above."""
+def build_light(scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float,
+                turn: float = 0.0) -> None:
+    """Replaces the lamps and the world of a scene.
+
+    Parameters
+    ----------
+    scene : changed
+    light : a preset's name, or a picture of surroundings; None: dark
+    frame : [4, 4], the head's place without scale
+    radius : of the head, in scene units
+    turn : of the light about the head, in radians, counter-clockwise from above
+    """
     clear(scene)
     frame = frame @ Matrix.Rotation(turn, 4, 'Z')
     scene.world = sky.world()
@@ -106,7 +114,19 @@ def rig(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def add_lamps(scene: bpy.types.Scene, lamps: tuple[Lamp, ...], frame: Matrix, radius: float) -> list[bpy.types.Object]:
-    """The lamps around the head, carried by the scene's rig."""
+    """Puts lamps around the head, carried by the scene's rig.
+
+    Parameters
+    ----------
+    scene : changed
+    lamps : of a preset
+    frame : [4, 4], the head's place without scale: where a rig that is not there yet is put
+    radius : of the head, in scene units
+
+    Returns
+    -------
+    The lamps' objects.
+    """
     carrier = rig(scene)
     if carrier is None:
         carrier = bpy.data.objects.new(RIG, None)

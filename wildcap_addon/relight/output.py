@@ -44,7 +44,7 @@ def busy() -> bool:
     return bpy.app.is_job_running('RENDER')
 
 
-def still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
+def render_still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
     """Renders `path`, a PNG, and its EXR. wait=False returns at once and shows Blender's render window. Raises Problem
     when the folder cannot be written."""
     global _running
@@ -56,8 +56,16 @@ def still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
     _render(scene, wait, write_still=True)
 
 
-def stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable[[], None]) -> None:
-    """As `still`, for the frames 1, 2, ... of the scene; `then` is called when all are there."""
+def render_stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable[[], None]) -> None:
+    """As `render_still`, for the frames 1, 2, ... of the scene.
+
+    Parameters
+    ----------
+    scene : of as many frames
+    paths : their PNGs, in one folder
+    wait : False returns at once
+    then : called when all are there
+    """
     global _running
     make_room(paths[0])
     scene.frame_start, scene.frame_end = 1, len(paths)
@@ -69,9 +77,18 @@ def stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable
     _render(scene, wait, animation=True)
 
 
-def frames(scene: bpy.types.Scene, folder: Path, name: str, count: int, wait: bool) -> None:
-    """Renders the frames 1 to `count` to folder/name, which holds #### or is a film's; the folder replaces the one
-    before when all are there."""
+def render_frames(scene: bpy.types.Scene, folder: Path, name: str, count: int, wait: bool) -> None:
+    """Renders the frames of a scene; the folder replaces the one before when all are there. Raises Problem where it
+    cannot be written.
+
+    Parameters
+    ----------
+    scene : rendered
+    folder : made anew
+    name : of the files in it, with #### for the frame's number; or the film's
+    count : of the frames, from 1 on
+    wait : False returns at once
+    """
     global _running
     hidden = _hidden(folder)
     shutil.rmtree(hidden, ignore_errors=True)

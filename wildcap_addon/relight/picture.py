@@ -33,19 +33,28 @@ class RenderSettings:
 
     def scene(self, obj: bpy.types.Object, light: str | Hdri) -> bpy.types.Scene:
         """The relight scene with this head."""
-        return set_up(obj, light, self.resolution, self.samples, self.turn, self.view)
+        return set_up_scene(obj, light, self.resolution, self.samples, self.turn, self.view)
 
 
-def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, samples: int, turn: float = 0.0,
-           view: str = colours.VIEWS[0]) -> bpy.types.Scene:
-    """The relight scene with this head and what it wears alone in it, framed and lit (None: dark); the light is turned
-    by `turn` radians about the head. The picture is shown by the view transform `view`, and its file says so."""
+def set_up_scene(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, samples: int, turn: float = 0.0,
+                 view: str = colours.VIEWS[0]) -> bpy.types.Scene:
+    """The relight scene with this head and what it wears alone in it, framed and lit.
+
+    Parameters
+    ----------
+    obj : the head
+    light : a preset's name, or a picture of surroundings; None: dark
+    resolution : pixels of a side
+    samples : of Cycles
+    turn : of the light about the head, in radians, counter-clockwise from above
+    view : the view transform that the picture is shown by; its file says so
+    """
     scene = find(bpy.data.scenes, SCENE) or bpy.data.scenes.new(SCENE)
     output.let_go(scene)
     for thing in (obj, *captures.worn(obj)):
         scene.collection.objects.link(thing)
     frame, radius = frame_of(obj)
-    lights.build(scene, light, frame, radius, turn)
+    lights.build_light(scene, light, frame, radius, turn)
     _camera(scene, frame, radius)
     now = bpy.context.scene  # a head that is animated looks as it does there
     scene.frame_set(now.frame_current, subframe=now.frame_subframe)

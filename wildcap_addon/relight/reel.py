@@ -34,10 +34,18 @@ def each_light(obj: bpy.types.Object, presets: tuple[str, ...], settings: pictur
     return scene
 
 
-def turning(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int,
-            settings: picture.RenderSettings) -> bpy.types.Scene:
-    """The relight scene in which, over the frames 1 to `frames`, the 'HEAD' or the 'LIGHT' goes once around,
-    counter-clockwise from above."""
+def animate_turn(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int,
+                 settings: picture.RenderSettings) -> bpy.types.Scene:
+    """The relight scene in which the head or the light goes once around, counter-clockwise from above.
+
+    Parameters
+    ----------
+    obj : the head
+    light : a preset's name, or a picture of surroundings
+    turns : 'HEAD' or 'LIGHT'
+    frames : of the whole turn, from 1 on
+    settings : of each frame
+    """
     scene = settings.scene(obj, light)
     frame, _ = picture.frame_of(obj)
     rig, camera = lights.rig(scene), scene.camera

@@ -32,8 +32,8 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
         compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is None:
-            asking.ask(("plan", compute, source, wheels), lambda task: look_up(task, compute, source, wheels, folder),
-                       "install_solver")
+            asking.find_answer(("plan", compute, source, wheels),
+                               lambda task: look_up_plan(task, compute, source, wheels, folder), "install_solver")
             return None
         return describe_plan(plan, compute, folder, index.check_space(plan, folder))
 
@@ -47,7 +47,7 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
                                          installation.PackageSource(compute, source, wheels),
                                          len(plan.packages) if plan is not None else 0)
         asking.forget(("size", str(folder)))
-        jobs.begin("", "install", task, lambda: accept(environment.python_of(folder)))
+        jobs.start_worker("", "install", task, lambda: accept(environment.python_of(folder)))
 
 
 class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
@@ -68,7 +68,7 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
         folder = preferences.environment_folder()
         size = asking.answer(("size", str(folder)))
         if size is None:
-            asking.ask(("size", str(folder)), lambda task: measure(task, folder), "remove_solver")
+            asking.find_answer(("size", str(folder)), lambda task: measure(task, folder), "remove_solver")
             return None
         return (iface_("Deletes {} and frees {}.").format(folder, index.gigabytes(size)),
                 "Captures, masks and maps stay; what pip keeps in its own cache stays, too.")
@@ -79,11 +79,23 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
         asking.forget(("size", str(folder)))
         if preferences.get().python == str(environment.python_of(folder)):
             preferences.set_python(None)
-        jobs.begin("", "ask", environment.removal(folder))
+        jobs.start_worker("", "ask", environment.removal(folder))
 
 
 def describe_plan(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
-    """What an installation means, before the artist says yes; `free` bytes are on the folder's disk."""
+    """What an installation means, before the artist says yes.
+
+    Parameters
+    ----------
+    plan : of the installation
+    compute : a key of COMPUTES
+    folder : installed to
+    free : bytes on that folder's disk
+
+    Returns
+    -------
+    The dialog's lines.
+    """
     torch, others = plan.packages.get("torch", ""), len(plan.packages) - 1
     return (iface_("PyTorch {} for {} and {} more packages.").format(torch, iface_(COMPUTES[compute]), others),
             iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
@@ -102,12 +114,27 @@ def chosen_packages() -> tuple[str, str, Path | None]:
     return pip_steps.compute_of(preferences.get().compute), source, preferences.wheels_folder()
 
 
-def look_up(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.InstallationPlan:
-    """The plan of an installation, asked of the package index."""
+def look_up_plan(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.InstallationPlan:
+    """Asks the package index what an installation would bring.
+
+    Parameters
+    ----------
+    task : says how far it is, and runs pip
+    compute : a key of COMPUTES
+    source : as the preferences have it under Packages From
+    wheels : their folder; None where they come from the index
+    folder : installed to
+
+    Raises
+    ------
+    Problem
+        Where there is no Python to begin with or no solver for this machine, the folder's path is too long, or the
+        index cannot be reached or lacks a package.
+    """
     task.say(0, 4, "looking for a Python to begin with")
     base = installation.base_python()
     locks.check_path(pip_steps.lock_of(base, REQUIREMENTS), folder, limited=os.name == "nt")
-    return index.plan(REQUIREMENTS, base, compute, source, task.run, task.say, wheels)
+    return index.plan_installation(REQUIREMENTS, base, compute, source, task.run, task.say, wheels)
 
 
 def measure(task, folder) -> int:

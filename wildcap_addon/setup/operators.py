@@ -30,8 +30,8 @@ class WILDCAP_OT_use_python(FileOperator, bpy.types.Operator):
     def work(self, context):
         python = interpreter(Path(bpy.path.abspath(self.filepath)))
         if self.options.is_invoke:
-            jobs.begin("", "ask", BackgroundTask("setup", lambda task: try_out(task, python)),
-                       lambda: checking.accept(python))
+            jobs.start_worker("", "ask", BackgroundTask("setup", lambda task: try_out(task, python)),
+                              lambda: checking.accept(python))
         else:  # a script waits for the answer
             checking.judge(python, importing=False)
             preferences.set_python(python)

@@ -40,11 +40,30 @@ class WILDCAP_OT_save_report(FileOperator, bpy.types.Operator):
         item = captures.active(context)
         capture = captures.folder(item) if item is not None else None
         blender = bpy.app.version_string
-        task = BackgroundTask("setup", lambda task: save(task, target, python, capture, blender))
-        jobs.begin("", "ask", task, lambda: tell(task.result))
+        task = BackgroundTask("setup", lambda task: save_report(task, target, python, capture, blender))
+        jobs.start_worker("", "ask", task, lambda: tell(task.result))
 
 
-def save(task: BackgroundTask, target: Path, python, capture, blender: str) -> Path:
+def save_report(task: BackgroundTask, target: Path, python, capture, blender: str) -> Path:
+    """Writes the report in the background.
+
+    Parameters
+    ----------
+    task : says how far it is
+    target : the zip; .zip is added where it lacks
+    python : of the worker; None where there is none
+    capture : told of; None where there is none
+    blender : its version
+
+    Returns
+    -------
+    The zip that was written.
+
+    Raises
+    ------
+    Problem
+        Where the file is there already, or cannot be written.
+    """
     task.say(0, 1, "writing the report")
     return problem_report.write(target, jobs.ROOT, python, capture, Blender=blender)
 

@@ -34,7 +34,7 @@ class WILDCAP_OT_self_test(BaseOperator, bpy.types.Operator):
         preferences.get().tested = ""
         folder = Path(tempfile.mkdtemp(prefix="self_test_", dir=bpy.app.tempdir or None))
         capture = self_test.prepare(folder)
-        job = jobs.begin("", "test", Worker(preferences.python(), jobs.ROOT, capture.job, folder / "worker.log"))
+        job = jobs.start_worker("", "test", Worker(preferences.python(), jobs.ROOT, capture.job, folder / "worker.log"))
         job.then, job.ended = lambda: tell(job.figures), lambda: shutil.rmtree(folder, ignore_errors=True)
 
 

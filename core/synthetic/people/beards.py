@@ -10,7 +10,7 @@ from ...face.strands import SkinSurface, Strands, clumped, coloured, grow, waved
 from ...geometry.noise import octaves
 from ..canvas import Canvas
 from ..regions import regions
-from .ground import Ground, strewn, turned
+from .ground import Ground, strew_roots, turned
 from .person import Person
 
 DENSITY = {"stubble": 0.75, "moustache": 1.3, "full": 0.85}  # hairs per mm^2 where it is densest
@@ -18,11 +18,19 @@ SIDEBURNS = [[162, 127, 234, 93], [389, 356, 454, 323]]  # from the temples down
 RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}  # of a hair at its root
 
 
-def beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
-    """Hairs that leave the mouth aside and fall; a longer beard is bent down and clumps."""
+def grow_beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
+    """Hairs that leave the mouth aside and fall; a longer beard is bent down and clumps.
+
+    Parameters
+    ----------
+    person : whose beard is not "none"
+    ground : of their head
+    skin : which hairs may not enter
+    rng : of single hairs
+    """
     on, kind = ground.canvas, person.beard
-    roots = strewn(ground, DENSITY[kind] * beard_density(kind, on, np.random.default_rng([person.seed, 65])), _ways(on),
-                   rng)
+    density = DENSITY[kind] * beard_density(kind, on, np.random.default_rng([person.seed, 65]))
+    roots = strew_roots(ground, density, _ways(on), rng)
     roots = turned(roots, rng.normal(0, 0.3, len(roots.at)))
     count = len(roots.at)
     # a moustache is kept out of the mouth

@@ -9,15 +9,23 @@ import numpy as np
 from ...face.lids import OpenHead
 from ...face.strands import Roots, SkinSurface, Strands, coloured, grow
 from ..regions import regions
-from .ground import Ground, strewn, turned
+from .ground import Ground, strew_roots, turned
 from .person import Person
 
 RADIUS_M = 0.000045  # of a hair at its root
 UPPER, LOWER = (110, 0.0085), (60, 0.0050)  # lashes on a lid, and their length in metres
 
 
-def brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
-    """Near the nose hairs stand up, then they lie along the brow, and at the tail they point down."""
+def grow_brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
+    """Near the nose hairs stand up, then they lie along the brow, and at the tail they point down.
+
+    Parameters
+    ----------
+    person : whose they are
+    ground : of their head
+    skin : which hairs may not enter
+    rng : of single hairs
+    """
     on = ground.canvas
     region = regions(on)["brows"]
     outer = np.abs(on.position[:, :1]) / np.abs(on.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
@@ -25,7 +33,7 @@ def brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Gene
     way = np.sign(on.position[:, :1]) * [1.0, 0, 0] + rise * [0, 0, 1.0]
     chance = np.clip(region * 2.4 - 1.5 + 0.6 * min(person.brow, 1.3), 0, 1)
     density = (1.25 - 0.6 * outer[:, 0].clip(0, 1)) * 1.15 * person.brow * chance
-    roots = strewn(ground, density, way, rng)
+    roots = strew_roots(ground, density, way, rng)
     roots = turned(roots, rng.normal(0, 0.22, len(roots.at)))
     count = len(roots.at)
     tail = np.clip(np.abs(roots.at[:, 0]) / np.abs(on.landmarks[[70, 300], 0]).mean(), 0, 1.2)
@@ -36,7 +44,7 @@ def brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Gene
                    coloured(count, np.asarray(person.brow_colour), 0.4 * person.grey, rng), "brows")
 
 
-def lashes(person: Person, head: OpenHead, rng: np.random.Generator) -> Strands:
+def grow_lashes(person: Person, head: OpenHead, rng: np.random.Generator) -> Strands:
     """Upper lashes that bow upwards from the edge of the lid (of closed lids: downwards and out), and shorter lower
     ones."""
     points = []

@@ -18,9 +18,22 @@ EYES = ((33, 133), (362, 263))
 RIMS = 0.1
 
 
-def backdrop(directions: np.ndarray, environment: Environment, light: float, rng: np.random.Generator) -> np.ndarray:
-    """Radiance [S, S, 3] behind the person: the panorama out of focus, or walls and cloth of any colour, with or
-    without things before them."""
+def paint_backdrop(directions: np.ndarray, environment: Environment, light: float,
+                   rng: np.random.Generator) -> np.ndarray:
+    """What is behind the person: the panorama out of focus, or walls and cloth of any colour, with or without things
+    before them.
+
+    Parameters
+    ----------
+    directions : [S, S, 3], unit, from the camera through the pixels, in the head's axes
+    environment : what lights the person
+    light : radiance of a white thing
+    rng : of all of it
+
+    Returns
+    -------
+    [S, S, 3], linear radiance.
+    """
     size = len(directions)
     kind = rng.random()
     if kind < 0.4:
@@ -42,10 +55,23 @@ def backdrop(directions: np.ndarray, environment: Environment, light: float, rng
     return cv2.GaussianBlur(np.maximum(ground, 0), (0, 0), blur)
 
 
-def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light: float, rng: np.random.Generator,
-          rims: float = RIMS) -> tuple[np.ndarray, np.ndarray]:
-    """Things before the person, a hat or, in a share `rims` of pictures, the rims of glasses, now and then: they are
-    background."""
+def cover_person(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light: float,
+                 rng: np.random.Generator, rims: float = RIMS) -> tuple[np.ndarray, np.ndarray]:
+    """Things before the person, a hat or the rims of glasses, now and then: they are background.
+
+    Parameters
+    ----------
+    radiance : [S, S, 3], linear
+    shares : [S, S, len(PARTS)], of the parts
+    landmarks : [468, 2], in pixels
+    light : radiance of a white thing
+    rng : of all of it
+    rims : share of the pictures with glasses
+
+    Returns
+    -------
+    The radiance and the shares with them.
+    """
     size, face = len(radiance), float(np.ptp(landmarks[:, 1]))
     hidden = np.zeros((size, size), np.float32)
     if rng.random() < 0.25:
@@ -66,9 +92,21 @@ def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light
     return radiance, shares
 
 
-def with_open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray,
-                    rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """A mouth that stands open on some: dark, with teeth or without; it belongs to the lips."""
+def open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray,
+               rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """A mouth that stands open on a quarter of the people: dark, with teeth or without; it belongs to the lips.
+
+    Parameters
+    ----------
+    albedo : [S, S, 3], linear
+    shares : [S, S, len(PARTS)], of the parts
+    landmarks : [468, 2], in pixels
+    rng : whether, and how wide
+
+    Returns
+    -------
+    The albedo and the shares with it.
+    """
     if rng.random() > 0.25:
         return albedo, shares
     size = len(albedo)

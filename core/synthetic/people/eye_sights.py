@@ -58,7 +58,7 @@ def with_other_lids(figure: Figure, rng: np.random.Generator) -> Figure:
     openness = 0.0 if rng.random() < SHUT else rng.uniform(0.3, 1.4)
     gaze = np.clip(rng.normal(0, [14, 8]), -30, 30)
     opened = open_lids(figure.head, openness, gaze)
-    lashes = brows.lashes(replace(figure.person, openness=openness), opened, rng)
+    lashes = brows.grow_lashes(replace(figure.person, openness=openness), opened, rng)
     others = tuple(growth for growth in figure.strands if growth.part != "lashes")
     return replace(figure, opened=opened, strands=(*others, lashes))
 
@@ -81,7 +81,7 @@ def see_eye(scene: Scene, left: bool, rng: np.random.Generator) -> EyeSight:
     iris = np.sin(np.minimum(angle, np.pi / 2)) * 1000 * scene.figure.opened.balls[0].radius < IRIS_MM
     ball[on_ball] = np.stack([~iris, iris], 1)
     ball = ball.reshape(SIZE, OVER, SIZE, OVER, 2).mean((1, 3))
-    return EyeSight(unlit.see(scene, view, rng, OVER), np.round(255 * ball).astype(np.uint8),
+    return EyeSight(unlit.trace_unlit(scene, view, rng, OVER), np.round(255 * ball).astype(np.uint8),
                     view.project(ends)[0].astype(np.float32), left)
 
 

@@ -13,8 +13,20 @@ WHITE = np.array([0.50, 0.43, 0.39])  # linear albedo
 VESSELS = np.array([0.55, 0.20, 0.15])
 
 
-def eye_picture(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512) -> np.ndarray:
-    """Linear albedo float32 [size, size, 3] of both eyes of a person; iris: its albedo [3]; ball_radius in metres."""
+def paint_eyes(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512) -> np.ndarray:
+    """The albedo of both eyes of a person, in the eyeball's UVs.
+
+    Parameters
+    ----------
+    iris : [3], its linear albedo
+    ball_radius : of the eyeball, in metres
+    seed : the person
+    size : pixels along a side
+
+    Returns
+    -------
+    Linear, float32 [size, size, 3].
+    """
     rng = np.random.default_rng([seed, 64])
     y, x = (np.mgrid[0:size, 0:size] + 0.5) / size - 0.5
     angle = np.pi * (2 * np.hypot(x, y)).clip(0, 1) ** (1 / 0.6)

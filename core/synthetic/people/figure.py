@@ -56,8 +56,8 @@ def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = N
     skin, seen, growth = paint(person, size)
     cloth = shirt(person, head)
     return Figure(person, head, opened, cloth, skin, seen,
-                  eyes.eye_picture(np.array(person.iris), opened.balls[0].radius, person.seed),
-                  growth, grown(person, head, opened, cloth))
+                  eyes.paint_eyes(np.array(person.iris), opened.balls[0].radius, person.seed),
+                  growth, grow_hair(person, head, opened, cloth))
 
 
 def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.ndarray]]:
@@ -79,14 +79,23 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
     return skin, on.spread(diffuse.astype(np.float32)), grows
 
 
-def grown(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:
-    """All hairs of a person: brows, lashes, and beard and hair where there are any."""
+def grow_hair(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:
+    """All hairs of a person: brows, lashes, and beard and hair where there are any.
+
+    Parameters
+    ----------
+    person : whose they are
+    head : their closed head, in the template's topology
+    opened : the same with its lids as they are
+    cloth : on which long hair lies
+    """
     ground, skin = ground_of(head), SkinSurface(head)
-    strands = [brows.brows(person, ground, skin, _rng(person, 0)), brows.lashes(person, opened, _rng(person, 1))]
+    strands = [brows.grow_brows(person, ground, skin, _rng(person, 0)),
+               brows.grow_lashes(person, opened, _rng(person, 1))]
     if person.beard != "none":
-        strands.append(beards.beard(person, ground, skin, _rng(person, 2)))
+        strands.append(beards.grow_beard(person, ground, skin, _rng(person, 2)))
     if person.hair != "none":
-        strands.append(head_hair.head_hair(person, ground, SkinSurface(joined([head, cloth])), _rng(person, 3)))
+        strands.append(head_hair.grow_head_hair(person, ground, SkinSurface(joined([head, cloth])), _rng(person, 3)))
     return tuple(strands)
 
 

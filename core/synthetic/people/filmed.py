@@ -35,8 +35,8 @@ def render(work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot
     bare : without hair, lashes and clothes
     module : what is run to do the job
     """
-    parts = {"skin": skin_part(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen,
-                               figure.skin.specular, figure.skin.normal)}
+    parts = {"skin": write_skin(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen,
+                                figure.skin.specular, figure.skin.normal)}
     for side, ball in zip(("left", "right"), figure.opened.balls, strict=True):
         parts[f"{side}_eye"] = _written(work, f"{side}_eye", ball.mesh, "eyes", figure.eye)
     strands = []
@@ -55,7 +55,7 @@ def render_parts(work: Path, seed: int, mesh_jobs: dict[str, dict], strands: lis
     ----------
     work, light, shot, module : as `render` takes them
     seed : of the room behind the person
-    mesh_jobs : by name what the job says of a mesh, as `skin_part` gives it
+    mesh_jobs : by name what the job says of a mesh, as `write_skin` gives it
     strands : files of hair
     """
     work.mkdir(parents=True, exist_ok=True)
@@ -79,9 +79,21 @@ def render_parts(work: Path, seed: int, mesh_jobs: dict[str, dict], strands: lis
                    stdout=subprocess.DEVNULL)
 
 
-def skin_part(work: Path, mesh: Mesh, albedo: np.ndarray, specular: np.ndarray, normal: np.ndarray) -> dict:
-    """A skin for render_parts: a mesh with UVs, its linear albedo [S, S, 3], Specular IOR Level [S, S] and unit tangent
-    normals [S, S, 3]."""
+def write_skin(work: Path, mesh: Mesh, albedo: np.ndarray, specular: np.ndarray, normal: np.ndarray) -> dict:
+    """Writes a skin for `render_parts`: skin.npz, skin.png, specular.png and normal.png.
+
+    Parameters
+    ----------
+    work : folder of the job
+    mesh : of the skin, with UVs
+    albedo : [S, S, 3], linear
+    specular : [S, S], Specular IOR Level in [0, 1]
+    normal : [S, S, 3], unit, tangent space, OpenGL Y+
+
+    Returns
+    -------
+    What the job says of it.
+    """
     skin = _written(work, "skin", mesh, "skin", albedo)
     images.write_data(work / "specular.png", specular, bits=16)
     images.write_data(work / "normal.png", normal / 2 + 0.5, bits=16)

@@ -91,8 +91,21 @@ def sample_glasses(landmarks: np.ndarray, rng: np.random.Generator, kind: str = 
 
 def put_on(radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses, light: float,
            rng: np.random.Generator) -> np.ndarray:
-    """The picture [H, W, 3] of a head with the glasses before it. depth [H, W]: how far away in metres what is seen
-    lies; light: radiance of a white thing."""
+    """The picture of a head with the glasses before it.
+
+    Parameters
+    ----------
+    radiance : [H, W, 3], linear
+    view : the camera, in the head's axes
+    depth : [H, W], metres from the camera to what is seen
+    glasses : as they sit on that head
+    light : radiance of a white thing
+    rng : of their shading, shadow and reflections
+
+    Returns
+    -------
+    [H, W, 3], linear radiance.
+    """
     frame, colour = np.zeros(radiance.shape[:2], np.float32), np.zeros(radiance.shape, np.float32)
     lens = np.zeros_like(frame)
     for curve, closed, thick, solid in _curves(glasses):

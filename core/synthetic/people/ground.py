@@ -36,9 +36,16 @@ def ground_of(skin: Mesh) -> Ground:
                   normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))
 
 
-def strewn(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.random.Generator) -> Roots:
-    """Roots at `density` [N] hairs per mm^2 whose hairs lie along `way` [N, 3] (template's space, any length),
-    flattened onto the skin."""
+def strew_roots(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.random.Generator) -> Roots:
+    """Roots of hairs, strewn over the skin at random.
+
+    Parameters
+    ----------
+    ground : of the head
+    density : [N], hairs per mm^2
+    way : [N, 3], along which hairs lie: the template's axes, any length, flattened onto the skin
+    rng : of their places
+    """
     at, texel = strew(ground.canvas, density, rng)
     offset = (at - ground.canvas.position[texel]) / 1000
     normal = ground.normal[texel]

@@ -10,7 +10,7 @@ from ...face.strands import SkinSurface, Strands, clumped, coloured, grow, waved
 from ...geometry.noise import octaves
 from ..canvas import Canvas
 from ..regions import regions
-from .ground import Ground, strewn, turned
+from .ground import Ground, strew_roots, turned
 from .person import Person
 
 COUNT = {"cropped": 34000, "short": 26000, "long": 24000}  # hairs
@@ -46,10 +46,19 @@ def _before_the_ears(on: Canvas) -> np.ndarray:
     return band * above * below * (1 - regions(on)["ears"])
 
 
-def head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
+def grow_head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
+    """Cropped, short or long hair; long hair hangs beside the face and lies on the shoulders.
+
+    Parameters
+    ----------
+    person : whose hair is not "none"
+    ground : of their head
+    skin : which hairs may not enter, clothes included
+    rng : of single hairs
+    """
     on, style = ground.canvas, person.hair
     density = scalp_density(on, person.seed)
-    roots = strewn(ground, density * COUNT[style] / float((density * on.area).sum()), _ways(on, person), rng)
+    roots = strew_roots(ground, density * COUNT[style] / float((density * on.area).sum()), _ways(on, person), rng)
     roots = turned(roots, rng.normal(0, 0.15, len(roots.at)))
     count = len(roots.at)
     front = _front(roots.at)

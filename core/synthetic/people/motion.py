@@ -19,9 +19,20 @@ TAPS = 9
 FAR_M = 1.6  # what is behind the person
 
 
-def sway(frames: int, millimetres: float, degrees: float, rng: np.random.Generator) -> np.ndarray:
-    """Head-to-world matrices [frames, 4, 4] of a person who keeps still as well as people do: smooth motion of these
-    deviations per axis, of mean zero."""
+def sample_sway(frames: int, millimetres: float, degrees: float, rng: np.random.Generator) -> np.ndarray:
+    """The head of a person who keeps still as well as people do: smooth motion of mean zero about the neck.
+
+    Parameters
+    ----------
+    frames : their number
+    millimetres : deviation of the place, per axis
+    degrees : deviation of the turn, per axis
+    rng : of the motion
+
+    Returns
+    -------
+    Head-to-world matrices [frames, 4, 4], in metres.
+    """
     path = gaussian_filter1d(rng.normal(size=(frames + 8 * PERIOD, 6)), PERIOD, axis=0)[4 * PERIOD:4 * PERIOD + frames]
     path = (path - path.mean(0)) / np.maximum(path.std(0), 1e-9)
     turn = Rotation.from_rotvec(np.radians(degrees) * path[:, :3]).as_matrix()
@@ -31,10 +42,21 @@ def sway(frames: int, millimetres: float, degrees: float, rng: np.random.Generat
     return poses
 
 
-def image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray,
-                 coarse: float = 0.125) -> np.ndarray:
-    """How far each pixel of the middle view moves in a frame's time, [H, W, 2] in pixels: from the views before and
-    after it, the head (`caster`) being where poses [3, 4, 4] say; all else stands still."""
+def measure_image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray,
+                         coarse: float = 0.125) -> np.ndarray:
+    """How far each pixel of the middle view moves in a frame's time; all but the head stands still.
+
+    Parameters
+    ----------
+    caster : of the head, in its own axes
+    views : of the frame before, of this one and of the one after, in the world
+    poses : [3, 4, 4], head to world in these frames
+    coarse : of the view's size, at which it is worked out
+
+    Returns
+    -------
+    float32 [H, W, 2], x and y in pixels.
+    """
     before, now, after = views
     width, height = round(now.width * coarse), round(now.height * coarse)
     y, x = np.mgrid[0:height, 0:width]

@@ -56,23 +56,49 @@ def sample_phone(seed: int) -> Phone:
 
 
 def develop(linear: np.ndarray, phone: Phone, gain: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """sRGB [H, W, 3] in [0, 1] of scene light; `gain` [3] is the exposure and white balance. Compression is left to
-    what stores the picture."""
-    sensed = np.clip(noisy(np.clip(linear * gain, 0, 4), phone.shot, phone.read, rng), 0, None)
-    picture = tone(reduced(sensed, phone.reduction, phone.shot, phone.read), phone.contrast, phone.shoulder)
+    """The picture that a phone makes of a scene. Compression is left to what stores it.
+
+    Parameters
+    ----------
+    linear : [H, W, 3], the scene's light
+    phone : how it does so
+    gain : [3], exposure and white balance
+    rng : of the sensor's noise
+
+    Returns
+    -------
+    sRGB, float32 [H, W, 3] in [0, 1].
+    """
+    sensed = np.clip(add_noise(np.clip(linear * gain, 0, 4), phone.shot, phone.read, rng), 0, None)
+    picture = tone(reduce_noise(sensed, phone.reduction, phone.shot, phone.read), phone.contrast, phone.shoulder)
     picture = with_local_contrast(picture, phone.local, phone.local_radius * len(picture))
     return np.clip(sharpened(picture, phone.sharpening, phone.sharpening_px), 0, 1).astype(np.float32)
 
 
-def noisy(linear: np.ndarray, shot: float, read: float, rng: np.random.Generator) -> np.ndarray:
-    """A sensor's noise: photons and reading, of variance shot x signal + read^2."""
+def add_noise(linear: np.ndarray, shot: float, read: float, rng: np.random.Generator) -> np.ndarray:
+    """A sensor's noise: photons and reading, of variance shot x signal + read^2.
+
+    Parameters
+    ----------
+    linear : [...], the signal
+    shot : variance per signal
+    read : deviation without light
+    rng : of the noise
+    """
     return (linear + rng.standard_normal(linear.shape, np.float32)
             * np.sqrt(shot * np.maximum(linear, 0) + read**2)).astype(np.float32)
 
 
-def reduced(linear: np.ndarray, strength: float, shot: float, read: float) -> np.ndarray:
-    """Noise reduction that keeps edges (bilateral, in the space where the noise is even), mixed in by `strength`: fine
-    texture goes with the noise."""
+def reduce_noise(linear: np.ndarray, strength: float, shot: float, read: float) -> np.ndarray:
+    """Noise reduction that keeps edges (bilateral, in the space where the noise is even): fine texture goes with the
+    noise.
+
+    Parameters
+    ----------
+    linear : [H, W, 3]
+    strength : in [0, 1], the reduced picture's share
+    shot, read : of the noise, as in `add_noise`
+    """
     if strength <= 0:
         return linear
     # deviation 1 everywhere (Anscombe 1948)

@@ -9,35 +9,24 @@ colours are varied far beyond the plausible.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from ...contract.files import replacing
 from ...face.parts import PARTS
-from ...geometry import raster
-from ...geometry.meshes import vertex_normals
-from ...geometry.views import View
 from ...imaging import images
-from ...light.skylight import radiance_transfer
 from ...light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..environments import Environment, made_environment, panorama_environment
 from ..fitted_light import FittedLight, LampOnHead, fitted_light
 from ..olat import BASIS, LIGHTS
-from ..portrait import GOBOS, Portrait, gobo, with_lips
+from ..portrait import GOBOS, Portrait, cast_gobo, with_lips
 from ..response import curve, develop, expose
-from .clutter import backdrop, cover, with_open_mouth
-from .figure import Figure
+from .clutter import cover_person, open_mouth, paint_backdrop
 from .markings import moles, stains, tufts
-from .snapshot import GLOSS, SKIN, directions, highlight, recoloured, weave
-from .truth import Scene
-from .unlit import Unlit, random_view, scene_of, see
+from .relightable import RelightableView
+from .snapshot import GLOSS, SKIN, directions, recoloured, shade_highlight, weave
 
-SIDE = 256
-CLOSEST, WIDEST = 1.25, 2.0  # side of the picture in sides of the face's landmarks
-RAYS = 160
 STRONGEST = 25.0
 """Of a lamp's irradiance over pi, where the sky's radiance is one in the mean: the sun is some nine times its sky, a
 lamp in a dark room more."""
@@ -47,73 +36,11 @@ BARE = ("skin", "lips", "clothes")
 
 
 @dataclass(frozen=True)
-class RelightableView:
-    """A sight of a person with what any light needs. unlit: what is seen; position float16 [S, S, 3] of it in metres
-    about the head's middle; and of the bare head alone, as a capture would register it: here bool [S, S], normal int8
-    [S, S, 3] of 127, transfer float16 [S, S, 9] of the sky's coefficients and reach uint8 [S, S, LAMPS] of 255, what it
-    lets through to itself."""
-
-    unlit: Unlit
-    position: np.ndarray
-    here: np.ndarray
-    normal: np.ndarray
-    transfer: np.ndarray
-    reach: np.ndarray
-
-
-@dataclass(frozen=True)
 class Colours:
     """Linear albedo float32 [S, S, 3] and shares [S, S, len(PARTS)] of one person."""
 
     albedo: np.ndarray
     shares: np.ndarray
-
-
-class Sitter:
-    """A figure before the camera: what its views share is worked out once."""
-
-    def __init__(self, figure: Figure, rng: np.random.Generator):
-        self.scene: Scene = scene_of(figure, rng)
-        self.bald = raster.RayCaster(figure.head)
-        self.normals = vertex_normals(figure.head)
-        self.transfer = radiance_transfer(self.bald, figure.head.vertices, self.normals, RAYS)
-
-    def stage(self, rng: np.random.Generator) -> RelightableView:
-        """A sight from anywhere before the person."""
-        view = random_view(self.scene.figure, rng, SIDE, rng.uniform(CLOSEST, WIDEST))
-        unlit = see(self.scene, view, rng)
-        mesh = self.bald.mesh
-        face, bary, _ = raster.render_view(self.bald, view, 1)
-        here = face >= 0
-        normal, transfer, reach = (np.zeros((*here.shape, n), np.float32) for n in (3, 9, len(unlit.lamps)))
-        towards = raster.interpolate(self.normals, mesh.faces, face[here], bary[here])
-        towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
-        points = raster.interpolate(mesh.vertices, mesh.faces, face[here], bary[here]) + 1e-3 * towards
-        normal[here], transfer[here] = towards, raster.interpolate(self.transfer, mesh.faces, face[here], bary[here])
-        for k, lamp in enumerate(unlit.lamps):
-            reach[here, k] = ~self.bald.blocked(points, np.repeat(lamp[None], len(points), 0))
-        return RelightableView(unlit, self._position(view), here, np.round(127 * normal).astype(np.int8),
-                               transfer.astype(np.float16), np.round(255 * reach).astype(np.uint8))
-
-    def _position(self, view: View) -> np.ndarray:
-        face, bary, _ = raster.render_view(self.scene.whole, view, 1)
-        mesh = self.scene.whole.mesh
-        points = raster.interpolate(mesh.vertices, mesh.faces, np.maximum(face, 0), bary)
-        points = points - self.bald.mesh.vertices.mean(0)
-        return np.where(face[..., None] >= 0, points, 0).astype(np.float16)
-
-
-def save(path: Path, stage: RelightableView) -> None:
-    arrays = {f.name: getattr(stage, f.name) for f in fields(RelightableView) if f.name != "unlit"}
-    arrays |= {f"unlit_{f.name}": getattr(stage.unlit, f.name) for f in fields(Unlit)}
-    with replacing(path) as temporary, open(temporary, "wb") as file:
-        np.savez_compressed(file, **arrays)
-
-
-def load(path: Path) -> RelightableView:
-    with np.load(path, allow_pickle=False) as stored:
-        unlit = Unlit(**{f.name: stored[f"unlit_{f.name}"] for f in fields(Unlit)})
-        return RelightableView(unlit, **{f.name: stored[f.name] for f in fields(RelightableView) if f.name != "unlit"})
 
 
 def colours_of(stage: RelightableView, rng: np.random.Generator) -> Colours:
@@ -132,13 +59,25 @@ def colours_of(stage: RelightableView, rng: np.random.Generator) -> Colours:
     if rng.random() < 0.6:
         log += tufts(len(albedo), stage.unlit.landmarks, rng)
     albedo = np.clip(albedo * np.exp(on_skin * log), 0.003, 0.92).astype(np.float32)
-    return Colours(*with_open_mouth(albedo, shares, stage.unlit.landmarks, rng))
+    return Colours(*open_mouth(albedo, shares, stage.unlit.landmarks, rng))
 
 
 def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator,
             panoramas: list[np.ndarray] = ()) -> Portrait:
-    """A person under a random light. Where hair grows, and on the eyes, `even` is that of the bare head; `fitted` is
-    that of all pixels, row by row, and 0 off the bare head."""
+    """A person under a random light.
+
+    Parameters
+    ----------
+    stage : the sight
+    colours : of the person there
+    rng : of light, background, what covers the face, and camera
+    panoramas : as `read_panoramas` gives them; they may light it
+
+    Returns
+    -------
+    Where hair grows, and on the eyes, `even` is that of the bare head; `fitted` is that of all pixels, row by row, and
+    0 off the bare head.
+    """
     sight, (albedo, shares) = stage.unlit, (colours.albedo, colours.shares)
     environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
                    and rng.random() < 0.6 else made_environment(rng))
@@ -151,8 +90,9 @@ def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator,
     seen = shares[..., :-1].sum(-1) > 0.5
     light = float(np.mean(diffuse[seen])) if seen.any() else 1.0
     behind = shares[..., -1:]
-    radiance = (albedo * diffuse + shine) * (1 - behind) + backdrop(directions(sight), environment, light, rng) * behind
-    radiance, shares = cover(radiance, shares, sight.landmarks, light, rng)
+    ground = paint_backdrop(directions(sight), environment, light, rng)
+    radiance = (albedo * diffuse + shine) * (1 - behind) + ground * behind
+    radiance, shares = cover_person(radiance, shares, sight.landmarks, light, rng)
     face = shares[..., SKIN] > 0.5
     linear, gains = expose(radiance, face if face.sum() > 50 else shares[..., -1] < 0.5, rng)
     tone = (albedo[face] if face.sum() > 50 else albedo[seen] if seen.any() else albedo.reshape(-1, 3)).mean(0)
@@ -184,8 +124,8 @@ def _lamps(stage: RelightableView, environment: Environment,
         tint = strength * np.exp([0.6 * warm, rng.normal(0, 0.04), -warm])
         if environment.colour.any() and rng.random() < 0.5:
             tint = strength * environment.colour / max(float(environment.colour.mean()), 1e-6)
-        lost = gobo(stage.position.reshape(-1, 3).astype(np.float32), stage.unlit.lamps[k], 0.01,
-                    str(rng.choice(GOBOS)), rng)
+        lost = cast_gobo(stage.position.reshape(-1, 3).astype(np.float32), stage.unlit.lamps[k], 0.01,
+                         str(rng.choice(GOBOS)), rng)
         chosen.append(int(k))
         tints.append(tint.astype(np.float32))
         before.append(1 - np.reshape(lost, (side, side)).astype(np.float32) if np.ndim(lost) else 1.0)
@@ -241,7 +181,7 @@ def _lit(stage: RelightableView, surface: _Surface, sky: np.ndarray, lamps: list
         lamp = stage.unlit.lamps[k]
         arrives = surface.reach[..., k] * through
         diffuse = diffuse + _softened(np.maximum(surface.normal @ lamp, 0) * arrives, surface.scatters, radius) * tint
-        glint = highlight(surface.normal, towards, lamp, surface.rough) * arrives
+        glint = shade_highlight(surface.normal, towards, lamp, surface.rough) * arrives
         shine = shine + glint[..., None] * surface.reflectance * tint
     return diffuse.astype(np.float32), shine.astype(np.float32)
 

@@ -20,7 +20,7 @@ from ...light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..environments import Environment, made_environment, panorama_environment
 from ..olat import BASIS, LIGHTS
 from ..response import curve, develop, expose
-from .clutter import RIMS, backdrop, cover, with_open_mouth
+from .clutter import RIMS, cover_person, open_mouth, paint_backdrop
 from .person import BROWS
 from .unlit import Unlit
 
@@ -33,21 +33,32 @@ SKIN, HAIR, BROW, BEARD, LIPS, CLOTHES = (PARTS.index(name)
 
 def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarray] = (),
                worn: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """An sRGB picture [S, S, 3] of a sight and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1].
-    worn(radiance [S, S, 3], light) -> radiance puts on what the person wears, of which the shares know nothing;
-    otherwise some wear the rims of glasses."""
+    """A photograph of a sight.
+
+    Parameters
+    ----------
+    sight : what is seen
+    rng : of colours, light, background, what covers the face, and camera
+    panoramas : as `read_panoramas` gives them; they may light it
+    worn : (radiance [S, S, 3], light) -> radiance puts on what the person wears, of which the shares know nothing;
+        without it some wear the rims of glasses
+
+    Returns
+    -------
+    An sRGB picture [S, S, 3] and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1].
+    """
     shares = sight.shares.astype(np.float32) / 255
     shares /= np.maximum(shares.sum(-1, keepdims=True), 1e-6)
     albedo = recoloured(images.srgb_to_linear(sight.albedo.astype(np.float32) / 255), shares, rng)
-    albedo, shares = with_open_mouth(albedo, shares, sight.landmarks, rng)
+    albedo, shares = open_mouth(albedo, shares, sight.landmarks, rng)
     environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
                    and rng.random() < 0.6 else made_environment(rng))
     radiance, light = _lit(sight, albedo, shares, environment, rng)
     behind = shares[..., -1:]
-    radiance = radiance * (1 - behind) + backdrop(directions(sight), environment, light, rng) * behind
+    radiance = radiance * (1 - behind) + paint_backdrop(directions(sight), environment, light, rng) * behind
     if worn:
         radiance = worn(radiance, light)
-    radiance, shares = cover(radiance, shares, sight.landmarks, light, rng, 0.0 if worn else RIMS)
+    radiance, shares = cover_person(radiance, shares, sight.landmarks, light, rng, 0.0 if worn else RIMS)
     face = shares[..., SKIN] > 0.5
     linear, _ = expose(radiance, face if face.sum() > 50 else behind[..., 0] < 0.5, rng)
     return develop(curve(linear, rng), rng), shares
@@ -123,13 +134,25 @@ def _lit(sight: Unlit, albedo: np.ndarray, shares: np.ndarray, environment: Envi
         arrives = cv2.GaussianBlur(sight.reach[..., k].astype(np.float32) / 255, (0, 0), softness)
         facing = np.maximum(normal @ lamp, 0)
         diffuse = diffuse + (facing * arrives)[..., None] * colour
-        shine = shine + (highlight(normal, towards, lamp, rough) * arrives)[..., None] * reflectance * colour
+        shine = shine + (shade_highlight(normal, towards, lamp, rough) * arrives)[..., None] * reflectance * colour
         light += 0.4 * float(colour.mean())
     return albedo * diffuse + shine, light
 
 
-def highlight(normal: np.ndarray, towards: np.ndarray, lamp: np.ndarray, rough: np.ndarray) -> np.ndarray:
-    """GGX over the reflectance [S, S], times the cosine and pi (Walter et al. 2007)."""
+def shade_highlight(normal: np.ndarray, towards: np.ndarray, lamp: np.ndarray, rough: np.ndarray) -> np.ndarray:
+    """GGX over the reflectance, times the cosine and pi (Walter et al. 2007).
+
+    Parameters
+    ----------
+    normal : [S, S, 3], unit
+    towards : [S, S, 3], unit, to the camera
+    lamp : [3], unit direction to it
+    rough : [S, S], roughness
+
+    Returns
+    -------
+    [S, S], 60 at most.
+    """
     half = towards + lamp
     half /= np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-6)
     a2 = np.maximum(rough, 0.1) ** 4

@@ -40,7 +40,8 @@ class Truth:
 
 
 class Scene:
-    """A figure ready for rays; hair and clothes are left out of the second caster, `body`."""
+    """A figure ready for rays: `whole` in the head's own axes, `body` the same without hair and clothes; `blockers`,
+    what stands in the light's way, in the world's axes, since it does not sway with the head."""
 
     def __init__(self, figure: Figure, blockers: Mesh | None = None):
         body = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)]
@@ -58,9 +59,8 @@ class Scene:
         self.uv = np.concatenate([mesh.uvs[mesh.face_uvs] for mesh in body])
         self.body = raster.RayCaster(joined(body))
         self.normals = vertex_normals(self.body.mesh)
-        whole = joined(meshes)
-        self.whole = raster.RayCaster(whole)
-        self.opaque = raster.RayCaster(joined([whole, blockers])) if blockers else self.whole
+        self.whole = raster.RayCaster(joined(meshes))
+        self.blockers = raster.RayCaster(blockers) if blockers else None
 
     def albedo(self, face: np.ndarray, bary: np.ndarray, skin: np.ndarray) -> np.ndarray:
         """Linear albedo [N, 3] of what rays hit, `skin` [S, S, 3] being the skin's."""
@@ -72,9 +72,18 @@ class Scene:
         return out
 
 
-def look(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3) -> Truth:
-    """The truth through a view in the head's own axes; sun: unit direction to it, in the same axes; `over`: rays along
-    a pixel's side."""
+def trace_truth(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3,
+                pose: np.ndarray | None = None) -> Truth:
+    """The truth through a view.
+
+    Parameters
+    ----------
+    scene : the person
+    view : the camera, in the head's own axes
+    sun : [3], unit direction to it in these axes; None: there is no shadow
+    over : rays along a pixel's side
+    pose : [4, 4], head to world; None: they are one
+    """
     face, bary, _ = raster.render_view(scene.whole, view, over)
     hit = face >= 0
     seen, parts = np.zeros((*hit.shape, 3), np.float32), np.zeros((*hit.shape, len(PARTS)), np.float32)
@@ -92,12 +101,21 @@ def look(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3)
         normal = np.cross(b - a, c - a)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         points = a * bary[hit, :1] + b * bary[hit, 1:2] + c * bary[hit, 2:]
-        towards_sun = np.repeat(sun[None], hit.sum(), 0)
-        dark[hit] = (normal @ sun <= 0) | scene.opaque.blocked(points + 5e-4 * normal, towards_sun)
+        dark[hit] = (normal @ sun <= 0) | _blocked(scene, points + 5e-4 * normal, sun, pose)
     bare, normal = _bare(scene, view, over)
     cover = _shrunk(hit.astype(np.float32), over)
     return Truth(_shrunk(seen, over) / np.maximum(cover, 1e-6)[..., None], bare, cover, _shrunk(parts, over),
                  (_shrunk(in_face, over) > 0.5) & (cover > 0.99), normal, _shrunk(dark, over) > 0.5)
+
+
+def _blocked(scene: Scene, points: np.ndarray, sun: np.ndarray, pose: np.ndarray | None) -> np.ndarray:
+    """Whether the figure itself, or a blocker while the head is as `pose` says, keeps the sun from points, bool [N]."""
+    blocked = scene.whole.blocked(points, np.repeat(sun[None], len(points), 0))
+    if scene.blockers is None:
+        return blocked
+    pose = np.eye(4) if pose is None else pose
+    towards_sun = np.repeat((pose[:3, :3] @ sun)[None], len(points), 0)
+    return blocked | scene.blockers.blocked(points @ pose[:3, :3].T + pose[:3, 3], towards_sun)
 
 
 def _bare(scene: Scene, view: View, over: int) -> tuple[np.ndarray, np.ndarray]:

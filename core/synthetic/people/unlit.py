@@ -69,8 +69,16 @@ def landmarks_of(figure: Figure) -> np.ndarray:
 def random_view(
     figure: Figure, rng: np.random.Generator, size: int = SIZE, margin: float = WIDER * MARGIN_FACE_HEIGHTS
 ) -> View:
-    """A square picture around the head, `margin` times as large as the face's landmarks, from the front to beyond the
-    profile, from above and below, near and far, held askew."""
+    """A square picture around the head, from the front to beyond the profile, from above and below, near and far, held
+    askew.
+
+    Parameters
+    ----------
+    figure : whose head
+    rng : of where the camera stands
+    size : pixels along a side
+    margin : side of the picture in sides of the face's landmarks
+    """
     yaw, pitch, roll = np.radians([rng.uniform(-100, 100) if rng.random() < 0.45 else rng.normal(0, 25),
                                    rng.normal(0, 13), rng.normal(0, 6)])
     back = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
@@ -91,8 +99,16 @@ def random_view(
     return View("", Path(), camera, rotation, np.array([0, 0, distance]) - rotation @ middle, True)
 
 
-def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) -> Unlit:
-    """A view of a scene with lamps from anywhere before the person."""
+def trace_unlit(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) -> Unlit:
+    """A view of a scene with lamps from anywhere before the person.
+
+    Parameters
+    ----------
+    scene : the person
+    view : a square one, in the head's axes
+    rng : of the lamps and of the directions of the sky
+    over : rays along a pixel's side
+    """
     face, bary, _ = raster.render_view(scene.whole, view, over)
     hit = face >= 0
     triangle, weight = face[hit], bary[hit].astype(np.float32)
@@ -107,10 +123,10 @@ def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) ->
     points = (corners * weight[..., None]).sum(1) + 5e-4 * flat
     lamps = _lamps(view, rng)
     reach = [((normal @ lamp > 0)
-              & ~scene.opaque.blocked(points, np.repeat(lamp[None], len(points), 0))).astype(np.float32)
+              & ~scene.whole.blocked(points, np.repeat(lamp[None], len(points), 0))).astype(np.float32)
              for lamp in lamps]
     sky = normal + _unit(rng.normal(size=normal.shape))  # cosine-weighted about the normal
-    free = ~scene.opaque.blocked(points, _unit(sky))
+    free = ~scene.whole.blocked(points, _unit(sky))
     layers = np.concatenate([scene.albedo(triangle, weight, scene.figure.seen), _shares(scene, triangle, weight),
                              normal, np.stack(reach, 1), free[:, None]], 1)
     picture = np.zeros((*hit.shape, layers.shape[1] + 1), np.float32)
@@ -129,7 +145,7 @@ def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) ->
 
 
 def true_shares(coverage: np.ndarray) -> np.ndarray:
-    """The coverage [..., len(figure.PARTS)] of truth.look as shares of face/parts.py [..., len(PARTS)]; the rest is
+    """The coverage [..., len(figure.PARTS)] of truth.Truth as shares of face/parts.py [..., len(PARTS)]; the rest is
     background."""
     out = np.zeros((*coverage.shape[:-1], len(PARTS)), np.float32)
     for k, name in enumerate(GROWN):

@@ -57,11 +57,11 @@ def ratio(root: Path, light: str, subsurface: float, method: str):
     bpy.data.node_groups["WildCap Skin"].nodes["WildCap Principled"].subsurface_method = method.upper()
     means = []
     for engine in (EEVEE, "CYCLES"):
-        scene = addon.module("relight.picture").set_up(addon.head(), light, SIDE, SAMPLES)
+        scene = addon.module("relight.picture").set_up_scene(addon.head(), light, SIDE, SAMPLES)
         scene.render.engine, scene.cycles.use_denoising, scene.eevee.taa_render_samples = engine, False, SAMPLES
         about(scene.render)
         path = root / "renders" / "engine.png"
-        addon.module("relight.output").still(scene, path, True)
+        addon.module("relight.output").render_still(scene, path, True)
         yield 0.2
         name = (
             f"engines_{light}_{method if subsurface else 'surface'}_{'cycles' if engine == 'CYCLES' else 'eevee'}.png"
