@@ -17,7 +17,8 @@ def lines(tree, indent: str = "") -> list[str]:
     return sorted(found)
 
 
-OPTIONS = ("operation", "use_clamp", "subsurface_method", "space", "attribute_name", "interpolation", "uv_map")
+OPTIONS = ("operation", "use_clamp", "subsurface_method", "space", "attribute_name", "interpolation", "extension",
+           "uv_map")
 RENAMED = {"Factor": "Fac"}  # in Blender 5
 
 

@@ -8,8 +8,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 bmesh = pytest.importorskip("bmesh")
+BVHTree = pytest.importorskip("mathutils.bvhtree").BVHTree
 
-from tests.test_acting import coordinates, head, write_head  # noqa: E402, F401  (head is a fixture)
+from tests.test_acting import coordinates, head, shown, write_head  # noqa: E402, F401  (head is a fixture)
 
 NECK_M = -0.12
 """Height below which the built-in head is neck."""
@@ -94,3 +95,48 @@ def test_what_fails_after_the_maps_are_in_does_not_pass_for_an_artists_edit(head
     with pytest.raises(RuntimeError, match="no"):
         bpy.ops.wildcap.assemble_material()
     assert not addon("relight.material").is_edited(head)
+
+
+def test_an_undo_gives_the_iris_its_colour_back(head):  # noqa: F811
+    """In the picture, of which Blender's undo takes back no pixels; and the one before can be chosen again."""
+    name, material = head.name, head.data.materials[1].name
+
+    def told_and_shown() -> tuple[str, bool]:
+        image = bpy.data.materials[material].node_tree.nodes["WildCap Eye"].image
+        red, _, blue, _ = image.pixels[4 * (256 * 512 + 305):][:4]  # half way from the pupil to the iris' rim
+        return image["wildcap_iris"], bool(blue > red)
+
+    bpy.ops.wildcap.iris(iris='brown')
+    bpy.ops.ed.undo_push(message="brown")
+    images = len(bpy.data.images)
+    bpy.ops.wildcap.iris(iris='blue')
+    bpy.ops.ed.undo_push(message="blue")
+    assert told_and_shown() == ("blue", True) and len(bpy.data.images) == images
+    bpy.ops.ed.undo()
+    assert told_and_shown() == ("brown", False)
+    bpy.context.view_layer.objects.active = bpy.data.objects[name]
+    bpy.ops.wildcap.iris(iris='blue')
+    bpy.ops.wildcap.iris(iris='brown')
+    assert told_and_shown() == ("brown", False)
+    assert bpy.data.materials[material].node_tree.nodes["WildCap Eye"].image.name == f"{name} Eye"
+
+
+def test_lids_keep_off_the_eyeballs_half_way(head, addon):  # noqa: F811
+    """By half a millimetre; on a straight way from shut to open a lid would lie as deep within the cornea."""
+    asset, keys = addon("acting.asset").load(), head.data.shape_keys
+    skin = len(asset.template) + len(asset.copies)
+    eyes = [[int(i) for i in face if i >= 0] for face in asset.faces[asset.slots == 1]]
+    lids = coordinates(keys.key_blocks["eyesOpenLeft"].data) - coordinates(keys.reference_key.data)
+    lids = np.flatnonzero(np.linalg.norm(lids[:skin], axis=1) > 3e-4)
+    for opened, blink in ((0, 0), (0.25, 0), (0.5, 0), (0.75, 0), (1, 0), (1, 0.5), (1, 0.75)):
+        keys["eyesOpen"], keys.key_blocks["eyeBlinkLeft"].value = float(opened), blink
+        places = shown(head)
+        ball = BVHTree.FromPolygons(places.tolist(), eyes)
+        left = places[skin:][asset.kind == 1]
+        centre = (left.max(0) + left.min(0)) / 2
+        gaps = []
+        for arm in places[lids] - centre:
+            far = np.linalg.norm(arm)
+            _, _, _, surface = ball.ray_cast(centre.tolist(), (arm / far).tolist())
+            gaps += [far - surface] if arm[1] < -0.4 * far else []
+        assert len(gaps) > 300 and min(gaps) > 2e-4, (opened, blink)

@@ -154,3 +154,12 @@ def test_pips_settings_are_read_as_pip_reads_them(tmp_path, monkeypatch):
     file.write_text("no section")
     monkeypatch.setenv("HOME", str(tmp_path))
     pip_source.setting("no-such-setting")
+    own = tmp_path / "config" / "pip"
+    own.mkdir(parents=True)
+    for name in ("XDG_CONFIG_HOME", "APPDATA"):
+        monkeypatch.setenv(name, str(own.parent))
+    for name in ("pip.conf", "pip.ini"):
+        (own / name).write_text("[global]\nindex-url = https://own/simple\n")
+    for chosen, value in (("", "https://own/simple"), (os.devnull, "")):
+        monkeypatch.setenv("PIP_CONFIG_FILE", chosen)
+        assert pip_source.setting("index-url") == value

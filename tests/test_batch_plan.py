@@ -3,13 +3,16 @@
 """Planning a batch: tables as spreadsheets write them, folders of films, rows that cannot be used, and records that are
 none."""
 
+import errno
 import json
+import os
 
 import pytest
 
 from core.__main__ import main
 from core.batch.record import read_batch
 from core.batch.shots import read_faces
+from core.contract import lease
 from core.contract.messages import Problem
 
 
@@ -54,6 +57,34 @@ def test_a_rows_settings_lie_over_the_files_and_those_over_the_shared_ones(folde
     assert faces[0].settings == {"solve": {"steps": 30, "size": 256, "skin_tone": "0.7,0.6,0.5"}, "seed": 4,
                                  "registration": {"template": str(folder / "head.obj")}}
     assert faces[1].settings == {"solve": {"steps": 9, "size": 256}, "seed": 4}, "one row's values reach no other"
+
+
+def test_a_name_that_a_disk_may_take_for_another_one_is_refused(folder, capsys):
+    """Both faces would get one capture on the disks of Windows and macOS."""
+    table, batch = folder / "shots.csv", folder / "batch"
+    table.write_text("video,name\nanna.mp4,Anna\nzoë b.mov,Zo\u00eb\n", encoding="utf-8")
+    assert main(["batch", "plan", str(table), str(batch)]) == 0
+    table.write_text("video,name\nanna.avi,ANNA\nzoë b.mov,Zoe\u0308\ncarl,\n", encoding="utf-8")
+    assert main(["batch", "plan", str(table), str(batch)]) == 2
+    told = capsys.readouterr().err
+    assert "Line 2: The name ANNA was planned before as Anna" in told and "Line 3: " in told
+    assert [face.name for face in read_batch(batch).faces] == ["Anna", "Zo\u00eb", "carl"]
+    faces, faults = plan(folder, "video,name\nanna.mp4,Zo\u00eb\nanna.avi,Zoe\u0308\n")
+    assert len(faces) == 1 and "is taken by Line 2" in faults[0].problem
+
+
+@pytest.mark.parametrize("code, said", [(errno.ENOSPC, "The disk is full"), (errno.EROFS, "is read-only")])
+def test_a_batch_whose_folder_cannot_be_written_is_refused_by_name(folder, capsys, monkeypatch, code, said):
+    batch = folder / "batch"
+    assert main(["batch", "plan", str(folder), str(batch)]) == 0
+
+    def refuse(*_) -> None:
+        raise OSError(code, os.strerror(code), str(batch / "lock"))
+
+    monkeypatch.setattr(lease, "_make", refuse)
+    assert main(["batch", "run", str(batch)]) == 2
+    told = capsys.readouterr().err
+    assert said in told and str(batch) in told and "inside WildCap" not in told
 
 
 @pytest.mark.parametrize("row, said", [

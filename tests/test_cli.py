@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """python -m core: what each command prints and how it exits. `run` is tested over tiny rooms, with the real worker."""
 
+import argparse
 import os
 import signal
 import subprocess
@@ -13,6 +14,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
+from core import __main__ as command_line
 from core.contract import stages
 from core.contract.capture import Capture
 from core.contract.messages import Problem
@@ -58,6 +60,20 @@ def capture(tmp_path) -> Capture:
     capture.set_source("")
     (capture.root / "mood.json").write_text("{}")
     return capture
+
+
+def test_every_command_has_its_help(capsys):
+    waiting, seen = [command_line._parser()], []
+    while waiting:
+        parser = waiting.pop()
+        seen.append(parser.prog)
+        assert parser.format_help().startswith("usage: python -m core")
+        waiting += [each for action in parser._actions if isinstance(action, argparse._SubParsersAction)
+                    for each in action.choices.values()]
+    assert {f"python -m core {words}" for words in ("run", "landmarks set", "mask import", "batch task")} <= set(seen)
+    with pytest.raises(SystemExit):
+        command_line.main(["landmarks", "set", "a.wildcap", "152", "0.1", "0.2"])
+    assert "the following arguments are required: Z" in capsys.readouterr().err
 
 
 def test_stages_lists_the_chain():

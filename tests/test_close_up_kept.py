@@ -57,3 +57,44 @@ def test_what_the_artist_lets_the_cornea_shade_stays(close_up):  # noqa: F811
     cornea.visible_shadow = True
     bpy.ops.wildcap.assemble_material()
     assert cornea.visible_shadow
+
+
+def test_a_head_that_is_subdivided_keeps_its_skin(head):  # noqa: F811
+    """The close-up hides vertices by their numbers, which are those of the mesh and not of its subdivision: this makes
+    a quad of each corner that is shown."""
+    def faces():
+        return head.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons
+
+    bpy.ops.wildcap.close_up()
+    corners = sum(face.loop_total for face in faces())
+    bpy.ops.wildcap.close_up()
+    head.modifiers.new("Subdivision", 'SUBSURF').levels = 1
+    bpy.ops.wildcap.close_up()
+    assert [modifier.name for modifier in head.modifiers] == ["WildCap Lids on Eyes", "Subdivision"]
+    assert len(faces()) == corners > 3 * 24356
+
+
+def test_depths_of_light_and_relief_grow_with_the_head(head):  # noqa: F811
+    """As the skin's do: 1.2 mm in enamel are 12 mm in that of a head of ten times the size, and what the artist set
+    grows along."""
+    def lengths() -> dict[str, float]:
+        nodes = {(slot.material.name.split()[-1], node.type): node for thing in head.children
+                 for slot in thing.material_slots if "wildcap_inside" in slot.material
+                 for node in slot.material.node_tree.nodes}
+        return {"enamel": nodes["Enamel", 'BSDF_PRINCIPLED'].inputs["Subsurface Scale"],
+                "iris": nodes["Iris", 'BUMP'].inputs["Distance"]}
+
+    def resize(factor: float) -> None:
+        head.scale = (factor,) * 3
+        bpy.context.view_layer.update()
+
+    resize(10)
+    bpy.ops.wildcap.close_up()
+    made = lengths()
+    assert {name: socket.default_value for name, socket in made.items()} == pytest.approx({"enamel": 0.012,
+                                                                                           "iris": 0.003})
+    made["iris"].default_value = 0.006
+    resize(2)
+    bpy.ops.wildcap.assemble_material()
+    assert {name: socket.default_value for name, socket in made.items()} == pytest.approx({"enamel": 0.0024,
+                                                                                           "iris": 0.0012})

@@ -5,18 +5,24 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pycolmap
 import pytest
+import trimesh
 
 from core.contract.capture import Capture
 from core.contract.files import write_json
-from core.contract.messages import Problem, Reporter
+from core.contract.messages import Problem, Progress, Reporter
 from core.contract.settings import from_json
 from core.delight import run
+from core.delight.lit_head import fit_lit_head
+from core.delight.surface import skin_weights
 from core.face import template
+from core.face.head import Head
 from core.geometry import meshes, raster
+from core.geometry.meshes import Mesh
 from core.geometry.views import read_views
 from core.imaging import images
 from core.light.skylight import fibonacci_sphere, radiance_transfer
@@ -103,7 +109,10 @@ def deviation(capture: Capture, share: float) -> float:
 
 def test_light_of_the_sky_is_divided_out(capture):
     render_frames(capture, sun=0 * SUN_COLOUR)
-    run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
+    said = []
+    run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight", said.append))
+    shares = {kind: [m.done / m.of for m in said if isinstance(m, Progress) and kind in m.text] for kind in ("", "Fit")}
+    assert shares[""] == sorted(shares[""]) and shares["Fit"][-1] < 0.5, "the light is half of it, and none is undone"
     assert deviation(capture, 0.8) < 0.03 and deviation(capture, 0.95) < 0.08
     assert not list((capture.delit / "shadow").glob("*.png"))  # no sun, so nothing was in shadow
 
@@ -117,6 +126,69 @@ def test_sun_with_self_shadows_and_stripes_of_leaves_is_divided_out(capture):
     raw = Reporter("delight")
     run(capture, from_json({"delight": {"delighter": "none"}}), raw)
     assert deviation(capture, 0.8) > 0.5
+
+
+def test_two_profiles_that_share_hardly_any_skin_are_delit(tmp_path):
+    """No point of the skin is seen twice, so those that one view alone shows tell the light."""
+    capture = profiles(tmp_path, (-80, 80))
+    run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
+    assert deviation(capture, 0.8) < 0.05
+
+
+def test_frames_of_the_back_of_the_head_are_refused(tmp_path):
+    capture = profiles(tmp_path, (170, 190))
+    with pytest.raises(Problem, match="no bare skin of the face"):
+        run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
+
+
+def test_the_tone_of_the_skin_does_not_depend_on_how_fine_the_head_is(capture):
+    """Of four times as many vertices every second is drawn: the same skin in the same sun."""
+    render_frames(capture, sun=SUN_COLOUR)
+    mesh, views, tones = template.load(), read_views(capture, selected_only=True), []
+    for shape in ((mesh.vertices, mesh.faces), trimesh.remesh.subdivide(mesh.vertices, mesh.faces)):
+        tones.append(fit_lit_head(Head(Mesh(*shape)), views, Reporter("delight")).best_lit)
+    assert np.abs(np.log(tones[1] / tones[0])).max() < 0.01  # 0.10 where what is not drawn counts as unlit
+
+
+def test_the_built_in_heads_masks_are_not_asked_of_a_head_with_other_uvs():
+    """The same triangles, as many, unwrapped anew: where lips were on the map is something else now."""
+    anew = replace(template.load(), uvs=1 - template.load().uvs)
+    skin, features = skin_weights(Head(template.load()))
+    assert features.max() > 0.9 and skin.min() < 0.1
+    skin, features = skin_weights(Head(anew))
+    assert features.max() == 0 and skin.min() == 1
+
+
+def test_chosen_frames_of_which_none_has_a_camera_are_a_problem_and_what_was_there_stays(capture):
+    render_frames(capture, sun=0 * SUN_COLOUR)
+    settings = from_json({"delight": {"delighter": "none"}})
+    run(capture, settings, Reporter("delight"))
+    record = json.loads(capture.frames_json.read_text())
+    write_json(capture.frames_json, {"frames": [{**frame, "selected": False} for frame in record["frames"]]})
+    with pytest.raises(Problem, match="None of the frames that were chosen .* has a camera"):
+        run(capture, settings, Reporter("delight"))
+    assert len(list(capture.delit.glob("*.png"))) == 3
+
+
+def profiles(folder, angles) -> Capture:
+    """A head under the sky alone, seen from two sides."""
+    capture = Capture(folder / "two.wildcap")
+    write_cameras(capture, angles)
+    meshes.write_obj(capture.head, template.load())
+    render_frames(capture, sun=0 * SUN_COLOUR)
+    return capture
+
+
+def test_shading_finds_the_shadows_of_what_stands_beside_the_head(capture):
+    """As its card says: leaves' stripes on skin that the head itself leaves in the sun."""
+    render_frames(capture, sun=SUN_COLOUR)
+    lit = [images.read_srgb(view.path) for view in read_views(capture, selected_only=True)]
+    render_frames(capture, sun=SUN_COLOUR, stripes=True)
+    run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
+    for view, picture in zip(read_views(capture, selected_only=True), lit, strict=True):
+        stripes = (picture - images.read_srgb(view.path) > 0.1).any(-1)
+        found = images.read_mask(capture.delit / "shadow" / view.name) > 0.5
+        assert stripes.sum() > 1000 and found[stripes].mean() > 0.9
 
 
 def test_quarter_of_the_skin_in_shadow_does_not_move_the_light():

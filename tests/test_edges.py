@@ -46,6 +46,16 @@ def test_alpha_lies_on_the_penumbra(width):
     )
 
 
+def test_an_edge_at_the_end_of_the_search_has_its_penumbra_and_deeper_all_stays():
+    """The shadow ends 22 texels inside of what was painted, softly: alpha falls beyond 24, and not beyond 36."""
+    depth = (np.arange(200) + 0.5 - 120) * 2.0 * np.ones((64, 1))
+    shadow = penumbra(depth + 22, np.float32(19))[..., None]
+    painted = (depth < 0).astype(np.float32)
+    edge = place(pores(200)[:64] * (1 - shadow * TAKEN), painted, np.ones_like(painted), 2.0)
+    assert edge.alpha[(depth < -INWARD_TEXELS) & (depth > -INWARD_TEXELS - 4)].mean() < 0.9
+    assert edge.alpha[depth < -INWARD_TEXELS - BAND_TEXELS].min() == 1
+
+
 def test_a_mask_without_a_shadow_stays_as_it_was_painted():
     painted = soften_mask(shadowed(0)[2])
     edge = place(pores(SIZE) * np.ones(3), painted, np.ones((SIZE, SIZE), np.float32), 2.0)

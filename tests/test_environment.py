@@ -3,7 +3,6 @@
 """The worker's environment: made from nothing, continued after a failure, checked and removed; without the network."""
 
 import hashlib
-import os
 import shutil
 import sys
 import time
@@ -13,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.messages import Cancelled, Done, Failed, Problem, Progress
+from core.contract.messages import Cancelled, CancelledError, Done, Failed, Problem, Progress
 from core.worker import bare_environment, index, installation, locks
 from core.worker.background import BackgroundTask
-from core.worker.environment import answer, python_of, remove, verify
+from core.worker.environment import COMPUTE_FILE, answer, empty, python_of, removal, remove, verify
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 
@@ -74,7 +73,7 @@ def made_before(bare, monkeypatch) -> None:
     """An environment is not made, which takes seconds, but copied from one that was: for what comes after that. How
     one is made from nothing, and made anew, is asked for by the tests without this, and by test_bare_environment.py."""
     def make(folder: Path, base: Path, requirements: Path, run, wheels=None, wheel_only=False, keep="") -> Path:
-        bare_environment._empty(folder, keep)
+        empty(folder, keep)
         shutil.copytree(bare, folder, symlinks=True, dirs_exist_ok=True)
         return python_of(folder)
 
@@ -120,6 +119,20 @@ def test_an_installation_from_nothing_through_a_failure_and_another_device_to_re
     remove(folder)
     assert not folder.exists()
     remove(folder)
+
+
+def test_wherever_pip_is_set_up_to_put_packages_this_environment_gets_them(local, made_before, tmp_path, monkeypatch):
+    (tmp_path / "pip.conf").write_text("[global]\nuser = true\n")
+    monkeypatch.setenv("PIP_CONFIG_FILE", str(tmp_path / "pip.conf"))
+    monkeypatch.setenv("PIP_USER", "1")
+    for name in ("PIP_TARGET", "PIP_PREFIX", "PIP_CONSTRAINT"):
+        monkeypatch.setenv(name, str(tmp_path / "elsewhere"))
+    task = BackgroundTask("index", lambda task: index.plan_installation(
+        local, installation.base_python(), "cpu", "pytorch", task.run))
+    task.start()
+    assert isinstance(follow(task)[-1], Done) and task.result.packages.keys() == {"tinytorch", "tinynets"}
+    assert isinstance(install(tmp_path / "env", local)[-1], Done)
+    assert verify(python_of(tmp_path / "env"), local) == [] and not (tmp_path / "elsewhere").exists()
 
 
 def test_an_environment_of_an_older_wildcap_is_brought_up_to_date(local, made_before, tmp_path):
@@ -192,6 +205,11 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, made_befor
     assert plan.download == sum(wheel.stat().st_size for wheel in wheels)
     assert plan.disk == 3 * plan.download > 0
     assert index.check_space(plan, tmp_path / "not" / "there") > plan.needed
+    commands: list[list[str]] = []
+    work(task, lambda command: commands.append(list(map(str, command))) or BackgroundTask.run(task, command))
+    assert len(commands) == 2 and all("--require-hashes" in command for command in commands), (
+        "nothing that runs here comes unchecked, pip's own update neither")
+    assert str(local / "locks" / "pip.txt") in commands[0]
     huge = replace(plan, disk=1 << 60)
     with pytest.raises(Problem, match="are needed while"):
         index.check_space(huge, tmp_path)
@@ -205,37 +223,27 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, made_befor
     assert "did not answer as expected" in follow(task)[-1].problem
 
 
-def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
-    def refuse(task):
-        raise Problem("It cannot be.", "Let it be.")
+@pytest.mark.parametrize("at", range(4))
+def test_a_removal_that_is_ended_at_any_file_can_be_asked_for_again(tmp_path, at):
+    folder, elsewhere = tmp_path / "solver", tmp_path / "theirs"
+    (folder / "lib" / "packages").mkdir(parents=True)
+    elsewhere.mkdir()
+    (elsewhere / "mine.txt").write_text("mine")
+    for name in ("lib/packages/a.py", "pyvenv.cfg", COMPUTE_FILE):
+        (folder / name).write_text("")
+    (folder / "lib64").symlink_to(elsewhere, target_is_directory=True)
+    left = iter(range(at))
 
-    for work, problem in ((refuse, "It cannot be."), (lambda task: 1 / 0, "An error inside WildCap stopped")):
-        task = BackgroundTask("try", work)
-        task.start()
-        ended, = follow(task)
-        assert ended.problem.startswith(problem)
-    task = BackgroundTask("sleep", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"]))
+    def check() -> None:
+        if next(left, None) is None:
+            raise CancelledError("environment")
+
+    with pytest.raises(CancelledError):
+        remove(folder, check)
+    assert (folder / COMPUTE_FILE).is_file()
+    task = removal(folder)
     task.start()
-    task.cancel()
-    assert follow(task, 2) == [Cancelled("sleep")]
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows ends the command alone")
-def test_a_cancel_ends_what_the_command_has_started(tmp_path):
-    """venv runs pip's installer as a process of its own, which must not go on in a folder that the next installation
-    begins with."""
-    late = tmp_path / "late"
-    child = (f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(1); "
-             f"pathlib.Path({str(late)!r}).touch()")
-    starter = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
-    task = BackgroundTask("venv", lambda task: task.run([sys.executable, "-c", starter]))
-    task.start()
-    while not (tmp_path / "begun").exists():
-        time.sleep(0.02)
-    task.cancel()
-    assert follow(task, 2) == [Cancelled("venv")]
-    time.sleep(1.3)
-    assert not late.exists()
+    assert isinstance(follow(task)[-1], Done) and not folder.exists() and (elsewhere / "mine.txt").is_file()
 
 
 def test_other_peoples_folders_are_left_alone(local, tmp_path):

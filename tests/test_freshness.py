@@ -41,6 +41,14 @@ def test_a_changed_input_makes_stale_and_is_named(capture):
     assert capture.verdict(CAMERAS, Settings()).reason() == "frames/ changed"
 
 
+def test_what_a_system_leaves_in_a_folder_that_was_looked_into_changes_nothing(capture):
+    for name in (".DS_Store", "._00000.jpg", "Thumbs.db", "desktop.ini"):
+        (capture.frames / name).write_text("by the system")
+    assert states(capture) == ["done", "done"]
+    (capture.frames / "mine.jpg").write_text("by hand")
+    assert states(capture) == ["done", "stale"]
+
+
 def test_a_changed_setting_makes_its_own_stage_stale_and_is_named(capture):
     other = from_json({"cameras": {"matching": "exhaustive"}})
     assert states(capture, other) == ["done", "stale"]

@@ -18,7 +18,7 @@ from core.contract import lease, processes
 from core.contract.capture import Capture
 from core.contract.files import replacing, write_json
 from core.contract.messages import CancelledError, Problem
-from core.worker.job import wait_until_free
+from core.worker.job import wait_until_free, write_job
 
 from . import kept_capture
 
@@ -121,6 +121,23 @@ def test_a_wait_for_another_machine_is_cancelled_and_ends_by_itself_before_a_com
     wait_until_free(capture, lambda text: None)  # nobody is here
 
 
+@pytest.mark.parametrize("left", ["", "another machine", "in another container"])
+def test_a_job_can_be_given_to_a_worker_that_will_take_over_what_was_left_long_ago(capture, soon, left):
+    """As by a Blender that was closed in the middle of a job, in a container that is another one each time."""
+    text = left and written_by(host="another machine" if left == "another machine" else processes.name_host() + "0")
+    capture.lock.write_text(text)
+    with pytest.raises(Problem, match="is working on|just beginning"):
+        write_job(capture)
+    assert not capture.job.exists()
+    os.utime(capture.lock, (0, time.time() - 1))
+    write_job(capture)
+    assert capture.lock.read_text() == text, "who takes it over waits for a term of its own"
+    with capture.locked():
+        os.utime(capture.lock, (0, 0))
+        with pytest.raises(Problem, match=f"process {os.getpid()}"):
+            write_job(capture)
+
+
 def test_a_disk_that_does_not_answer_for_a_moment_costs_nobody_the_lease(capture, monkeypatch):
     read = lease.require_regular
 
@@ -133,6 +150,16 @@ def test_a_disk_that_does_not_answer_for_a_moment_costs_nobody_the_lease(capture
             write_json(capture.root / "texture.json", 1)
         monkeypatch.setattr(lease, "require_regular", read)
         write_json(capture.root / "texture.json", 1)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has a disk that is always full")
+def test_a_lock_that_does_not_fit_on_the_disk_is_not_left_behind(capture, monkeypatch):
+    monkeypatch.setattr(lease, "open", lambda descriptor, mode: os.close(descriptor) or open("/dev/full", mode),
+                        raising=False)
+    with pytest.raises(Problem, match="The disk is full"), capture.locked():
+        pass
+    assert not capture.lock.exists()
+    capture.check_free()
 
 
 def test_the_holder_refreshes_and_gives_back_only_its_own(capture, soon):

@@ -157,6 +157,7 @@ def test_the_terminal_runs_the_chain_with_the_solver_that_is_set_up(addon, captu
     assert execute(["solve", str(capture)]) == 1
     assert "solver is not set up" in capfd.readouterr().err
     monkeypatch.setattr(preferences, "python", lambda: sys.executable)
+    monkeypatch.setenv("PYTHONHOME", str(capture))  # of another Python: the solver's does not listen
     # the chain's own exit code, and its words
     assert execute(["run", str(capture / "no_film.mp4"), str(capture), "--quality", "draft"]) == 2
     assert "no_film.mp4" in capfd.readouterr().err

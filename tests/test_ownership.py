@@ -80,6 +80,28 @@ def test_every_file_of_a_capture_has_the_users_mode(capture):
 # -- folders
 
 
+def test_every_file_is_on_the_disk_before_it_gets_its_name(capture, monkeypatch):
+    flushed, named = set(), set()
+    fsync, rename = os.fsync, os.replace
+
+    def flush(descriptor: int) -> None:
+        flushed.add(os.fstat(descriptor).st_ino)
+        fsync(descriptor)
+
+    def place(path, into) -> None:
+        files = Path(path).rglob("*") if Path(path).is_dir() else [Path(path)]
+        named.update(file.stat().st_ino for file in files if file.is_file())
+        assert named <= flushed
+        rename(path, into)
+
+    monkeypatch.setattr(os, "fsync", flush)
+    monkeypatch.setattr(os, "replace", place)
+    make_frames(capture, "00000.jpg", "00001.jpg")
+    with replacing(capture.scan) as temporary:
+        temporary.write_text("scan")
+    assert len(named) == 3
+
+
 def test_files_that_others_put_into_a_folder_of_ours_stay_where_they_are(capture):
     make_frames(capture, "00000.jpg", "00001.jpg")
     (capture.frames / "holiday.jpg").write_text("a picture")
@@ -97,6 +119,33 @@ def test_a_changed_file_in_a_folder_of_ours_is_kept_aside_whether_there_is_a_new
     assert contents(capture.frames) == {"00000.jpg": b"new"}
     assert contents(capture.root / "kept") == {f"frames/{name}": f"retouched {name}".encode()
                                                for name in ("00000.jpg", "00001.jpg")}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a link needs a privilege there")
+def test_a_link_in_place_of_a_file_or_folder_of_ours_is_kept_aside_and_what_it_leads_to_stays(capture, tmp_path):
+    """As somebody makes it who moves the frames to a larger disk, which may not be connected."""
+    make_frames(capture, "00000.jpg", "00001.jpg")
+    capture.frames.rename(tmp_path / "larger")
+    (tmp_path / "larger" / "notes.txt").write_text("notes")
+    before = contents(tmp_path / "larger")
+    for number, leads_to in enumerate(("larger", "not connected")):
+        link = capture.frames if number == 0 else capture.delit
+        link.symlink_to(tmp_path / leads_to, target_is_directory=True)
+        for text in ("new", "newer"):
+            with replacing_folder(link) as folder:
+                (folder / "00000.jpg").write_text(text)
+        assert contents(link) == {"00000.jpg": b"newer"} and not link.is_symlink()
+        assert (capture.root / "kept" / link.name).readlink() == tmp_path / leads_to
+    capture.scan.symlink_to(tmp_path / "not connected" / "scan.ply")
+    with replacing(capture.scan) as temporary:
+        temporary.write_text("ours")
+    assert (capture.root / "kept" / "scan.ply").readlink() == tmp_path / "not connected" / "scan.ply"
+    left = capture.root / ".cameras.old"  # of a version that put links aside as folders
+    left.symlink_to(tmp_path / "larger", target_is_directory=True)
+    with replacing_folder(capture.cameras) as folder:
+        (folder / "a.bin").write_text("cameras")
+    assert not left.is_symlink() and (capture.root / "kept" / "cameras").readlink() == tmp_path / "larger"
+    assert contents(tmp_path / "larger") == before
 
 
 KILLED = """

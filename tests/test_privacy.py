@@ -9,11 +9,12 @@ import sys
 
 import pytest
 
+from core.batch import task
 from core.contract import consent, report, switchlight_api
 from core.contract.capture import Capture
 from core.contract.messages import Problem
 from core.contract.settings import Settings
-from core.worker import client, terminal
+from core.worker import client, environment, terminal
 from core.worker.background import BackgroundTask
 from core.worker.job import write_job
 
@@ -77,6 +78,19 @@ def test_the_key_goes_to_workers_that_send_and_to_nobody_else(key, tmp_path, mon
     task.start()
     task._thread.join()
     assert heard and KEY not in "".join(heard)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a script is no program there")
+def test_a_python_that_is_asked_and_a_blender_that_renders_do_not_inherit_the_key(key, tmp_path):
+    assert environment.answer(sys.executable, "import os; print(len(os.environ))") not in ("", "0")
+    assert KEY not in environment.answer(sys.executable, "import os; print(os.environ)")
+    blender, capture = tmp_path / "blender", Capture(tmp_path / "a.wildcap")
+    blender.write_text("#!/bin/sh\nenv\n")
+    blender.chmod(0o755)
+    with pytest.raises(Problem, match="no contact sheet"):
+        task._render_sheet(str(blender), capture, lambda message: None, lambda: False)
+    told = (capture.logs / "contact_sheet.log").read_text()
+    assert "PATH=" in told and KEY not in told
 
 
 def test_what_a_worker_starts_does_not_inherit_the_key(key):

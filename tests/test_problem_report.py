@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.contract import unforeseen
+from core.contract import stages, unforeseen
 from core.contract.capture import Capture
+from core.contract.settings import from_json
 from core.worker import problem_report
+from core.worker.job import write_job
 from core.worker.problem_report import REMOVED, Scrubber
 
 from . import recorded
@@ -44,6 +46,21 @@ def test_nothing_of_the_user_s_is_left_whatever_a_log_says(capture):
     for line in (*LINES, *map(repr, LINES), *map(json.dumps, LINES), f"{capture.root}/frames/geheim: {capture.source}"):
         said = scrub(line)
         assert not any(secret.lower() in said.lower() for secret in SECRETS), (line, said)
+
+
+def test_no_name_of_what_the_settings_name_elsewhere_is_left(capture, tmp_path):
+    """A figure tells the own head's name, and a problem that of another capture of the person."""
+    (tmp_path / "lights" / "Jane Doe evening.wildcap").mkdir(parents=True)
+    (tmp_path / "lights" / "Jane Doe evening.wildcap" / "capture.json").write_text("{}")
+    chosen = from_json({"registration": {"template": str(tmp_path / "heads" / "jane_doe_bust.obj")}})
+    capture.finish(stages.by_name("registration"), {"inputs": {}, "code": ""}, 1.0, chosen,
+                   {"own_template": "jane_doe_bust"}, "0.2.0")
+    write_job(capture, settings={"solve": {"together": str(tmp_path / "lights")}})
+    scrub = Scrubber(ROOT, None, capture)
+    assert scrub("the head jane_doe_bust.obj") == f"the head {REMOVED}"
+    assert scrub("Jane Doe evening has no texture") == f"{REMOVED} has no texture"
+    described = json.dumps(problem_report._described(capture))
+    assert "jane_doe_bust" in described and "jane_doe" not in scrub(described)
 
 
 def test_what_helps_stays(capture):

@@ -53,6 +53,21 @@ def test_scattering_follows_the_heads_size_at_each_click_unless_the_artist_set_i
     assert socket.default_value == pytest.approx(0.001)
 
 
+@pytest.mark.parametrize(("scale", "looks"), [((-1, 1, 1), -1), ((2, -2, 2), 1)])
+def test_a_mirrored_head_scatters_light_and_is_seen_from_in_front(addon, capture, scale, looks):
+    """Exchanged left for right it looks towards -Y as before, back for front towards +Y, upright both times."""
+    bpy.ops.wildcap.bring_in_head()
+    head = bpy.context.view_layer.objects.active
+    head.scale = scale
+    bpy.context.view_layer.update()
+    bpy.ops.wildcap.assemble_material()
+    socket = head.data.materials[0].node_tree.nodes["WildCap Skin"].inputs["Subsurface Scale"]
+    assert socket.default_value == pytest.approx(0.003 * abs(scale[0]))
+    camera = addon("relight.picture").set_up(head, "three_point", 16, 1).camera
+    assert looks * (camera.matrix_world.translation.y - head.bound_box[0][1]) > 0.3
+    assert camera.matrix_world.col[1].z > 0.9, "its up is up"
+
+
 def test_a_render_is_written_and_the_scene_is_untouched(addon, capture):
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.assemble_material()

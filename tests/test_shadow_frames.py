@@ -137,6 +137,18 @@ def test_what_softening_lightens_becomes_the_proposal(capture, tmp_path):
     assert columns[0] > 20 * columns[1]
 
 
+def test_smaller_softened_pictures_with_hard_edges_tell_the_same(capture, tmp_path):
+    """White letters on black cloth beside the face: the enlarged picture swings below black there."""
+    for i, view in enumerate(views()):
+        soft = images.linear_to_srgb(np.clip(seen(view, lit(0.25)), 0, 1))
+        soft[-40:] = 0
+        soft[-28:-12:8, 8:-8] = soft[-28:-12, 8:-8:8] = 1
+        small = soft[::2, ::2]
+        assert images.resize(small, view.width, view.height).mean(-1).min() < -0.13, "linear, + 0.01: below 0"
+        images.write_srgb(tmp_path / "soft" / f"{3 * i:04d}.png", small)
+    assert overlap(proposal(capture, dilate_px=0, softened=str(tmp_path / "soft"))) > 0.75
+
+
 def test_the_command_line_takes_the_folder(capture, tmp_path, monkeypatch):
     monkeypatch.setattr("core.worker.terminal.follow", lambda *arguments, **options: 0)
     capture.set_source(tmp_path)
@@ -184,6 +196,9 @@ def test_softening_alone_is_shadow_not_gain_nor_noise():
     soft[100:200, 80:160] *= 1.5
     alpha = softening(raw, soft)
     assert alpha[110:190, 90:150].min() > 0.8 and alpha[:80].max() < 0.2
+    cut = np.pad(soft[40:, 40:200], ((40, 0), (40, 40), (0, 0)), constant_values=0.01)  # no background, saved as JPEG
+    alpha = softening(raw, cut)
+    assert alpha[110:190, 90:150].min() > 0.8 and alpha[210:, 50:190].max() < 0.2, "lit skin is not in shadow"
 
 
 def test_the_sun_s_shadow_is_told_by_the_filmed_texture_alone(monkeypatch):

@@ -15,10 +15,10 @@ ShaderNodeAttribute WildCap Regions: attribute_name=wildcap_roughness
 ShaderNodeGroup WildCap Skin: Specular Amount=1.25, Roughness=0.45, IOR=1.4, Subsurface=1, Subsurface Scale=0.003, Displacement=0, Midlevel=0, Oil=0
 ShaderNodeNormalMap WildCap Normal Map: uv_map=UVMap
 ShaderNodeOutputMaterial Material Output
-ShaderNodeTexImage WildCap Albedo: diffuse_albedo.png sRGB, interpolation=Cubic
-ShaderNodeTexImage WildCap Displacement: displacement.exr Non-Color, interpolation=Cubic
-ShaderNodeTexImage WildCap Normal: normal.png Non-Color, interpolation=Cubic
-ShaderNodeTexImage WildCap Specular: specular_albedo.png Non-Color, interpolation=Cubic
+ShaderNodeTexImage WildCap Albedo: diffuse_albedo.png sRGB, interpolation=Cubic, extension=EXTEND
+ShaderNodeTexImage WildCap Displacement: displacement.exr Non-Color, interpolation=Cubic, extension=EXTEND
+ShaderNodeTexImage WildCap Normal: normal.png Non-Color, interpolation=Cubic, extension=EXTEND
+ShaderNodeTexImage WildCap Specular: specular_albedo.png Non-Color, interpolation=Cubic, extension=EXTEND
 ShaderNodeUVMap WildCap UV: uv_map=UVMap
 WildCap Albedo.Color -> WildCap Skin.Albedo
 WildCap Displacement.Color -> WildCap Skin.Height

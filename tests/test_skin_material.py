@@ -95,6 +95,40 @@ def test_displacement_is_off_by_default_and_then_in_the_heads_own_metres(patch, 
     assert sunk == pytest.approx([0, 0.2 * math.sin(math.pi / 4), 0.4 * math.sin(math.pi / 4)], abs=0.015)
 
 
+def test_a_relief_that_is_gone_moves_nothing(patch, tmp_path):
+    """The stage Delivery without its scan takes displacement.exr away; one of the artist's own in its place stays."""
+    height_map(patch, 0.2)
+    material = assembled()
+    skin = sockets(material)
+    skin["Displacement"].default_value, skin["Subsurface"].default_value = 1.0, 0.0
+    lamp((0, -1, 0))
+    (patch / "delivery" / "displacement.exr").rename(tmp_path / "mine.exr")
+    assert bpy.ops.wildcap.assemble_material() == {'FINISHED'}
+    rows = seen(tmp_path / "flat.exr", 45, side=48, samples=16, width=6.0).sum((1, 2))
+    assert np.average((np.arange(48) + 0.5) / 48 * 6 - 3, weights=rows) == pytest.approx(0, abs=0.015)
+
+    (tmp_path / "mine.exr").rename(patch / "delivery" / "displacement.exr")
+    bpy.ops.wildcap.assemble_material()
+    node = material.node_tree.nodes["WildCap Displacement"]
+    (patch / "delivery" / "displacement.exr").rename(tmp_path / "mine.exr")
+    node.image = bpy.data.images.load(str(tmp_path / "mine.exr"))
+    bpy.ops.wildcap.assemble_material()
+    assert material.node_tree.nodes["WildCap Displacement"].image.name == "mine.exr" and skin["Height"].is_linked
+
+
+def test_the_maps_upper_and_lower_border_do_not_mix(patch, tmp_path):
+    """They are the crown and the end of the neck: at the upper edge of a map that is red above and green below there is
+    no green."""
+    paint(patch, "diffuse_albedo.png", [[(1, 0, 0)] * 4] * 2 + [[(0, 1, 0)] * 4] * 2)
+    paint(patch, "normal.png", [[(0.5, 0.5, 1)] * 4] * 4)
+    skin = sockets(assembled())
+    skin["Subsurface"].default_value = skin["Specular Amount"].default_value = 0.0
+    white_world()
+    bpy.context.view_layer.objects.active.location.z = -1
+    red, green, _ = seen(tmp_path / "edge.exr", width=0.2)[:3].mean((0, 1))  # the edge is in the picture's middle
+    assert green < 0.01 * red and red > 0.1
+
+
 def test_oil_lies_where_skin_is_smoother_than_the_cheeks_and_reflects_as_its_film_does(patch, tmp_path):
     """A black patch without gloss of its own, all of it nose, forehead or cheek; at normal incidence under even
     light."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core import texture
-from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.messages import CancelledError, Problem, Progress, Reporter
 from core.contract.settings import from_json
 from core.imaging import images
 
@@ -59,6 +59,24 @@ def test_the_filmed_texture_is_the_delit_one_with_its_light(tmp_path, painted):
     seen = images.read_linear(capture.texture_filmed) / found
     assert np.median(np.abs(np.log(seen / light))[sure]) < 0.03
     assert np.corrcoef(seen[sure][:, 0], light[sure][:, 0])[0, 1] > 0.97
+
+
+def test_the_bar_does_not_go_back_from_the_fine_detail_to_what_was_filmed(tmp_path, painted):
+    said, capture = [], capture_of(tmp_path / "bar", painted, (-20, 20), light=np.full_like(painted, 0.7))
+    texture.run(capture, from_json({"texture": {"size": SIZE}}), Reporter("texture", said.append))
+    steps = [m for m in said if isinstance(m, Progress) and m.of == 2 + 6]  # a view each, and six beside
+    assert any("fine detail" in m.text for m in steps) and "as filmed" in steps[-1].text
+    assert [m.done for m in steps] == sorted(m.done for m in steps)
+
+
+def test_without_its_frames_a_texture_is_not_compared_with_one_that_was_filmed_before(tmp_path, painted):
+    capture = capture_of(tmp_path / "gone", painted, (0, 30), light=np.full_like(painted, 0.7))
+    textured(capture)
+    assert capture.texture_filmed.is_file()
+    for path in capture.frames.glob("*.jpg"):
+        path.unlink()
+    textured(capture)
+    assert capture.texture.is_file() and not capture.texture_filmed.exists()
 
 
 def test_what_no_view_saw_has_no_confidence(tmp_path, painted):

@@ -56,6 +56,16 @@ def test_a_folder_of_wheels_is_made_and_installed_from(index, tmp_path, monkeypa
     assert environment.verify(python, setup_commands.REQUIREMENTS, importing=True) == []
 
 
+def test_python_files_in_the_working_directory_are_not_taken_for_python_s_own(index, tmp_path, monkeypatch, capsys):
+    """Blender is started where a .blend lies, and whatever else."""
+    (tmp_path / "scripts" / "pip").mkdir(parents=True)
+    for name in ("json.py", "venv.py", "ensurepip.py", "pip/__init__.py", "pip/__main__.py"):
+        (tmp_path / "scripts" / name).write_text("raise RuntimeError('not for Python')")
+    monkeypatch.chdir(tmp_path / "scripts")
+    assert main(["wheels", str(tmp_path / "wheels")]) == 0, capsys.readouterr().err
+    assert main(["install", str(tmp_path / "env"), "--compute", "cpu"]) == 0, capsys.readouterr().err
+
+
 def test_what_keeps_wheels_from_coming_is_said(index, tmp_path, capsys):
     (index / "tinytorch-1.0-py3-none-any.whl").unlink()
     assert main(["wheels", str(tmp_path / "wheels")]) == 2

@@ -19,7 +19,7 @@ HAIR_KEY = "wildcap_hair"
 CLOSE_UP_KEY = "wildcap_close_up"
 """Custom property of the objects of a head's close-up eyes and mouth: what each is."""
 HAIR_COLOUR = "wildcap_colour"
-"""Their attribute of each curve: its linear albedo."""
+"""Their attribute of each curve: its albedo, in the scene's working space."""
 
 
 def active(context) -> bpy.types.PropertyGroup | None:

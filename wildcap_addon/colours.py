@@ -4,9 +4,14 @@
 
 Data (masks, normals, specular) goes by OCIO's role `data`; pictures by the names that sRGB for textures has in the
 usual configurations, else by the role `default_byte`, which a configuration gives to pictures of 8 bits.
+
+Numbers of a colour are linear light of sRGB's primaries (Rec.709) here and in the capture; the scene's working space,
+in which Blender takes those of nodes, lamps and attributes, may have others (ACEScg, Rec.2020).
 """
 
 import bpy
+import numpy as np
+from mathutils import Color
 
 SRGB = ("sRGB", "sRGB - Texture", "Utility - sRGB - Texture", "Input - Generic - sRGB - Texture", "srgb_texture",
         "srgb_tx", "sRGB Encoded Rec.709 (sRGB)")
@@ -14,6 +19,8 @@ SRGB = ("sRGB", "sRGB - Texture", "Utility - sRGB - Texture", "Input - Generic -
 Forum's (2024)."""
 VIEWS = ("Standard", "Un-tone-mapped", "Raw")
 """Views that show colours as they are."""
+ROUNDED = 1e-4
+"""What a configuration's own matrices, of some five digits, are off by"""
 
 
 def as_srgb(image: bpy.types.Image) -> None:
@@ -26,6 +33,22 @@ def as_data(image: bpy.types.Image) -> None:
     """Reads numbers as they are."""
     if not image.colorspace_settings.is_data:  # setting it has Blender read the file anew
         image.colorspace_settings.is_data = True
+
+
+def to_working(linear: np.ndarray | tuple) -> np.ndarray:
+    """Linear colours [..., 3] of sRGB's primaries in the scene's working space."""
+    return np.asarray(linear) @ _towards_working()
+
+
+def from_working(linear: np.ndarray | tuple) -> np.ndarray:
+    """Colours [..., 3] in the scene's working space as linear ones of sRGB's primaries."""
+    return np.asarray(linear) @ np.linalg.inv(_towards_working())
+
+
+def _towards_working() -> np.ndarray:
+    """[3, 3], for rows; exactly the identity where the working space has sRGB's primaries."""
+    matrix = np.array([Color(axis).from_rec709_linear_to_scene_linear()[:] for axis in np.eye(3)])
+    return np.eye(3) if np.abs(matrix - np.eye(3)).max() < ROUNDED else matrix
 
 
 def show_by(scene: bpy.types.Scene, view: str) -> None:

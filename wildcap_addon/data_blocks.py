@@ -64,6 +64,11 @@ def replace_data(obj: bpy.types.Object, data, kind) -> None:
         data.name = name
 
 
+def scale_of(obj: bpy.types.Object) -> float:
+    """How large an object is against its own units, in the mean of its axes."""
+    return sum(map(abs, obj.matrix_world.to_scale())) / 3  # negative for one that is mirrored
+
+
 def stop_animation(data_block: bpy.types.ID) -> None:
     """Takes a data-block's animation away, and its action, where nothing else has it."""
     action = data_block.animation_data.action if data_block.animation_data else None

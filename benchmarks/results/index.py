@@ -92,7 +92,7 @@ def spread(state: Figures) -> str:
         mean), and {solved.psnr_shared.difference:+.2f} ± {solved.psnr_shared.error:.2f} dB on the map up to one shared
         light: from {least:+.2f} dB (`{worst}`) to {most:+.2f} dB (`{best}`). Where a person was filmed in several
         lights ({solved.agreement.people} of them) it adds {solved.agreement.difference:+.2f} dB to how well the albedos
-        agree. {worse_in_the_picture(gains["psnr"])} {the_synthetic(state.people.solved)}
+        agree. {worse_in_the_picture(gains["psnr"])} {the_synthetic(state.people.solved)} [The page](state.md).
         """)
 
 

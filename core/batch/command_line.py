@@ -10,6 +10,7 @@ import contextlib
 import json
 import signal
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -112,7 +113,8 @@ def _plan(options: argparse.Namespace) -> int:
     before = read_batch(root) if (root / NAME).is_file() else Batch(root, ())
     _refuse_strangers(root)
     batch = _with_options(before, options)
-    faces, faults = read_faces(options.shots, root, options.quality, command_settings.read_options(options, "run"))
+    faces, faults = read_faces(options.shots, root, options.quality, command_settings.read_options(options, "run"),
+                               before.faces)
     kept = [face for face in before.faces if face.name not in {new.name for new in faces}]
     if faces or kept:
         write_batch(replace(batch, faces=(*kept, *faces)))
@@ -157,7 +159,7 @@ def _run(options: argparse.Namespace) -> int:
             raise Problem(f"{flag} goes with --on {where} only.", f"Add --on {where}, or leave {flag} out.")
         if isinstance(value, int) and value < 1:
             raise Problem(f"{flag} is less than one.", "Leave it out, or give a whole number from 1 on.")
-    with lease.hold(batch.root, _tell, "batch"), known_hashes(batch.root):
+    with _held(batch), known_hashes(batch.root):
         if options.on == "ray":
             from .ray_cluster import run_on_ray
 
@@ -166,6 +168,17 @@ def _run(options: argparse.Namespace) -> int:
         else:
             tally = run_local(batch, faces, options.at_once or 1, options.retry, _tell, options.until)
     return _sum_up(tally, len(faces))
+
+
+@contextlib.contextmanager
+def _held(batch: Batch) -> Iterator[None]:
+    """Holds the batch's lease. Raises Problem, also where its folder cannot be written."""
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(lease.hold(batch.root, _tell, "batch"))
+        except OSError as error:
+            raise storage_problem(error, batch.root) from error
+        yield
 
 
 def _sum_up(tally: Tally, of: int) -> int:

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import csv
 import io
+import unicodedata
+from collections.abc import Iterable
 from pathlib import Path
 
 from ..contract import settings as known
@@ -31,7 +33,8 @@ MOST_BYTES = 16 << 20
 """Of a table: some hundred thousand rows."""
 
 
-def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[list[BatchFace], list[Problem]]:
+def read_faces(shots: Path, root: Path, quality: str, shared: dict,
+               planned: Iterable[BatchFace] = ()) -> tuple[list[BatchFace], list[Problem]]:
     """The faces of a table or a folder.
 
     Parameters
@@ -40,6 +43,7 @@ def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[lis
     root : the batch's folder, in which the captures lie
     quality : preset of the rows that name none
     shared : settings {stage: {name: value}} that lie under each row's own
+    planned : the batch's faces so far
 
     Returns
     -------
@@ -52,13 +56,18 @@ def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[lis
     """
     rows = _rows_of_folder(shots, root) if shots.is_dir() else _rows_of_table(shots)
     faces, faults, taken = [], [], {}
+    spelled = {_as_a_disk_tells(face.root): face.name for face in planned}
     for place, row in rows:
         try:
             face = _face(row, shots if shots.is_dir() else shots.parent, root, quality, shared)
-            other = taken.setdefault(face.root.name.casefold(), place)  # some disks do not tell ANNA from Anna
+            folder = _as_a_disk_tells(face.root)
+            other = taken.setdefault(folder, place)
             if other != place:
                 raise Problem(f"The name {face.name} is taken by {other}.",
                               "Give each face a name of its own in the column name.")
+            if spelled.get(folder, face.name) != face.name:
+                raise Problem(f"The name {face.name} was planned before as {spelled[folder]}, and not every disk tells "
+                              "the two apart.", "Write it as before, or give the face another name in the column name.")
             faces.append(face)
         except Problem as problem:
             faults.append(Problem(f"{place}: {problem.problem}", problem.remedy))
@@ -67,6 +76,11 @@ def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[lis
                       f"A folder holds videos or folders of photographs; a table has a line of headings: "
                       f"{', '.join(HEADINGS)}.")
     return faces, faults
+
+
+def _as_a_disk_tells(folder: Path) -> str:
+    """The same for two folders that some disk does not tell apart: ANNA and Anna, or Zoë in one letter and in two."""
+    return unicodedata.normalize("NFC", str(folder)).casefold()
 
 
 def _rows_of_folder(folder: Path, root: Path) -> list[tuple[str, dict[str, str]]]:

@@ -128,7 +128,8 @@ def _render_sheet(blender: str, capture: Capture, hear: Callable[[Message], None
     with open(log, "wb") as told:
         try:
             process = subprocess.Popen([blender, "--command", "wildcap", "contact_sheet", str(capture.root)],
-                                       stdin=subprocess.DEVNULL, stdout=told, stderr=told)
+                                       stdin=subprocess.DEVNULL, stdout=told, stderr=told,
+                                       env=switchlight_api.environment_without_key())
         except OSError as error:
             raise Problem(f"Blender could not be started as {blender} ({error.strerror or error}).",
                           "Plan the batch with --blender and its path.") from error

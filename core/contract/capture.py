@@ -281,9 +281,9 @@ class Capture:
     # -- lock
 
     def check_free(self) -> None:
-        """Raises Problem naming the worker that works here, if one does; a dead process's lock does not count."""
+        """Raises Problem naming the worker that works here, if one does; what a lost one left does not count."""
         holder = lease.holder(self.lock)
-        if holder is not None:
+        if holder is not None and not lease.seems_expired(holder, self.lock):
             raise lease.refuse(holder, self.lock)
 
     @contextlib.contextmanager

@@ -61,7 +61,7 @@ CARDS = {
         best_for="Soft light. Hard shadows are left to the mask and the solver.",
         runs="On your machine, on the processor; seconds per frame.",
         leaves=NOTHING, costs=NOTHING,
-        shadows="Only those that the head casts on itself.",
+        shadows="Yes, where there is a sun: those of the head itself, and of what stands beside it.",
         weights="None.",
         licence="GPL-3.0-or-later.",
     ),

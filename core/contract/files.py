@@ -51,8 +51,7 @@ def replacing(path: Path):
         if root is not None:
             ownership.note_temporary(root, temporary)
         yield temporary
-        with open(temporary, "rb+") as file:  # Windows flushes none that was opened to be read
-            os.fsync(file.fileno())
+        _flush(temporary)
         place_file(temporary, path)
     except OSError as error:
         raise storage_problem(error, path) from error
@@ -84,10 +83,10 @@ def replacing_folder(path: Path):
 def place_file(temporary: Path, path: Path) -> None:
     """Gives a complete file its name. In a capture, one that is there and not as WildCap wrote it is kept aside."""
     root = None if path.name in ownership.BOOKS else ownership.root_of(path)
-    os.chmod(temporary, MODE)  # some libraries write files that only their owner may read
+    _set_mode(temporary)
     if root is not None:
         check_lease(root)
-        if path.is_file() and not ownership.is_ours(root, path):
+        if (path.is_file() or path.is_symlink()) and not ownership.is_ours(root, path):
             ownership.keep_aside(root, path)
         ownership.note_written(root, {ownership.path_inside(root, path): read_hash(temporary)})
     check_lease(root or path.parent)
@@ -100,13 +99,16 @@ def place_folder(temporary: Path, path: Path) -> None:
     root, old = ownership.root_of(path), path.with_name(f".{path.name}.old")
     written = [file for file in temporary.rglob("*") if file.is_file()]
     for file in written:
-        os.chmod(file, MODE)
+        _set_mode(file)
+        _flush(file)
     if root is None:
         shutil.rmtree(old, ignore_errors=True)
     else:
         check_lease(root)
-        if old.exists():  # of a process that was killed between the two renames
+        if os.path.lexists(old):  # of a process that was killed between the two renames
             ownership.take_back(root, old)
+        if path.is_symlink():  # what it leads to is elsewhere, and its owner's
+            ownership.keep_aside(root, path)
         ownership.note_temporary(root, old)
         ownership.note_written(root,
                                {ownership.path_inside(root, path / file.relative_to(temporary)): read_hash(file)
@@ -119,6 +121,19 @@ def place_folder(temporary: Path, path: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
     else:
         ownership.clear_replaced(root, old, path)
+
+
+def _flush(file: Path) -> None:
+    """To the disk itself: what is renamed before that may be empty after a power cut, and on record as finished."""
+    with open(file, "rb+") as opened:  # Windows flushes none that was opened to be read
+        os.fsync(opened.fileno())
+
+
+def _set_mode(file: Path) -> None:
+    """The user's own: some libraries write files that only their owner may read. A share or a stick that is mounted for
+    everybody gives files another owner, who alone may do that, and a mode that everybody can read."""
+    with contextlib.suppress(OSError):
+        os.chmod(file, MODE)
 
 
 def _rename(path: Path, into: Path) -> None:

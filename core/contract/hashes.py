@@ -22,6 +22,8 @@ BLOCKS, BLOCK_BYTES = 64, 1 << 20
 """What is read of a longer one, spread evenly from its first byte to its last."""
 PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif")
 """Suffixes of the files in a folder of photographs that are read; others may lie beside them."""
+LITTER = frozenset({"thumbs.db", "desktop.ini"})
+"""What Windows leaves in a folder, above all on a share, where somebody has looked at its pictures."""
 _hashes: dict[tuple, str] = {}
 
 
@@ -56,10 +58,11 @@ def sample_file(path: Path) -> str:
 
 
 def hash_tree(path: Path, hash_one: Callable[[Path], str] = hash_file) -> str | dict:
-    """The content hash of a file, {relative name: hash} of a folder, or '' for what is not there."""
+    """The content hash of a file, {relative name: hash} of a folder, or '' for what is not there. What a system leaves
+    in folders by itself, hidden files and LITTER, is not of it."""
     if path.is_dir():
         return {p.relative_to(path).as_posix(): hash_one(p) for p in sorted(path.rglob("*")) if p.is_file()
-                and not p.name.startswith(".")}
+                and not p.name.startswith(".") and p.name.lower() not in LITTER}
     return hash_one(path) if path.is_file() else ""
 
 

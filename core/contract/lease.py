@@ -15,6 +15,7 @@ import contextlib
 import json
 import os
 import secrets
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -68,6 +69,16 @@ def holder(path: Path) -> dict | None:
     _refuse_stranger(path)
     lease_holder = _read(path)
     return None if lease_holder is None or lease_holder and is_gone(lease_holder) else lease_holder
+
+
+def seems_expired(holder: dict, path: Path) -> bool:
+    """Whether the lease that `holder` has in the file `path` was not refreshed for a term, by the clock that the disk
+    gives a new file beside it. That may not be the clock of its holder: who takes it over still waits (hold)."""
+    if holder and is_at_work(holder):
+        return False
+    with contextlib.suppress(OSError), tempfile.TemporaryFile(dir=path.parent) as new:
+        return os.fstat(new.fileno()).st_mtime - path.stat().st_mtime > TERM_S
+    return False
 
 
 def refuse(holder: dict, path: Path, folder_kind: str = "capture") -> Problem:
@@ -138,8 +149,13 @@ def _make(lease: Lease) -> bool:
         descriptor = os.open(lease.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     except FileExistsError:
         return False
-    with open(descriptor, "wb") as file:
-        file.write(json.dumps(content).encode())
+    try:
+        with open(descriptor, "wb") as file:
+            file.write(json.dumps(content).encode())
+    except OSError:  # an empty one on a full disk would be taken for somebody who is just beginning
+        with contextlib.suppress(OSError):
+            lease.path.unlink()
+        raise
     return True
 
 

@@ -131,7 +131,7 @@ def clear_leftovers(root: Path) -> None:
     for left, by in read_record(root)[1].items():
         path = root / left
         # no link leads out of the capture
-        if is_gone(by) and path.exists() and path.parent.resolve().is_relative_to(root.resolve()):
+        if is_gone(by) and os.path.lexists(path) and path.parent.resolve().is_relative_to(root.resolve()):
             if path.suffix == ".old":
                 take_back(root, path)
             elif path.is_dir():
@@ -159,9 +159,12 @@ def _shorten(root: Path) -> None:
 
 
 def take_back(root: Path, replaced: Path) -> None:
-    """A folder that was put aside for a new one: finishes that, or undoes it where the new one never came."""
+    """A folder that was put aside for a new one: finishes that, or undoes it where the new one never came. A link is
+    kept aside as it is."""
     path = replaced.with_name(replaced.name[1:-len(".old")])
-    if path.exists():
+    if replaced.is_symlink():
+        keep_aside(root, replaced, path_inside(root, path))
+    elif path.exists():
         clear_replaced(root, replaced, path)
     else:
         os.replace(replaced, path)

@@ -16,6 +16,10 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
+QUERY_LIMITED_INFORMATION, ACCESS_DENIED, STILL_ACTIVE = 0x1000, 5, 259
+"""Of Windows: the right to ask a process when it began, the error of who does not have it, and the exit code of a
+process that runs."""
+
 
 @cache
 def name_host() -> str:
@@ -45,7 +49,8 @@ def is_gone(process: dict) -> bool:
         return True  # this machine has been started again since
     if space and space != our_space:
         return False
-    return not _runs(process["pid"]) or (bool(process.get("began")) and process["began"] != _began(process["pid"]))
+    began = process.get("began")
+    return not _runs(process["pid"]) or bool(began) and _began(process["pid"]) not in ("", began)
 
 
 def is_at_work(process: dict) -> bool:
@@ -53,6 +58,8 @@ def is_at_work(process: dict) -> bool:
     name, _, space = _place(process)
     if name != socket.gethostname() or space not in ("", _place({"host": name_host()})[2]) or is_gone(process):
         return False
+    if process.get("began") and not _began(process["pid"]):
+        return False  # of another user, whose processes are not told: the number may have gone to another
     with contextlib.suppress(OSError, IndexError):
         return Path(f"/proc/{process['pid']}/stat").read_bytes().rpartition(b") ")[2][:1] not in (b"T", b"t")
     return True
@@ -79,7 +86,7 @@ def _own_beginning(pid: int) -> str:
 
 def _ask_beginning(pid: int) -> str:
     if os.name == "nt":
-        return _windows_beginning(pid)
+        return _ask_windows(pid)[0]
     with contextlib.suppress(OSError, IndexError):
         # Linux: clock ticks since the machine was started
         return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2].split()[19].decode()
@@ -91,24 +98,31 @@ def _ask_beginning(pid: int) -> str:
     return ""
 
 
-def _windows_beginning(pid: int) -> str:
+def _ask_windows(pid: int) -> tuple[str, bool]:
+    """When a process of this machine began, '' where that is not told, and whether it runs. One that has ended is there
+    for as long as somebody holds a handle of it, as Blender does of its worker; one of another user may not be asked
+    and does run."""
     import ctypes
     from ctypes import wintypes
 
-    handle = ctypes.windll.kernel32.OpenProcess(0x1000, False, pid)  # PROCESS_QUERY_LIMITED_INFORMATION
+    kernel = ctypes.WinDLL("kernel32", use_last_error=True)
+    kernel.OpenProcess.restype = wintypes.HANDLE
+    kernel.OpenProcess.argtypes = wintypes.DWORD, wintypes.BOOL, wintypes.DWORD
+    handle = kernel.OpenProcess(QUERY_LIMITED_INFORMATION, False, pid)
     if not handle:
-        return ""
-    times = [wintypes.FILETIME() for _ in range(4)]
+        return "", ctypes.get_last_error() == ACCESS_DENIED
+    handle, code, times = wintypes.HANDLE(handle), wintypes.DWORD(), [wintypes.FILETIME() for _ in range(4)]
     try:
-        told = ctypes.windll.kernel32.GetProcessTimes(handle, *map(ctypes.byref, times))
-        return f"{times[0].dwHighDateTime}:{times[0].dwLowDateTime}" if told else ""
+        told = kernel.GetProcessTimes(handle, *map(ctypes.byref, times))
+        runs = not kernel.GetExitCodeProcess(handle, ctypes.byref(code)) or code.value == STILL_ACTIVE
+        return f"{times[0].dwHighDateTime}:{times[0].dwLowDateTime}" if told else "", runs
     finally:
-        ctypes.windll.kernel32.CloseHandle(handle)
+        kernel.CloseHandle(handle)
 
 
 def _runs(pid: int) -> bool:
     if os.name == "nt":
-        return bool(_windows_beginning(pid))
+        return _ask_windows(pid)[1]
     try:
         with contextlib.suppress(PermissionError):
             os.kill(pid, 0)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from . import ownership
 from .capture import Capture
-from .files import replacing_folder, storage_problem, write_json
+from .files import replacing_folder, write_json
 from .messages import Problem
 
 SHIPPED = Path(__file__).resolve().parents[1] / "assets" / "sample_head"
@@ -25,18 +25,19 @@ def copy_to(folder: Path) -> Capture:
     capture = Capture(folder / "sample_head.wildcap")
     if not capture.head.is_file():
         capture.refuse_strangers()
-        try:
-            with replacing_folder(capture.root) as temporary:
-                shutil.copytree(SHIPPED, temporary, dirs_exist_ok=True, copy_function=shutil.copyfile)
-                moved = (temporary / VERTICES).read_text(encoding="ascii")
-                built_in = (SHIPPED.parent / "head.obj").read_text(encoding="ascii").splitlines(keepends=True)
-                rest = "".join(line for line in built_in if not line.startswith("v "))
-                (temporary / capture.head.name).write_text(moved + rest, encoding="ascii")
-                (temporary / VERTICES).unlink()
-                write_json(temporary / capture.json.name, capture.read())
-                ownership.claim_all(temporary)
-        except shutil.Error as error:  # a list of (source, target, reason)
-            raise storage_problem(OSError(0, str(error.args[0][0][2])), capture.root) from error
+        with replacing_folder(capture.root) as temporary:
+            for path in ownership.files_in(SHIPPED):
+                place = temporary / path.relative_to(SHIPPED)
+                # not shutil.copytree: a folder of an extension that nobody may write to would get a copy like that
+                place.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(path, place)
+            moved = (temporary / VERTICES).read_text(encoding="ascii")
+            built_in = (SHIPPED.parent / "head.obj").read_text(encoding="ascii").splitlines(keepends=True)
+            rest = "".join(line for line in built_in if not line.startswith("v "))
+            (temporary / capture.head.name).write_text(moved + rest, encoding="ascii")
+            (temporary / VERTICES).unlink()
+            write_json(temporary / capture.json.name, capture.read())
+            ownership.claim_all(temporary)
     elif not capture.json.is_file():  # by WildCap 0.1.0
         ownership.adopt_first_format(capture.root)
         write_json(capture.json, capture.read())

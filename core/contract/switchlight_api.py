@@ -80,6 +80,11 @@ def keep_key() -> None:
     _kept = os.environ.pop(KEY_VARIABLE, "")
 
 
+def environment_without_key() -> dict[str, str]:
+    """This process's environment, for what it starts and what has no use for the key."""
+    return {name: value for name, value in os.environ.items() if name != KEY_VARIABLE}
+
+
 def key() -> str:
     """The artist's key. Raises Problem where there is none, or it cannot be one; its text is never part of a
     message."""

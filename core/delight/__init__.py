@@ -14,8 +14,9 @@ import numpy as np
 
 from ..contract.capture import Capture
 from ..contract.files import replacing_folder
-from ..contract.messages import Reporter
+from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
+from ..contract.stages import advise_again
 from ..imaging import images
 from .contract import Delighter, Photographer
 from .folder import folder
@@ -36,7 +37,8 @@ PHOTOGRAPHERS: dict[str, Photographer] = {"network": delight_with_network, "open
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Runs the delighter of `settings.delight.delighter` and replaces the folder delit/ by what it yields."""
+    """Runs the delighter of `settings.delight.delighter` and replaces the folder delit/ by what it yields. Raises
+    Problem where that is nothing."""
     shown = []
     with replacing_folder(capture.delit) as delit:
         for result in DELIGHTERS[settings.delight.delighter](capture, settings, report):
@@ -46,6 +48,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
                 images.write_data(delit / "shadow" / f"{stem}.png", result.shadow)
             shown.append((result.view, _small(images.read_srgb(result.view.path)), _small(result.image)))
             report.check()
+        if not shown:
+            raise Problem("None of the frames that were chosen for the texture has a camera.",
+                          advise_again("cameras"))
     report.figure("delighter", settings.delight.delighter)
     report.figure("delit_views", len(shown))
     middle = shown[:: max(1, len(shown) // 4)][:4]

@@ -16,7 +16,7 @@ import numpy as np
 
 from .evening import ShadingEstimate
 
-RIDGE_SHARE = 0.01  # of the features' mean square, against pictures whose light hardly varies
+RIDGE = 0.01  # a feature's mean square at which half of its slope is taken, against pictures whose light hardly varies
 USUAL_HUE_LOG = 0.08  # natural log units of hue from which skin is something else: lips, make-up, a burnt highlight
 MIN_SKIN_CELLS = 200  # cells of skin below which nothing is said
 
@@ -35,7 +35,7 @@ def remove_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[
         centre, level = np.average(x, axis=0, weights=trust), np.average(y, axis=0, weights=trust)
         weighted = (x - centre) * trust[:, None]
         # [4, 3]
-        slopes = np.linalg.solve(weighted.T @ (x - centre) + RIDGE_SHARE * len(x) * np.eye(x.shape[1]),
+        slopes = np.linalg.solve(weighted.T @ (x - centre) + RIDGE * len(x) * np.eye(x.shape[1]),
                                  weighted.T @ (y - level))
         trust = 1 / (1 + ((y - level - (x - centre) @ slopes) ** 2).sum(1) / USUAL_HUE_LOG**2)
     return [replace(look, shading=(look.shading + (f - centre) @ slopes).astype(np.float32))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contract.messages import Reporter
+from ..contract.messages import Problem, Reporter
 from ..face.head import Head
 from ..geometry.meshes import Mesh
 from ..geometry.raster import RayCaster, interpolate
@@ -20,6 +20,8 @@ from .surface import skin_weights, smooth_normals, vertex_colours
 
 MAX_ALBEDO = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed
 FIT_POINTS = 6000  # points of the skin that the light is fitted to
+FEWEST_POINTS = 200  # points that two views show below which those that one alone shows count as well
+UNKNOWNS = 10  # of the light in each colour: the sky's nine coefficients and the sun
 
 
 @dataclass(frozen=True)
@@ -62,23 +64,30 @@ class LitHead:
 
 def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     """Fits the light of these views to the head; half of the stage's progress. Raises Problem where the views hardly
-    see it."""
+    see it, or no bare skin of it."""
     normals = smooth_normals(head)
     colours, count, hair, seen_brows = vertex_colours(head, normals, views, report)
     transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done,
-                                 of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
-    skin, features = skin_weights(head.mesh)
+                                 of: report.progress(2 * of + done, 8 * of, "Casting rays at the sky"))
+    skin, features = skin_weights(head)
     skin, features = skin * (1 - hair) * (1 - seen_brows), np.maximum(features, seen_brows)
-    light, reached = _fit(head, normals, transfer, colours, skin * (count >= min(2, len(views))), report)
+    told = (skin > 0.3) & (colours.min(1) > 1e-3)
+    often = told & (count >= min(2, len(views)))
+    light, reached = _fit(head, normals, transfer, colours,
+                          skin * (often if often.sum() >= FEWEST_POINTS else told), report)
     return LitHead(head, normals, transfer, skin, hair, features, light,
                    _best_lit(light, normals, transfer, reached, count))
 
 
 def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.ndarray]:
-    """The light from an even draw of skin vertices; the draw's posterior on all vertices [V] (0 where not drawn) and
-    the figures."""
-    skin = np.flatnonzero((weights > 0.3) & (colours.min(1) > 1e-3))
-    drawn = skin[:: max(1, len(skin) // FIT_POINTS)]
+    """The light from an even draw of skin vertices, and the figures; the posterior [V] that its sun reaches them, 0 on
+    as even a draw of the other vertices, nan on those that were not drawn."""
+    skin = np.flatnonzero(weights)
+    if len(skin) < UNKNOWNS:
+        raise Problem("The selected frames show no bare skin of the face.",
+                      "Film the face from in front as well, or choose another delighter: Folder or None.")
+    every = max(1, len(skin) // FIT_POINTS)
+    drawn = skin[::every]
     origins = head.mesh.vertices[drawn] + 1e-3 * normals[drawn]
 
     def reaches(direction: np.ndarray) -> np.ndarray:
@@ -87,7 +96,7 @@ def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.n
         return free.astype(float)
 
     light, lit, inlier = fit_light(colours[drawn], normals[drawn], transfer[drawn], reaches, weights[drawn],
-                                   step=lambda done, of: report.progress(of + done / 2, 2 * of, "Fitting the light"))
+                                   step=lambda done, of: report.progress(3 * of + done, 8 * of, "Fitting the light"))
     expected = light.ambient(transfer[drawn]) + lit[:, None] * light.direct(normals[drawn])
     residual = np.abs(np.log(colours[drawn] / expected)).mean(1)
     report.figure("inlier_percent", round(100 * float(inlier.mean()), 1))
@@ -95,14 +104,15 @@ def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.n
     report.figure("environment_sh", np.round(light.environment, 4).tolist())
     report.figure("sun_direction", np.round(light.sun, 3).tolist() if light.has_sun else None)
     report.figure("sun_to_sky", round(float(light.colour[1] / np.median(light.ambient(transfer[drawn])[:, 1])), 2))
-    reached = np.zeros(len(normals))
+    reached = np.full(len(normals), np.nan)
+    reached[np.flatnonzero(weights == 0)[::every]] = 0
     reached[drawn] = lit
     return light, reached
 
 
 def _best_lit(light, normals, transfer, reached, count) -> np.ndarray:
     """[3]: the colour of the best lit tenth of the skin, taken for the colour of the skin itself."""
-    seen = count > 0
+    seen = (count > 0) & np.isfinite(reached)  # without their sun, most vertices of a fine mesh would pass for shaded
     lit = (light.ambient(transfer) + reached[:, None] * light.direct(normals))[seen]
     tone = lit[lit.mean(1) >= np.quantile(lit.mean(1), 0.9)].mean(0)
     return tone * min(1.0, MAX_ALBEDO / tone.max())

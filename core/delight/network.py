@@ -215,7 +215,5 @@ def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = Non
 
 def _landmarks(head: LitHead) -> np.ndarray:
     """Points [N, 3] that frame the face: MediaPipe's landmarks on the built-in topology, else all vertices."""
-    if head.mesh.faces.shape != template.load().faces.shape:
-        return head.mesh.vertices
-    face, bary = template.landmarks()
-    return (head.mesh.vertices[head.mesh.faces[face]] * bary[..., None]).sum(1)
+    same = np.array_equal(head.mesh.faces, template.load().faces)  # as many triangles may be others
+    return template.landmark_points(head.mesh) if same else head.mesh.vertices

@@ -12,7 +12,7 @@ from ..contract.messages import Problem, Reporter
 from ..face import parser, template
 from ..face.head import Head
 from ..face.parts import keep_present
-from ..geometry.meshes import Mesh, vertex_uvs
+from ..geometry.meshes import vertex_uvs
 from ..geometry.raster import sample, sample_uv, visible_from
 from ..geometry.views import View
 from ..imaging import images
@@ -109,14 +109,14 @@ def _without_doubts(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.nansum(shares * present, -1) > 0.5, mean
 
 
-def skin_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+def skin_weights(head: Head) -> tuple[np.ndarray, np.ndarray]:
     """([V], [V]): 1 on plain facial skin, 0 on lips, brows, eyes and off the face; and 1 on brows and lips, 0
-    elsewhere. On a mesh of another topology all is skin."""
-    if mesh.uvs is None or mesh.faces.shape != template.load().faces.shape:
-        return np.ones(len(mesh.vertices)), np.zeros(len(mesh.vertices))
+    elsewhere. On a mesh of another topology, or with other UVs, all is skin."""
+    if not head.built_in:
+        return np.ones(len(head.mesh.vertices)), np.zeros(len(head.mesh.vertices))
     skin = template.mask("skin", 512)
     for name in NOT_SKIN:
         skin = skin * (1 - template.mask(name, 512))
-    uvs = vertex_uvs(mesh)
+    uvs = vertex_uvs(head.mesh)
     features = np.maximum(template.mask("brows", 512), template.mask("lips", 512))
     return sample_uv(skin, uvs), sample_uv(features, uvs)

@@ -42,10 +42,13 @@ def delit_views(capture: Capture) -> list[tuple[View, Path]]:
 
 
 def read_picture(path: Path, view: View, kind: str) -> np.ndarray:
-    """sRGB [H, W, 3] at the frame's size. Raises Problem where the picture has another shape than its frame."""
+    """sRGB [H, W, 3] in [0, 1] at the frame's size. Raises Problem where the picture has another shape than its
+    frame."""
     image = images.read_srgb(path)
     check_shape(path, image, view, kind)
-    return image if image.shape[:2] == (view.height, view.width) else images.resize(image, view.width, view.height)
+    if image.shape[:2] != (view.height, view.width):
+        image = images.resize(image, view.width, view.height)
+    return image.clip(0, 1)  # enlarged, it swings beyond at hard edges, and below 0 there is no logarithm of light
 
 
 def check_shape(path: Path, image: np.ndarray, view: View, kind: str) -> None:

@@ -43,7 +43,8 @@ class Edge:
 
 def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float,
           check: Callable[[], None] = lambda: None) -> Edge:
-    """The edge of the shadow under a rough mask. Deeper than INWARD_TEXELS inside the mask alpha is never lowered.
+    """The edge of the shadow under a rough mask. Deeper inside the mask than an edge is looked for and its penumbra may
+    reach, INWARD_TEXELS + BAND_TEXELS, alpha is never lowered.
 
     Parameters
     ----------

@@ -28,6 +28,8 @@ SH_RIDGE = np.array([0, *[0.5] * 3, *[2.0] * 5]) * (per_function(ORTHONORMAL) / 
 # Skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their
 # mean
 MIN_SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
+DIRECTIONS_AROUND = 12  # that are tried about the best so far: six on each of two rings
+FINER_DEG = (12.0, 4.0)  # how far about the best direction so far others are tried, one round after the other
 AMBIENT_FLOOR_SHARE = 0.15  # the environment's shading never falls below this share of its median
 
 
@@ -80,7 +82,7 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
     transfer : [N, 9], `radiance_transfer` of the points
     reaches : direction [3] -> [N] in [0, 1], whether the head itself lets light from there through
     weights : [N]
-    step : hears (done, of)
+    step : hears (done, of), of all directions that are tried
 
     Returns
     -------
@@ -92,11 +94,13 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
     best_direction = np.array([0.0, 0.0, 1.0])
     candidates = fibonacci_sphere(160)
     candidates = candidates[candidates[:, 2] > -0.3]  # what shines on a person stands above or beside
-    for spread in (None, 12.0, 4.0):
+    tried, of = 0, len(candidates) + len(FINER_DEG) * DIRECTIONS_AROUND
+    for spread in (None, *FINER_DEG):
         if spread is not None:
             candidates = _around(best_direction, np.radians(spread))
-        for i, direction in enumerate(candidates):
-            step(i, len(candidates))
+        for direction in candidates:
+            step(tried, of)
+            tried += 1
             cosine = np.maximum(normals @ direction, 0)
             fitted = _expectation_maximisation(skin, cosine, reaches(direction), best[5] if spread else None)
             if fitted[0] > best[0]:
@@ -120,11 +124,11 @@ def log_likelihood(residual: np.ndarray) -> np.ndarray:
 
 
 def _around(direction: np.ndarray, spread: float) -> np.ndarray:
-    """Twelve directions on two rings about a direction, the outer one `spread` radians away."""
+    """DIRECTIONS_AROUND directions on two rings about a direction, the outer one `spread` radians away."""
     side = np.cross(direction, [0.0, 0.0, 1.0] if abs(direction[2]) < 0.9 else [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
     up = np.cross(direction, side)
-    angles = np.arange(6) * np.pi / 3
+    angles = np.arange(DIRECTIONS_AROUND // 2) * 4 * np.pi / DIRECTIONS_AROUND
     rings = [direction + np.tan(spread * r) * (np.cos(a) * side + np.sin(a) * up) for r in (0.5, 1.0)
              for a in angles + r]
     return np.array([d / np.linalg.norm(d) for d in rings])

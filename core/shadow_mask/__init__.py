@@ -146,8 +146,8 @@ def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> ShadowEv
     filmed = (images.resize(images.read_linear(capture.texture_filmed), size, size) if capture.texture_filmed.is_file()
               else texture)
     confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size)
-    # on a head of another topology everything is face and skin
-    built_in = head.mesh.faces.shape == template.load().faces.shape
+    # on a head of another topology, or with other UVs, everything is face and skin
+    built_in = head.head.built_in
     face, skin = (template.mask(name, size) if built_in else np.ones((size, size), np.float32)
                   for name in ("face", "skin"))
     brows = template.mask("brows", size) if built_in else np.zeros_like(skin)

@@ -25,6 +25,7 @@ from .tidy import without_small
 THRESHOLD = 0.5  # shadow alpha from which a pixel is in shadow at a sensitivity of 0.5
 # natural log units by which softening lightens: less is no shadow, more is one for certain
 LEAST_STEP_LOG, SURE_STEP_LOG = 0.10, 0.40
+CUT_OUT_SRGB = 4 / 255  # a softened picture is black up to here, JPEG's noise and all
 # share of the pixels that softening has lightened least: they are lit, and tell the two pictures' gain
 UNTOUCHED_SHARE = 0.25
 # deviation over which a difference is averaged, of the frame's longer side: a tool's pictures may lack the pores
@@ -71,7 +72,8 @@ def softening(raw: np.ndarray, soft: np.ndarray) -> np.ndarray:
     that has lightened it."""
     lighter = np.log((images.srgb_to_linear(soft).mean(-1) + 0.01) / (images.srgb_to_linear(raw).mean(-1) + 0.01))
     lighter = cv2.GaussianBlur(lighter.astype(np.float32), (0, 0), max(BLUR_SIDE_SHARE * max(lighter.shape), 0.8))
-    seen = raw.max(-1) < 0.99  # what is burnt out has lost its light
+    # what is burnt out has lost its light, and what is black was cut out: a tool may leave the background away
+    seen = (raw.max(-1) < 0.99) & (soft.max(-1) > CUT_OUT_SRGB)
     gain = np.quantile(lighter[seen], UNTOUCHED_SHARE) if seen.any() else 0.0
     return np.clip((lighter - gain - LEAST_STEP_LOG) / (SURE_STEP_LOG - LEAST_STEP_LOG), 0, 1)
 

@@ -43,7 +43,8 @@ once. Of a larger texture one view after the other is read along it."""
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """delit/, cameras/, head.obj -> texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1],
     texture_filmed.png (sRGB), the same with the light in it, and texture_parts.png (brows, beard and head hair in [0,
-    1]) where the frames are still there, and texture_detail.exr where they show more than a texel.
+    1]) where the frames are still there, and texture_detail.exr where they show more than a texel; where not, those of
+    another run go.
 
     Raises Problem where no view was delit or none of them sees the head.
     """
@@ -74,6 +75,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.figure("fine_detail_agreed_percent",
                       round(100 * float(detail[..., 1][detail[..., 1] > 0].mean()), 1) if detail[..., 1].any() else 0.0)
     lit = filmed(observations, surface.covered, size, report)
+    remove_file(capture.texture_filmed)
     if lit is not None:
         images.write_srgb(capture.texture_filmed, images.linear_to_srgb(fill(lit, built.confidence, covered)))
 

@@ -24,7 +24,8 @@ def equalise(observations: list[UnwrappedView], rounds: int = 6) -> np.ndarray:
     """Brings all views to one exposure and white balance; returns the log gains [views, 3] that were added (weighted
     mean zero).
 
-    Alternates between the mean over views and each view's weighted median difference from it, which no highlight moves.
+    Alternates between the mean over views and, where a view has a tenth of its best weight, its median difference from
+    it, which no highlight moves.
     """
     step = max(1, len(observations[0].weight) // 256)
     colours = np.stack([cv2.blur(o.log_colour, (step, step))[::step, ::step] for o in observations])  # [V, s, s, 3]

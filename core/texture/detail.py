@@ -51,7 +51,7 @@ def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: in
     size = factor * texels
     total, squares, weights, weights2 = (np.zeros((size, size), np.float32) for _ in range(4))
     for observation in observations:
-        report.progress(len(observations) + 5, len(observations) + 6, f"fine detail of {observation.name}")
+        report.progress(len(observations) + 4, len(observations) + 6, f"fine detail of {observation.name}")
         weight = cv2.resize(observation.weight, (size, size), interpolation=cv2.INTER_LINEAR) ** SHARP_EXPONENT
         pixels = cv2.resize(raster.bleed(observation.pixels, surface.covered), (size, size),
                             interpolation=cv2.INTER_LINEAR)

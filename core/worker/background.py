@@ -19,6 +19,9 @@ from collections.abc import Callable
 from ..contract import switchlight_api, unforeseen
 from ..contract.messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
 
+PLACES = frozenset({"PIP_USER", "PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_CONSTRAINT"})
+"""Environment variables of pip's that would have packages elsewhere than in the environment they are for, or others
+than a lock says."""
 GRACE_S = 1.0
 """How long a cancelled task's thread may take to end before it is waited for no longer."""
 
@@ -60,15 +63,24 @@ class BackgroundTask:
 
     terminate = cancel
 
+    def check(self) -> None:
+        """Raises CancelledError where the task was cancelled: whoever did so takes the work for ended within GRACE_S,
+        and may begin another in the same place."""
+        if self._cancelled_at is not None:
+            raise CancelledError(self.name)
+
     def say(self, done: float, of: float, text: str) -> None:
+        """Raises CancelledError as `check`."""
+        self.check()
         self._messages.put(Progress(self.name, done, of, text))
 
     def run(self, command: list, hear: Callable[[str], None] = lambda line: None) -> tuple[int, str]:
         """Runs a command, each line it writes through `hear`; its exit code and the last line with an error in it.
         Raises OSError when it cannot be started, and CancelledError where the task is cancelled before or meanwhile."""
+        self.check()
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
-                       and name != switchlight_api.KEY_VARIABLE}
+        environment = {name: value for name, value in switchlight_api.environment_without_key().items()
+                       if not name.startswith("PYTHON") and name not in PLACES}
         self._process = subprocess.Popen(
             [str(word) for word in command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **apart)
@@ -80,8 +92,7 @@ class BackgroundTask:
                 hear(line)
                 last_error = line.strip() if "error" in line.lower() else last_error
         code = self._process.wait()
-        if self._cancelled_at is not None:
-            raise CancelledError(self.name)
+        self.check()
         return code, last_error
 
     def _kill(self) -> None:

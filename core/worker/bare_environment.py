@@ -20,7 +20,7 @@ from pathlib import Path
 from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from . import pip_source
-from .environment import answer, python_of
+from .environment import answer, empty, python_of
 
 Run = Callable[[list], tuple[int, str]]
 """Runs a command; its exit code and the last line with an error in it."""
@@ -50,17 +50,17 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
         Where none can be made, or pip does not work in it.
     """
     folder = Path(folder)
-    _empty(folder, keep)
-    code, error = run([base, "-m", "venv", "--without-pip", folder])
+    empty(folder, keep)
+    code, error = run([base, "-I", "-m", "venv", "--without-pip", folder])
     if code:
-        _empty(folder, keep)
+        empty(folder, keep)
         _by_hand(folder, base)
     python = python_of(folder)
     if answer(python, "import sys; print(sys.prefix != sys.base_prefix)") != "True":
         raise Problem(f"No environment can be made from {base} ({error or 'it does not start'}).",
                       "Click Use an Existing Python.")
     has_pip = not wheel_only and answer(python, "import ensurepip; print(ensurepip.version())")
-    if not has_pip or run([python, "-m", "ensurepip", "--default-pip"])[0]:
+    if not has_pip or run([python, "-I", "-m", "ensurepip", "--default-pip"])[0]:
         unpack_pip(folder, pip_source.fetch(requirements, wheels))
     if answer(python, "import pip; print('pip')") != "pip":
         raise Problem(f"pip does not work in {folder}.", "Click Use an Existing Python, or choose another folder.")
@@ -79,17 +79,6 @@ def unpack_pip(folder: Path, wheel: bytes) -> None:
             file.extractall(said)
     except OSError as error:
         raise storage_problem(error, folder) from error
-
-
-def _empty(folder: Path, keep: str) -> None:
-    """Deletes what a broken or other environment has in its folder; the folder stays, and the file `keep` in it."""
-    for path in list(folder.iterdir()) if folder.is_dir() else ():
-        if path.name == keep:
-            continue
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
-        else:
-            path.unlink()
 
 
 def _by_hand(folder: Path, base: Path) -> None:

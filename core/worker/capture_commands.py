@@ -38,10 +38,10 @@ def add_commands(commands) -> None:
     marks = marks.add_subparsers(required=True, metavar="set|free|import")
     put = add_command(marks, "set", _landmarks, "put one landmark at a place of the capture's world", "CAPTURE")
     put.add_argument("index", metavar="INDEX", help="0 to 467, as in landmarks.json")
-    put.add_argument("position", metavar=("X", "Y", "Z"), nargs=3, type=float, help="metres")
+    for axis in "XYZ":
+        put.add_argument(axis.lower(), metavar=axis, type=float, help="metres")
     free = add_command(marks, "free", _landmarks, "let the frames say again where a landmark is", "CAPTURE")
     free.add_argument("index", metavar="INDEX")
-    free.set_defaults(position=None)
     many = add_command(marks, "import", _landmarks,
                        'take the points of a JSON file: {"points": {"152": [x, y, z]}}, metres', "CAPTURE")
     many.add_argument("file", metavar="JSON", type=Path)
@@ -101,7 +101,8 @@ def _mask_import(options: argparse.Namespace) -> int:
 def _landmarks(options: argparse.Namespace) -> int:
     if "file" in options and not options.file.is_file():
         raise Problem(f"There is no file at {options.file}.", "Check its name.")
-    points = artist_landmarks.read(options.file) if "file" in options else {options.index: options.position}
+    position = (options.x, options.y, options.z) if "x" in options else None
+    points = artist_landmarks.read(options.file) if "file" in options else {options.index: position}
     count = len(artist_landmarks.put(Capture(options.capture), points))
     print(f"{count} landmark{'' if count == 1 else 's'} put by hand; the stage registration comes next.")
     return 0

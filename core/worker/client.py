@@ -158,8 +158,7 @@ def _environment(own: dict[str, str]) -> dict[str, str]:
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     threads = str(cores if cores <= 2 else cores - 1)
-    inherited = {name: value for name, value in os.environ.items() if name != switchlight_api.KEY_VARIABLE}
-    return {**{name: threads for name in THREAD_VARIABLES}, **SPINS, **inherited, **own}
+    return {**{name: threads for name in THREAD_VARIABLES}, **SPINS, **switchlight_api.environment_without_key(), **own}
 
 
 def _apart() -> dict:

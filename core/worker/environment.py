@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
+from ..contract import switchlight_api
 from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from .background import BackgroundTask
@@ -86,16 +87,32 @@ def judge(survey: dict, requirements: Path) -> list[str]:
     return problems + [f"{module} does not load: {text}." for module, text in survey["errors"].items()]
 
 
-def remove(folder: Path) -> None:
-    """Deletes an environment. Raises Problem for a folder that is none, or that cannot be deleted."""
+def remove(folder: Path, check: Callable[[], None] = lambda: None) -> None:
+    """Deletes an environment, last of all the file that says that it is ours: ended in the middle, by `check` or
+    otherwise, it can be asked for again. Raises Problem for a folder that is none, or that cannot be deleted, and what
+    `check`, called before each file goes, raises."""
     folder = Path(folder)
     check_removable(folder)
     if not folder.exists():
         return
     try:
-        shutil.rmtree(folder)
+        empty(folder, COMPUTE_FILE, check)
+        (folder / COMPUTE_FILE).unlink()
+        folder.rmdir()
     except OSError as error:
         raise storage_problem(error, folder) from error
+
+
+def empty(folder: Path, keep: str, check: Callable[[], None] = lambda: None) -> None:
+    """Deletes all that is in a folder but the file `keep`; what links lead to stays. Raises OSError, and what `check`,
+    called before each file goes, raises."""
+    for place, folders, files in os.walk(folder, topdown=False):
+        for path in (Path(place, name) for name in (*files, *folders)):
+            check()
+            if path.is_dir() and not path.is_symlink():
+                path.rmdir()
+            elif path != folder / keep:
+                path.unlink()
 
 
 def check_removable(folder: Path) -> None:
@@ -109,7 +126,7 @@ def removal(folder: Path) -> BackgroundTask:
     """`remove` in the background: an environment has tens of thousands of files."""
     def work(task: BackgroundTask) -> None:
         task.say(0, 1, "deleting the solver")
-        remove(folder)
+        remove(folder, task.check)
 
     return BackgroundTask("environment", work)
 
@@ -144,11 +161,13 @@ print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv"
 
 
 def answer(python: str | Path, code: str, timeout_s: float = 20) -> str:
-    """What `python` prints for `code`; '' when it cannot be run."""
+    """What `python` prints for `code`; '' when it cannot be run. Isolated: a json.py in the folder that Blender was
+    started in is nobody's module."""
     flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
     try:
-        result = subprocess.run([str(python), "-E", "-s", "-c", code], capture_output=True, text=True,
-                                timeout=timeout_s, stdin=subprocess.DEVNULL, **flags)
+        result = subprocess.run([str(python), "-I", "-c", code], capture_output=True, text=True,
+                                timeout=timeout_s, stdin=subprocess.DEVNULL,
+                                env=switchlight_api.environment_without_key(), **flags)
         return result.stdout.strip()
     except (OSError, subprocess.TimeoutExpired):
         return ""

@@ -64,11 +64,11 @@ def plan_installation(requirements: Path, base: Path, compute: str, source: str,
     with tempfile.TemporaryDirectory(prefix="wildcap_index_", ignore_cleanup_errors=True) as folder:
         say(0, 3, "preparing to ask the package index")
         python = bare_environment.make(Path(folder) / "environment", base, requirements, run, wheels)
-        pip = [python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", *RETRIES]
+        pip = [python, *pip_steps.INSTALL, *RETRIES]
         say(1, 3, "preparing to ask the package index")
         if wheels is None:
             # one that reads descriptions without downloading packages; an old one works, slowly
-            run([*pip, "--quiet", "--upgrade", "pip"])
+            run([*pip, "--quiet", *pip_steps.PINNED, "--require-hashes", "-r", requirements / "locks" / "pip.txt"])
         packages, report = {}, Path(folder) / "report.json"
 
         def ask(words: tuple[str, ...]) -> tuple[int, str]:

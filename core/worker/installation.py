@@ -21,7 +21,7 @@ from ..contract.messages import Problem
 from . import bare_environment, locks
 from .background import BackgroundTask
 from .environment import COMPUTE_FILE, answer, python_of, required, verify
-from .pip_steps import carry_out, compute_of, lock_of, plan_steps
+from .pip_steps import INSTALL, carry_out, compute_of, lock_of, plan_steps
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,7 @@ class _Installing:
             bare_environment.make(folder, self.base, requirements, lambda command: task.run(command, self.hear),
                                   chosen.wheels, keep=COMPUTE_FILE)
             (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
-        pip = [python_of(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar",
-               "off"]
+        pip = [python_of(folder), *INSTALL, "--progress-bar", "off"]
         todo = plan_steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
         code, error = carry_out(todo, lambda words: task.run([*pip, *words], self.hear))
         if code:

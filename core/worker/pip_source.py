@@ -49,10 +49,12 @@ def fetch(requirements: Path, wheels: Path | None = None) -> bytes:
 
 def setting(name: str) -> str:
     """One of pip's settings, as 'index-url' or 'cert': from its environment variable, else from its files, the user's
-    before the machine's; '' if none."""
+    before the machine's; '' if none. PIP_CONFIG_FILE as the null device means to pip that no file counts."""
     said = os.environ.get(f"PIP_{name.upper().replace('-', '_')}", "")
     files = [os.environ.get("PIP_CONFIG_FILE", "")]
-    if os.name == "nt":
+    if files == [os.devnull]:
+        pass
+    elif os.name == "nt":
         files += [f"{os.environ.get('APPDATA', '')}/pip/pip.ini", f"{Path.home()}/pip/pip.ini",
                   f"{os.environ.get('PROGRAMDATA', '')}/pip/pip.ini"]
     else:

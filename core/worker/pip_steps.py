@@ -29,6 +29,9 @@ SOURCES = ("pytorch", "pip", "folder")
 pip is set up to look; or all from there (pip.conf, PIP_INDEX_URL and their like: a studio's mirror), which then also
 decides what the build computes on; or all from a folder of wheels."""
 PINNED = ("--no-deps", "--only-binary", ":all:")
+INSTALL = ("-I", "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--no-user")
+"""What a Python is told before that: `user = true` in somebody's pip.conf is not for this environment, where pip would
+refuse it."""
 
 
 def compute_of(choice: str) -> str:

@@ -33,6 +33,8 @@ from ..contract.files import replacing
 from ..contract.frame_records import read_frames
 from ..contract.messages import Problem
 from ..contract.ownership import BOOKS, FIRST_FORMAT
+from ..contract.portable_paths import convert_settings
+from ..contract.together import captures_in
 from . import doctor
 from .job import last_settings
 
@@ -43,7 +45,7 @@ REMOVED = "<removed>"
 ABSOLUTE = re.compile(r"""(?<![\w<>:/\\.])(?:file:/{1,3}|[A-Za-z]:[\\/]|\\\\|~[\w.-]*[\\/]|/(?=[^\s/]))""")
 """Where an absolute path begins: POSIX, a drive, a server's share, somebody's home, a file's URL."""
 COMMON = {"root", "user", "admin", "frames", "video", "capture", "photographs", "home", "users", "tmp", "var",
-          "wildcap"}
+          "wildcap", "head", "mesh", "template"}
 """Words that tell nobody's name, and stand in every log."""
 
 
@@ -155,8 +157,13 @@ def _own_names() -> set[str]:
 
 
 def _names_of(capture: Capture) -> set[str]:
-    """The capture's, those of its source and of the folders they lie in, and of the photographs."""
+    """The capture's, those of its source and of the folders they lie in, of the photographs, and of what settings name
+    elsewhere: a head mesh, other captures of the person."""
     names = {capture.root.stem, *capture.root.absolute().parts}
+    for path in _chosen_paths(capture):
+        names |= {path.stem, *path.parts}
+        with contextlib.suppress(Problem, OSError):
+            names |= {other.stem for other in captures_in(str(path))}
     with contextlib.suppress(Problem, OSError):
         source = capture.source
         if source is not None:
@@ -166,7 +173,20 @@ def _names_of(capture: Capture) -> set[str]:
             names |= {record.source, PurePosixPath(record.source).stem} if record.source else set()
     with contextlib.suppress(Problem, OSError):
         names |= {str(stamp[0]) for stamp in capture.read().get("source_stamp", [])}
-    return {name for name in names if name.strip("/\\") and not name.isdigit()}
+    return {name for name in names if name.strip("/\\.") and not name.isdigit()}
+
+
+def _chosen_paths(capture: Capture) -> list[Path]:
+    """What the settings of the last job, and those that finished stages were run with, name outside of the capture."""
+    paths: list[Path] = []
+    told: list[dict] = []
+    with contextlib.suppress(Problem, OSError):
+        told.append(contract_settings.to_json(last_settings(capture)))
+    with contextlib.suppress(Problem, OSError):
+        told += [{name: entry.get("settings")} for name, entry in capture.read()["stages"].items()]
+    for by_stage in told:
+        convert_settings(by_stage, lambda path: paths.append(Path(path)))
+    return paths
 
 
 def _examined(root: Path, python: Path | None) -> str:

@@ -31,20 +31,30 @@ def stand_in(capture: Capture, folder: str) -> Iterator[Capture]:
     place = Path(folder).expanduser() / f".wildcap.{os.getpid()}.tmp"
     try:
         try:
-            shutil.copytree(capture.root, place / capture.root.name, copy_function=_link,
-                            ignore=shutil.ignore_patterns("lock", ".*"))
-        except (OSError, shutil.Error) as error:
-            raise storage_problem(error if isinstance(error, OSError) else OSError(0, str(error)), place) from error
+            _stand_in(capture.root, place / capture.root.name)
+        except OSError as error:
+            raise storage_problem(error, place) from error
         yield Capture(place / capture.root.name)
     finally:
         shutil.rmtree(place, ignore_errors=True)
 
 
-def _link(source: str, target: str) -> None:
+def _stand_in(source: Path, target: Path) -> None:
+    """Fills a new folder. It does not get the other one's mode, as shutil.copytree would give it: nothing could be
+    written there, or removed."""
+    target.mkdir(parents=True)
+    for path in source.iterdir():
+        if path.is_dir() and not path.name.startswith("."):
+            _stand_in(path, target / path.name)
+        elif path.name != "lock" and not path.name.startswith("."):
+            _link(path, target / path.name)
+
+
+def _link(source: Path, target: Path) -> None:
     """The books are written to, so they are copied; so is what no link can be made of."""
-    if not source.endswith((".json", ".jsonl")):
+    if source.suffix not in (".json", ".jsonl"):
         with contextlib.suppress(OSError, NotImplementedError):
-            os.symlink(os.path.abspath(source), target)
+            os.symlink(source.absolute(), target)
             return
     shutil.copyfile(source, target)
 

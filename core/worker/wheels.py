@@ -44,7 +44,8 @@ def download(requirements: Path, name: str, compute: str, source: str, folder: P
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
         raise Problem(f"{folder} is not a folder.", "Choose a folder for the wheels.")
-    pip = [sys.executable, "-m", "pip", "download", "--disable-pip-version-check", "--no-input", "--progress-bar",
+    # -P and not -I: this Python's pip may be the user's own, but is not what lies in the working directory
+    pip = [sys.executable, "-P", "-m", "pip", "download", "--disable-pip-version-check", "--no-input", "--progress-bar",
            "off", "--dest", folder, *tags(name)]
     with tempfile.TemporaryDirectory(prefix="wildcap_wheels_") as scratch:
         own_pip = pip_steps.PipStep(("--no-deps", "--require-hashes", "-r",

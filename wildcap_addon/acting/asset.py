@@ -15,6 +15,8 @@ ASSETS = Path(__file__).resolve().parents[2] / "core" / "assets"
 SOFT, LEFT_EYE, RIGHT_EYE, JAWS = range(4)
 """What an inner vertex moves with: the rim before it, a ball, the jaws."""
 SIDES = ("Left", "Right")
+HALF = "eyesHalf"
+"""With a side the name of a key that is no unit: it is driven, and bends the way of the lids around the ball."""
 GAZE = tuple(f"eye{kind}" for kind in ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide"))
 """Units that mean an open eye: each opens the lids of its side as far as it is used."""
 

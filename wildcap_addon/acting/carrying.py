@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .asset import JAWS, LEFT_EYE, RIGHT_EYE, SIDES, SOFT, FaceUnits
+from .asset import HALF, JAWS, LEFT_EYE, RIGHT_EYE, SIDES, SOFT, FaceUnits
 from .filmed import FilmedEyes
 
 STEPS = 80  # of averaging: each neighbourhood reaches some 7 (lids) to 20 mm (cheeks)
@@ -24,7 +24,8 @@ BEHIND_M = 0.002  # metres between teeth and lips
 def carried(asset: FaceUnits, head: np.ndarray,
             filmed: FilmedEyes | None = None) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """All vertices [V + C + P, 3] of the head cut open, at rest, and each unit's rows and displacements, for a
-    registered head [V, 3].
+    registered head [V, 3]; and by HALF and a side what keeps the lids off the ball half way, where a straight line
+    from shut to open would lead through it.
 
     filmed: eyes that were open while filming: the balls are those, and `eyesOpen` opens the lids as far as they were.
     """
@@ -57,8 +58,10 @@ def carried(asset: FaceUnits, head: np.ndarray,
     units = {name: (rows, np.einsum("nij,nj->ni", turns[rows], moves)) for name, (rows, moves) in asset.units.items()}
     for side, ball in zip(SIDES, balls, strict=True):
         rows, moves = units[f"eyesOpen{side}"]
-        moves = _over_ball(rest[rows], moves, ball) if filmed is None else _as_filmed(rest, rows, moves, filmed)
+        moves = (moves + _outwards(rest[rows] + moves, ball) if filmed is None
+                 else _as_filmed(rest, rows, moves, filmed))
         units[f"eyesOpen{side}"], units[f"eyeBlink{side}"] = (rows, moves), (rows, -moves)
+        units[f"{HALF}{side}"] = rows, _outwards(rest[rows] + moves / 2, ball)
     return rest, units
 
 
@@ -171,12 +174,12 @@ def _behind_lips(asset: FaceUnits, head: np.ndarray, jaws: np.ndarray) -> np.nda
     return np.array([0, max(0.0, BEHIND_M - depth[gap.min(1) < 0.003].min(initial=BEHIND_M)), 0])
 
 
-def _over_ball(rest_points: np.ndarray, moves: np.ndarray, ball: tuple[np.ndarray, float, np.ndarray]) -> np.ndarray:
-    """An opening [n, 3] of the lids that ends outside of the eyeball."""
+def _outwards(points: np.ndarray, ball: tuple[np.ndarray, float, np.ndarray]) -> np.ndarray:
+    """What takes points [n, 3] of the lids out of the eyeball, [n, 3]."""
     centre, radius, matrix = ball
-    v = rest_points + moves - centre
+    v = points - centre
     length = np.linalg.norm(v, axis=1)
     v = v / length[:, None]
     inside = np.clip(_surface(v, matrix, radius) + CLEAR_M - length, 0, 0.003)
     front = v @ (matrix @ [0, -1, 0]) > 0
-    return moves + v * (inside * front)[:, None]
+    return v * (inside * front)[:, None]

@@ -6,7 +6,7 @@ so that every export has them."""
 import bpy
 import numpy as np
 
-from .. import node_trees
+from .. import colours, node_trees
 from ..data_blocks import find
 
 SIZE_PX = 512
@@ -14,7 +14,7 @@ IRIS_ANGLE_RAD = 0.42  # radians from the pupil's middle to the iris' rim, seen 
 PUPIL_ANGLE_RAD = 0.15
 IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0.14, 0.20, 0.10),
           "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
-"""Linear colours."""
+"""Linear colours of sRGB's primaries, as all numbers of colours here."""
 DEFAULT = "brown"
 SLOTS = ("Eyes", "Mouth", "Teeth")
 """Of a head that is cut open, after the skin's; the artist's own follow."""
@@ -45,10 +45,15 @@ def recolour(obj, iris: str | tuple) -> None:
 
 def tint(material, colour: tuple[float, float, float]) -> None:
     """Gives an iris its linear colour."""
-    material.diffuse_color = (*colour, 1)
+    material.diffuse_color = rgba(colour)
     node = material.node_tree.nodes.get(IRIS_NODE)
     if node is not None:
-        node.outputs[0].default_value = (*colour, 1)
+        node.outputs[0].default_value = rgba(colour)
+
+
+def rgba(colour: tuple[float, float, float]) -> tuple[float, ...]:
+    """A linear colour as nodes and materials take it."""
+    return (*colours.to_working(colour), 1.0)
 
 
 def colour_of(obj) -> tuple[float, float, float]:
@@ -69,13 +74,13 @@ def _material(name: str, kind: str, colour: tuple, roughness: float, coat: float
     material = bpy.data.materials.new(name)
     material[KEY] = kind
     shader = next(n for n in node_trees.of(material).nodes if n.type == 'BSDF_PRINCIPLED')
-    shader.inputs["Base Color"].default_value = (*colour, 1)
+    shader.inputs["Base Color"].default_value = rgba(colour)
     shader.inputs["Roughness"].default_value = roughness
     shader.inputs["IOR"].default_value = 1.376  # the cornea's, and nearly saliva's
     shader.inputs["Coat Weight"].default_value = coat
     shader.inputs["Coat Roughness"].default_value = 0.04
     shader.inputs["Coat IOR"].default_value = 1.376
-    material.diffuse_color = (*colour, 1)
+    material.diffuse_color = rgba(colour)
     return material
 
 
@@ -89,14 +94,28 @@ def _paint(material, name: str, iris: str | tuple) -> None:
         node.location = (-320, 280)
         shader = next(n for n in nodes if n.type == 'BSDF_PRINCIPLED')
         links.new(node.outputs["Color"], shader.inputs["Base Color"])
-        node.image = bpy.data.images.new(f"{name} Eye", SIZE_PX, SIZE_PX)
-    colour = IRISES.get(iris, iris)
-    told = iris if iris in IRISES else " ".join(f"{value:.3f}" for value in colour)
-    if node.image is not None and node.image.get("wildcap_iris") != told:
-        node.image.pixels.foreach_set(picture(colour).ravel())
-        node.image.update()
-        node.image.pack()
-        node.image["wildcap_iris"] = told
+        node.image = _drawn(f"{name} Eye", iris)
+    elif node.image is not None and node.image.get("wildcap_iris") != _told(iris):
+        before = node.image
+        before.user_remap(_drawn(before.name, iris))
+        if before.users == 0:
+            bpy.data.images.remove(before)
+            node.image.name = f"{name} Eye"
+
+
+def _drawn(name: str, iris: str | tuple) -> bpy.types.Image:
+    """A new picture of the eye, packed: Blender's undo does not know of pixels that change within one."""
+    image = bpy.data.images.new(name, SIZE_PX, SIZE_PX)
+    colours.as_srgb(image)
+    image.pixels.foreach_set(picture(IRISES.get(iris, iris)).ravel())
+    image.update()
+    image.pack()
+    image["wildcap_iris"] = _told(iris)
+    return image
+
+
+def _told(iris: str | tuple) -> str:
+    return iris if iris in IRISES else " ".join(f"{value:.3f}" for value in iris)
 
 
 def picture(iris: tuple[float, float, float]) -> np.ndarray:

@@ -4,8 +4,9 @@
 animation stay.
 
 For exporters: the keys are called as ARKit calls them (`jawOpen`, `eyeBlinkLeft`), their basis is the head as solved,
-lids closed; `eyesOpenLeft` and `eyesOpenRight` open the lids and are no names of ARKit's. Slots: skin, "... Eyes", "...
-Mouth", "... Teeth". The custom property `MARK` of the mesh says that it has them.
+lids closed; `eyesOpenLeft` and `eyesOpenRight` open the lids and are no names of ARKit's; what `HALF` names is driven,
+and in no delivery. Slots: skin, "... Eyes", "... Mouth", "... Teeth". The custom property `MARK` of the mesh says that
+it has them.
 """
 
 from pathlib import Path
@@ -19,7 +20,7 @@ from .. import captures
 from ..data_blocks import read_field
 from ..head import OUTER
 from . import carrying, filmed, going_over, materials
-from .asset import GAZE, SIDES, FaceUnits, load
+from .asset import GAZE, HALF, SIDES, FaceUnits, load
 
 MARK = "wildcap_face_units"
 OPEN = "eyesOpen"
@@ -77,6 +78,8 @@ def add(obj, iris: str = "") -> None:
     obj.shape_key_add(name="Basis", from_mix=False)
     for unit in asset.units:
         obj.shape_key_add(name=unit, from_mix=False).value = 0  # Blender 5 begins with 1
+    for side in SIDES:
+        obj.shape_key_add(name=f"{HALF}{side}", from_mix=False).value = 0
     _shape(obj, *carried, normals)
     _drive(new.shape_keys, seen is not None)
 
@@ -235,8 +238,8 @@ def _set_normals(mesh, normals: np.ndarray) -> None:
 
 
 def _drive(keys, filmed_open: bool) -> None:
-    """Lids open by the slider, or as far as a unit of the eye is used: drivers of kind Maximum, which need no
-    script."""
+    """Lids open by the slider, or as far as a unit of the eye is used, and half way they keep off the ball: drivers of
+    kind Maximum and simple expressions, which need no script."""
     keys[OPEN] = 1.0 if filmed_open else 0.0
     told = ("How far the lids are open; 1 is as they were filmed" if filmed_open
             else "How far the lids are open; they were filmed closed")
@@ -246,7 +249,18 @@ def _drive(keys, filmed_open: bool) -> None:
         driver = keys.key_blocks[f"{OPEN}{side}"].driver_add("value").driver
         driver.type = 'MAX'
         for path in (f'["{OPEN}"]', *(f'key_blocks["{unit}{side}"].value' for unit in GAZE)):
-            variable = driver.variables.new()
-            variable.targets[0].id_type = 'KEY'
-            variable.targets[0].id = keys
-            variable.targets[0].data_path = path
+            _led_by(driver, keys, path)
+        half = keys.key_blocks[f"{HALF}{side}"].driver_add("value").driver
+        half.type = 'SCRIPTED'
+        for name, unit in (("opened", OPEN), ("shut", "eyeBlink")):
+            _led_by(half, keys, f'key_blocks["{unit}{side}"].value').name = name
+        half.expression = "max(0, 4 * (opened - shut) * (1 - opened + shut))"
+
+
+def _led_by(driver, keys, path: str) -> bpy.types.DriverVariable:
+    """A driver's new variable: a property of the shape keys."""
+    variable = driver.variables.new()
+    variable.targets[0].id_type = 'KEY'
+    variable.targets[0].id = keys
+    variable.targets[0].data_path = path
+    return variable

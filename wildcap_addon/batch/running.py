@@ -112,9 +112,9 @@ def _problem_of(code: int) -> Problem | None:
 
 def _environment(batch: Batch) -> dict[str, str]:
     """Blender's own, with the key of a paid service for those alone who need it."""
-    inherited = {name: value for name, value in os.environ.items() if name != switchlight_api.KEY_VARIABLE}
     paid = next((face for face in batch.faces if face.chosen().delight.delighter == "switchlight"), None)
-    return {**inherited, **preferences.worker_environment("switchlight" if paid else "")}
+    return {**switchlight_api.environment_without_key(),
+            **preferences.worker_environment("switchlight" if paid else "")}
 
 
 def _apart() -> dict:

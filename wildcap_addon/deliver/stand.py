@@ -15,8 +15,10 @@ from pathlib import Path
 import bpy
 from mathutils import Matrix
 
+from ...core.contract import delivery_plan
 from ...core.contract.delivery_plan import PACKING, DeliveryPlan
 from ...core.contract.messages import Problem
+from ...core.contract.ownership import free_place
 from .. import captures, colours, head, node_trees
 from ..data_blocks import read_field
 
@@ -30,7 +32,10 @@ LINKED = {".glb": ("base_color", "normal"), ".gltf": ("base_color", "normal"),
 """What each format's exporter writes as it is. glTF's would make new pictures of roughness and specular."""
 HAIR_IN = ".usdc"
 """The format that holds hair curves."""
+NAMES_ITS_SPACE = (5, 2, 0)
+"""The Blender from which on USD says in which space its colours are."""
 LIDS = ("eyesOpenLeft", "eyesOpenRight")
+DRIVEN = ("eyesHalfLeft", "eyesHalfRight")
 SOCKETS = {"base_color": "Base Color", "roughness": "Roughness", "specular": "Specular IOR Level"}
 
 
@@ -52,7 +57,7 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
             mesh.uv_layers.remove(mesh.uv_layers[head.HAIR_UVS])
         if plan.what == "head" and plan.preset.open_eyes:
             _open_eyes(obj)
-        _at_rest(mesh)
+        _at_rest(obj)
         mesh.transform(Matrix.Scale(FACTORS[plan.unit], 4), shape_keys=True)
         _materials(mesh, plan, packing)
         scene.collection.objects.link(obj)
@@ -112,14 +117,14 @@ def _hairs(plan: DeliveryPlan, source: bpy.types.Object, obj) -> list[bpy.types.
         copy.data.name, copy.parent, copy.data.surface = copy.name, obj, None
         copy.data.materials.clear()
         material, shader = _new(copy.name)
-        shader.inputs["Base Color"].default_value = (*_mean_colour(copy.data), 1)
+        shader.inputs["Base Color"].default_value = _exported((*_mean_colour(copy.data), 1), plan)
         copy.data.materials.append(material)
         copies.append(copy)
     return copies
 
 
 def _mean_colour(data: bpy.types.Curves) -> list[float]:
-    """The mean of the hairs' linear colours; Blender's grey where they have none."""
+    """The mean of the hairs' colours, in the scene's working space; Blender's grey where they have none."""
     attribute = data.attributes.get(captures.HAIR_COLOUR)
     if attribute is None or not attribute.data:
         return [0.8] * 3
@@ -153,12 +158,15 @@ def _open_eyes(obj) -> None:
     obj.data.update()
 
 
-def _at_rest(mesh) -> None:
-    """Shape keys at zero: what is delivered is the neutral head, and the keys."""
-    if mesh.shape_keys is not None:
-        mesh.shape_keys.animation_data_clear()
-        for key in mesh.shape_keys.key_blocks:
+def _at_rest(obj) -> None:
+    """Shape keys at zero: what is delivered is the neutral head, and the keys, but for those that only drivers move."""
+    keys = obj.data.shape_keys
+    if keys is not None:
+        keys.animation_data_clear()
+        for key in keys.key_blocks:
             key.value, key.mute = 0.0, False
+        for key in filter(None, map(keys.key_blocks.get, DRIVEN)):
+            obj.shape_key_remove(key)
 
 
 def _materials(mesh, plan: DeliveryPlan, packing: dict) -> None:
@@ -193,6 +201,8 @@ def _skin(name: str, plan: DeliveryPlan, maps: list[dict], roughness: float, uv_
             continue
         node = tree.nodes.new('ShaderNodeTexImage')
         node.image = bpy.data.images.load(str(plan.staged / entry["file"]))
+        if plan.what == "head":  # all of its skin is within the picture, whose borders are crown and neck
+            node.extension = 'EXTEND'
         if entry["kind"] != "colour":
             colours.as_data(node.image)
         elif plan.colour == "srgb":
@@ -213,15 +223,12 @@ def _plain(original, plan: DeliveryPlan) -> bpy.types.Material:
     material, shader = _new(f"{original.name} Delivered" if original is not None else "Plain")
     if original is None:
         return material
-    shader.inputs["Base Color"].default_value = original.diffuse_color
+    shader.inputs["Base Color"].default_value = _exported(original.diffuse_color, plan)
     shader.inputs["Roughness"].default_value = original.roughness
     packed = _packed(original)
     if packed is not None:
-        path = plan.staged / "textures" / f"{plan.name}_{original.name.split()[-1].lower()}.png"
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(packed.packed_file.data)
         node = material.node_tree.nodes.new('ShaderNodeTexImage')
-        node.image = bpy.data.images.load(str(path))
+        node.image = bpy.data.images.load(str(_unpacked(packed, original, plan)))
         material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
     return material
 
@@ -234,6 +241,26 @@ def _packed(original) -> bpy.types.Image | None:
         if image is not None and image.packed_file is not None and image.packed_file.data[:4] == b"\x89PNG":
             return image
     return None
+
+
+def _unpacked(image: bpy.types.Image, original, plan: DeliveryPlan) -> Path:
+    """The file of a packed PNG among the delivery's own, named after the last word of its material's name, and no
+    other's in its place."""
+    last_word = delivery_plan.safe_name((original.name.split() or [""])[-1]).lower()
+    path = plan.staged / delivery_plan.TEXTURES / f"{plan.name}_{last_word}.png"
+    path.parent.mkdir(exist_ok=True)
+    data = bytes(image.packed_file.data)
+    if path.is_file() and path.read_bytes() != data:
+        path = free_place(path)
+    path.write_bytes(data)
+    return path
+
+
+def _exported(rgba: tuple, plan: DeliveryPlan) -> tuple[float, ...]:
+    """A colour of the working space as the exporter is to write it, which passes its numbers on: a file's are linear
+    light of sRGB's primaries, but for a USD that names the space that they are in."""
+    named = plan.format.suffix == ".usdc" and bpy.app.version >= NAMES_ITS_SPACE
+    return tuple(rgba) if named else (*colours.from_working(tuple(rgba)[:3]), rgba[3])
 
 
 def _new(name: str):

@@ -15,7 +15,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
-from .. import captures, head, local_view, node_trees
+from .. import captures, colours, head, local_view, node_trees
 from ..data_blocks import find, read_field, replace_data
 
 TITLES = {"brows": "Brows", "lashes": "Lashes", "beard": "Beard"}
@@ -58,6 +58,7 @@ def grow_part(context, obj, part: str, points: np.ndarray, radius: np.ndarray, c
     if hair is not None and is_combed(hair):
         follow(hair, obj)
         return False
+    colour = colours.to_working(colour)
     data = _made(f"{obj.name} {TITLES[part]}", points, radius, colour)
     if hair is None:
         hair = bpy.data.objects.new(data.name, data)
@@ -112,8 +113,8 @@ def _made(name: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray)
     data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
     _attribute(data, "radius", 'FLOAT', 'POINT').data.foreach_set("value", radius.astype(np.float32).ravel())
     rgba = np.concatenate([colour, np.ones((count, 1))], 1)
-    colours = _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR', 'CURVE').data
-    colours.foreach_set("color", rgba.astype(np.float32).ravel())
+    _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR', 'CURVE').data.foreach_set(
+        "color", rgba.astype(np.float32).ravel())
     return data
 
 

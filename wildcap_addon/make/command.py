@@ -28,7 +28,7 @@ def _core(*words: str | Path) -> int:
     if python is None:
         raise Problem("The solver is not set up on this machine.",
                       "Click Install Solver in the Setup panel of Blender's window, once.")
-    return subprocess.run([str(python), str(jobs.ROOT), *map(str, words)]).returncode
+    return subprocess.run([str(python), "-E", "-s", str(jobs.ROOT), *map(str, words)]).returncode
 
 
 def _of_run(kind) -> None:

@@ -13,6 +13,7 @@ from math import radians
 import bpy
 from mathutils import Matrix, Vector
 
+from ..colours import to_working
 from ..data_blocks import stop_animation
 from ..hdri import Hdri, light_with
 from . import sky
@@ -141,7 +142,7 @@ def add_lamps(scene: bpy.types.Scene, lamps: tuple[Lamp, ...], frame: Matrix, ra
 
 def _lamp(lamp: Lamp, radius: float) -> bpy.types.Object:
     data = bpy.data.lights.new(f"WildCap {lamp.name}", 'AREA' if lamp.size else 'SUN')
-    data.color = lamp.colour
+    data.color = to_working(lamp.colour)
     if lamp.size:
         data.size = lamp.size * radius
         data.energy = lamp.power * (radius / REFERENCE_RADIUS_M) ** 2

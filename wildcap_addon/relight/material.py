@@ -8,12 +8,13 @@ keeping values.
 """
 
 from math import isclose
+from pathlib import Path
 
 import bpy
 
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
-from .. import captures, head, node_trees, status
+from .. import captures, data_blocks, head, node_trees, status
 from . import asset, node_group, regions
 
 KEY = "wildcap_skin"
@@ -44,9 +45,8 @@ def assemble(context, item) -> tuple[bpy.types.Material, str]:
     regions.write(obj.data)
     height = capture.delivery / DISPLACEMENT[1]
     _build(material, {path.name: path for path in (*maps, height) if path.is_file()}, obj)
-    _set(material,
-         {"Specular Amount": _specular_amount(capture), "Subsurface Scale": node_group.SCATTERING_M * _scale(obj)},
-         before)
+    _set(material, {"Specular Amount": _specular_amount(capture),
+                    "Subsurface Scale": node_group.SCATTERING_M * data_blocks.scale_of(obj)}, before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
     try:
         told = head.complete(obj, capture)
@@ -114,12 +114,16 @@ def _build(material, paths: dict, obj) -> None:
     uv.uv_map = obj.data.uv_layers[0].name
     for row, (name, file_name, data) in enumerate((*IMAGES, DISPLACEMENT)):
         if file_name not in paths:
+            if name in tree.nodes and not _has_picture(tree.nodes[name]):
+                tree.nodes.remove(tree.nodes[name])  # Cycles would take what is missing for a height of 0.3 m
             continue
-        if file_name == DISPLACEMENT[1] and name not in tree.nodes:
+        is_new = name not in tree.nodes
+        if file_name == DISPLACEMENT[1] and is_new:
             material.displacement_method = 'DISPLACEMENT'  # the surface itself moves, once the socket says so
         node = _node(tree, name, 'ShaderNodeTexImage', (-540, 300 - 300 * row))
         node.image = head.load_image(paths[file_name], data)
-        node.interpolation = 'Cubic' if node.interpolation == 'Linear' and KEY not in material else node.interpolation
+        if is_new:  # the map's upper and lower border are crown and neck, which are not to mix
+            node.interpolation, node.extension = 'Cubic', 'EXTEND'
         _link(tree, uv.outputs["UV"], node.inputs["Vector"])
     normal = _node(tree, "WildCap Normal Map", 'ShaderNodeNormalMap', (-200, -300))
     normal.space = 'TANGENT'
@@ -143,6 +147,13 @@ def _build(material, paths: dict, obj) -> None:
     material[KEY] = True
 
 
+def _has_picture(node) -> bool:
+    """Whether the picture of an image node is in the .blend or on the disk."""
+    image = node.image
+    return image is not None and (image.packed_file is not None or image.source != 'FILE'
+                                  or Path(bpy.path.abspath(image.filepath, library=image.library)).is_file())
+
+
 def _node(tree, name: str, kind: str, location):
     node = tree.nodes.get(name)
     if node is None:
@@ -164,7 +175,7 @@ def _set_before(material, obj) -> dict[str, float]:
         return {}
     # of the group's version 1
     return (material[SET].to_dict() if SET in material
-            else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * _scale(obj)})
+            else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * data_blocks.scale_of(obj)})
 
 
 def _set(material, inputs: dict[str, float], before: dict[str, float]) -> None:
@@ -181,8 +192,3 @@ def _specular_amount(capture: Capture) -> float:
     """What makes the mean of cheeks and forehead a Specular IOR Level of one half, by the worker's figure."""
     figures = capture.read()["stages"].get("upscale", {}).get("figures", {})
     return 0.5 / (figures.get("specular_mean") or node_group.TYPICAL_SPECULAR)
-
-
-def _scale(obj) -> float:
-    """How large the head is against metres: scattering keeps its size on skin."""
-    return sum(obj.matrix_world.to_scale()) / 3

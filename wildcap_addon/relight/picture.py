@@ -82,11 +82,14 @@ def _label(scene) -> None:
 
 
 def frame_of(obj) -> tuple[Matrix, float]:
-    """Where the head is: a matrix without scale at its bounding box's centre, and its radius in scene units."""
+    """Where the head is: a matrix without scale at its bounding box's centre, and its radius in scene units. A head
+    that is mirrored looks where it looks, with its left and right exchanged."""
     corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
     centre = sum(corners, Vector()) / 8
     radius = max(abs((a - b)[axis]) for a in corners for b in corners for axis in range(3)) / 2
-    return Matrix.Translation(centre) @ obj.matrix_world.to_quaternion().to_matrix().to_4x4(), radius
+    world = obj.matrix_world
+    turn = world @ Matrix.Diagonal((-1, 1, 1, 1)) if world.is_negative else world
+    return Matrix.Translation(centre) @ turn.to_quaternion().to_matrix().to_4x4(), radius
 
 
 def has_denoiser() -> bool:

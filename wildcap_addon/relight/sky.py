@@ -12,6 +12,7 @@ import bpy
 from mathutils import Matrix
 
 from .. import node_trees
+from ..colours import to_working
 from ..data_blocks import find, stop_animation
 
 WORLD = "WildCap Relight"
@@ -83,7 +84,7 @@ def sockets(world: bpy.types.World) -> list[bpy.types.NodeSocket]:
 def colours(sky: Sky) -> list[tuple]:
     """As `sockets` takes them."""
     zenith, horizon, ground = astuple(sky)
-    return [(*colour, 1.0) for colour in (horizon, zenith, ground)]
+    return [(*to_working(colour), 1.0) for colour in (horizon, zenith, ground)]
 
 
 def _mix(nodes, name: str) -> bpy.types.Node:

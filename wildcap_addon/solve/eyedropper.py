@@ -10,7 +10,7 @@ from mathutils import Vector
 from mathutils.geometry import barycentric_transform
 
 from ...core.contract.messages import Problem
-from .. import captures
+from .. import captures, colours
 from ..base_operator import BaseOperator
 from ..data_blocks import read_pixels
 
@@ -113,9 +113,9 @@ def colour_at(image: bpy.types.Image, uv) -> tuple[float, float, float]:
     reach = max(1, round(PATCH_SIDE_SHARE * width))
     top, left = max(0, row - reach), max(0, column - reach)
     patch = read_pixels(image)[top:row + reach + 1, left:column + reach + 1, :3]
-    if not image.is_float:  # bytes are as in the file, sRGB; float images are linear already
+    if not image.is_float:  # bytes are as in the file, sRGB; float images are in the scene's working space already
         patch = np.where(patch <= 0.04045, patch / 12.92, ((patch + 0.055) / 1.055) ** 2.4)
-    mean = patch.mean((0, 1))
+    mean = colours.from_working(patch.mean((0, 1))) if image.is_float else patch.mean((0, 1))
     return tuple(float(c)
                  for c in np.where(mean <= 0.0031308, 12.92 * mean, 1.055 * np.clip(mean, 0, 1) ** (1 / 2.4) - 0.055))
 

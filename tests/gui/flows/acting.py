@@ -23,7 +23,7 @@ def flow():
     yield from d.scroll(END)
     d.screenshot("acting_before")
     yield from d.press("wildcap.add_face_units")
-    yield from d.until(lambda: keys() is not None and len(keys().key_blocks) == 55, "the face units", 60)
+    yield from d.until(lambda: keys() is not None and len(keys().key_blocks) == 57, "the face units", 60)
     yield from d.scroll(END)
     d.screenshot("acting_closed")
     keys()["eyesOpen"], keys().key_blocks["jawOpen"].value = 1.0, 0.6

@@ -11,7 +11,7 @@ from ... import captures, data_blocks, local_view
 from .. import materials as of_the_head
 from .. import mesh
 from ..asset import load
-from . import eyes, keeping, mouth, nodes, pictures, shapes
+from . import eyes, keeping, materials, mouth, nodes, pictures, shapes
 
 KEY = captures.CLOSE_UP_KEY
 
@@ -47,6 +47,7 @@ def add(context, obj) -> list[str]:
 
     eyes.build(obj, keep, _irises(obj))
     mouth.build(obj, keep)
+    materials.resize(of(obj), data_blocks.scale_of(obj))
     local_view.join(context, made)
     return left
 

@@ -24,6 +24,8 @@ OPAQUE_V = 0.08
 DEEP_M, DEEP_DARK = 0.035, 0.92
 """Metres behind the front teeth where the mouth is darkest in EEVEE, and how dark: without ray tracing it lights a
 mouth as if nothing were before it."""
+SIZE = "wildcap_size"
+"""Custom property of a material: the scale of the head by which its lengths were set."""
 FLESH, FOLD, GUMS, TONGUE = (0.50, 0.20, 0.17), (0.60, 0.39, 0.35), (0.44, 0.135, 0.125), (0.42, 0.15, 0.135)
 ENAMEL = (0.80, 0.735, 0.62)
 
@@ -34,9 +36,9 @@ def white(name: str) -> bpy.types.Material:
         return material
     tree = material.node_tree
     told = _told(tree, pictures.white())
-    pink = _mixed(tree, told["Green"], (*WHITE_COLOUR, 1),
-                  (*(a * b for a, b in zip(WHITE_COLOUR, PINK, strict=True)), 1))
-    tree.links.new(_mixed(tree, math(tree, 'MULTIPLY', told["Red"], 0.75), pink, (*VESSEL_COLOUR, 1)),
+    pink = _mixed(tree, told["Green"], materials.rgba(WHITE_COLOUR),
+                  materials.rgba(tuple(a * b for a, b in zip(WHITE_COLOUR, PINK, strict=True))))
+    tree.links.new(_mixed(tree, math(tree, 'MULTIPLY', told["Red"], 0.75), pink, materials.rgba(VESSEL_COLOUR)),
                    shader.inputs["Base Color"])
     _moist(shader, 0.35, (1.0, 0.45, 0.3), 0.0012, 0.0)  # its wet layer is the shell
     _bumped(tree, shader, told["Blue"], 0.25, 0.0001)
@@ -79,7 +81,7 @@ def flesh(name: str) -> bpy.types.Material:
     if shader is not None:
         tree = material.node_tree
         on_ball = add(tree, 'ShaderNodeAttribute', attribute_name="onto").outputs["Fac"]
-        tree.links.new(_mixed(tree, on_ball, (*FLESH, 1), (*FOLD, 1)), shader.inputs["Base Color"])
+        tree.links.new(_mixed(tree, on_ball, materials.rgba(FLESH), materials.rgba(FOLD)), shader.inputs["Base Color"])
         _uneven(tree, shader, 900.0, 0.3, 0.0005)
         _moist(shader, 0.4, (1.0, 0.4, 0.3), 0.0015, 0.8)
     return material
@@ -151,6 +153,19 @@ def fill(obj, *materials) -> None:
             obj.data.materials.append(material)
 
 
+def resize(things, scale: float) -> None:
+    """Brings depths of scattering and relief in the materials of a close-up's objects to the size of their head, scale:
+    1 is life's. What the artist set grows along."""
+    for material in {slot.material for thing in things for slot in thing.material_slots if slot.material is not None}:
+        if materials.KEY not in material or material.node_tree is None:  # a lid's margin has the head's skin
+            continue
+        for node in material.node_tree.nodes:
+            length = node.inputs.get({'BSDF_PRINCIPLED': "Subsurface Scale", 'BUMP': "Distance"}.get(node.type, ""))
+            if length is not None:
+                length.default_value *= scale / material.get(SIZE, 1.0)
+        material[SIZE] = scale
+
+
 def _moist(shader, inside: float, radius: tuple[float, float, float], scale: float, coat: float) -> None:
     """Light that scatters within, and spittle on top. scale: metres."""
     shader.inputs["Subsurface Weight"].default_value, shader.inputs["Subsurface Scale"].default_value = inside, scale
@@ -184,9 +199,10 @@ def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
         return existing, None
     material = bpy.data.materials.new(name)
     material[materials.KEY] = kind
-    material.diffuse_color = (*colour, 1)
+    material.diffuse_color = materials.rgba(colour)
     shader = next(node for node in node_trees.of(material).nodes if node.type == 'BSDF_PRINCIPLED')
-    shader.inputs["Base Color"].default_value, shader.inputs["Roughness"].default_value = (*colour, 1), roughness
+    shader.inputs["Base Color"].default_value = materials.rgba(colour)
+    shader.inputs["Roughness"].default_value = roughness
     shader.inputs["IOR"].default_value = IOR
     return material, shader
 

@@ -68,8 +68,12 @@ def group(name: str, inputs: dict[str, str], build) -> bpy.types.NodeTree:
 
 
 def modify(obj, tree, **inputs) -> None:
-    """The modifier of a group on an object, with its inputs."""
-    modifier = obj.modifiers.get(tree.name) or obj.modifiers.new(tree.name, 'NODES')
+    """The modifier of a group on an object, with its inputs; a new one comes before all others, which may have given
+    the mesh other vertices than those that the group knows by their numbers."""
+    modifier = obj.modifiers.get(tree.name)
+    if modifier is None:
+        modifier = obj.modifiers.new(tree.name, 'NODES')
+        obj.modifiers.move(len(obj.modifiers) - 1, 0)
     modifier.node_group = tree
     for socket in tree.interface.items_tree:
         if socket.in_out == 'INPUT' and socket.name in inputs:
