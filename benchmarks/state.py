@@ -18,7 +18,7 @@ the same code, stay in it and on the page: the table may be made person by perso
 from __future__ import annotations
 
 import argparse
-import hashlib
+import ast
 import json
 import sys
 from pathlib import Path
@@ -26,13 +26,14 @@ from pathlib import Path
 import numpy as np
 
 from core.contract.capture import Capture
+from core.contract.code_key import write_canonically
 from core.contract.files import write_json
-from core.contract.hashes import hash_file, hash_tree
+from core.contract.hashes import hash_bytes, hash_file, hash_tree, hash_value
 from core.contract.settings import QUALITIES
 from core.face import template
 from core.imaging import images
 
-from . import figures, freeze, people, state_scores
+from . import albedo_score, delight_measures, figures, freeze, people, state_captures, state_scores
 from .albedo_score import looks
 from .measures.table import Column, Scores, format_table, summarise, to_record
 from .pages import write_page
@@ -180,13 +181,19 @@ def code_of(captures: list[Filmed]) -> dict[str, str]:
     keys = {name: " ".join(sorted({each[name].get("code", each[name].get("key", ""))[:12]
                                    for each in stages if name in each}))
             for name in freeze.STAGES}
-    measures = " ".join(hash_file(path) for path in measuring())
-    return {**keys, "measures": hashlib.sha256(measures.encode()).hexdigest()[:12]}
+    return {**keys, "measures": hash_value(measuring())[:12]}
 
 
-def measuring() -> list[Path]:
-    """The files that say what a figure is."""
-    return [*sorted(Path(__file__).parent.glob("measures/*.py")), Path(state_scores.__file__)]
+def measuring() -> dict[str, str]:
+    """The code that says what a figure is: file -> hash, in which words that only explain do not count."""
+    files = [*sorted(Path(__file__).parent.glob("measures/*.py")),
+             *(Path(module.__file__) for module in (state_scores, state_captures, albedo_score, delight_measures))]
+    hashes = {}
+    for path in files:
+        text: list[str] = []
+        write_canonically(ast.parse(path.read_text(encoding="utf-8")), text)
+        hashes[path.name] = hash_bytes("".join(text).encode())
+    return hashes
 
 
 def merge_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]],
@@ -217,7 +224,7 @@ def seen_in_pictures(filmed: Filmed, answers: dict[str, np.ndarray]) -> dict[str
     sources = {"inputs": {path.name: hash_file(path) for path in filmed.inputs()},
                "truth": {name: hash_tree(filmed.truth / name) for name in ("albedo", "face", "shadow")},
                "methods": list(answers),
-               "code": {path.name: hash_file(path) for path in measuring()}}
+               "code": measuring()}
     kept = filmed.work / f"{filmed.name}.json"
     if kept.is_file() and (stored := json.loads(kept.read_text(encoding="utf-8")))["sources"] == json.loads(
         json.dumps(sources)

@@ -38,6 +38,18 @@ def test_files_that_others_added_stay_and_the_delivery_goes_on(capture):
     assert [path.name for path in capture.exports.iterdir()] == [place.name], "nothing is left beside it"
 
 
+def test_a_delivery_goes_where_a_link_in_its_place_leads_and_the_link_stays(capture, tmp_path):
+    delivered.deliver(capture, **OBJ)
+    place, elsewhere = folder(capture), tmp_path / "another disk"
+    shutil.move(place, elsewhere)
+    (elsewhere / "my notes.txt").write_text("mine")
+    place.symlink_to(elsewhere, target_is_directory=True)
+    assert isinstance(delivered.deliver(capture, **{**OBJ, "hair": False}), Done)
+    assert place.is_symlink() and (elsewhere / "my notes.txt").read_text() == "mine"
+    assert delivery_plan.read_delivered(elsewhere)
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")], "nothing is left beside it"
+
+
 def test_files_of_ours_that_were_changed_are_refused_by_name_and_given_up_when_asked(capture):
     delivered.deliver(capture, **OBJ)
     picture = next((folder(capture) / "textures").glob("*.png"))

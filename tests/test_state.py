@@ -232,6 +232,19 @@ def test_an_answer_that_takes_too_much_light_is_not_called_better():
     assert "| solved | -0.50 ± 0.00 |" in page and "**" not in page
 
 
+def test_words_in_the_measures_change_no_figure_and_their_code_does(monkeypatch, tmp_path):
+    written = tmp_path / "measure.py"
+
+    def hashed(text):
+        written.write_text(text)
+        return state.measuring()["measure.py"]
+
+    monkeypatch.setattr(state.state_scores, "__file__", str(written))
+    before = hashed('"""Words."""\nWIDTH = 3  # pixels\n')
+    assert hashed('"""Other words."""\n\nWIDTH = 3\n') == before != hashed("WIDTH = 4\n")
+    assert {"albedo_score.py", "delight_measures.py", "state_captures.py", "edges.py"} < state.measuring().keys()
+
+
 def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
     filled(tmp_path, "anna", "A")
     captures = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
@@ -242,12 +255,8 @@ def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
                                  "code": "1234567890abcdef", "version": "0.2.0"}
     captures[0].capture.json.write_text(json.dumps(record))
     after = state.code_of(captures)
-    assert (
-        before["solve"] == ""
-        and after["solve"] == "1234567890ab"
-        and len(after["measures"]) == 12
-        and after["delight"] == ""
-    )
+    assert before["solve"] == "" and after["solve"] == "1234567890ab" and after["delight"] == ""
+    assert len(after["measures"]) == 12
 
 
 def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path, monkeypatch, capsys):

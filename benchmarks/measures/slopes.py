@@ -3,8 +3,9 @@
 """Two slopes that tell skin from light, on pairs of pictures that differ in one of them alone.
 
 Change only the pigment: the answer's albedo should follow (slope 1). Change only the light: it should not (slope 0).
-Doing nothing scores 1 and 1, a flat colour 0 and 0; no answer that treats pigment and light alike can score better than
-one number for both.
+Doing nothing scores 1 by the light, and nearly that by the pigment (what the camera's curve and the gloss make of it is
+not in proportion); a flat colour 0 and 0. No answer that treats pigment and light alike can score better than one
+number for both.
 """
 
 from __future__ import annotations

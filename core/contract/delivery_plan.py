@@ -88,6 +88,8 @@ def plan(capture: Capture, settings: DeliverSettings) -> DeliveryPlan:
     name = safe_name(capture.root.stem)
     base = Path(settings.folder).expanduser() if settings.folder else capture.exports
     target = base / f"{name}_{settings.what}_{settings.preset}_{format_name}"
+    if target.is_symlink():  # what is exchanged is the folder that it leads to, on whose disk that is one renaming
+        target = target.resolve()
     numbered = preset.numbered if settings.udim == "preset" else settings.udim == "numbered"
     return DeliveryPlan(name, capture.root.name, settings.what, preset, format, pictures, colour,
                         format.normals or preset.normals, format.unit or preset.unit, numbered,
