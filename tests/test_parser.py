@@ -12,9 +12,10 @@ import torch
 
 from benchmarks import parts as benchmark
 from core.contract.messages import Problem, Reporter
-from core.face import parser
+from core.face import parser, template
 from core.face.parser_network import ParseNet, network_input
-from core.face.parts import BRIDGE, CHIN, PARTS, SIDE_PX, cut, inside, put_back, to_crop
+from core.face.parts import BRIDGE, CHIN, PARTS, SIDE_PX, cut, inside, keep_beard, put_back, to_crop
+from core.geometry.meshes import vertex_uvs
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.people import figure, snapshot, unlit
 from core.training import descent, snapshots
@@ -257,3 +258,21 @@ def test_the_figures_of_a_row_are_those_counted_by_hand():
         and row["iou"]["background"] == 1.0
         and row["iou"]["beard"] is None
     )
+
+
+def test_a_beard_is_believed_where_both_sides_of_the_face_say_so():
+    left, right, both_seen = np.array([0.7, 0.6, 0.0]), np.array([0.6, 0.5, 0.0]), np.ones(3, bool)
+    assert np.array_equal(keep_beard(left, right, both_seen), left), "more likely than not on both: 0.55 in the mean"
+    shadow = np.array([0.95, 0.9, 0.0])
+    assert not keep_beard(shadow, 0 * shadow, both_seen).any(), "sure, but on one side alone"
+    assert not keep_beard(left, right, ~both_seen).any(), "a profile that is not sure"
+    assert np.array_equal(keep_beard(shadow, 0 * shadow, ~both_seen), shadow), "a profile that is"
+
+
+def test_the_head_and_its_uvs_are_their_own_mirror_image():
+    head, mirror = template.load(), template.mirrored_vertices()
+    assert np.abs(head.vertices[mirror] - head.vertices * [-1, 1, 1]).max() < 1e-6
+    assert np.array_equal(mirror[mirror], np.arange(len(mirror)))
+    uvs = vertex_uvs(head)
+    off = np.abs(uvs[mirror] + uvs * [1, -1] - [1, 0]).max(1)
+    assert (off < 1e-6).mean() > 0.99, "all but the seam behind"

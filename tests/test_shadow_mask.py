@@ -120,6 +120,16 @@ def test_a_beard_that_the_parser_saw_in_the_frames_is_no_shadow(capture):
     assert proposed(capture, texture, dilate_px=0)[beard].mean() < 0.05
 
 
+@pytest.mark.parametrize("sure, sides, taken_for_shadow", [(0.6, 2, False), (0.75, 1, True), (0.45, 2, True)])
+def test_stubble_grows_on_both_sides_and_a_hard_shadow_falls_on_one(capture, sure, sides, taken_for_shadow):
+    cheeks = [painted_blob(cheek(side), 0.10) for side in (-1, 1)[-sides:]]
+    dark = sum(cheeks).clip(0, 1).astype(np.float32)
+    texture = skin_texture() * (1 - dark[..., None] * (1 - SHADOW))
+    images.write_data(capture.texture_parts, np.stack([0 * dark, sure * dark, 0 * dark], -1).astype(np.float32))
+    mask = proposed(capture, texture, dilate_px=0)[dark > 0.9].mean()
+    assert (mask > 0.5) == taken_for_shadow
+
+
 def test_dilation_grows_with_the_setting_and_nothing_else_changes(capture):
     texture = skin_texture() * (1 - painted_blob(cheek(1), 0.10)[..., None] * (1 - SHADOW))
     areas = [proposed(capture, texture, dilate_px=px).sum() for px in (0, 8, 32)]

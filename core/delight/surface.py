@@ -11,7 +11,7 @@ import scipy.sparse as sparse
 from ..contract.messages import Problem, Reporter
 from ..face import parser, template
 from ..face.head import Head
-from ..face.parts import keep_present
+from ..face.parts import keep_beard, keep_present
 from ..geometry.meshes import vertex_uvs
 from ..geometry.raster import sample, sample_uv, visible_from
 from ..geometry.views import View
@@ -75,7 +75,8 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
         unburnt = srgb.max(1) < 0.99  # what is burnt out has lost its colour
         seen_colours[i, candidates[unburnt]] = images.srgb_to_linear(srgb[unburnt])
         shares[i, candidates] = _shares(head, view, picture, pixels[candidates])
-    hidden, share = _without_doubts(shares)
+    mirror = template.mirrored_vertices() if head.built_in else np.arange(len(mesh.vertices))
+    hidden, share = _without_doubts(shares, mirror)
     seen_colours[hidden] = np.nan
     count = np.isfinite(seen_colours[..., 0]).sum(0)
     if (count > 0).sum() < 100:
@@ -97,14 +98,14 @@ def _shares(head: Head, view: View, picture: np.ndarray, pixels: np.ndarray) -> 
     return np.zeros((len(pixels), len(ASKED)), np.float32)
 
 
-def _without_doubts(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _without_doubts(shares: np.ndarray, mirror: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shares of ASKED [K, V, len(ASKED)], nan where a view sees nothing -> where a view shows more of them than skin,
     bool [K, V], and their means over the views [V, len(ASKED)]; of beard and hair where the person has any."""
     seen = np.isfinite(shares[..., :1]).sum(0)
     mean = np.nansum(shares, 0) / np.maximum(seen, 1)
-    for name in ("beard", "hair"):
-        column = ASKED.index(name)
-        mean[:, column] = keep_present(mean[:, column])
+    beard, hair = (ASKED.index(name) for name in ("beard", "hair"))
+    mean[:, beard] = keep_beard(mean[:, beard], mean[mirror, beard], ((seen > 0) & (seen[mirror] > 0))[:, 0])
+    mean[:, hair] = keep_present(mean[:, hair])
     present = (mean > 0).any(0)
     return np.nansum(shares * present, -1) > 0.5, mean
 

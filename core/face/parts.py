@@ -29,6 +29,29 @@ def keep_present(share: np.ndarray) -> np.ndarray:
     return share if there.any() and share[there].mean() > PRESENT_SHARE else np.zeros_like(share)
 
 
+def keep_beard(share: np.ndarray, mirrored: np.ndarray, both_seen: np.ndarray) -> np.ndarray:
+    """The shares of a beard all over a head; zeros where the person has none.
+
+    The parser is less sure of stubble than of a hard shadow on a bare jaw. But a beard grows on both sides of a face,
+    and such a shadow falls on one: there is a beard where it is likelier than not on both sides at once. Where the two
+    are not seen, it has to be as sure as of any part.
+
+    Parameters
+    ----------
+    share : [...] in [0, 1]
+    mirrored : the same at each place's mirror image
+    both_seen : bool [...], places that are seen as well as their mirror image
+
+    Returns
+    -------
+    [...] in [0, 1].
+    """
+    on_either = (np.maximum(share, mirrored) > 0.5) & both_seen
+    if not on_either.any():
+        return keep_present(share)
+    return share if np.minimum(share, mirrored)[on_either].mean() > 0.5 else np.zeros_like(share)
+
+
 def to_crop(landmarks: np.ndarray, side: int = SIDE_PX, margin: float = MARGIN_FACE_HEIGHTS) -> np.ndarray:
     """The map [2, 3] of a similarity that puts a face of landmarks [468, 2 or 3] in pixels upright into the middle of a
     square.

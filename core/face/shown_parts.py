@@ -11,7 +11,7 @@ from ..contract.capture import Capture
 from ..contract.messages import Problem
 from ..contract.stages import advise_again
 from ..imaging import images
-from .parts import GROWTHS, keep_present
+from .parts import GROWTHS, keep_beard, keep_present
 
 
 def read_parts(capture: Capture, size: int) -> np.ndarray | None:
@@ -33,4 +33,6 @@ def read_hidden_skin(capture: Capture, size: int) -> np.ndarray:
     parts = read_parts(capture, size)
     if parts is None:
         return np.zeros((size, size), np.float32)
-    return np.clip(sum(keep_present(parts[..., GROWTHS.index(name)]) for name in ("beard", "hair")), 0, 1)
+    beard, hair = (parts[..., GROWTHS.index(name)] for name in ("beard", "hair"))
+    seen = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size) > 0
+    return np.clip(keep_beard(beard, beard[:, ::-1], seen & seen[:, ::-1]) + keep_present(hair), 0, 1)

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..contract import shipped_files
 from ..geometry import meshes
@@ -35,6 +36,14 @@ def identity() -> np.ndarray:
     MakeHuman's heads."""
     with np.load(_shipped("identity.npz"), allow_pickle=False) as stored:
         return stored["components"].astype(np.float32)
+
+
+@cache
+def mirrored_vertices() -> np.ndarray:
+    """int64 [V]: the vertex on the other side of the face. In the UVs that is u and 1 - u, exactly, but on the seam
+    behind."""
+    vertices = load().vertices
+    return cKDTree(vertices).query(vertices * [-1, 1, 1])[1]
 
 
 @cache

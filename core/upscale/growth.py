@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from ..face import beard, template
-from ..face.parts import GROWTHS, keep_present
+from ..face.parts import GROWTHS, keep_beard
 from .surface import HeadSurface
 from .whole_head import seen_well
 
@@ -91,7 +91,7 @@ def _present(bearded: np.ndarray, power: np.ndarray) -> np.ndarray:
     there = bearded > 0.5
     if there.any() and np.log(power[there]).mean() > np.log(STROKES_RATIO):
         return bearded
-    return keep_present(bearded)
+    return keep_beard(bearded, bearded[:, ::-1], np.ones(bearded.shape, bool))
 
 
 def _bearable(zone: np.ndarray) -> np.ndarray:
