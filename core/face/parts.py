@@ -19,8 +19,7 @@ SIDE_PX = 192  # of the crop
 MARGIN_FACE_HEIGHTS = 1.9  # side of the square in heights of the face's landmarks: hair and neck are in it
 BRIDGE, CHIN = 9, 152
 PRESENT_SHARE = 0.8
-"""Mean share of a part, where it has more than half, from which the person has it: over hard shadows on a bare jaw the
-parser is 0.62 sure of a beard (the sample), where a full beard is 0.92."""
+"""Mean share of a part, where it has more than half, from which the person has it where nothing else tells."""
 
 
 def keep_present(share: np.ndarray) -> np.ndarray:
