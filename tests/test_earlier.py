@@ -71,8 +71,15 @@ def test_a_checkout_of_another_version_is_refused(folders, monkeypatch, capsys):
     assert "holds no code of 0.1.0" in capsys.readouterr().err
 
 
-def test_people_with_other_captures_are_not_compared():
-    before = Figures.of({"ann": {"psnr": 25.0, "captures": 3}, "bob": {"psnr": 20.0, "captures": 1}})
-    now = Figures.of({"ann": {"psnr": 27.0, "captures": 3}, "bob": {"psnr": 30.0, "captures": 2}})
+def test_people_are_compared_on_the_same_captures():
+    before = Figures.of({"people": {"solved": {"ann": {"psnr": 25.0, "captures": 3}, "bob": {"psnr": 20.0, "captures": 1},
+                                               "cat": {"psnr": 22.0, "captures": 2}}}})
+    bob = {"solved": {"psnr": 24.0, "psnr_shared": 23.0, "psnr_alone": 26.0}}
+    now = Figures.of({"people": {"solved": {"ann": {"psnr": 27.0, "captures": 3}, "bob": {"psnr": 30.0, "captures": 3},
+                                            "cat": {"psnr": 31.0, "captures": 3}}},
+                      "captures": {"bob": bob, "bob_below": {"solved": {"psnr": 33.0, "psnr_alone": 33.0}}}})
     scores = state_0_1_0.paired(before, now, "solved")
-    assert {method: list(people) for method, people in scores.items()} == {"solved, 0.1.0": ["ann"], "solved": ["ann"]}
+    assert {method: list(people) for method, people in scores.items()} == {"solved, 0.1.0": ["ann", "bob"],
+                                                                           "solved": ["ann", "bob"]}
+    assert scores["solved"]["ann"]["psnr"] == 27.0 and scores["solved"]["bob"]["psnr"] == 24.0
+    assert scores["solved"]["bob"]["psnr_shared"] == 26.0, "of one capture, the light that is shared is its own"

@@ -30,16 +30,22 @@ def sections(before: Figures, now: Figures) -> Sections:
 
 
 def changes(before: Figures, now: Figures) -> str:
-    """Today's texture and albedo less those of 0.1.0, person by person, of people with the same captures in both."""
+    """Today's texture and albedo less those of 0.1.0, person by person, on the captures that 0.1.0 was measured on."""
     return "\n\n".join(
-        format_table(summarise(paired(before.people[method], now.people[method], method), COMPARED,
-                               f"{method}, 0.1.0"),
-                    COMPARED, "taken for albedo", f"{method}, 0.1.0")
+        format_table(summarise(paired(before, now, method), COMPARED, f"{method}, 0.1.0"), COMPARED,
+                     "taken for albedo", f"{method}, 0.1.0")
         for method in (DELIT, SOLVED))
 
 
 def paired(before: Figures, now: Figures, method: str) -> Scores:
-    """Method of then and of now -> person -> figures, where as many captures of the person were measured."""
-    same = [person for person, row in before.items() if now.get(person, {}).get("captures") == row["captures"]]
-    return {f"{method}, 0.1.0": {person: before[person] for person in same},
-            method: {person: now[person] for person in same}}
+    """Method of then and of now -> person -> figures, of the same captures."""
+    rows = {}
+    for person, then in before.people[method].items():
+        today = now.people[method].get(person, {})
+        if then["captures"] == 1 != today.get("captures"):  # one capture shares its light with no other
+            today = dict(now.captures.get(person, {}).get(method, {}))
+            today |= {"captures": 1, "psnr_shared": today["psnr_alone"]} if today else {}
+        if today.get("captures") == then["captures"]:
+            rows[person] = then, today
+    return {f"{method}, 0.1.0": {person: then for person, (then, _) in rows.items()},
+            method: {person: today for person, (_, today) in rows.items()}}
