@@ -72,7 +72,8 @@ def test_a_checkout_of_another_version_is_refused(folders, monkeypatch, capsys):
 
 
 def test_people_are_compared_on_the_same_captures():
-    before = Figures.of({"people": {"solved": {"ann": {"psnr": 25.0, "captures": 3}, "bob": {"psnr": 20.0, "captures": 1},
+    before = Figures.of({"people": {"solved": {"ann": {"psnr": 25.0, "captures": 3},
+                                               "bob": {"psnr": 20.0, "captures": 1},
                                                "cat": {"psnr": 22.0, "captures": 2}}}})
     bob = {"solved": {"psnr": 24.0, "psnr_shared": 23.0, "psnr_alone": 26.0}}
     now = Figures.of({"people": {"solved": {"ann": {"psnr": 27.0, "captures": 3}, "bob": {"psnr": 30.0, "captures": 3},
