@@ -170,7 +170,8 @@ def solve_by_method(capture: Capture, settings: Settings, method: str,
     cell = evidence.cell_side(settings.solve.grid_cells)
     tone = parse_skin_tone(settings.solve.skin_tone)
     start = initial.start_solve(prior, evidence, tone, cell, recipe_of(settings, prior),
-                                lambda marks: confirm_marks(capture, head, marks, evidence.size))
+                                callbacks=initial.Callbacks(
+                                    lambda marks: confirm_marks(capture, head, marks, evidence.size)))
     fit, recipe = {}, start.recipe
     if method in LIGHTS:
         start, recipe, move = LIGHTS[method](start, recipe)

@@ -27,7 +27,7 @@ QUALITY = 88
 
 
 @dataclass(frozen=True)
-class Picture:
+class WindowPicture:
     """shots: side by side, names in dist/gui; box: left, top, right and bottom of what is shown, as shares of a shot;
     width_px: of each shot, at most."""
 
@@ -39,15 +39,15 @@ class Picture:
 HEAD = (0.285, 0.13, 0.54, 0.8)
 """The head in the 3D view, between its tools and the sidebar."""
 PICTURES = {
-    "paint_on_head": Picture(("4_stroke_on_head",), 1280),
-    "paint_on_sheet": Picture(("5_stroke_on_sheet",), 1280),
-    "solve_running": Picture(("6_solve_running",), 1280),
-    "compare": Picture(("compare_filmed", "compare_delit", "compare_solved"), 320, HEAD),
-    "panels": Picture(("panels",), 1076),
-    "walk_1": Picture(("1_new",), 640),
-    "walk_2": Picture(("4_stroke_on_head",), 640),
-    "walk_3": Picture(("6_solve_running",), 640),
-    "walk_4": Picture(("9_three_point",), 640),
+    "paint_on_head": WindowPicture(("4_stroke_on_head",), 1280),
+    "paint_on_sheet": WindowPicture(("5_stroke_on_sheet",), 1280),
+    "solve_running": WindowPicture(("6_solve_running",), 1280),
+    "compare": WindowPicture(("compare_filmed", "compare_delit", "compare_solved"), 320, HEAD),
+    "panels": WindowPicture(("panels",), 1076),
+    "walk_1": WindowPicture(("1_new",), 640),
+    "walk_2": WindowPicture(("4_stroke_on_head",), 640),
+    "walk_3": WindowPicture(("6_solve_running",), 640),
+    "walk_4": WindowPicture(("9_three_point",), 640),
 }
 
 
@@ -65,7 +65,7 @@ def main() -> int:
     return 1 if missing else 0
 
 
-def draw(picture: Picture, folder: Path) -> np.ndarray:
+def draw(picture: WindowPicture, folder: Path) -> np.ndarray:
     """The shots, cut out, reduced and laid side by side, sRGB [H, W, 3]."""
     parts = []
     for name in picture.shots:

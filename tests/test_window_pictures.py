@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from benchmarks import window_pictures
-from benchmarks.window_pictures import PICTURES, Picture, draw
+from benchmarks.window_pictures import PICTURES, WindowPicture, draw
 from core.imaging import images
 
 from .conftest import ROOT
@@ -18,7 +18,7 @@ def test_shots_are_cut_reduced_and_laid_side_by_side(tmp_path):
         shot = np.zeros((100, 200, 3), np.float32)
         shot[20:80, 50:150] = colour
         images.write_srgb(tmp_path / f"{name}.png", shot)
-    drawn = draw(Picture(("left", "right"), 50, (0.25, 0.2, 0.75, 0.8)), tmp_path)
+    drawn = draw(WindowPicture(("left", "right"), 50, (0.25, 0.2, 0.75, 0.8)), tmp_path)
     assert drawn.shape == (30, 100, 3)
     assert np.allclose(drawn[:, :50], (1, 0, 0)) and np.allclose(drawn[:, 50:], (0, 0, 1))
 

@@ -107,17 +107,12 @@ def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report:
 
 
 def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> FittedTemplate:
-    """Lays the artist's mesh over the head.
+    """Lays the artist's mesh over the head. Raises Problem where no face is found on it or the fit does not hold.
 
     Parameters
     ----------
     own : the artist's mesh, in any unit and pose
     head, ours, report : as in `run`
-
-    Raises
-    ------
-    Problem
-        Where no face is found on it or the fit does not hold.
     """
     whole, index = surfaces.welded(own.mesh)
     first = np.full(len(whole.vertices), -1)
@@ -127,8 +122,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     shapes = (own.shapes[:, first] @ pose.turn.T.astype(np.float32)) * np.float32(render_landmarks.FACE_M / pose.width)
 
     known = np.flatnonzero(np.isfinite(landmarks.points).all(1))
-    seen = landmarks.points[known]
-    # any side of the surface will do
+    seen = landmarks.points[known]  # any side of the surface will do
     at, bary = surfaces.Surface(whole, 0.004).find_nearest(seen, np.tile([0.0, -1.0, 0.0], (len(seen), 1)), 0.02, -1.0)
     label = _components(whole)
     main = np.bincount(label[whole.faces[at[at >= 0], 0]]).argmax()
@@ -152,18 +146,16 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     surface = surfaces.Surface(head, SOURCE_SPACING_M)
     dense = Scan(_dense(head))
     placed, coefficients = alignment.fit_landmarks(model, target, trust)
-    follow = _follow(model, placed, coefficients, surface, eyes)
     for _ in range(2):
-        placed, coefficients = alignment.fit_scan(model, placed, coefficients, target, trust, dense, follow)
         follow = _follow(model, placed, coefficients, surface, eyes)
+        placed, coefficients = alignment.fit_scan(model, placed, coefficients, target, trust, dense, follow)
+    follow = _follow(model, placed, coefficients, surface, eyes)
     if eyes:
         trust[list(LID_MARKS)] = 0
-    start = placed.apply(model.shape(coefficients))
-    start = _matched(model, start, follow, head, ours, report)
+    start = _matched(model, placed.apply(model.shape(coefficients)), follow, head, ours, report)
     vertices = nonrigid.fit(model, start, dense, follow,
                             nonrigid.LandmarkTargets(target, SLIGHT_TRUST_SHARE * trust, ours.hold), ITERATIONS,
                             lambda share: report.progress(0.5 + 0.5 * share, 1, "fitting the head to the scan"))
-
     final = skin.moved(vertices)
     drawn = follow > 0.5
     distances = dense.distances(vertices[drawn], vertex_normals(final)[drawn], 0.01)
@@ -171,11 +163,16 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     everything = placed.apply(whole.vertices + np.tensordot(coefficients, shapes, 1))
     everything = carried.carry_along(everything, label, used, vertices, report)
     counterpart = np.zeros(len(whole.vertices), bool)
-    normals = vertex_normals(final)
-    near = surface.find_nearest(vertices, normals, PAINTED_M)[0] >= 0
-    counterpart[used] = near & (_free_sky(final, normals) > OPEN_SKY_SHARES[0])
+    counterpart[used] = _has_counterpart(final, surface)
     return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances,
                           nonrigid.flipped_triangles(skin.moved(start), final), pictures)
+
+
+def _has_counterpart(fitted: Mesh, surface: surfaces.Surface) -> np.ndarray:
+    """bool [V]: vertices that lie on the head's surface, and are no inside of a mouth or a socket."""
+    normals = vertex_normals(fitted)
+    near = surface.find_nearest(fitted.vertices, normals, PAINTED_M)[0] >= 0
+    return near & (_free_sky(fitted, normals) > OPEN_SKY_SHARES[0])
 
 
 def _require_laid(own: own_mesh.OwnMesh, distances: np.ndarray, drawn: int) -> None:

@@ -82,8 +82,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     tone = resolve_skin_tone(capture, head, settings, known, evidence, prior.tones, report)
     others = read_others(capture, settings, report)
     report.progress(0, recipe.steps, "telling skin from light and laying the mask on the shadow's edges")
-    start = initial.start_solve(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, witness, others,
-                                report.check)
+    start = initial.start_solve(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, others,
+                                initial.Callbacks(witness, report.check))
     if others and not start.recipe.linear:
         report.log("The other captures were not used: they help where a delighter has left a faint light, on the "
                    "built-in head, by the default recipe.")

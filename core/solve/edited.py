@@ -59,7 +59,8 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     if window is not None:
         near[window.inside] = 1
     start = initial.start_again(prior, evidence, earlier, cell, recipe, near,
-                                lambda marks: confirm_marks(capture, head, marks, evidence.size), report.check)
+                                initial.Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size),
+                                                  report.check))
     solution = (earlier if window is None
                 else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, window, report))
     state = State(0, None, solution.denoised, solution.lights)

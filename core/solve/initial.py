@@ -44,9 +44,19 @@ class Start:
     local: torch.Tensor = field(default_factory=lambda: torch.zeros(3, 1, 1))
 
 
+@dataclass(frozen=True)
+class Callbacks:
+    """What is asked on the way: `witness` leaves those marks that the views confirm; `check` may raise to cancel."""
+
+    witness: Callable[[list[Mark]], list[Mark]] = list
+    check: Callable[[], None] = lambda: None
+
+
+NOBODY = Callbacks()
+
+
 def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe: Recipe,
-                witness: Callable[[list[Mark]], list[Mark]] = list, other_captures: Sequence[Evidence] = (),
-                check: Callable[[], None] = lambda: None) -> Start:
+                other_captures: Sequence[Evidence] = (), callbacks: Callbacks = NOBODY) -> Start:
     """All that a run begins with.
 
     Parameters
@@ -56,9 +66,8 @@ def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, r
     tone : of the skin
     cell : side of a cell of V in texels of a 1024 map
     recipe : of the solve
-    witness : leaves those marks that the views confirm
     other_captures : what is known of other captures of the same person
-    check : may raise to cancel
+    callbacks : asked on the way
 
     Raises
     ------
@@ -75,7 +84,7 @@ def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, r
     local = torch.zeros(3, 1, 1)
     if recipe.linear:
         told = split_captures([make_shapes(each, albedo_of(make_reference(prior, tone, each, recipe.reference)))
-                               for each in (evidence, *other_captures)], check=check)
+                               for each in (evidence, *other_captures)], check=callbacks.check)
         light = told.light(evidence.normal)
         if weighted_deviation(light.log(), lit) < recipe.linear:
             recipe = settle_recipe(recipe)
@@ -89,11 +98,11 @@ def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, r
         else:
             recipe = free_recipe(recipe)
     begun = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
-    return _laid_out(prior, evidence, begun, cell, witness=witness, check=check)
+    return _laid_out(prior, evidence, begun, cell, callbacks)
 
 
 def start_again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, recipe: Recipe, near: torch.Tensor,
-                witness: Callable[[list[Mark]], list[Mark]] = list, check: Callable[[], None] = lambda: None) -> Start:
+                callbacks: Callbacks = NOBODY) -> Start:
     """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and its mask but for the
     edit's surroundings.
 
@@ -105,34 +114,31 @@ def start_again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float
     cell : side of a cell of V in texels of a 1024 map
     recipe : of the solve
     near : [S, S] in [0, 1]; where it is 0 the earlier mask stays
-    witness : leaves those marks that the views confirm
-    check : may raise to cancel
+    callbacks : asked on the way
     """
     x_ref = make_reference(prior, earlier.tone, evidence, recipe.reference)
     recipe = settle_recipe(recipe) if earlier.settled else free_recipe(recipe)
     begun = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {},
                   State(0, None, earlier.denoised, earlier.lights), local=earlier.local)
-    return _laid_out(prior, evidence, begun, cell, lambda alpha: torch.lerp(earlier.alpha, alpha, near), witness,
-                     check)
+    return _laid_out(prior, evidence, begun, cell, callbacks, lambda alpha: torch.lerp(earlier.alpha, alpha, near))
 
 
-def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float,
-              mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha,
-              witness: Callable[[list[Mark]], list[Mark]] = list, check: Callable[[], None] = lambda: None) -> Start:
+def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float, callbacks: Callbacks,
+              mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha) -> Start:
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
     recipe = begun.recipe
     evidence = replace(evidence, texture=evidence.texture / enlarge_field(begun.local, evidence.size).exp())
     light = find_remaining_light(evidence, begun)
     if recipe.sharp_edges:
         evidence = snap_to_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust),
-                                 check)
+                                 callbacks.check)
     evidence = replace(evidence, alpha=mask(evidence.alpha))
     if recipe.faint:
         told = evidence.weight * evidence.trust * evidence.bare
         evidence = replace(evidence, missing=measure_missing_light(light, evidence.alpha, told, evidence.texel))
     marks: list[Mark] = []
     if recipe.protect_marks:
-        evidence, marks = protect_marks(evidence, witness)
+        evidence, marks = protect_marks(evidence, callbacks.witness)
     return replace(begun, alpha=evidence.alpha, marks=tuple(marks),
                    observations=make_observations(evidence, begun.exposure, cell, prior.multiple, recipe))
 

@@ -35,7 +35,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
     tone = parse_skin_tone(settings.solve.skin_tone)
     tone = tone or estimate_from_texture(evidence.texture, initial.weigh_lit_skin(evidence), prior.tones)
-    start = initial.start_solve(prior, evidence, tone, CELL_TEXELS, recipe, check=report.check)
+    start = initial.start_solve(prior, evidence, tone, CELL_TEXELS, recipe,
+                                callbacks=initial.Callbacks(check=report.check))
     snapped = np.clip(images.resize(start.alpha.numpy(), width, height), 0, 1)
     images.write_data(capture.shadow_mask_edges, snapped)
     painted = images.resize(evidence.alpha.numpy(), width, height)
