@@ -63,7 +63,7 @@ def test_a_mirrored_head_scatters_light_and_is_seen_from_in_front(addon, capture
     bpy.ops.wildcap.assemble_material()
     socket = head.data.materials[0].node_tree.nodes["WildCap Skin"].inputs["Subsurface Scale"]
     assert socket.default_value == pytest.approx(0.003 * abs(scale[0]))
-    camera = addon("relight.picture").set_up(head, "three_point", 16, 1).camera
+    camera = addon("relight.picture").set_up_scene(head, "three_point", 16, 1).camera
     assert looks * (camera.matrix_world.translation.y - head.bound_box[0][1]) > 0.3
     assert camera.matrix_world.col[1].z > 0.9, "its up is up"
 

@@ -75,7 +75,7 @@ def test_eyes_teeth_and_hair(head, capture, addon):  # noqa: F811
     assert picture.colorspace_settings.name == "sRGB", "whatever the configuration takes pictures of 8 bits for"
 
     brown = np.array([[0.05, 0.03, 0.018]], np.float32)
-    addon("groom.curves").grow(bpy.context, head, "brows", strands["brows"][:1], np.full((1, 5), 4e-5), brown)
+    addon("groom.curves").grow_part(bpy.context, head, "brows", strands["brows"][:1], np.full((1, 5), 4e-5), brown)
     hair = addon("groom.curves").of(head)[0]
     assert list(hair.data.attributes["wildcap_colour"].data[0].color)[:3] == pytest.approx(working(brown[0]), NEAR)
     assert not addon("groom.curves").is_combed(hair)
