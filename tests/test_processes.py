@@ -15,6 +15,7 @@ def test_processes_are_told_apart():
     me = processes.identify_process()
     assert not processes.is_gone(me) and processes.is_at_work(me)
     assert processes.is_gone({**me, "began": "another time"}) and processes.is_gone({**me, "pid": 2**22 + 1})
+    assert processes.is_gone({**me, "pid": -1}) and processes.is_gone({**me, "pid": 0}), "to kill(2), many at once"
     container = {**me, "pid": 2**22 + 1, "host": processes.name_host() + "0"}
     assert not processes.is_gone(container) and not processes.is_at_work(container), "a number there means nothing here"
     elsewhere = {**me, "host": "another machine"}

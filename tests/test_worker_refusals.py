@@ -92,7 +92,7 @@ def test_a_write_is_named_by_the_file_it_was_for():
 def test_an_installation_that_stops_says_why(tmp_path, monkeypatch, said, words):
     monkeypatch.setattr(installation, "lock_of", lambda *_: Lock("manylinux_x86_64-3.11", {}))
     monkeypatch.setattr(installation.bare_environment, "make", lambda *_, **__: None)
-    monkeypatch.setattr(installation, "steps", lambda *_: [PipStep((said,))])
+    monkeypatch.setattr(installation, "plan_steps", lambda *_: [PipStep((said,))])
 
     def run(task, command, hear):
         hear(said)

@@ -121,6 +121,8 @@ def _ask_windows(pid: int) -> tuple[str, bool]:
 
 
 def _runs(pid: int) -> bool:
+    if not isinstance(pid, int) or pid <= 0:  # to the system, all processes or a group of them
+        return False
     if os.name == "nt":
         return _ask_windows(pid)[1]
     try:
