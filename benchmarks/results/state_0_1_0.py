@@ -23,9 +23,9 @@ COMPARED = {name: state.TABLES[table][name]
 def sections(before: Figures, now: Figures) -> Sections:
     return [("", prose("""
         `python -m benchmarks.earlier` took the captures of [the state](state.md) through 0.1.0's own code and weights,
-        from the delighter on; frames, cameras and heads are today's. The tables below the first are those of that page; the
-        steps along shadows in them are by older true shadows: those of leaves and window bars swayed with the heads of
-        the fringed and the stubbled person, some millimetres off.
+        from the delighter on; frames, cameras and heads are today's. The tables below the first are those of that page;
+        the steps along shadows in them are by older true shadows: those of leaves and window bars swayed with the heads
+        of the fringed and the stubbled person, some millimetres off.
         """)),
             ("What has changed", changes(before, now)),
             *((title or "By 0.1.0 alone", text) for title, text in state.sections(before.people, before.captures))]
