@@ -33,8 +33,8 @@ def sections(*records: Figures) -> Sections:
     return [("", prose("""
         Every page has command, commit and day of its figures, all on 2 cores of a shared machine (25 GB; each page
         names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only, and may be
-        older. The sample and the state of the albedo are by delighter and solver as they are; the sample's relit rows are
-        by those of the day before, the delighter's answers by a delighter that took short beards for shade.
+        older. The sample and the state of the albedo are by delighter and solver as they are; the sample's relit rows
+        are by those of the day before, the delighter's answers by a delighter that took short beards for shade.
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),
