@@ -14,7 +14,7 @@ from core.contract.messages import Cancelled, CancelledError, Problem
 from core.worker.background import BackgroundTask
 
 
-def follow(task: BackgroundTask, timeout_s: float) -> list:
+def follow(task: BackgroundTask, timeout_s: float = 120) -> list:
     messages, deadline = [], time.monotonic() + timeout_s
     while task.running:
         messages += task.poll()

@@ -5,7 +5,6 @@
 import hashlib
 import shutil
 import sys
-import time
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from core.contract.messages import Cancelled, CancelledError, Done, Failed, Prob
 from core.worker import bare_environment, index, installation, locks
 from core.worker.background import BackgroundTask
 from core.worker.environment import COMPUTE_FILE, answer, empty, python_of, removal, remove, verify
+from tests.test_background import follow
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 
@@ -78,15 +78,6 @@ def made_before(bare, monkeypatch) -> None:
         return python_of(folder)
 
     monkeypatch.setattr(bare_environment, "make", make)
-
-
-def follow(task: BackgroundTask, timeout_s: float = 120) -> list:
-    messages, deadline = [], time.monotonic() + timeout_s
-    while task.running:
-        messages += task.poll()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    return messages
 
 
 def install(folder: Path, local: Path, **options) -> list:

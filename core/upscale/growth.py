@@ -71,7 +71,7 @@ def find(light: np.ndarray, seen: np.ndarray, zones: dict[str, np.ndarray], surf
     loud = np.minimum(np.abs(fine) / max(grain, 1e-6), LOUDEST_DEVIATIONS)
     power = {name: (cv2.GaussianBlur(loud, (0, 0), reach / texel) / USUAL_LOUDNESS) ** 2
              for name, reach in ALIKE_MM.items()}
-    bearded = _present(_likely("beard", part_shares, power) * _bearable(zones["beard"]), power["beard"])
+    bearded = _present(_likely("beard", part_shares, power) * _bearable(zones["beard"]), power["beard"], seen > 0)
     return Growth(
         _faded(_likely("brows", part_shares, power)) * _near_brows(surface), _faded(bearded), head, grain, True
     )
@@ -85,13 +85,13 @@ def _likely(name: str, part_shares: np.ndarray, power: dict[str, np.ndarray]) ->
     return there / np.maximum(hairy * power[name] + np.clip(1 - hairy, 0, 1), 1e-6)
 
 
-def _present(bearded: np.ndarray, power: np.ndarray) -> np.ndarray:
+def _present(bearded: np.ndarray, power: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """The probabilities of a beard [S, S], or zeros where neither parser and strokes together are sure of one on the
     whole nor the strokes by themselves: hard shadows on a bare jaw are half a beard to the parser."""
     there = bearded > 0.5
     if there.any() and np.log(power[there]).mean() > np.log(STROKES_RATIO):
         return bearded
-    return keep_beard(bearded, bearded[:, ::-1], np.ones(bearded.shape, bool))
+    return keep_beard(bearded, bearded[:, ::-1], seen & seen[:, ::-1])
 
 
 def _bearable(zone: np.ndarray) -> np.ndarray:
