@@ -16,6 +16,7 @@ WINDOW_CELLS = 1  # radius, in cells of the coarse map
 EDGE_LOG = 0.02  # natural log units: what varies less in a window is skin and not an edge
 # of the picture's side, and in log units: what is finer and fainter is left out of the guide
 PORE_SHARE, PORE_LOG = 0.006, 0.25
+WIDEST_PX = 6.0  # sigma of the widest filter that is run: a face of 1,000 pixels. Its cost per pixel is its square
 
 
 def lift_shading(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
@@ -39,8 +40,18 @@ def lift_share(share: np.ndarray, log: np.ndarray) -> np.ndarray:
 def remove_pores(log: np.ndarray) -> np.ndarray:
     """A log picture [H, W, C] smoothed where it varies finely and faintly; edges stay."""
     reach = max(1.0, PORE_SHARE * max(log.shape[:2]))
-    channels = (np.ascontiguousarray(log[..., k], np.float32) for k in range(log.shape[-1]))
-    return np.stack([cv2.bilateralFilter(channel, -1, PORE_LOG, reach) for channel in channels], -1)
+    return np.stack([_smooth(np.ascontiguousarray(log[..., k], np.float32), reach) for k in range(log.shape[-1])], -1)
+
+
+def _smooth(channel: np.ndarray, reach: float) -> np.ndarray:
+    """A channel [H, W] smoothed over `reach` pixels (sigma) but for its edges. Where that is wide, the finest goes at
+    the full size, and what the rest takes away is smooth: it is found at half the size."""
+    if reach <= WIDEST_PX:
+        return cv2.bilateralFilter(channel, -1, PORE_LOG, reach)
+    fine = cv2.bilateralFilter(channel, -1, PORE_LOG, WIDEST_PX / 2)
+    height, width = channel.shape
+    half = cv2.resize(fine, ((width + 1) // 2, (height + 1) // 2), interpolation=cv2.INTER_AREA)
+    return fine + cv2.resize(_smooth(half, reach / 2) - half, (width, height), interpolation=cv2.INTER_LINEAR)
 
 
 def _affine(guide: np.ndarray, shading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
