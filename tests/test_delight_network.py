@@ -17,7 +17,8 @@ from core.delight.below_hair import FITTED_SHARE, fill_hair
 from core.delight.casts import remove_casts
 from core.delight.evening import ShadingEstimate
 from core.delight.lift import lift_shading, lift_share
-from core.delight.network import WEIGHTS, _landmarks, crop, load_network, square_around
+from core.delight.lit_head import MAX_ALBEDO
+from core.delight.network import WEIGHTS, _divided, _landmarks, crop, load_network, square_around
 from core.delight.second_opinion import Weighing, continue_beyond, weigh_in
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.face import template
@@ -153,6 +154,21 @@ def test_beyond_the_square_the_fitted_light_takes_over_at_the_same_level():
     assert dark[:10] == pytest.approx(1) and not dark[10:].any()
     same, _ = continue_beyond(shading, shadow, np.zeros_like(known), box, light, share, here)
     assert np.array_equal(same, shading)  # nothing to take the level from
+
+
+@pytest.mark.parametrize(("skin", "expected"), [(0.4, 0.4), (1.7, MAX_ALBEDO)])
+def test_how_bright_a_frame_came_out_is_told_by_its_skin_and_not_by_the_wall_behind(skin, expected):
+    """A face over a third of its square before a wall that is white in sun, under a light of a half: skin as people
+    have it stays, skin brighter than any is brought down to the brightest."""
+    light, face = 0.5, np.zeros((32, 32), np.float32)
+    face[4:28, 9:23] = 1
+    linear = np.where(cv2.resize(face, (96, 96), interpolation=cv2.INTER_NEAREST)[..., None] > 0, skin * light,
+                      np.float32([0.9, 0.95, 1.0]))
+    srgb = images.linear_to_srgb(np.broadcast_to(linear, (96, 96, 3)))
+    look = ShadingEstimate((0, 0, 96), np.full((32, 32, 3), np.log(light), np.float32), 0 * face,
+                           np.zeros((32, 32, 3), np.float32), np.where(face > 0, 0, -1))
+    albedo, _ = _divided(srgb, look, face)
+    assert images.srgb_to_linear(albedo)[36:60, 40:56] == pytest.approx(expected, rel=0.01)
 
 
 def test_missing_weights_are_named(monkeypatch, tmp_path):

@@ -62,11 +62,11 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see
     the head."""
     answers = ask(capture, settings, report)
-    for i, (view, look) in enumerate(zip(answers.views, put_together(answers), strict=True)):
+    for i, (view, look, skin) in enumerate(zip(answers.views, put_together(answers), answers.skins, strict=True)):
         report.progress(3 * len(answers.views) + i, 4 * len(answers.views),
                         f"Delighting frame {i + 1} of {len(answers.views)}")
         srgb = images.read_srgb(view.path)
-        albedo, shadow = _divided(srgb, look, light_in_frame(view, answers.head, srgb))
+        albedo, shadow = _divided(srgb, look, skin, light_in_frame(view, answers.head, srgb))
         yield Delit(view, albedo, shadow)
 
 
@@ -103,7 +103,8 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
     look = _look(load_network("cpu"), box, crop(srgb, box, SIDE_PX))
     share = crop(parser.parse(srgb, face.landmarks).of(*FEATURES), box, len(look.shading))
     look = replace(look, shading=fill_features(look.shading, share))
-    return _divided(srgb, remove_casts([look], [_hull(face.landmarks[:, :2], look)])[0])
+    skin = _hull(face.landmarks[:, :2], look)
+    return _divided(srgb, remove_casts([look], [skin])[0], skin)
 
 
 def load_network(device: str) -> DelightNet:
@@ -191,9 +192,11 @@ def _hull(points: np.ndarray, look: ShadingEstimate) -> np.ndarray:
     return inside.astype(np.float32)
 
 
-def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """A picture without its shading, and its shadows at its own size. Beyond the square `fitted` (of light_in_frame) is
-    taken; without it the shading is that of the square's border, and nothing is said of shadows."""
+def _divided(srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray,
+             fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """A picture without its shading, and its shadows at its own size. `skin` [h, h] in [0, 1] tells how bright it came
+    out: the wall behind may be whiter than any skin. Beyond the square `fitted` (of light_in_frame) is taken; without
+    it the shading is that of the square's border, and nothing is said of shadows."""
     linear = images.srgb_to_linear(srgb)
     size = round(look.box[2])
     log = np.log(np.maximum(crop(linear, look.box, size), MIN_LINEAR))
@@ -208,7 +211,8 @@ def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = Non
         share = np.clip(within / (FADE_SHARE * size), 0, 1).astype(np.float32)
         shading, shadow = continue_beyond(shading, shadow, share, *fitted)
     albedo = linear / np.exp(shading)
-    bright = float(np.quantile(albedo[inside].max(-1), 0.75)) if inside.any() else 0.0
+    bare = inside & (sample(skin, at * len(skin) / size).reshape(inside.shape) > 0.5)
+    bright = float(np.quantile(albedo[bare].max(-1), 0.75)) if bare.any() else 0.0
     return images.linear_to_srgb(albedo
                                  * min(1.0, MAX_ALBEDO / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(np.float32)
 
