@@ -22,6 +22,7 @@ from core.face.head import Head, Unfolded, read_head
 from core.geometry import raster
 from core.geometry.views import View, read_views
 from core.imaging import images
+from core.texture.held_picture import hold
 from core.texture.projection import observe
 
 LEAST = 0.2  # cosine at which the division stops: beyond, pixels stay dark, and the texture hardly trusts them
@@ -120,7 +121,7 @@ def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
 
 def _observed(frame: Lit, surface: Unfolded) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What a frame shows of each texel: its unshaded colour [S, S, 3], n.l [S, S], and how far that counts [S, S]."""
-    seen = observe(frame.view, frame.unshaded, surface, 1.0)
+    seen = observe(frame.view, hold(frame.unshaded), surface, 1.0)
     burnt = cv2.dilate((images.linear_to_srgb(frame.linear).max(-1) > BURNT).astype(np.uint8),
                        np.ones((5, 5))).astype(np.float32)
     weight = seen.quality * (cv2.remap(burnt, seen.pixels[..., 0] - 0.5, seen.pixels[..., 1] - 0.5, cv2.INTER_LINEAR)

@@ -19,6 +19,7 @@ from core.synthetic import sample, scene
 from core.synthetic.people import phone
 from core.synthetic.people.figure import Figure
 from core.synthetic.people.truth import Scene
+from core.texture.held_picture import hold
 from core.texture.parts_shown import PartsShown, tell_parts
 from core.texture.projection import observe
 from core.upscale.maps import HeadMaps
@@ -71,7 +72,7 @@ def read_maps(figure: Figure, views: list[View], colours: list[np.ndarray]) -> t
     what the parser says of the views."""
     surface = Head(figure.head).unfold(SIZE)
     total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
-    looks = [observe(view, colour, surface, 1.0) for view, colour in zip(views, colours, strict=True)]
+    looks = [observe(view, hold(colour), surface, 1.0) for view, colour in zip(views, colours, strict=True)]
     for look in looks:
         weight = look.weight[..., None] ** 2
         total, weights = total + weight * look.log_colour, weights + weight

@@ -21,6 +21,7 @@ from core.registration import eyeballs  # noqa: E402
 from core.synthetic.painted_head import place_camera  # noqa: E402
 from core.synthetic.people import shape  # noqa: E402
 from core.texture import blinks  # noqa: E402
+from core.texture.held_picture import hold  # noqa: E402
 from core.texture.projection import observe  # noqa: E402
 
 SEED, AZIMUTHS, SIZE = 4, (-20, -8, 8, 20, 70), 128
@@ -50,7 +51,7 @@ def filmed(tmp_path, monkeypatch):
         if i == 4:
             seen[1] = replace(seen[1], upper=seen[1].lower)
         found[view.name] = (-azimuth, *seen)
-        observations.append(observe(view, np.full((view.height, view.width, 3), 0.5, np.float32), surface, 1.0))
+        observations.append(observe(view, hold(np.full((view.height, view.width, 3), 0.5)), surface, 1.0))
     monkeypatch.setattr(blinks, "_eyes_in", lambda view: found[view.name])
     return capture, observations, surface
 

@@ -12,7 +12,8 @@ import pytest
 from core.contract.messages import Reporter
 from core.imaging import images
 from core.texture.detail import fine_detail, finer
-from core.texture.projection import UnwrappedView, log_colours
+from core.texture.held_picture import hold
+from core.texture.projection import UnwrappedView
 from core.upscale.detail import guide
 
 SIZE = 64
@@ -23,11 +24,11 @@ HEAD = SimpleNamespace(covered=np.ones((SIZE, SIZE), bool))
 def seen_flat(log_luminance: np.ndarray, density: float, weight: float = 1.0) -> UnwrappedView:
     """A view that looks straight at the map: `density` pixels per texel, its picture the exponential of log_luminance
     [density S, density S]."""
-    picture = np.repeat(np.exp(log_luminance - 1.5)[..., None], 3, 2).astype(np.float32)
+    picture = hold(np.repeat(np.exp(log_luminance - 1.5)[..., None], 3, 2))
     at = ((np.arange(SIZE) + 0.5) * density).astype(np.float32)
     pixels = np.stack(np.meshgrid(at, at), -1)
     even = np.full((SIZE, SIZE), weight, np.float32)
-    return UnwrappedView(SimpleNamespace(name="a view"), picture, pixels, log_colours(picture, pixels), even, even)
+    return UnwrappedView(SimpleNamespace(name="a view"), picture, pixels, picture.log_colours(pixels), even, even)
 
 
 def pattern(size: int, deviation: float, seed: int) -> np.ndarray:

@@ -19,6 +19,7 @@ from core.imaging import images  # noqa: E402
 from core.registration import hair  # noqa: E402
 from core.synthetic.painted_head import person, place_camera  # noqa: E402
 from core.texture import foreign, parts_shown  # noqa: E402
+from core.texture.held_picture import hold  # noqa: E402
 from core.texture.projection import observe  # noqa: E402
 
 SIZE, AZIMUTHS = 256, (-50, -20, 0, 20, 50)
@@ -62,7 +63,7 @@ def sees(monkeypatch, module, views, head, mask, otherwise=None):
 @pytest.fixture
 def observations(views, head):
     surface = head.unfold(SIZE)
-    return [observe(view, np.full((view.height, view.width, 3), 0.5, np.float32), surface, 1.0)
+    return [observe(view, hold(np.full((view.height, view.width, 3), 0.5)), surface, 1.0)
             for view in views], surface
 
 

@@ -18,6 +18,7 @@ from core.contract.settings import from_json
 from core.face import template
 from core.face.head import Head, read_head
 from core.texture import features, foreign
+from core.texture.held_picture import hold
 from core.texture.perceptual import refine
 
 from .painted_egg import capture_of, skin
@@ -118,8 +119,8 @@ def test_background_takes_a_views_weight_outside_the_face_only(head, tmp_path, m
 
     def seen(person):
         monkeypatch.setattr(foreign.faces, "segment_person", lambda srgb: person)
-        observation = texture.UnwrappedView(SimpleNamespace(name="x", path=path), np.zeros((64, 64, 3), np.float32),
-                                            pixels, ones, ones, ones)
+        observation = texture.UnwrappedView(SimpleNamespace(name="x", path=path), hold(np.zeros((64, 64, 3))), pixels,
+                                            ones, ones, ones)
         return foreign.leave_out_background([observation], Reporter("texture")), observation.weight
 
     person = np.ones((64, 64), np.float32)

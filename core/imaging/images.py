@@ -75,13 +75,13 @@ def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
 def read_srgb(path: Path) -> np.ndarray:
     """A picture as sRGB [H, W, 3]; an EXR's linear values are encoded. EXIF orientation is applied."""
     pixels = _rgb(_read(path))
-    return linear_to_srgb(pixels) if _is_linear(path) else pixels
+    return linear_to_srgb(pixels) if is_linear(path) else pixels
 
 
 def read_linear(path: Path) -> np.ndarray:
     """A picture as linear [H, W, 3]; anything but EXR and HDR is decoded from sRGB."""
     pixels = _rgb(_read(path))
-    return pixels if _is_linear(path) else srgb_to_linear(pixels)
+    return pixels if is_linear(path) else srgb_to_linear(pixels)
 
 
 def read_data(path: Path) -> np.ndarray:
@@ -102,6 +102,11 @@ def read_mask(path: Path) -> np.ndarray:
     """A grey picture [H, W] in [0, 1], stored values; of a colour picture the mean of R, G, B."""
     pixels = _read(path)
     return np.ascontiguousarray(pixels[..., 0] if pixels.shape[2] < 3 else pixels[..., :3].mean(-1))
+
+
+def is_linear(path: Path) -> bool:
+    """Whether a file's values are linear, and floats (EXR, HDR); all others' encode sRGB."""
+    return Path(path).suffix.lower() in (".exr", ".hdr")
 
 
 def size(path: Path) -> tuple[int, int]:
@@ -160,7 +165,7 @@ def write_packed(path: Path, channels: np.ndarray, bits: int = 8, srgb: bool = F
     srgb : whether the first three are colours encoded so
     """
     _write(path, channels,
-           _Encoding("half" if _is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True))
+           _Encoding("half" if is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True))
 
 
 def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, small: bool = False,
@@ -190,7 +195,7 @@ def write_linear(path: Path, linear: np.ndarray, small: bool = False, check: Cal
     linear : [H, W, C]; of a PNG in [0, 1]
     small, check : as in `write_srgb`
     """
-    _write(path, linear, _Encoding("half" if _is_linear(path) else "uint16", "lin_srgb", small=small), check)
+    _write(path, linear, _Encoding("half" if is_linear(path) else "uint16", "lin_srgb", small=small), check)
 
 
 def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False,
@@ -204,17 +209,13 @@ def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False,
     bits : of a PNG, 8 or 16
     small, check : as in `write_srgb`
     """
-    _write(path, data, _Encoding("half" if _is_linear(path) else f"uint{bits}", "raw", small=small), check)
+    _write(path, data, _Encoding("half" if is_linear(path) else f"uint{bits}", "raw", small=small), check)
 
 
 def resize(image: np.ndarray, width: int, height: int) -> np.ndarray:
     """[H, W(, C)] resampled: area averaging to shrink, Lanczos to enlarge."""
     shrinks = width * height < image.shape[0] * image.shape[1]
     return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LANCZOS4)
-
-
-def _is_linear(path: Path) -> bool:
-    return Path(path).suffix.lower() in (".exr", ".hdr")
 
 
 def _rgb(pixels: np.ndarray) -> np.ndarray:
@@ -240,7 +241,7 @@ def _write(path: Path, pixels: np.ndarray, encoding: _Encoding, check: Callable[
         spec.attribute("oiio:UnassociatedAlpha", 1)
     # an EXR would carry the hour, and the same pixels would not be the same file
     spec.attribute("DateTime", "2000:01:01 00:00:00")
-    if _is_linear(path):
+    if is_linear(path):
         spec.attribute("compression", "dwaa:45" if encoding.small else "zip")
     elif path.suffix.lower() in (".jpg", ".jpeg"):
         spec.attribute("Compression", f"jpeg:{encoding.quality}")

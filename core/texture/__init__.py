@@ -32,6 +32,7 @@ from .detail import fine_detail
 from .fill import fill
 from .filmed import filmed
 from .foreign import clothes, leave_out_background, leave_out_hair
+from .held_picture import HeldPicture, read_held
 from .parts_shown import GROWTHS, PartsShown, tell_parts
 from .projection import UnwrappedView, observe
 
@@ -131,11 +132,11 @@ def observe_all(capture: Capture, head: Head, size: int,
     return observations, surface, shown
 
 
-def _delit(path: Path, view: View) -> np.ndarray:
-    """A delit picture, linear [H, W, 3]. Raises Problem where it is not of its frame's shape."""
-    linear = images.read_linear(path)
-    check_shape(path, linear, view, "delit")
-    return linear
+def _delit(path: Path, view: View) -> HeldPicture:
+    """A delit picture. Raises Problem where it is not of its frame's shape."""
+    picture = read_held(path)
+    check_shape(path, picture.stored, view, "delit")
+    return picture
 
 
 def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settings, report: Reporter,

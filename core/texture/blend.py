@@ -42,7 +42,7 @@ def equalise(observations: list[UnwrappedView], rounds: int = 6) -> np.ndarray:
                     gains[i] += np.median((mean - colours[i])[used] - gains[i], axis=0)
             gains -= np.average(gains, axis=0, weights=np.maximum(mass, 1e-9))
     for observation, gain in zip(observations, gains, strict=True):
-        observation.picture = (observation.picture * np.exp(gain)).astype(np.float32)
+        observation.picture = observation.picture.brightened(gain)
         observation.log_colour = observation.log_colour + gain.astype(np.float32)
     return gains
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..contract.messages import Reporter
 from ..face.head import Unfolded
 from ..geometry import raster
-from .projection import UnwrappedView, log_colours
+from .projection import UnwrappedView
 
 WORTH_PX_PER_TEXEL = 1.3
 """Pixels per texel of the texture from which a map twice as fine is worth its while; half of it, from twice as many,
@@ -55,7 +55,7 @@ def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: in
         weight = cv2.resize(observation.weight, (size, size), interpolation=cv2.INTER_LINEAR) ** SHARP_EXPONENT
         pixels = cv2.resize(raster.bleed(observation.pixels, surface.covered), (size, size),
                             interpolation=cv2.INTER_LINEAR)
-        grey = log_colours(observation.picture, pixels).mean(-1)
+        grey = observation.picture.log_colours(pixels).mean(-1)
         band = grey - cv2.GaussianBlur(grey, (0, 0), COARSE_SIGMA_TEXELS * factor)
         total += weight * band
         squares += weight * band ** 2

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..contract.messages import Reporter
-from ..imaging import images
 from .blend import blend
-from .projection import UnwrappedView, log_colours
+from .held_picture import read_held
+from .projection import UnwrappedView
 
 
 def filmed(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter) -> np.ndarray | None:
@@ -30,8 +30,9 @@ def filmed(observations: list[UnwrappedView], covered: np.ndarray, size: int, re
     if not all(o.view.path.is_file() for o in observations):
         return None
     for o in observations:
-        frame = images.read_linear(o.view.path)
+        frame = read_held(o.view.path)
         # a delighter may give another size
         o.pixels = o.pixels * np.float32([frame.shape[1] / o.picture.shape[1], frame.shape[0] / o.picture.shape[0]])
-        o.picture, o.log_colour = frame, log_colours(frame, o.pixels)
+        o.picture = frame.around(o.pixels[covered])
+        o.log_colour = o.picture.log_colours(o.pixels)
     return np.exp(blend(observations, covered, size, report, "as filmed", 4))

@@ -24,7 +24,8 @@ from ..geometry import raster
 from ..imaging import images
 from .blend import blurred
 from .features import Features
-from .projection import DARKEST_LINEAR, UnwrappedView
+from .held_picture import DARKEST_LINEAR
+from .projection import UnwrappedView
 
 TILE_PX = 288
 """Pixels along a side of the part of a view that one step looks at: bounds memory and seconds whatever the frames'
@@ -126,7 +127,7 @@ def _target(observation: UnwrappedView, surface: Unfolded, face_mask: np.ndarray
         RAYS_PER_SIDE * h, RAYS_PER_SIDE * w
     )
     trust = cv2.resize(trust.astype(np.float32), (int(w), int(h)), interpolation=cv2.INTER_AREA)
-    picture = images.linear_to_srgb(observation.picture[low[1]:high[1], low[0]:high[0]])
+    picture = images.linear_to_srgb(observation.picture.linear(slice(low[1], high[1]), slice(low[0], high[0])))
     return Target(
         observation.name,
         picture,

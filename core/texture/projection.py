@@ -12,9 +12,8 @@ import numpy as np
 from ..face.head import Unfolded
 from ..geometry import raster
 from ..geometry.views import View, lengths
+from .held_picture import HeldPicture
 
-DARKEST_LINEAR = 2e-3
-"""Linear values below this are noise to a logarithm."""
 MARGIN_PX = (1.5, 12.0)
 """Pixels from a silhouette at which a texel starts to count, and counts in full."""
 GRAZING_COSINE = 0.15
@@ -28,7 +27,7 @@ class UnwrappedView:
     """One view in UV space, float32 [S, S, ...]; zero weight where it sees nothing."""
 
     view: View
-    picture: np.ndarray  # linear [H, W, 3]
+    picture: HeldPicture
     pixels: np.ndarray  # [S, S, 2] where in the picture each texel is seen
     log_colour: np.ndarray  # [S, S, 3] natural logarithm of linear colour
     quality: np.ndarray  # [S, S] in [0, 1]: angle and silhouette only; makes the confidence map
@@ -45,7 +44,7 @@ class UnwrappedView:
         with the warp that led to them, where that is the last one."""
         if warp is not None:
             self.pixels, self.warp = pixels, warp
-        self.log_colour = log_colours(self.picture, pixels)
+        self.log_colour = self.picture.log_colours(pixels)
 
     def enlarged(self, size: int, covered: np.ndarray) -> UnwrappedView:
         """The same on a map of `size`, `covered` [S, S] being the texels of this one: where each texel is seen, and how
@@ -58,18 +57,18 @@ class UnwrappedView:
 
         pixels = larger(raster.bleed(self.pixels, covered))
         warp = None if self.warp is None else larger(self.warp) * np.float32(size / len(self.weight))
-        return replace(self, pixels=pixels, log_colour=log_colours(self.picture, pixels), quality=larger(self.quality),
+        return replace(self, pixels=pixels, log_colour=self.picture.log_colours(pixels), quality=larger(self.quality),
                        weight=larger(self.weight), warp=warp)
 
 
-def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float,
+def observe(view: View, picture: HeldPicture, surface: Unfolded, sharpness: float,
             reference_m: float | None = None) -> UnwrappedView:
     """Projects every texel into a picture of a view.
 
     Parameters
     ----------
     view : the camera
-    picture : [H, W, 3], linear, of any size
+    picture : of any size; no more of it is kept than shows the head
     surface : of the head, unfolded
     sharpness : in [0, 1], scales the view's weight
     reference_m : width in metres, on the head, of the pixels of the view that others are weighed beside; None: this
@@ -82,12 +81,12 @@ def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float
         chunk = slice(first, first + POINTS_AT_ONCE)
         xy, quality[chunk], distance[chunk], seen[chunk] = _look(view, surface, chunk, silhouette)
         pixels[chunk] = np.nan_to_num(xy, nan=-1) * scale
-    pixels = surface.spread(pixels)
+    picture, pixels = picture.around(pixels), surface.spread(pixels)
     pixel_m = distance / view.camera.mean_focal_length()
     if reference_m is None:
         reference_m = float(np.median(pixel_m[seen])) if seen.any() else 1.0
     weight = quality ** 2 * sharpness * (reference_m / pixel_m) ** 2
-    return UnwrappedView(view, picture, pixels, log_colours(picture, pixels), surface.spread(quality),
+    return UnwrappedView(view, picture, pixels, picture.log_colours(pixels), surface.spread(quality),
                          surface.spread(weight))
 
 
@@ -108,14 +107,6 @@ def _look(view: View, surface: Unfolded, rows: slice,
     near, far = MARGIN_PX
     ramp = np.clip((margin - near) / (far - near), 0, 1)
     return xy, np.where(seen, np.clip((cosine - GRAZING_COSINE) / (1 - GRAZING_COSINE), 0, 1) * ramp, 0), distance, seen
-
-
-def log_colours(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Bicubic log colours [S, S, 3] of a linear picture at pixels [S, S, 2]; bilinear would soften pores."""
-    x, y = (np.ascontiguousarray(pixels[..., i] - 0.5, np.float32) for i in range(2))
-    return np.log(
-        np.maximum(cv2.remap(picture, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), DARKEST_LINEAR)
-    )
 
 
 def _silhouette_distance(caster: raster.RayCaster, view: View, scale: float = 0.5) -> np.ndarray:
