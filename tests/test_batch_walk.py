@@ -5,6 +5,7 @@
 import json
 import os
 import socket
+import time
 
 import pytest
 
@@ -119,6 +120,25 @@ def test_what_is_no_batch_is_refused_and_one_that_is_damaged_meanwhile_says_so(a
     # a long path is broken anywhere
     assert "batch.json cannot be read".replace(" ", "") in texts.replace(" ", "") and "Masks" not in texts
     refuses("batch.json cannot be read", bpy.ops.wildcap.solve_all)
+
+
+def test_what_a_machine_that_has_gone_left_is_no_obstacle(addon, batches, tmp_path):
+    """The locks of a batch and of a face, by another machine: they hold while they are refreshed, and a term longer."""
+    capture = batch_faces.up_to_mask(tmp_path / "batch", "anna", from_json({}, preset("draft")))
+    folder = batch_faces.planned(tmp_path / "batch", capture)
+    locks = folder / "lock", capture.lock
+    for path in locks:
+        path.write_text(json.dumps({"host": "elsewhere/1/2", "pid": 1, "since": "2026-11-24T00:00:00", "token": "x"}))
+    bpy.ops.wildcap.open_batch(directory=str(folder))
+    batch_faces.wait(addon, lambda: batches.view().runner == "elsewhere" and batches.view().count(state.WORKING) == 1)
+    refuses("A batch is running", bpy.ops.wildcap.solve_all)
+    refuses("by a batch or another Blender", bpy.ops.wildcap.reconstruct)
+    for path in locks:
+        os.utime(path, (0, time.time() - 60))
+    batch_faces.wait(addon, lambda: batches.view().count(state.WAITING) == 1, limit_s=15)
+    assert not batches.view().runner and bpy.ops.wildcap.reconstruct.poll() and bpy.ops.wildcap.accept_mask.poll()
+    assert bpy.ops.wildcap.solve_all.poll()
+    assert "wildcap.cancel_batch" not in buttons(addon("batch.panel").WILDCAP_PT_batch)
 
 
 def test_a_folder_that_goes_away_while_it_is_looked_at(addon, batches, monkeypatch, tmp_path):

@@ -128,8 +128,9 @@ def test_a_job_can_be_given_to_a_worker_that_will_take_over_what_was_left_long_a
     capture.lock.write_text(text)
     with pytest.raises(Problem, match="is working on|just beginning"):
         write_job(capture)
-    assert not capture.job.exists()
+    assert not capture.job.exists() and lease.present_holder(capture.lock) is not None
     os.utime(capture.lock, (0, time.time() - 1))
+    assert lease.present_holder(capture.lock) is None and lease.holder(capture.lock) is not None
     write_job(capture)
     assert capture.lock.read_text() == text, "who takes it over waits for a term of its own"
     with capture.locked():

@@ -163,7 +163,7 @@ def _changed(path: Path) -> int:
 def _runner(root: Path) -> str:
     """The machine that runs a batch; '' for none."""
     try:
-        holder = lease.holder(root / "lock")
+        holder = lease.present_holder(root / "lock")
     except Problem:  # something else is in the lock's place: running it says so
         return ""
     return str(holder.get("host") or "...").partition("/")[0] if holder is not None else ""

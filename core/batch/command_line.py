@@ -202,7 +202,7 @@ def _status(options: argparse.Namespace) -> int:
             print(f"{face.name:20} {state.words()}", flush=True)
     print(", ".join(f"{count} {state}" for state, count in counts.items()))
     with contextlib.suppress(Problem):
-        holder = lease.holder(batch.root / "lock")
+        holder = lease.present_holder(batch.root / "lock")
         if holder:
             print(f"The batch is being run on {str(holder['host']).partition('/')[0]} (process {holder['pid']}, since "
                   f"{holder['since']}).")

@@ -48,7 +48,7 @@ def derive_state(batch: Batch, face: BatchFace) -> FaceState:
     try:
         capture = face.capture
         group = next((group for group in GROUPS if not is_done(batch, face, group)), None)
-        holder = lease.holder(capture.lock) if capture.root.is_dir() else None
+        holder = lease.present_holder(capture.lock) if capture.root.is_dir() else None
         if holder is not None:
             return FaceState(WORKING, group or GROUPS[-1],
                              machine=str(holder.get("host", "another machine")).partition("/")[0])

@@ -282,8 +282,8 @@ class Capture:
 
     def check_free(self) -> None:
         """Raises Problem naming the worker that works here, if one does; what a lost one left does not count."""
-        holder = lease.holder(self.lock)
-        if holder is not None and not lease.seems_expired(holder, self.lock):
+        holder = lease.present_holder(self.lock)
+        if holder is not None:
             raise lease.refuse(holder, self.lock)
 
     @contextlib.contextmanager

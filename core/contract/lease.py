@@ -81,6 +81,12 @@ def seems_expired(holder: dict, path: Path) -> bool:
     return False
 
 
+def present_holder(path: Path) -> dict | None:
+    """As `holder`, and None where its lease seems expired: what a machine that has gone left is no obstacle."""
+    lease_holder = holder(path)
+    return None if lease_holder is None or seems_expired(lease_holder, path) else lease_holder
+
+
 def refuse(holder: dict, path: Path, folder_kind: str = "capture") -> Problem:
     """The Problem of a capture, or a batch, that is worked on."""
     if not holder:
