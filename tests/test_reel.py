@@ -39,6 +39,65 @@ def test_the_contact_sheet_shows_each_preset_as_it_is_alone(addon, capture):
     assert not [d for d in (*bpy.data.curves, *bpy.data.actions) if d.users == 0]
 
 
+@pytest.mark.parametrize("moment", [20, 20.5, 30000])
+def test_a_head_that_is_animated_is_in_each_light_as_it_is_now(addon, capture, moment):
+    """It jumps into the picture a quarter of a frame before `moment`, where it also drifts by a radius a frame: it is
+    beside the camera's view in frames 1 to 6."""
+    bpy.ops.wildcap.bring_in_head()
+    head, scene = bpy.context.view_layer.objects.active, bpy.context.scene
+    for place, frame in ((5.0, 1), (0.0, moment - 0.25), (0.125, moment + 1)):
+        head.location.x = place
+        head.keyframe_insert("location", index=0, frame=frame)
+    keys = _keys(head)
+    keys[0].interpolation, keys[1].interpolation = 'CONSTANT', 'LINEAR'
+    before = [tuple(key.co) for key in keys]
+    scene.frame_set(int(moment), subframe=moment % 1)
+    here = head.matrix_world.translation.x
+    assert here == pytest.approx(0.025)
+    names, reel = tuple(addon("relight.lights").PRESETS), addon("relight.reel")
+    settings = addon("relight.picture").RenderSettings(16, 1)
+    shown, first = reel.each_light(head, names, settings)
+    for i, name in enumerate(names):
+        shown.frame_set(first + i)
+        depsgraph = shown.view_layers[0].depsgraph
+        lamps = {o.name.split(".")[0] for o in shown.objects
+                 if o.type == 'LIGHT' and not o.evaluated_get(depsgraph).hide_render}
+        assert lamps == {f"WildCap {lamp.name}" for lamp in addon("relight.lights").preset(name).lamps}
+        off = head.evaluated_get(depsgraph).matrix_world.translation.x - here
+        assert 0 <= off <= 0.1 * 0.2, "a fifth of a frame's drift at most, and never what was before now"
+    assert scene.frame_current_final == moment and [tuple(key.co) for key in _keys(head)] == before
+    scene.frame_set(int(moment), subframe=moment % 1)
+    assert settings.scene(head, "sun").frame_current_final == moment, "time goes by as ever in the next render"
+
+
+def test_the_contact_sheet_of_an_animated_head_is_that_of_its_pose(addon, capture):
+    bpy.ops.wildcap.bring_in_head()
+    head, sheet = bpy.context.view_layer.objects.active, addon("relight.contact_sheet")
+    settings, folder = addon("relight.picture").RenderSettings(16, 1), capture / "renders"
+    still = pixels(sheet.render(head, folder, True, settings))
+    for place, frame in ((5.0, 1), (0.0, 20)):
+        head.location.x = place
+        head.keyframe_insert("location", index=0, frame=frame)
+    _keys(head)[0].interpolation = 'CONSTANT'
+    bpy.context.scene.frame_set(20)
+    assert np.abs(pixels(sheet.render(head, folder, True, settings)) - still).mean() < 0.005, "but for noise, the same"
+    assert not [p for p in folder.iterdir() if p.name.startswith(".")] and bpy.context.scene.frame_current == 20
+
+
+def test_a_contact_sheet_before_frame_0_is_refused(addon, capture):
+    bpy.ops.wildcap.bring_in_head()
+    bpy.context.scene.frame_set(-3)
+    with pytest.raises(RuntimeError, match="Frame -3 lies before frame 0"):
+        bpy.ops.wildcap.contact_sheet()
+
+
+def _keys(obj):
+    """The keys of an object's one curve."""
+    action = obj.animation_data.action
+    curves = action.fcurves if hasattr(action, "fcurves") else action.layers[0].strips[0].channelbags[0].fcurves
+    return curves[0].keyframe_points
+
+
 @pytest.mark.parametrize("turns", ['LIGHT', 'HEAD'])
 def test_a_turntable_goes_once_around(addon, capture, turns):
     """The window stands at the head's right: a quarter turn counter-clockwise it is before the face, half a turn at the

@@ -24,7 +24,7 @@ GROUND_SRGB = 0.07
 
 
 def render(obj: bpy.types.Object, folder: Path, wait: bool, settings: picture.RenderSettings) -> Path:
-    """Renders the head in every preset and joins the pictures.
+    """Renders the head, as it is at the current frame, in every preset and joins the pictures.
 
     Parameters
     ----------
@@ -39,10 +39,10 @@ def render(obj: bpy.types.Object, folder: Path, wait: bool, settings: picture.Re
 
     Raises
     ------
-    Problem : when the folder cannot be written
+    Problem : when the folder cannot be written, or before frame 0
     """
     presets = tuple(name for name, *_ in LIGHTS if name in lights.PRESETS)
-    scene = reel.each_light(obj, presets, settings)
+    scene, first = reel.each_light(obj, presets, settings)
     size = settings.resolution
     names = {name: iface_(label) for name, label, *_ in LIGHTS}
     rows = [[names[p] for p in presets[i:i + COLUMNS]] for i in range(0, len(presets), COLUMNS)]
@@ -50,7 +50,7 @@ def render(obj: bpy.types.Object, folder: Path, wait: bool, settings: picture.Re
     paths, sheet = [folder / f"{name}.png" for name in presets], folder / NAME
     output.make_room(sheet)
     strips = captions.draw([*rows, about], COLUMNS * size, max(size // 14, 8))
-    output.render_stills(scene, paths, wait, lambda: _save(_joined(paths, strips, size), sheet))
+    output.render_stills(scene, paths, wait, lambda: _save(_joined(paths, strips, size), sheet), first)
     return sheet
 
 

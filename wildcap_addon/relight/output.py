@@ -56,8 +56,9 @@ def render_still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
     _render(scene, wait, write_still=True)
 
 
-def render_stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable[[], None]) -> None:
-    """As `render_still`, for the frames 1, 2, ... of the scene.
+def render_stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable[[], None],
+                  first: int = 1) -> None:
+    """As `render_still`, for frames of the scene, from `first` on.
 
     Parameters
     ----------
@@ -65,13 +66,14 @@ def render_stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: C
     paths : their PNGs, in one folder
     wait : False returns at once
     then : called when all are there
+    first : frame
     """
     global _running
     make_room(paths[0])
-    scene.frame_start, scene.frame_end = 1, len(paths)
+    scene.frame_start, scene.frame_end = first, first + len(paths) - 1
     as_linear(scene)
     scene.render.filepath = str(paths[0].with_name(".frame_####.exr"))
-    _running = Running(stills={paths[0].with_name(f".frame_{i:04d}.exr"): path for i, path in enumerate(paths, 1)},
+    _running = Running(stills={paths[0].with_name(f".frame_{i:04d}.exr"): path for i, path in enumerate(paths, first)},
                        then=then)
     scene.render.use_persistent_data = True  # the head and its maps are the same in all frames
     _render(scene, wait, animation=True)

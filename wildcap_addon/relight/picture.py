@@ -6,7 +6,7 @@ The artist's scene (camera, world, lights, render settings) is not touched.
 """
 
 from dataclasses import dataclass
-from math import tan
+from math import floor, tan
 
 import bpy
 from mathutils import Matrix, Vector
@@ -56,9 +56,9 @@ def set_up_scene(obj: bpy.types.Object, light: str | Hdri | None, resolution: in
     frame, radius = frame_of(obj)
     lights.build_light(scene, light, frame, radius, turn)
     _camera(scene, frame, radius)
-    now = bpy.context.scene  # a head that is animated looks as it does there
-    scene.frame_set(now.frame_current, subframe=now.frame_subframe)
-    render = scene.render
+    now, render = bpy.context.scene, scene.render
+    render.frame_map_old = render.frame_map_new = 100
+    _show_moment(scene, now.frame_current_final)  # a head that is animated looks as it does there
     render.engine = 'CYCLES'
     render.resolution_x = render.resolution_y = resolution
     render.resolution_percentage = 100
@@ -70,6 +70,10 @@ def set_up_scene(obj: bpy.types.Object, light: str | Hdri | None, resolution: in
     colours.show_by(scene, view)
     _label(scene)
     return scene
+
+
+def _show_moment(scene, moment: float) -> None:
+    scene.frame_set(floor(moment), subframe=moment - floor(moment))
 
 
 def _label(scene) -> None:

@@ -3,8 +3,8 @@
 """Several pictures in one render, which Esc stops as it does any of Blender's: each frame has a light of its own, or
 the head or the light turns.
 
-Every frame has its key, so nothing lies in between; the head, which is the artist's object, has none: where it turns,
-all else turns the other way.
+Every frame has its key, so nothing lies in between; the head, which is the artist's object, has none of ours: where it
+turns, all else turns the other way, and where it is animated and is to stand still, time goes by slowly.
 """
 
 from math import tau
@@ -12,26 +12,48 @@ from math import tau
 import bpy
 from mathutils import Matrix
 
+from ...core.contract.messages import Problem
 from ..hdri import Hdri
 from . import lights, picture, sky
 
+SLOWEST = 64
+"""Frames to one of the artist's where time is to stand still: keys that lie closer than 1/100 replace each other."""
 
-def each_light(obj: bpy.types.Object, presets: tuple[str, ...], settings: picture.RenderSettings) -> bpy.types.Scene:
-    """The relight scene in which frame i, from 1 on, has the light presets[i - 1]."""
+
+def each_light(obj: bpy.types.Object, presets: tuple[str, ...],
+               settings: picture.RenderSettings) -> tuple[bpy.types.Scene, int]:
+    """The relight scene in which the head is as it is now, and the first of the frames that have the lights `presets`
+    in turn. Raises Problem before frame 0, where Blender renders no row of frames."""
     scene = settings.scene(obj, presets[0])
+    first, moments = _slow_down(scene, len(presets))
     lights.clear(scene)
     frame, radius = picture.frame_of(obj)
     frame = frame @ Matrix.Rotation(settings.turn, 4, 'Z')
-    for i, name in enumerate(presets, 1):
+    for name, moment in zip(presets, moments, strict=True):
         preset = lights.preset(name)
         for lamp in lights.add_lamps(scene, preset.lamps, frame, radius):
-            for at in range(1, len(presets) + 1):
-                lamp.hide_render = at != i
+            for at in moments:
+                lamp.hide_render = at != moment
                 lamp.keyframe_insert("hide_render", frame=at)
         for socket, colour in zip(sky.sockets(scene.world), sky.colours(preset.sky), strict=True):
             socket.default_value = colour
-            socket.keyframe_insert("default_value", frame=i)
-    return scene
+            socket.keyframe_insert("default_value", frame=moment)
+    return scene, first
+
+
+def _slow_down(scene: bpy.types.Scene, count: int) -> tuple[int, list[float]]:
+    """Lets time go by so slowly that all which is animated is seen as it is now in each of `count` frames; the first of
+    them, and the moments that they show. By a power of two, so that the first shows this very moment."""
+    now, last = scene.frame_current_final, scene.bl_rna.properties["frame_end"].hard_max
+    if now < 0:
+        raise Problem(f"Frame {now:g} lies before frame 0, where Blender renders no row of pictures.",
+                      "Go to frame 0 or a later one, or render one light after the other.")
+    steps = SLOWEST
+    while steps > 1 and now * steps + count > last:
+        steps //= 2
+    scene.render.frame_map_old, scene.render.frame_map_new = 1, steps
+    first = round(now * steps)
+    return first, [(first + i) / steps for i in range(count)]
 
 
 def animate_turn(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int,
