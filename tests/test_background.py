@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from core.contract.messages import Cancelled, CancelledError, Problem
+from core.contract.messages import Cancelled, CancelledError, Done, Problem
 from core.worker.background import BackgroundTask
 
 
@@ -32,6 +32,10 @@ def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
         task.start()
         ended, = follow(task, 20)
         assert ended.problem.startswith(problem)
+    task = BackgroundTask("slow", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"],
+                                                        limit_s=0.2))
+    task.start()
+    assert isinstance(follow(task, 20)[-1], Done) and task.result[0] != 0, "what takes longer than it may is ended"
     task = BackgroundTask("sleep", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"]))
     task.start()
     task.cancel()

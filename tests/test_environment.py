@@ -23,11 +23,11 @@ REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 HERE = locks.lock_name(answer(sys.executable, locks.DESCRIBE))
 
 
-def write_wheel(folder: Path, name: str, version: str = "1.0") -> Path:
+def write_wheel(folder: Path, name: str, version: str = "1.0", code: str = "") -> Path:
     path = folder / f"{name}-{version}-py3-none-any.whl"
     with zipfile.ZipFile(path, "w") as wheel:
         info = f"{name}-{version}.dist-info"
-        wheel.writestr(f"{name}.py", "")
+        wheel.writestr(f"{name}.py", code)
         wheel.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
         wheel.writestr(f"{info}/WHEEL",
                        "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")

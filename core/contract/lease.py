@@ -35,7 +35,7 @@ REFRESHES = 5
 LOOK_S = 0.1
 SUCCESSION = ".succeeding"
 """Ending of the file that keeps two who found the same lease expired from both taking it."""
-_held: dict[str, Lease] = {}  # capture folder -> the lease that this process holds
+_held: dict[str, Lease] = {}  # lock -> the lease that this process holds
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Lease:
 def check_lease(root: Path) -> None:
     """Raises Problem where this process had the capture and another one took it over while this one was asleep: it may
     write nothing more."""
-    lease = _held.get(_key(root))
+    lease = _held.get(_key(root / "lock"))
     if lease is not None and not lease.holds():
         raise Problem("Another worker has taken this capture over while this one was asleep; nothing more was written "
                       "here.",
@@ -104,19 +104,25 @@ def _refuse_stranger(path: Path) -> None:
         raise Problem(f"{path} is in the way: it is not one of WildCap's locks.", "Move it away, or delete it.")
 
 
-@contextlib.contextmanager
 def hold(root: Path, tell: Callable[[str], None] = lambda text: None, folder_kind: str = "capture",
-         cancelled: Callable[[], bool] = lambda: False) -> Iterator[Lease]:
-    """Holds the lease of a capture's folder, or a batch's, which must be there.
+         cancelled: Callable[[], bool] = lambda: False) -> contextlib.AbstractContextManager[Lease]:
+    """Holds the lease of a capture's folder, or a batch's, which must be there: `hold_file` of its lock."""
+    return hold_file(root / "lock", tell, folder_kind, cancelled)
+
+
+@contextlib.contextmanager
+def hold_file(path: Path, tell: Callable[[str], None] = lambda text: None, folder_kind: str = "capture",
+              cancelled: Callable[[], bool] = lambda: False) -> Iterator[Lease]:
+    """Holds the lease whose file is `path`, in a folder that must be there.
 
     A process of this machine that is at work is refused at once, and one that has ended is replaced at once. For one
     that was stopped, or that lives on another machine, a term is waited for a refresh.
 
     Parameters
     ----------
-    root : the folder
+    path : of the lock
     tell : hears of the wait
-    folder_kind : "capture" or "batch", for the Problem
+    folder_kind : "capture", "batch" or another word for what is worked on, for the Problem
     cancelled : whether the wait is to end
 
     Raises
@@ -126,12 +132,12 @@ def hold(root: Path, tell: Callable[[str], None] = lambda text: None, folder_kin
     CancelledError
         Where `cancelled` says so.
     """
-    lease = Lease(root / "lock", secrets.token_hex(8))
+    lease = Lease(path, secrets.token_hex(8))
     while not _make(lease):
         expired = _wait_out(lease.path, tell, folder_kind, cancelled)
         if expired is not None:
             _take_over(lease, *expired)
-    _held[_key(root)] = lease
+    _held[_key(path)] = lease
     _clear_asides(lease.path)
     ended = threading.Event()
     keeper = threading.Thread(target=_refresh, args=(lease, ended), name="wildcap-lease", daemon=True)
@@ -141,7 +147,7 @@ def hold(root: Path, tell: Callable[[str], None] = lambda text: None, folder_kin
     finally:
         ended.set()
         keeper.join()
-        del _held[_key(root)]
+        del _held[_key(path)]
         with contextlib.suppress(OSError):  # a server that has gone: the lease runs out
             if lease.holds():
                 lease.path.unlink(missing_ok=True)
@@ -265,5 +271,5 @@ def _stamp(path: Path) -> tuple | None:
     return info.st_mtime_ns, info.st_size, info.st_ino
 
 
-def _key(root: Path) -> str:
-    return os.path.abspath(root)
+def _key(path: Path) -> str:
+    return os.path.abspath(path)

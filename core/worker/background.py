@@ -63,10 +63,14 @@ class BackgroundTask:
 
     terminate = cancel
 
+    @property
+    def cancelled(self) -> bool:
+        return self._cancelled_at is not None
+
     def check(self) -> None:
         """Raises CancelledError where the task was cancelled: whoever did so takes the work for ended within GRACE_S,
         and may begin another in the same place."""
-        if self._cancelled_at is not None:
+        if self.cancelled:
             raise CancelledError(self.name)
 
     def say(self, done: float, of: float, text: str) -> None:
@@ -74,9 +78,11 @@ class BackgroundTask:
         self.check()
         self._messages.put(Progress(self.name, done, of, text))
 
-    def run(self, command: list, hear: Callable[[str], None] = lambda line: None) -> tuple[int, str]:
-        """Runs a command, each line it writes through `hear`; its exit code and the last line with an error in it.
-        Raises OSError when it cannot be started, and CancelledError where the task is cancelled before or meanwhile."""
+    def run(self, command: list, hear: Callable[[str], None] = lambda line: None,
+            limit_s: float = threading.TIMEOUT_MAX) -> tuple[int, str]:
+        """Runs a command, for `limit_s` at most, each line it writes through `hear`; its exit code and the last line
+        with an error in it. Raises OSError when it cannot be started, and CancelledError where the task is cancelled
+        before or meanwhile."""
         self.check()
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
         environment = {name: value for name, value in switchlight_api.environment_without_key().items()
@@ -86,12 +92,17 @@ class BackgroundTask:
             stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **apart)
         if self._cancelled_at is not None:
             self._kill()
-        last_error = ""
-        with self._process.stdout as lines:
-            for line in lines:
-                hear(line)
-                last_error = line.strip() if "error" in line.lower() else last_error
-        code = self._process.wait()
+        last_error, limit = "", threading.Timer(limit_s, self._kill)
+        limit.daemon = True
+        limit.start()
+        try:
+            with self._process.stdout as lines:
+                for line in lines:
+                    hear(line)
+                    last_error = line.strip() if "error" in line.lower() else last_error
+            code = self._process.wait()
+        finally:
+            limit.cancel()
         self.check()
         return code, last_error
 

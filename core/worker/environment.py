@@ -7,13 +7,15 @@ Ground floor: standard library only. Nothing is installed into Blender's Python.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..contract import switchlight_api
+from ..contract import lease, processes, switchlight_api
 from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from .background import BackgroundTask
@@ -28,6 +30,9 @@ COMPUTE_FILE = "wildcap_compute.txt"
 """Says in an environment for what, from where and by which lock it was made: another choice makes it anew, and so does
 one of an older WildCap. It is the first file in the folder, and says that the others are ours; empty while they are not
 complete."""
+
+SURVEY_S = 300
+"""How long a Python may take to load every package once: on a cold disk, behind a virus scanner."""
 
 
 def python_of(folder: Path) -> Path:
@@ -47,21 +52,24 @@ def required(requirements: Path) -> dict[str, str]:
     return dict(line.split("==") for line in lines if line)
 
 
-def verify(python: Path, requirements: Path, importing: bool = False) -> list[str]:
+def verify(python: Path, requirements: Path, importing: bool = False, task: BackgroundTask | None = None) -> list[str]:
     """What keeps `python` from running the worker, one sentence each; [] when nothing does.
 
-    With `importing` every module is imported as well (some ten seconds), which finds broken installations.
+    With `importing` every module is imported as well (some ten seconds), which finds broken installations; a cancel of
+    `task` ends that.
     """
-    return judge(survey(python, requirements, importing), requirements)
+    return judge(survey(python, requirements, importing, task), requirements)
 
 
-def survey(python: Path, requirements: Path, importing: bool = False) -> dict:
+def survey(python: Path, requirements: Path, importing: bool = False, task: BackgroundTask | None = None) -> dict:
     """What a Python has: {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages],
-    "errors": {module: text}, "device": "cpu", "cuda" or "mps", "reason": why that one}. Raises Problem when it cannot
-    be run. The device is proven by a pass of the network (importing), else nothing is known of it: ''."""
+    "errors": {module: text}, "device": "cpu", "cuda" or "mps", "reason": why that one}. The device is proven by a
+    pass of the network (importing), else nothing is known of it: ''. Raises Problem when it cannot be run, and, where
+    `task` is cancelled, CancelledError."""
     modules = [MODULES.get(name, name) for name in required(requirements)] if importing else []
     root = str(Path(requirements).parent) if importing else ""
-    printed = answer(python, _SURVEY % {"names": list(required(requirements)), "modules": modules, "root": root}, 300)
+    code = _SURVEY % {"names": list(required(requirements)), "modules": modules, "root": root}
+    printed = answer(python, code, SURVEY_S) if task is None else _answer_in(task, python, code)
     try:
         return json.loads(printed.splitlines()[-1])
     except (ValueError, IndexError):
@@ -126,9 +134,31 @@ def removal(folder: Path) -> BackgroundTask:
     """`remove` in the background: an environment has tens of thousands of files."""
     def work(task: BackgroundTask) -> None:
         task.say(0, 1, "deleting the solver")
-        remove(folder, task.check)
+        with alone_in(folder, task):
+            remove(folder, task.check)
 
     return BackgroundTask("environment", work)
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path, task: BackgroundTask) -> Iterator[None]:
+    """Keeps every other installation and removal out of an environment's folder, of whatever Blender: by a lease
+    beside it, for what is in it comes and goes. One of this process was cancelled and has not quite ended: it is waited
+    for. Raises Problem naming who else works there, and CancelledError."""
+    path, here = folder.with_name(f"{folder.name}.wildcap-install.lock"), processes.identify_process().items()
+    while here <= (lease.holder(path) or {}).items():
+        task.say(0, 1, "waiting for what was cancelled to end")
+        time.sleep(lease.LOOK_S)
+    with lease.hold_file(path, lambda text: task.say(0, 1, text), "installation", lambda: task.cancelled):
+        yield
+
+
+def _answer_in(task: BackgroundTask, python: Path, code: str) -> str:
+    """As `answer`, until the task is cancelled; of what is printed, and said beside it, the lines that are JSON."""
+    lines: list[str] = []
+    with contextlib.suppress(OSError):
+        task.run([python, "-I", "-c", code], lines.append, SURVEY_S)
+    return "".join(line for line in lines if line.startswith("{"))
 
 
 _SURVEY = """

@@ -20,7 +20,7 @@ from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from . import bare_environment, locks
 from .background import BackgroundTask
-from .environment import COMPUTE_FILE, answer, python_of, required, verify
+from .environment import COMPUTE_FILE, alone_in, answer, python_of, required, verify
 from .pip_steps import INSTALL, carry_out, compute_of, lock_of, plan_steps
 
 
@@ -64,8 +64,9 @@ def installation(folder: Path, requirements: Path, log: Path, base: Path | None,
 
     def work(task: BackgroundTask) -> None:
         try:
-            log.parent.mkdir(parents=True, exist_ok=True)
-            with open(log, "w", encoding="utf-8") as file:
+            for place in (log.parent, folder.parent):
+                place.mkdir(parents=True, exist_ok=True)
+            with alone_in(folder, task), open(log, "w", encoding="utf-8") as file:
                 _Installing(task, folder, requirements, base or base_python(), chosen, _listener(task, file, expected),
                             log).run()
         except OSError as error:
@@ -141,7 +142,7 @@ class _Installing:
         if code:
             raise _failure(error, folder, self.log)
         task.say(99, 100, "trying every package")
-        return verify(python_of(folder), requirements, importing=True)
+        return verify(python_of(folder), requirements, importing=True, task=task)
 
 
 def _begun(folder: Path, made_for: str) -> bool:
