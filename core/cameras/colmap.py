@@ -83,7 +83,7 @@ def _extract(job: dict, names: list[str], finer: bool, reduction: int = 1) -> li
     options.use_gpu = False
     options.sift.first_octave = -1 if finer else 0
     options.sift.max_num_features = FILM_FEATURES if not finer else 4000
-    if job["skin"]:  # what holds on low-contrast skin, at ten times the cost
+    if job["skin"]:  # what holds on low-contrast skin; each feature is described at `dsp_num_scales` sizes, not at one
         options.sift.estimate_affine_shape = True
         options.sift.domain_size_pooling = True
         options.sift.peak_threshold = 0.002
