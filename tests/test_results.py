@@ -91,6 +91,16 @@ def test_what_a_page_calls_the_worst_or_free_is_so_in_its_record():
     assert "on nine synthetic heads at most 4.2 % off" in told_by(geometry, measured, scale)
 
 
+def test_the_page_of_the_state_says_whom_the_fitted_lights_weight_was_chosen_on():
+    shown, answers = (figures.read_record(name)["figures"] for name in ("state", "delight_answers"))
+    people = {person for rows in shown["people"].values() for person in rows}
+    assert people <= {row["person"] for row in answers["rows"].values()}, "else the sentence is no longer true"
+    page = (ROOT / "docs" / "results" / "state.md").read_text(encoding="utf-8").replace("\n", " ")
+    assert "chosen on these people among others" in page and "[the page of answers](answers.md)" in page
+    earlier = (ROOT / "docs" / "results" / "state_0_1_0.md").read_text(encoding="utf-8")
+    assert "fitted light counts" not in earlier, "which weighed nothing"
+
+
 def test_the_page_of_hair_says_where_it_falls_short_and_what_strokes_are_worth():
     rows = {"bearded": {"brows": {"iou": 0.9, "degrees": 11.0, "usual_degrees": 14.0},
                         "beard": {"iou": 0.4, "degrees": 31.0, "usual_degrees": 13.0}},

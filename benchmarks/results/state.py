@@ -12,7 +12,10 @@ TITLE = "The state of the albedo"
 SAYS = ("People like people, by the measures that tell light from skin, beside answers that do nothing or know the "
         "light.")
 RECORDS = ("state",)
+CHOSEN = ("How far the fitted light counts in the delit texture was chosen on these people among others; what it is "
+          "worth to people who are left out of the choice is on [the page of answers](answers.md).")
 
 
 def sections(record: Figures) -> Sections:
-    return state.sections(record.people, record.captures)
+    (heading, introduction), *others = state.sections(record.people, record.captures)
+    return [(heading, f"{introduction} {CHOSEN}"), *others]
