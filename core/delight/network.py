@@ -33,8 +33,9 @@ from .below_hair import FEATURES, fill_features, fill_hair
 from .casts import remove_casts
 from .contract import Delit
 from .evening import ShadingEstimate, even_out
-from .lift import lift_shading, lift_share
+from .lift import WINDOW_CELLS, lift_shading, lift_share
 from .lit_head import MAX_ALBEDO, LitHead, fit_lit_head
+from .occlusion import remove_seams
 from .second_opinion import average_cells, continue_beyond, weigh_in
 from .shading import light_in_frame, light_seen
 from .unet import MIN_LINEAR, SIDE_PX, DelightNet, network_input
@@ -42,6 +43,9 @@ from .unet import MIN_LINEAR, SIDE_PX, DelightNet, network_input
 DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 FACE_MARGIN = 1.35  # side of the square, in sides of the face's landmarks; training shows 1.25 to 2
+SEAM_ZONE_CELLS, SEAM_FINE_CELLS = 2 * WINDOW_CELLS, 2 / 3
+"""So far about a shadow's edge the answer is blurred, as it was lifted through two windows one after the other; and the
+deviation below which detail is the skin's own."""
 FADE_SHARE = 0.06  # of the square's side: along its border it gives way to the fitted light
 
 
@@ -101,10 +105,11 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
                       "Choose a photograph that shows the face from the front or half from the side.")
     box = square_around(face.landmarks[:, :2])
     look = _look(load_network("cpu"), box, crop(srgb, box, SIDE_PX))
-    share = crop(parser.parse(srgb, face.landmarks).of(*FEATURES), box, len(look.shading))
+    parts = parser.parse(srgb, face.landmarks)
+    share, skin = (crop(parts.of(*names), box, len(look.shading)) for names in (FEATURES, ("skin",)))
     look = replace(look, shading=fill_features(look.shading, share))
-    skin = _hull(face.landmarks[:, :2], look)
-    return _divided(srgb, remove_casts([look], [skin])[0], skin)
+    hull = _hull(face.landmarks[:, :2], look)
+    return _divided(srgb, remove_casts([look], [hull])[0], hull * skin)
 
 
 def load_network(device: str) -> DelightNet:
@@ -194,13 +199,16 @@ def _hull(points: np.ndarray, look: ShadingEstimate) -> np.ndarray:
 
 def _divided(srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray,
              fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """A picture without its shading, and its shadows at its own size. `skin` [h, h] in [0, 1] tells how bright it came
-    out: the wall behind may be whiter than any skin. Beyond the square `fitted` (of light_in_frame) is taken; without
-    it the shading is that of the square's border, and nothing is said of shadows."""
+    """A picture without its shading, and its shadows at its own size. On `skin` [h, h] in [0, 1] no outline of a shadow
+    stays, and it tells how bright the picture came out: the wall behind may be whiter. Beyond the square `fitted` (of
+    light_in_frame) is taken; without it the shading is that of the square's border, and nothing is said of shadows.
+    """
     linear = images.srgb_to_linear(srgb)
     size = round(look.box[2])
     log = np.log(np.maximum(crop(linear, look.box, size), MIN_LINEAR))
     shading, shadow = lift_shading(look.shading, log), lift_share(look.shadow, log)
+    cell, bare = size / len(skin), cv2.resize(skin, (size, size), interpolation=cv2.INTER_LINEAR) > 0.5
+    shading = shading + remove_seams(log - shading, 1 - shadow, bare, SEAM_ZONE_CELLS * cell, SEAM_FINE_CELLS * cell)
     y, x = np.mgrid[0:srgb.shape[0], 0:srgb.shape[1]]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]
     within = np.minimum(at, size - at).min(1).reshape(srgb.shape[:2])  # pixels to the square's border

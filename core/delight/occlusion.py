@@ -58,18 +58,21 @@ def estimate_sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarr
                    max(1.5, BAND_SHARE * side))
 
 
-def remove_seams(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
+def remove_seams(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, zone_px: float,
+                 fine_px: float) -> np.ndarray:
     """What to take from a log albedo along the edges of a shadow so that no outline of it stays.
 
     Bounces, subsurface light and the video's chroma make a penumbra that one share cannot explain. Near an edge the
-    coarse part of the albedo is carried over from both sides; its fine part stays.
+    coarse part of the albedo is carried over from both sides; its fine part stays. As far as the share does not change
+    across an edge, nothing is taken: there may be none.
 
     Parameters
     ----------
     log_albedo : [H, W, 3], natural log of linear values
     share : [H, W] in [0, 1], of the sun
-    head : bool [H, W]
-    side : the longer side in pixels of the frame that this is a part of
+    head : bool [H, W], where the albedo is that of skin
+    zone_px : half width of the zone about an edge that must be no darker or lighter than its surroundings
+    fine_px : deviation below which detail is the skin's own
 
     Returns
     -------
@@ -77,11 +80,12 @@ def remove_seams(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, si
     """
     lit = (share > 0.5).astype(np.uint8)
     distance = cv2.distanceTransform(lit, cv2.DIST_L2, 5) + cv2.distanceTransform(1 - lit, cv2.DIST_L2, 5)
-    zone = ZONE_SHARE * side
-    sure = head & (distance > zone)
-    known = cv2.GaussianBlur(sure.astype(np.float32), (0, 0), 0.7 * zone)
-    excess = _mean_over(log_albedo, head, FINE_SHARE * side) - _mean_over(log_albedo, sure, 0.7 * zone)
-    ramp = np.clip(2 * (1 - distance / zone), 0, 1) * np.clip(known / 0.05, 0, 1)
+    sure = head & (distance > zone_px)
+    known = cv2.GaussianBlur(sure.astype(np.float32), (0, 0), 0.7 * zone_px)
+    excess = _mean_over(log_albedo, head, fine_px) - _mean_over(log_albedo, sure, 0.7 * zone_px)
+    about = np.ones((2 * max(1, round(1.5 * zone_px)) + 1,) * 2, np.uint8)
+    step = np.clip(cv2.dilate(share, about) - cv2.erode(share, about), 0, 1)
+    ramp = np.clip(2 * (1 - distance / zone_px), 0, 1) * np.clip(known / 0.05, 0, 1) * step * head
     return np.clip(excess, -0.7, 0.7) * ramp[..., None]
 
 

@@ -22,7 +22,7 @@ from ..geometry.views import View, read_views
 from ..imaging import images
 from .contract import Delit
 from .lit_head import LitHead, fit_lit_head
-from .occlusion import estimate_sun_share, remove_seams
+from .occlusion import FINE_SHARE, ZONE_SHARE, estimate_sun_share, remove_seams
 
 
 def shading(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
@@ -81,7 +81,8 @@ def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.nda
         share = estimate_sun_share(linear, ambient, direct, free, 1 - own, here, side)
     lit = np.maximum(bleed((ambient + share[..., None] * direct).astype(np.float32), here), 1e-4)
     if head.light.has_sun:
-        lit = lit * np.exp(remove_seams(np.log(np.maximum(linear, 1e-3) / lit), share, here, side))
+        lit = lit * np.exp(remove_seams(np.log(np.maximum(linear, 1e-3) / lit), share, here, ZONE_SHARE * side,
+                                        FINE_SHARE * side))
     return lit, share
 
 
