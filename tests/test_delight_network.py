@@ -18,7 +18,7 @@ from core.delight.casts import remove_casts
 from core.delight.evening import ShadingEstimate
 from core.delight.lift import lift_shading, lift_share
 from core.delight.lit_head import MAX_ALBEDO
-from core.delight.network import WEIGHTS, _landmarks, crop, load_network, square_around
+from core.delight.network import WEIGHTS, _divided, _landmarks, crop, load_network, square_around
 from core.delight.second_opinion import Weighing, continue_beyond, weigh_in
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.face import template
