@@ -7,10 +7,10 @@
 FOLDER/NAME is a person of benchmarks/likenesses.py, filmed with open eyes, and FOLDER/NAME.wildcap what `core run` made
 of the film, up to the solve where the colour is asked for. The truth is laid where the capture's cameras see the face
 as it was filmed (benchmarks/cameras_against_truth.py). --eyes: the captures of benchmarks/eye_captures.py, whose eyes
-are fitted here, by true cameras to heads half a millimetre off; then what no frame told is shown beside it: the eyes
-that these heads have by themselves. Distances in mm: from the fitted edges of the lids to the true ones, mean and
-largest of an eye's two; between the centres of the eyeballs. The iris' true colour is the median of the eye's picture
-between pupil and rim; delta E is CIE 2000.
+are fitted here, by true cameras to heads half a millimetre off, and whose irises are measured over their own skin's
+true albedo; then what no frame told is shown beside it: the eyes that these heads have by themselves. Distances in mm:
+from the fitted edges of the lids to the true ones, mean and largest of an eye's two; between the centres of the
+eyeballs. The iris' true colour is the median of the eye's picture between pupil and rim; delta E is CIE 2000.
 """
 
 from __future__ import annotations
@@ -27,13 +27,15 @@ from core.contract.capture import Capture
 from core.contract.eyes_record import SIDES, Eyeball, read_eyes, read_irises
 from core.contract.messages import Reporter
 from core.face import lids
+from core.face.head import FilmedHead
 from core.geometry import meshes
-from core.geometry.views import read_views
+from core.geometry.views import View, read_views
 from core.imaging import images
 from core.registration import eye_looks, eyeballs, landmarks
-from core.solve.iris import RING_SHARES
+from core.solve.iris import RING_SHARES, measure_both
 from core.synthetic.people import eyes
-from core.synthetic.people.figure import make_figure
+from core.synthetic.people.figure import paint
+from core.synthetic.people.person import sample_person
 
 from .cameras_against_truth import place_truth
 from .eye_captures import EYES
@@ -43,6 +45,7 @@ from .likenesses import HELD_BACK, LIKENESSES
 COLUMNS = ("rim, mm", "rim's worst, mm", "centre, mm", "radius, mm", "gaze, degrees", "iris radius, mm",
            "iris, delta E", "openness", "true openness")
 ALONE = ", by the head alone"
+SKIN_TEXELS = 512
 QUIET = Reporter("registration", emit=lambda message: None)
 
 
@@ -106,10 +109,20 @@ def fit_alone(folder: Path) -> dict[str, dict]:
         marks = eyeballs.mark_rims(eye_looks.look(views, seen, QUIET), head, seen.opening, QUIET)
         for name, told in (("", marks), (ALONE, (None, None))):
             fitted = eyeballs.fit(head, told, seen.opening)
+            colours = None if name else irises_over_own_skin(views, fitted, seed)
             for side, eye in enumerate(fitted.records()):
-                rows[f"{seed}, {SIDES[side]}{name}"] = (compare_eye(eye, fitted.opened.skin.vertices, true, side, still)
-                                                        | {"true openness": _plain(person["openness"])})
+                off = None if colours is None else apart(np.array(colours[side]),
+                                                         true_iris(person, true.balls[side].radius))
+                rows[f"{seed}, {SIDES[side]}{name}"] = (
+                    compare_eye(eye, fitted.opened.skin.vertices, true, side, still)
+                    | {"iris, delta E": _plain(off), "true openness": _plain(person["openness"])})
     return rows
+
+
+def irises_over_own_skin(views: list[View], fitted: eyeballs.OpenEyes, seed: int) -> tuple | None:
+    """Linear albedo of the left and the right iris by a person's true skin, where no solve has found it."""
+    head = FilmedHead(fitted.head, fitted.opened.skin, [ball.mesh for ball in fitted.opened.balls])
+    return measure_both(views, head, fitted.records(), paint(sample_person(seed), SKIN_TEXELS)[1], QUIET)
 
 
 def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int, pose: tuple) -> dict:
@@ -141,8 +154,8 @@ def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int
 
 
 def true_iris(person: dict, radius: float) -> np.ndarray:
-    """Linear albedo [3] between pupil and rim, the median of the eyes' picture."""
-    picture = make_figure(person["seed"], 64).eye
+    """Linear albedo [3] between pupil and rim, the median of the picture on eyeballs of a radius in metres."""
+    picture = eyes.paint_eyes(np.array(person["iris"]), radius, person["seed"])
     size = len(picture)
     y, x = (np.mgrid[0:size, 0:size] + 0.5) / size - 0.5
     angle = np.pi * (2 * np.hypot(x, y)).clip(0, 1) ** (1 / 0.6)

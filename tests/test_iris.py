@@ -15,7 +15,7 @@ from core.contract.eyes_record import Eyeball  # noqa: E402
 from core.contract.messages import Reporter  # noqa: E402
 from core.face import lids  # noqa: E402
 from core.face.eye_reader import SIDE_PX, EyeShares  # noqa: E402
-from core.face.head import Head  # noqa: E402
+from core.face.head import FilmedHead  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.solve import iris  # noqa: E402
@@ -44,12 +44,8 @@ class Painted:
         self.views = views
 
     @staticmethod
-    def _filmed(closed, opened) -> Head:
-        count = len(closed.faces)
-        skin = replace(closed, vertices=opened.skin.vertices, faces=opened.skin.faces[:count])
-        head = Head(skin, meshes.joined([opened.skin, *(ball.mesh for ball in opened.balls)]))
-        head.built_in = True
-        return head
+    def _filmed(closed, opened) -> FilmedHead:
+        return FilmedHead(closed, opened.skin, [ball.mesh for ball in opened.balls])
 
     def _photograph(self, view, head, lit) -> np.ndarray:
         whole = head.caster.mesh
@@ -88,6 +84,29 @@ class Painted:
 def apart(found, true) -> float:
     return float(deltaE_ciede2000(*(rgb2lab(images.linear_to_srgb(np.float32(v)).reshape(1, 1, 3))
                                     for v in (found, true)))[0, 0])
+
+
+def test_two_irises_have_the_middle_of_what_was_measured_but_for_a_brown_and_a_blue_one():
+    """One in the shade of its lid, the other with the sky in it."""
+    dim, bright = (0.02, 0.01, 0.004), (0.08, 0.04, 0.009)
+    assert iris.even_colours(dim, bright) == ((0.04, 0.02, 0.006),) * 2
+    brown, blue = (0.05, 0.024, 0.010), (0.048, 0.078, 0.115)
+    assert iris.even_colours(brown, blue) == (brown, blue)
+    assert iris.even_colours(blue, blue) == (blue, blue)
+
+
+def test_an_eye_in_the_shade_takes_half_of_it_from_the_other(monkeypatch):
+    told = [(0.03, 0.04, 0.05), (0.12, 0.16, 0.20)]
+    monkeypatch.setattr(iris, "measure_iris_colour", lambda views, head, side, *_: told[side])
+
+    def found():
+        return iris.measure_both([], None, (None, None), None, Reporter("solve"))
+
+    assert found() == ((0.06, 0.08, 0.1),) * 2
+    told[1] = None  # no frame shows it
+    assert found() == (told[0],) * 2
+    told[0] = None
+    assert found() is None
 
 
 @pytest.mark.parametrize("colour", [(0.05, 0.024, 0.010), (0.048, 0.078, 0.115)])

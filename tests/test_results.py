@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 
+import numpy as np
 import pytest
 
 from benchmarks import figures, groomed, open_eyes, pages, results
@@ -121,6 +122,13 @@ def test_the_page_of_eyes_says_who_is_in_no_mean():
     assert eyes.left_out(rows) == "Taken for closed, and in no mean: fringed."
     del rows["stubbled, left"]
     assert eyes.left_out(rows).endswith("Filmed with open eyes, too, and not measured: stubbled.")
+
+
+def test_the_true_iris_has_the_hue_that_was_painted():
+    """Between pupil and rim, on a ball of the truth's size; a five-hundredth is what the painter adds to all of it."""
+    colour = np.array([0.05, 0.024, 0.010])
+    true = open_eyes.true_iris({"iris": colour.tolist(), "seed": 4}, 0.0155) - 0.002
+    assert np.allclose(true / true[0], colour / colour[0], rtol=0.01) and true[0] == pytest.approx(0.05, rel=0.4)
 
 
 def test_eyes_that_were_taken_for_closed_are_rows_without_figures(tmp_path):

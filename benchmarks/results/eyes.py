@@ -31,8 +31,10 @@ def sections(record: Figures) -> Sections:
         fitted to their own heads, half a millimetre off. *By the head alone* is what such a head says of its eyes when
         no frame is asked: next to nothing is wrong there, since these people's lids are the template's own and open as
         it opens them. Real lids are not, so that row is no bound: it says what following the frames costs where there
-        is nothing to follow. *Filmed* are people whose head came from their film, too: a third of the stubbled man's
-        face is missing from his scan, so that his left eye lies on a face that is millimetres off.
+        is nothing to follow. *Filmed* are people whose head came from their film, too: their rims are worst at the
+        eyes' corners, where the opening is thinner than the reader tells. Irises of true heads are measured over their
+        true skin (a dash: not measured), those of filmed people over the skin that the solve found; both eyes have one
+        colour, so that a person's two figures are alike.
         """, markdown(["mean over eyes", *COLUMNS[:7]], table), *filter(None, [left_out(rows)]))),
         ("Eye by eye", markdown(["eye", *COLUMNS], [[name, *(_shown(row[column]) for column in COLUMNS)]
                                                     for name, row in {**fitted, **filmed}.items()]))]

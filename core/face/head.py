@@ -125,18 +125,21 @@ def read_filmed_head(capture: Capture) -> Head:
     opened = meshes.read_obj(capture.head_open)
     if not lids.belongs_to(opened, head.mesh):  # another head.obj was put beside it
         return head
-    balls = [lids.place_ball(side, np.array(eye.centre), eye.radius, np.array(eye.gaze)).mesh
-             for side, eye in enumerate(read_eyes(capture))]
-    whole = meshes.joined([opened, *balls])
-    count = len(head.mesh.faces)
-    mesh = replace(head.mesh, vertices=_shared(opened.vertices), faces=_shared(opened.faces[:count]))
-    return _Filmed(mesh, whole)
+    return FilmedHead(head.mesh, opened,
+                      [lids.place_ball(side, np.array(eye.centre), eye.radius, np.array(eye.gaze)).mesh
+                       for side, eye in enumerate(read_eyes(capture))])
 
 
-class _Filmed(Head):
+class FilmedHead(Head):
     """The built-in head, its triangles parted between the lids."""
 
     built_in = eyes_open = True
+
+    def __init__(self, closed: Mesh, opened: Mesh, balls: list[Mesh]):
+        """closed: the head; opened: the same with its lids open, and its sockets; balls: the eyeballs."""
+        faces = _shared(opened.faces[:len(closed.faces)])
+        super().__init__(replace(closed, vertices=_shared(opened.vertices), faces=faces),
+                         meshes.joined([opened, *balls]))
 
 
 def _shared(array: np.ndarray) -> np.ndarray:

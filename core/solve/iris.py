@@ -5,7 +5,9 @@ whose albedo the solve has found.
 
 So the white point, the exposure and most of the light divide out, frame by frame. The iris is what the eye reader sees
 of it where the fitted eyeball has it. What is a highlight, a lash's shadow or a blink in some frames, or in a part of
-the iris, the median leaves out.
+the iris, the median leaves out. What lies on an eye in all frames (a shadow of the lid or the brow, the sky in the
+cornea) is seldom the same on the other one: people's two irises are of one colour, and have the middle of what was
+measured.
 """
 
 from __future__ import annotations
@@ -39,6 +41,9 @@ MIN_SKIN_COSINE = 0.5
 """Least cosine between the normals of such skin and the gaze."""
 MIN_POINTS = 12  # points of skin, or pixels of the iris, that a frame must show
 MAX_VIEWS = 10  # those that face the eye most
+ODD_HUES_LOG = 1.2
+"""By how much two irises' blue over red, as a logarithm, must differ to be irises of two colours, as few people have
+them: half of what parts a brown iris from a blue one."""
 
 
 def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) -> None:
@@ -59,16 +64,41 @@ def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Rep
     remove_file(capture.irises)
     if not (head.built_in and capture.eyes.is_file() and capture.frames_json.is_file() and capture.cameras.is_dir()):
         return
-    eyes = read_eyes(capture)
     views = [view for view in read_views(capture) if view.path.is_file()]
+    colours = measure_both(views, head, read_eyes(capture), albedo, report)
+    if colours is None:
+        return
+    write_irises(capture.irises, *colours)
+    for side, colour in zip(SIDES, colours, strict=True):
+        report.figure(f"{side}_iris_srgb", [round(float(v), 3) for v in images.linear_to_srgb(np.array(colour))])
+
+
+def measure_both(views: list[View], head: Head, eyes: tuple[Eyeball, Eyeball], albedo: np.ndarray,
+                 report: Reporter) -> tuple[Colour, Colour] | None:
+    """The linear albedo of the left and of the right iris; None where no frame shows either.
+
+    Parameters
+    ----------
+    views : with their pictures
+    head : as fitted, in metres
+    eyes : the left and the right one
+    albedo : [S, S, 3], linear, of the head
+    report : hears whether it is cancelled
+    """
     colours = [measure_iris_colour(views, head, side, eye, albedo, report) for side, eye in enumerate(eyes)]
     known = [colour for colour in colours if colour is not None]
-    if not known:
-        return
-    left, right = (colour if colour is not None else known[0] for colour in colours)
-    write_irises(capture.irises, left, right)
-    for side, colour in zip(SIDES, (left, right), strict=True):
-        report.figure(f"{side}_iris_srgb", [round(float(v), 3) for v in images.linear_to_srgb(np.array(colour))])
+    return even_colours(known[0], known[-1]) if known else None
+
+
+def even_colours(left: Colour, right: Colour) -> tuple[Colour, Colour]:
+    """Both irises in the middle of their linear colours, a geometric mean: what shades an eye is a factor. As they are
+    where they are irises of two colours."""
+    logs = np.log([left, right])
+    hues = logs[:, 2] - logs[:, 0]
+    if abs(hues[1] - hues[0]) > ODD_HUES_LOG:
+        return left, right
+    even = tuple(round(float(v), 4) for v in np.exp(logs.mean(0)))
+    return even, even
 
 
 def measure_iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray,
