@@ -6,13 +6,13 @@ that no training saw.
     python -m benchmarks.ablation OUT.json [--rows NAME ...] [--subjects NAME ...] [--skins FOLDER] [--kind raw|delit]
                                   [--size 256] [--steps 20] [--jobs 2]
     python -m benchmarks.ablation OUT.json --table [--json docs/figures/ablation.json]
-    python -m benchmarks.ablation OUT.json --pictures FOLDER
+    python -m benchmarks.ablation OUT.json --picture docs/pictures/ablation.jpg
 
 Six subjects x three shadows for the rows that carry the method (KEY), the full method with two seeds, whose spread says
 what a tie is; the other rows run on one shadow per subject, the 600 steps of the paper and of the released code on one
 problem each; every row is compared with the full method on its own problems only. OUT.json keeps every finished solve,
 so the command goes on where it was stopped. --skins names a folder of skins carried into our UVs (`python -m core train
-carry`); those in the prior's card under held_out_skins are added to the subjects. The pictures are of synthetic
+carry`); those in the prior's card under held_out_skins are added to the subjects. The picture is of synthetic
 subjects only.
 """
 
@@ -101,10 +101,10 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--table", action="store_true", help="solve nothing, print what is there")
     parser.add_argument("--json", type=Path, help="where the table's figures go, such as docs/figures/ablation.json")
-    parser.add_argument("--pictures", type=Path)
+    parser.add_argument("--picture", type=Path, help="draw two subjects instead")
     options = parser.parse_args()
     done = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
-    if options.pictures:
+    if options.picture:
         draw(options)
         return
     if not options.table:
@@ -272,14 +272,14 @@ def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float], st
 
 
 def draw(options: argparse.Namespace) -> None:
-    """FOLDER/ablation.jpg: of two synthetic subjects the texture, the rows PICTURED and the truth."""
+    """Of two synthetic subjects the texture, the rows PICTURED and the truth."""
     lines = []
     for subject, shadows in (("9007", "leaves, hard"), ("9008", "edge, half soft")):
         given = make_problem(subject, shadows, options.size, options.kind)
         solves = [solve_row(given, row, 0, options.steps) for row in PICTURED]
         pictures = [given.texture * (given.albedo.mean() / given.texture.mean()), *solves]
         lines.append(np.hstack([*pictures, given.albedo]))
-    images.write_srgb(options.pictures / "ablation.jpg", images.linear_to_srgb(np.clip(np.vstack(lines), 0, 1)))
+    images.write_srgb(options.picture, images.linear_to_srgb(np.clip(np.vstack(lines), 0, 1)))
 
 
 @lru_cache(maxsize=1)

@@ -23,14 +23,14 @@ ROOT = Path(__file__).resolve().parent.parent
 LIGHTS = ("three_point", "overcast", "sun")
 SEAMS = {"mouth": 0, "eye": 1}
 """Where the camera looks: the middle of what the face units cut open there (the eye on the person's left)."""
-AWAY_M = 0.45
 EEVEE_SAMPLES = 32
 
 
 @dataclass(frozen=True)
 class CloseUp:
     """What a picture shows: opened: how far the eyes are open; units: face units and their values; at: one of SEAMS,
-    `above_m` metres above it, seen from the side `way` [3] in the head's axes through a lens of `lens_mm`."""
+    `above_m` metres above it, seen from `away_m` metres away on the side `way` [3] in the head's axes through a lens of
+    `lens_mm`."""
 
     light: str
     at: str
@@ -42,6 +42,7 @@ class CloseUp:
     opened: float = 0.0
     units: dict[str, float] = field(default_factory=dict)
     above_m: float = 0.0
+    away_m: float = 0.45
     iris: str = ""
 
 
@@ -185,7 +186,7 @@ def aim(camera, obj, shot: CloseUp) -> None:
     basis = obj.data.shape_keys.reference_key.data
     rim = [basis[int(row)].co for row in cut.copies[cut.seam == SEAMS[shot.at]]]
     at = obj.matrix_world @ (sum(rim, Vector()) / len(rim) + Vector((0, 0, shot.above_m)))
-    camera.matrix_world.translation = at + AWAY_M * Vector(shot.way).normalized()
+    camera.matrix_world.translation = at + shot.away_m * Vector(shot.way).normalized()
     camera.rotation_euler = (at - camera.matrix_world.translation).to_track_quat('-Z', 'Y').to_euler()
     camera.data.lens, camera.data.clip_start = shot.lens_mm, 0.01
 

@@ -4,7 +4,8 @@
 the flat true tone.
 
     python -m benchmarks.delight [--data DIR] [--sets NAME ...] [--capture NAME=FOLDER ...] [--opendelight PATH]
-    [--quick] [--json OUT] [--pictures FOLDER]
+    [--quick] [--json OUT]
+    python -m benchmarks.delight --sets portraits --picture docs/pictures/delighters.jpg
 
 Sets: faceolat (--data: laid out like ../shared/data/faceolat), portraits (synthetic subjects that no training sees, six
 per group of skin tone, two lights each), lps_sun, sample, or any folder laid out as benchmarks/albedo_score.py says. A
@@ -16,7 +17,7 @@ Figures (benchmarks/delight_measures.py) are means over the pictures:
   detail             correlation of log green between 1 and 3 px with the truth's
   shadow step        what is left of the light's step at the true shadow's edge, where it exceeds 0.2 in natural log;
                      `none` has all of it
-Pictures of real people are written only where --pictures says.
+--picture shows six photographs of one set, the truth and the rows; only of synthetic people in the documentation.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ from . import figures
 from .delight_measures import flat_tone, mean_of, score_picture, sheet, shortfalls, square, table, tone_group
 from .delight_portraits import make_portraits
 from .delight_sets import Photograph, Photographs, light_stage, registered, select_true_frames
+from .gallery import write_small
 from .measures.pictures import with_gain
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -72,8 +74,10 @@ def main() -> None:
     parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
     parser.add_argument("--json", type=Path, help="where the results go; what it holds of other sets and rows stays")
-    parser.add_argument("--pictures", type=Path, help="folder for SET.png: photographs, truth and rows side by side")
+    parser.add_argument("--picture", type=Path, help="six photographs of the set, truth and rows side by side")
     options = parser.parse_args()
+    if options.picture and len(options.sets) != 1:
+        parser.error("--picture shows one set: name it with --sets")
     settings = Settings(device=options.device)
     if options.opendelight:
         settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
@@ -87,7 +91,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             try:
                 found = measure_rows(_set(name, options, captures, Path(folder)), settings, not options.quick,
-                                     options.rows, options.pictures and options.pictures / f"{title}.png")
+                                     options.rows, options.picture)
             except Problem as problem:
                 found = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
         results[title] = {**results.get(title, {}), **found}
@@ -150,9 +154,8 @@ def measure_rows(chosen: Photographs, settings: Settings, features: bool = True,
         shown.append([_shown(delit[p.name], p) for p in spread])
     print(file=sys.stderr)
     if picture:
-        images.write_srgb(picture,
-                          sheet([[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p), *delit]
-                                 for p, *delit in zip(spread, *shown, strict=True)]))
+        write_small(picture, sheet([[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p), *delit]
+                                    for p, *delit in zip(spread, *shown, strict=True)]))
     return results
 
 

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One subject's row of the gallery in docs/results/gallery.md, by one command; two lines of seven pictures:
 
-    python -m benchmarks.gallery CAPTURE OUT.jpg [--truth MAPS]
+    python -m benchmarks.gallery FOLDER/NAME.wildcap docs/pictures/gallery_NAME.jpg [--truth FOLDER/NAME/maps]
 
-captured frame, delit frame, texture, shadow mask over it, diffuse albedo, true albedo (of the folder MAPS; black
-without it), specular albedo; normals, shading, a close-up of the albedo beside the nose, the head under four lights of
-the add-on: three lamps, a window, the sun, a city. Relit pictures are Cycles's linear light under the sRGB curve,
-clipped: Blender's view transform Standard, no look, exposure as the presets have it. Renders that are newer than the
-maps are taken as they are.
+captured frame, delit frame, texture, shadow mask over it, diffuse albedo, true albedo (of --truth; black without it),
+specular albedo; normals, shading, a close-up of the albedo beside the nose, the head under four lights of the add-on:
+three lamps, a window, the sun, a city. Relit pictures are Cycles's linear light under the sRGB curve, clipped:
+Blender's view transform Standard, no look, exposure as the presets have it. Renders that are newer than the maps are
+taken as they are.
 """
 
 from __future__ import annotations

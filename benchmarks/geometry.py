@@ -11,8 +11,7 @@ pictures/NAME.jpg (scan, wireframe and texture beside the frame) and geometry.js
 without --fresh: stages that are fresh, captures that came through. Captures that are in --json's record and were not
 measured here stay there. The perceptual row needs `pip install --no-deps -r requirements/perceptual.txt`; without it
 the table says so. Every stage runs in a process of its own, so its peak memory (of the largest of its processes, as
-getrusage tells) is its own. docs/pictures/geometry.jpg is FOLDER/pictures/sample.jpg: pictures of people never go into
-the documentation.
+getrusage tells) is its own.
 """
 
 from __future__ import annotations

@@ -1,8 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sheet for the eye: frame, scan, wireframe of the head and its texture, through the cameras of the capture."""
+"""A sheet for the eye: frame, scan, wireframe of the head and its texture, through the cameras of the capture.
+
+    python -m benchmarks.geometry_pictures .demo/sample.wildcap docs/pictures/geometry.jpg
+
+Pictures of people never go into the documentation.
+"""
 
 from __future__ import annotations
+
+import argparse
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -12,7 +20,17 @@ from core.geometry import meshes, raster
 from core.geometry.views import View, read_views
 from core.imaging import images
 
+from .gallery import write_small
+
 HEIGHT = 480
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path, help="reconstructed up to its texture, as `make demo` leaves it")
+    parser.add_argument("out", type=Path)
+    asked = parser.parse_args()
+    write_small(asked.out, sheet(Capture(asked.capture)))
 
 
 def sheet(capture: Capture, views: int = 3) -> np.ndarray:
@@ -66,3 +84,7 @@ def _painted(caster: raster.RayCaster, view: View, texture: np.ndarray, scale: f
     at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)
     colour = raster.sample(texture, at).reshape(*face.shape, 3)
     return np.where((face >= 0)[..., None], colour, 0.95).astype(np.float32)
+
+
+if __name__ == "__main__":
+    main()

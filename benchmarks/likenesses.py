@@ -4,7 +4,7 @@
 benchmarks/people.py.
 
     python -m benchmarks.likenesses FOLDER [--only NAME ...] [--lights own overcast below] [--facekit FOLDER]
-    python -m benchmarks.likenesses FOLDER --sheet OUT.jpg [--beside FOLDER_OF_PICTURES]
+    python -m benchmarks.likenesses FOLDER --sheet docs/pictures/people.jpg [--beside FOLDER_OF_PICTURES]
 
 FOLDER/NAME has the video, capture.mp4, and the truth in the layout that benchmarks/albedo_score.py says, with bare/
 (albedo without hair), parts/, normal/, strands_*.npz, opened.obj, maps/ and light.json besides. In its own light a

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Each delivered file, brought back by Blender's own importer and rendered beside the head that it was made of.
 
-    python -m benchmarks.reimported [--resolution 320] [--samples 48] [--picture OUT.jpg] [--json OUT.json]
+    python -m benchmarks.reimported [--resolution 320] [--samples 48] [--picture docs/pictures/reimported.jpg]
+                                    [--json docs/figures/reimported.json]
 
 A copy of the sample head is delivered to a folder that is gone afterwards. Both heads stand under the same light before
 the same camera, with the same noise. The original is shown with and without scattering under the skin, which no

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solved heads under new light beside the true subjects under the same light: the number that artists feel.
 
-    python -m benchmarks.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]] [--picture OUT.jpg] [--json
-    OUT.json]
+    python -m benchmarks.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]] [--picture
+    docs/pictures/relit.jpg] [--json OUT.json]
 
 CAPTURE was solved from core/synthetic/sample, FOLDER was made by benchmarks/people.py. Rendered by Cycles with the
 add-on's own material and lights, of which none lit a capture, as linear EXR; both heads are the registered one. A

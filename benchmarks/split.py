@@ -5,7 +5,8 @@ and what it takes for granted.
 
     python -m benchmarks.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...] [--skins FOLDER]
                                [--json PATH]
-    python -m benchmarks.split FOLDER --only NAME --picture OUT.jpg     the parts of that capture, side by side
+    python -m benchmarks.split FOLDER --only stubbled_below --picture docs/pictures/split.jpg
+                               the parts of that capture, side by side
 
 FOLDER holds captures as benchmarks/state.py measures them, several lights of each person, solved. The closed form alone
 is a second of work: the texture over the global light that it finds, of each capture alone and of all captures of a

@@ -3,7 +3,8 @@
 """Four times as many texels of a side: the network against Lanczos on subjects that no training saw, and what the
 frames add.
 
-    python -m benchmarks.upscale [--rows enlarging frames cost] [--work DIR] [--json FILE] [--picture FILE]
+    python -m benchmarks.upscale [--rows enlarging frames cost] [--work DIR] [--json FILE]
+                                 [--picture docs/pictures/upscale.jpg]
 
 enlarging: windows of the benchmark's subjects painted at 4096, reduced to 1024 as they are (plain) and softened as a
 solver leaves them (soft). PSNR, SSIM per map, FLIP and the distance in EfficientNet-Lite0's features (not LPIPS) for

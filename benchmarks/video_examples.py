@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a video should and should not look like, for the guide, made with the synthetic subject.
 
-    python -m benchmarks.video_examples FOLDER
+    python -m benchmarks.video_examples docs/pictures
 
-film_good.jpg: five frames of one arc from ear to ear. film_bad.jpg: moved too fast, from too far, too near, a bare
-background, burnt out, too dark.
+docs/pictures/film_good.jpg: five frames of one arc from ear to ear. docs/pictures/film_bad.jpg: moved too fast, from
+too far, too near, a bare background, burnt out, too dark.
 """
 
 from __future__ import annotations

@@ -18,9 +18,12 @@ def test_shots_are_cut_reduced_and_laid_side_by_side(tmp_path):
         shot = np.zeros((100, 200, 3), np.float32)
         shot[20:80, 50:150] = colour
         images.write_srgb(tmp_path / f"{name}.png", shot)
-    drawn = draw(WindowPicture(("left", "right"), 50, (0.25, 0.2, 0.75, 0.8)), tmp_path)
+    box = (0.25, 0.2, 0.75, 0.8)
+    drawn = draw(WindowPicture(("left", "right"), 50, (box,)), tmp_path)
     assert drawn.shape == (30, 100, 3)
     assert np.allclose(drawn[:, :50], (1, 0, 0)) and np.allclose(drawn[:, 50:], (0, 0, 1))
+    drawn = draw(WindowPicture(("left", "right"), 50, ((0.0, 0.0, 0.25, 0.3), box)), tmp_path)
+    assert np.allclose(drawn[:20, :50], 0) and np.allclose(drawn[:, 50:], (0, 0, 1)), "each shot has a box of its own"
 
 
 def test_a_picture_without_its_screenshot_stays(tmp_path, monkeypatch, capsys):

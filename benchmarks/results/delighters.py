@@ -54,7 +54,8 @@ def sections(delight: Figures) -> Sections:
         ![Synthetic people of six tones, their albedo, and four ways to delight them](../pictures/delighters.jpg)
 
         *One portrait per group of skin tone: the picture, its true albedo, the picture as it is after a gain per
-        channel, the flat true tone, the network on one photograph (`--sets portraits --pictures FOLDER`).*
+        channel, the flat true tone, the network on one photograph (`--sets portraits --picture
+        docs/pictures/delighters.jpg`).*
 
         `--quick` takes every fourth picture and leaves the feature distance out; `--weights FILE` measures other
         weights of our network, `--opendelight FOLDER` the authors' checkpoint.
