@@ -157,6 +157,22 @@ def test_lids_and_tears_keep_to_an_eye_however_it_is_opened_and_turned(close_up,
             assert np.minimum(from_lid, from_ball).max() < 3e-4
 
 
+def test_a_lid_is_one_sheet_of_skin(close_up, addon):
+    """A second one close behind it would make it a slab that light shines through: rays from before each lid, a
+    millimetre off its rim, meet the head once within a centimetre."""
+    set_face(close_up, 0.5)
+    rows, asset = as_set(close_up), addon("acting.asset").load()
+    skin = tree_of(close_up)
+    for number in (0, 1):
+        rims = addon("acting.close_up.ball").rims(asset, number)
+        for rim, off in ((rims.upper, 0.0015), (rims.lower, -0.0015)):
+            for place in rows[rim[10:-10]]:
+                start, met = mathutils.Vector(place + [0, -0.02, off]), 0
+                while (hit := skin.ray_cast(start, (0, 1, 0), 0.03))[0] is not None and hit[0].y < place[1] + 0.003:
+                    start, met = hit[0] + mathutils.Vector((0, 1e-5, 0)), met + 1
+                assert met == 1, (number, off, place)
+
+
 def test_it_goes_as_it_came_and_an_undo_takes_it_back(head, addon):  # noqa: F811
     before = {name: {block.name for block in getattr(bpy.data, name)}
               for name in ("objects", "meshes", "materials", "images", "node_groups", "shape_keys")}

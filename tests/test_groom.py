@@ -105,6 +105,18 @@ def test_what_was_combed_stays_and_the_rest_grows_anew(strands, addon):
     assert lengths == pytest.approx(0.5 * 0.006 * np.hypot(1, 0.2), rel=1e-3)
 
 
+def test_a_beard_is_as_long_as_the_artist_says_and_as_it_was_grown_where_they_say_nothing(capture, strands, addon):
+    with np.load(capture / "maps" / "strands.npz") as stored:
+        arrays = dict(stored)
+    arrays |= {name.replace("brows", "beard"): values for name, values in arrays.items() if name.startswith("brows")}
+    with replacing(capture / "maps" / "strands.npz") as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(file, **arrays)
+    for told, length_mm in ((0.0, 6 * np.hypot(1, 0.2)), (3.0, 3.0)):
+        bpy.ops.wildcap.grow_hair(beard_mm=told)
+        points = places(addon("groom.curves").of(head())[-1]).reshape(40, 5, 3)
+        assert 1000 * np.linalg.norm(points[:, -1] - points[:, 0], axis=1) == pytest.approx(length_mm, rel=1e-3)
+
+
 def test_what_was_thickened_stays_and_data_in_another_use_is_kept(strands, addon):
     bpy.ops.wildcap.grow_hair()
     brows, lashes = addon("groom.curves").of(head())

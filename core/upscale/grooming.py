@@ -10,7 +10,7 @@ w) of the skin bare, so n = -log(1 - cover) / (L w).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from ..contract.files import replacing
 from ..face import lids, strands, template
 from ..face.strands import Roots, Strands
-from . import strokes, ways
+from . import stroke_length, strokes, ways
 from .hair import Hair
 from .maps import HeadMaps
 from .strokes import HairTexels
@@ -63,8 +63,15 @@ class HairKind:
 
 
 KINDS = (HairKind("brows", (7.0, 1.3), 0.08, 0.30, 3.0, 0.35), HairKind("beard", (6.0, 1.5), 0.11, 0.45, 1.5, 0.25))
-"""Measures of usual hairs; in a mask, several can share a place. How long a beard is no texture tells: the button in
-Blender scales it."""
+"""Measures of usual hairs; in a mask, several can share a place. How long a beard is beyond stubble no texture tells:
+hairs lie over one another, and the button in Blender scales it."""
+STUBBLE = HairKind("beard", (1.0, 0.25), 0.08, 0.75, 0.75, 0.25)
+"""Hairs of stubble, each of its own root, in the length of its strokes where these are resolved."""
+STUBBLE_MM = 2.0
+"""Strokes that are shorter are whole hairs, as stubble has them."""
+SHADE_BLUE_SHARE = 0.22
+"""Share of blue light that a shaven beard below the skin takes at most (synthetic/hairs.py): more than that is taken by
+hair above it."""
 LASH = {"upper": (110, 9.0), "lower": (60, 5.5)}
 """Lashes of a lid and their length in mm."""
 LASH_DIAMETER_MM, LASH_ALBEDO_RATIO, LASH_LIGHTEST_LINEAR = 0.1, 0.4, 0.05
@@ -101,9 +108,14 @@ def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface,
         texels, texel = strokes.lay_texels(surface, where), float(np.median(surface.texel[where]))
         seen = 1 - hair.hidden  # what lies before a brow is no stroke of it, and not its colour
         tensors = strokes.measure_tensors(maps.diffuse, texels, texel) * seen[where][:, None, None]
-        way = strokes.choose_ways(tensors, texels, ways.usual(kind.name, texels.position, landmarks), trust)
+        usual = ways.usual(kind.name, texels.position, landmarks)
+        way = strokes.choose_ways(tensors, texels, usual, trust)
         colours = _unmix(maps.diffuse, cleaned, cover * where * seen, COLOUR_REACH_MM / texel)[where]
         check()
+        if kind.name == "beard" and not _covers(maps.diffuse[where], cleaned[where], kind):
+            kind = _as_long_as_seen(kind, stroke_length.measure(_light(maps.diffuse), texels, usual, texel))
+            if kind.length[0] < STUBBLE_MM and "brows" in hairs:  # its shade is the skin's
+                colours = np.broadcast_to(hairs["brows"].colour.mean(0), colours.shape)
         hairs[kind.name] = _grown(kind, cover[where], colours, texels, way, surface,
                                   np.random.default_rng([seed, number]))
     if "brows" in hairs:
@@ -120,6 +132,26 @@ def write(path: Path, strands_of: dict[str, Strands]) -> None:
         arrays |= {f"{part}_points": hairs.points, f"{part}_radius": hairs.taper(), f"{part}_colour": hairs.colour}
     with replacing(path) as temporary, open(temporary, "wb") as file:
         np.savez_compressed(file, **arrays)
+
+
+def _covers(albedo: np.ndarray, skin: np.ndarray, kind: HairKind) -> bool:
+    """Whether a beard takes more blue from the skin [N, 3] below it, to the albedo [N, 3], than its shade and stubble
+    together can."""
+    taken = 1 - float(albedo[:, 2].mean() / max(skin[:, 2].mean(), 1e-6))
+    stubble = 1 - np.exp(-STUBBLE.most * STUBBLE_MM * TAPER * kind.diameter)
+    return taken > 1 - (1 - SHADE_BLUE_SHARE) * (1 - stubble)
+
+
+def _as_long_as_seen(kind: HairKind, stroke_mm: float) -> HairKind:
+    """The kind for strokes of that length, 0 where they have none: stubble for short ones."""
+    if stroke_mm >= STUBBLE_MM:
+        return kind
+    length = stroke_mm or STUBBLE.length[0]
+    return replace(STUBBLE, length=(length, 0.25 * length))
+
+
+def _light(albedo: np.ndarray) -> np.ndarray:
+    return np.log(np.maximum(albedo, DARKEST_LINEAR)).mean(-1).astype(np.float32)
 
 
 def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairTexels, way: np.ndarray,

@@ -17,6 +17,9 @@ SOFT, LEFT_EYE, RIGHT_EYE, JAWS = range(4)
 SIDES = ("Left", "Right")
 HALF = "eyesHalf"
 """With a side the name of a key that is no unit: it is driven, and bends the way of the lids around the ball."""
+SOCKETS_M = -0.02
+"""Height below the eyes' middle above which what is soft inside is a socket, and not the mouth
+(core/face/eye_asset.py)."""
 GAZE = tuple(f"eye{kind}" for kind in ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide"))
 """Units that mean an open eye: each opens the lids of its side as far as it is used."""
 
@@ -59,6 +62,11 @@ def load() -> FaceUnits:
                          stored["anchors"].astype(int),
                          weights / np.maximum(weights.sum(1, keepdims=True), 1e-9), stored["parts"] * step,
                          stored["balls"].astype(np.float64), mirror, units)
+
+
+def sockets(asset: FaceUnits) -> np.ndarray:
+    """Which inner vertices [n] line the sockets behind the lids, of P."""
+    return np.flatnonzero((asset.kind == SOFT) & (asset.parts[:, 2] > SOCKETS_M))
 
 
 def _unit(stored, name: str, mirror: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,11 +11,7 @@ import numpy as np
 
 from ...core.contract.capture import Capture
 from ...core.contract.eyes_record import Eyeball, read_eyes, read_irises
-from .asset import SOFT, FaceUnits
-
-SOCKETS_M = -0.02
-"""Height below the eyes' middle above which what is soft inside is a socket, and not the mouth
-(core/face/eye_asset.py)."""
+from .asset import FaceUnits, sockets
 
 
 @dataclass(frozen=True)
@@ -36,8 +32,7 @@ def read(capture: Capture, asset: FaceUnits) -> FilmedEyes | None:
     lines = capture.head_open.read_text(encoding="ascii").splitlines()
     places = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], np.float64)
     count, copies = len(asset.template), len(asset.copies)
-    sockets = np.flatnonzero((asset.kind == SOFT) & (asset.parts[:, 2] > SOCKETS_M))
-    rows = np.concatenate([np.arange(count), count + np.flatnonzero(asset.seam > 0), count + copies + sockets])
+    rows = np.concatenate([np.arange(count), count + np.flatnonzero(asset.seam > 0), count + copies + sockets(asset)])
     if len(places) != len(rows):
         return None
     return FilmedEyes(read_eyes(capture), rows, places, read_irises(capture))

@@ -15,8 +15,6 @@ from .. import captures, status
 from ..base_operator import HeadOperator
 from . import curves
 
-BEARD_MM = 6.0
-"""Length to which the worker grows a beard; how long one is, its albedo does not tell."""
 MOST_BYTES = 256 << 20
 """A million hairs; more is no beard, and would take the memory before it is seen to be damaged."""
 AGAIN = advise_again("upscale")
@@ -31,8 +29,9 @@ class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     beard_mm: bpy.props.FloatProperty(
-        name="Beard Length (mm)", default=BEARD_MM, min=0.5, max=60.0,
-        description="How long a beard is, which its picture does not tell: stubble has 1 to 2 mm")
+        name="Beard Length (mm)", default=0.0, min=0.0, max=60.0,
+        description="Mean length of the beard's hairs; 0: as long as stubble's strokes are in the albedo, and 6 mm for "
+                    "a beard, whose length its picture does not tell")
     length: bpy.props.FloatProperty(name="Length", description="Times the length of brows and lashes", default=1.0,
                                     min=0.2, max=3.0)
     thickness: bpy.props.FloatProperty(name="Thickness",
@@ -48,7 +47,9 @@ class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
         combed = []
         for part, (points, radius, colour) in strands.items():
             kept = np.random.default_rng(0).permutation(len(points)) < round(self.share * len(points))
-            factor = self.beard_mm / BEARD_MM if part == "beard" else self.length
+            factor = self.length
+            if part == "beard":
+                factor = self.beard_mm / mean_length_mm(points) if self.beard_mm else 1.0
             points = points[:, :1] + factor * (points - points[:, :1])
             if not curves.grow_part(context, obj, part, points[kept], self.thickness * radius[kept], colour[kept]):
                 combed.append(curves.TITLES[part])
@@ -56,6 +57,11 @@ class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
         if combed:
             self.report({'INFO'},
                         f"{', '.join(combed)}: left as you combed them; delete them to grow them anew")
+
+
+def mean_length_mm(points: np.ndarray) -> float:
+    """Of hairs [M, K, 3] in metres."""
+    return max(1000 * float(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1).mean()), 1e-3)
 
 
 def keep_up(obj, capture: Capture) -> None:

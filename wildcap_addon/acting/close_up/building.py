@@ -58,6 +58,8 @@ def remove(obj) -> None:
     if modifier is not None:
         nodes.modify(obj, modifier.node_group, Lining=None)  # Blender 5.2 would go on counting it as a user
         obj.modifiers.remove(modifier)
+    if nodes.SOCKET in obj.data.attributes:
+        obj.data.attributes.remove(obj.data.attributes[nodes.SOCKET])
     things = of(obj)
     made = {slot.material for thing in things for slot in thing.material_slots if slot.material is not None
             and of_the_head.KEY in slot.material}

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...data_blocks import read_field
 from .. import materials as of_the_head
-from ..asset import LEFT_EYE, SIDES, FaceUnits, load
+from ..asset import LEFT_EYE, SIDES, FaceUnits, load, sockets
 from . import ball, keeping, materials, nodes, shapes
 
 REACH_M = 0.00042
@@ -72,8 +72,18 @@ def build(obj, keep, iris_m: tuple[float, float]) -> None:
         keep(f"{side} Wet Line", _along_lids(f"{obj.name} {side} Wet Line", rims, {"reach": REACH_M}), finish_wet)
         keep(f"{side} Caruncle", _caruncle(f"{obj.name} {side} Caruncle", rims, asset), finish_flesh)
         shells.append(shell)
-    first = len(asset.template) + len(asset.copies) + int(np.flatnonzero(asset.kind == LEFT_EYE)[0])
-    nodes.modify(obj, nodes.lids_on_eyes(), Left=shells[0], Right=shells[1], First=first)
+    inner = len(asset.template) + len(asset.copies)
+    _mark(obj.data, inner + sockets(asset))
+    nodes.modify(obj, nodes.lids_on_eyes(), Left=shells[0], Right=shells[1],
+                 First=inner + int(np.flatnonzero(asset.kind == LEFT_EYE)[0]))
+
+
+def _mark(mesh, rows: np.ndarray) -> None:
+    """Notes of the head's vertices which ones [n] line the sockets: the lids' geometry nodes take them away."""
+    lining = np.zeros(len(mesh.vertices), bool)
+    lining[rows] = True
+    layer = mesh.attributes.get(nodes.SOCKET) or mesh.attributes.new(nodes.SOCKET, 'BOOLEAN', 'POINT')
+    layer.data.foreach_set("value", lining)
 
 
 def _turned(name: str, shape: shapes.Turned, number: int):

@@ -18,6 +18,8 @@ SUNK_M = 0.0004
 """How far the caruncle begins within the rims of the lids, and ends within the ball."""
 FOOT_M = 0.0001
 """How far a lid's margin goes on within the ball."""
+SOCKET = "wildcap_socket"
+"""Attribute of the head's vertices: those that line the sockets."""
 MOUTH_SLOT = 2
 """Of the head's materials, the one of its mouth's inside (acting/materials.py)."""
 
@@ -85,7 +87,10 @@ def modify(obj, tree, **inputs) -> None:
 
 def lids_on_eyes() -> bpy.types.NodeTree:
     """Moves lids out of the eyes, takes away what the close-up's own objects stand for (vertices from First on, which
-    are the head's last ones), and gives the inside of the cheeks the material Lining."""
+    are the head's last ones, and the sockets' lining), and gives the inside of the cheeks the material Lining.
+
+    With the lining half a millimetre behind it, a lid would be a slab thinner than the way of red and green light in
+    skin: the sun would shine through its rim, yellow on dark skin."""
     return group(LIDS,
                  {"Left": 'NodeSocketObject', "Right": 'NodeSocketObject', "First": 'NodeSocketInt',
                   "Lining": 'NodeSocketMaterial'}, _lids)
@@ -127,7 +132,9 @@ def _lids(tree, inputs):
         geometry = add(tree, 'GeometryNodeSetPosition',
                        {"Geometry": geometry, "Selection": lid, "Offset": scaled(tree, out, short)}).outputs[0]
     beyond = math(tree, 'GREATER_THAN', index, math(tree, 'SUBTRACT', inputs["First"], 0.5))
-    kept = add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": beyond},
+    gone = add(tree, 'FunctionNodeBooleanMath', (beyond, _attribute(tree, SOCKET, 'BOOLEAN')),
+               operation='OR').outputs[0]
+    kept = add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": gone},
                domain='POINT').outputs[0]
     mouth = math(tree, 'COMPARE', add(tree, 'GeometryNodeInputMaterialIndex').outputs[0], float(MOUTH_SLOT), 0.5)
     return add(tree, 'GeometryNodeSetMaterial',
