@@ -54,11 +54,11 @@ def test_strokes_are_as_long_as_they_were_painted_however_sharp_the_picture_is(l
     for blur in (0, 1.5):
         light = painted(length_mm)
         light = cv2.GaussianBlur(light, (0, 0), blur) if blur else light
-        assert stroke_length.measure(light, *chin(), texel()) == pytest.approx(length_mm, rel=0.4)
+        assert stroke_length.measure_stroke_length(light, *chin(), texel()) == pytest.approx(length_mm, rel=0.4)
 
 
 def test_strokes_across_the_beard_are_none_of_its_hairs():
-    assert stroke_length.measure(painted(3.0, across=True), *chin(), texel()) == 0
+    assert stroke_length.measure_stroke_length(painted(3.0, across=True), *chin(), texel()) == 0
 
 
 def beard(light: np.ndarray) -> np.ndarray:

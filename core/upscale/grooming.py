@@ -20,9 +20,10 @@ from scipy.spatial import cKDTree
 from ..contract.files import replacing
 from ..face import lids, strands, template
 from ..face.strands import Roots, Strands
-from . import stroke_length, strokes, ways
+from . import strokes, ways
 from .hair import Hair
 from .maps import HeadMaps
+from .stroke_length import measure_stroke_length
 from .strokes import HairTexels
 from .surface import HeadSurface
 
@@ -113,7 +114,8 @@ def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface,
         colours = _unmix(maps.diffuse, cleaned, cover * where * seen, COLOUR_REACH_MM / texel)[where]
         check()
         if kind.name == "beard" and not _covers(maps.diffuse[where], cleaned[where], kind):
-            kind = _as_long_as_seen(kind, stroke_length.measure(_light(maps.diffuse), texels, usual, texel))
+            length = measure_stroke_length(_light(maps.diffuse), texels, usual, texel)
+            kind = _as_long_as_seen(kind, length)
             if kind.length[0] < STUBBLE_MM and "brows" in hairs:  # its shade is the skin's
                 colours = np.broadcast_to(hairs["brows"].colour.mean(0), colours.shape)
         hairs[kind.name] = _grown(kind, cover[where], colours, texels, way, surface,

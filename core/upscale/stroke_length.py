@@ -25,7 +25,7 @@ ROW = 1024
 """Texels in a row of what cv2 takes at once."""
 
 
-def measure(light: np.ndarray, texels: HairTexels, way: np.ndarray, texel: float) -> float:
+def measure_stroke_length(light: np.ndarray, texels: HairTexels, way: np.ndarray, texel: float) -> float:
     """Length of strokes in mm along the skin; 0 where they are no longer along `way` than across it.
 
     Parameters
