@@ -55,18 +55,19 @@ WORDS = ("Four people whose every hair is known, from nine sides through a phone
          "whether a fringe hides them or not. *Off*: the median angle on the skin between each true hair and the "
          "nearest grown one within 3 mm, from root to tip; *off, "
          "usual*: the same of hair that lies as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and "
-         "20 degrees. Nothing was chosen on these "
+         "20 degrees. Nothing but the rule for stubble was chosen on these "
          "four. How clear strokes must be to outweigh the usual direction was, on seeds 3, 5 and 13, and there the "
          "rule that joins the parser's answer with "
          "the strokes was looked at, too. *mm*: mean length of the hairs.\n\n"
-         "Stubble is told from a beard where its strokes are shorter than 2 mm and no more blue light is missing than "
-         "stubble and the shade of a shaven beard take; then a hair is as long as a stroke "
-         "(core/upscale/stroke_length.py). That rule was looked at on these people.\n\n"
+         "A beard is stubble where its strokes are shorter than 2 mm and no more blue light is missing than stubble "
+         "and the shade of a shaven beard take, the shade as these people's generator paints it; then a hair is as "
+         "long as a stroke (core/upscale/stroke_length.py). That rule was made with these people in view, and on no "
+         "others.\n\n"
          "Where it falls short: of a beard no length is told, its hairs are 6 mm long on everybody (*Beard Length* is "
-         "the artist's). Stubble covers hardly anywhere a tenth of a millimetre's surroundings, so that its IoU "
-         "compares where hairs happen to lie together; it has the brows' colour. Where both brows lie behind a fringe, "
+         "the artist's). Stubble hides little of the skin, so its IoU mostly compares where hairs happen to lie close "
+         "together; its hairs have the brows' colour. Where both brows lie behind a fringe, "
          "usual ones are grown, in no colour of the person's. Dark brows become a little wider than by dark strokes "
-         "alone (an IoU of 0.88 and 0.87 before on the bearded and the stubbled man).")
+         "alone.")
 CHOSEN_ON, TRUSTS, TURNS = (3, 5, 13), (0.03, 0.1, 0.3, 1.0, 3.0), (-40, 0, 40)
 """People on whom the trust in strokes was chosen; degrees by which the usual directions are turned, for nobody's hair
 is all as usual."""

@@ -32,7 +32,7 @@ from core.geometry import meshes
 from core.geometry.views import View, read_views
 from core.imaging import images
 from core.registration import eye_looks, eyeballs, landmarks
-from core.solve.iris import RING_SHARES, measure_both
+from core.solve.iris import RING_SHARES, measure_both_irises
 from core.synthetic.people import eyes
 from core.synthetic.people.figure import paint
 from core.synthetic.people.person import sample_person
@@ -122,7 +122,7 @@ def fit_alone(folder: Path) -> dict[str, dict]:
 def irises_over_own_skin(views: list[View], fitted: eyeballs.OpenEyes, seed: int) -> tuple | None:
     """Linear albedo of the left and the right iris by a person's true skin, where no solve has found it."""
     head = FilmedHead(fitted.head, fitted.opened.skin, [ball.mesh for ball in fitted.opened.balls])
-    return measure_both(views, head, fitted.records(), paint(sample_person(seed), SKIN_TEXELS)[1], QUIET)
+    return measure_both_irises(views, head, fitted.records(), paint(sample_person(seed), SKIN_TEXELS)[1], QUIET)
 
 
 def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int, pose: tuple) -> dict:

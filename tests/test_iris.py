@@ -100,7 +100,7 @@ def test_an_eye_in_the_shade_takes_half_of_it_from_the_other(monkeypatch):
     monkeypatch.setattr(iris, "measure_iris_colour", lambda views, head, side, *_: told[side])
 
     def found():
-        return iris.measure_both([], None, (None, None), None, Reporter("solve"))
+        return iris.measure_both_irises([], None, (None, None), None, Reporter("solve"))
 
     assert found() == ((0.06, 0.08, 0.1),) * 2
     told[1] = None  # no frame shows it

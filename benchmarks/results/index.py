@@ -33,8 +33,9 @@ def sections(*records: Figures) -> Sections:
     return [("", prose("""
         Every page has command, commit and day of its figures, all on 2 cores of a shared machine (25 GB; each page
         names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only, and may be
-        older. The sample and the state of the albedo are by delighter and solver as they are; the sample's relit rows
-        are by those of the day before, the delighter's answers by a delighter that took short beards for shade.
+        older. The sample and the state of the albedo are by delighter and solver as they are; relit rows and teaser are
+        by a delighter that left more of a shadow's outline, the delighter's answers by one that took short beards for
+        shade, too.
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),
@@ -151,8 +152,9 @@ def losses(of: Figures) -> str:
           error, aim 0.4 ([page](confidence.md)).
         - **In even studio light the solve makes the texture worse** ([controlled](controlled.md)).
         - **A scalp that nobody saw becomes bare skin** ({scalp.completed:.0f} of 255 off where hair was;
-          [whole head](whole_head.md)); a cap, or a cloth of the skin's colour, is not told from hair or skin; stubble
-          is grown like a beard ([hair](hair.md)); under open lids skin is made up, which a blink shows.
+          [whole head](whole_head.md)); a cap, or a cloth of the skin's colour, is not told from hair or skin; a
+          beard's length is not measured, and stubble is told from it by a rule made with four people in view
+          ([hair](hair.md)); under open lids skin is made up, which a blink shows.
         - **The prior is small**, of synthetic skins and few real ones, trained on a shared CPU ([prior](prior.md)): on
           the scan it takes fine detail with the shadow. The authors' own weights were not at hand: their loader and
           loop are verified with random ones only ([how far](../authors_prior.md)).

@@ -44,8 +44,8 @@ DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 FACE_MARGIN = 1.35  # side of the square, in sides of the face's landmarks; training shows 1.25 to 2
 SEAM_ZONE_CELLS, SEAM_FINE_CELLS = 2 * WINDOW_CELLS, 2 / 3
-"""So far about a shadow's edge the answer is blurred, as it was lifted through two windows one after the other; and the
-deviation below which detail is the skin's own."""
+"""How far the lift blurs the answer about a shadow's edge, through two windows one after the other; and the deviation
+below which detail is the skin's own, a third of that, about as the delighter Shading has it (occlusion.py)."""
 FADE_SHARE = 0.06  # of the square's side: along its border it gives way to the fitted light
 
 
@@ -207,19 +207,21 @@ def _divided(srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray,
     size = round(look.box[2])
     log = np.log(np.maximum(crop(linear, look.box, size), MIN_LINEAR))
     shading, shadow = lift_shading(look.shading, log), lift_share(look.shadow, log)
-    cell, bare = size / len(skin), cv2.resize(skin, (size, size), interpolation=cv2.INTER_LINEAR) > 0.5
-    shading = shading + remove_seams(log - shading, 1 - shadow, bare, SEAM_ZONE_CELLS * cell, SEAM_FINE_CELLS * cell)
+    cell, skin = size / len(skin), cv2.resize(skin, (size, size), interpolation=cv2.INTER_LINEAR)
+    shading = shading + remove_seams(log - shading, 1 - shadow, skin > 0.5, SEAM_ZONE_CELLS * cell,
+                                     SEAM_FINE_CELLS * cell)
     y, x = np.mgrid[0:srgb.shape[0], 0:srgb.shape[1]]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]
     within = np.minimum(at, size - at).min(1).reshape(srgb.shape[:2])  # pixels to the square's border
     inside = within >= 0
-    shading, shadow = (sample(layer, at).reshape(*srgb.shape[:2], *layer.shape[2:]) for layer in (shading, shadow))
+    shading, shadow, skin = (sample(layer, at).reshape(*srgb.shape[:2], *layer.shape[2:])
+                             for layer in (shading, shadow, skin))
     shadow = shadow * inside
     if fitted is not None:
         share = np.clip(within / (FADE_SHARE * size), 0, 1).astype(np.float32)
         shading, shadow = continue_beyond(shading, shadow, share, *fitted)
     albedo = linear / np.exp(shading)
-    bare = inside & (sample(skin, at * len(skin) / size).reshape(inside.shape) > 0.5)
+    bare = inside & (skin > 0.5)
     bright = float(np.quantile(albedo[bare].max(-1), 0.75)) if bare.any() else 0.0
     return images.linear_to_srgb(albedo
                                  * min(1.0, MAX_ALBEDO / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(np.float32)

@@ -83,6 +83,7 @@ def remove_seams(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, zo
     sure = head & (distance > zone_px)
     known = cv2.GaussianBlur(sure.astype(np.float32), (0, 0), 0.7 * zone_px)
     excess = _mean_over(log_albedo, head, fine_px) - _mean_over(log_albedo, sure, 0.7 * zone_px)
+    # the share is blurred as far as the zone reaches, so its two levels lie beyond
     about = np.ones((2 * max(1, round(1.5 * zone_px)) + 1,) * 2, np.uint8)
     step = np.clip(cv2.dilate(share, about) - cv2.erode(share, about), 0, 1)
     ramp = np.clip(2 * (1 - distance / zone_px), 0, 1) * np.clip(known / 0.05, 0, 1) * step * head

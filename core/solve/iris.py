@@ -65,7 +65,7 @@ def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Rep
     if not (head.built_in and capture.eyes.is_file() and capture.frames_json.is_file() and capture.cameras.is_dir()):
         return
     views = [view for view in read_views(capture) if view.path.is_file()]
-    colours = measure_both(views, head, read_eyes(capture), albedo, report)
+    colours = measure_both_irises(views, head, read_eyes(capture), albedo, report)
     if colours is None:
         return
     write_irises(capture.irises, *colours)
@@ -73,7 +73,7 @@ def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Rep
         report.figure(f"{side}_iris_srgb", [round(float(v), 3) for v in images.linear_to_srgb(np.array(colour))])
 
 
-def measure_both(views: list[View], head: Head, eyes: tuple[Eyeball, Eyeball], albedo: np.ndarray,
+def measure_both_irises(views: list[View], head: Head, eyes: tuple[Eyeball, Eyeball], albedo: np.ndarray,
                  report: Reporter) -> tuple[Colour, Colour] | None:
     """The linear albedo of the left and of the right iris; None where no frame shows either.
 
