@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from importlib import import_module
 
+import numpy as np
+
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
 from ..people import PEOPLE
@@ -70,10 +72,10 @@ def headline(of: Figures) -> str:
             ["the delit texture", over_people(summary, "delit texture"), *others("delit")],
             ["**WildCap**", over_people(summary, "solved"), *others("solved")],
             ["the true albedo's texture", over_people(summary, "true light"), None, None, None, None]]
-    head = ["PSNR, dB", "[albedo, people like people](state.md)", "[albedo, sample](sample.md)",
+    head = ["PSNR, dB", f"[albedo, {summary.solved.psnr.people} people](state.md)", "[albedo, sample](sample.md)",
             "[albedo, head scan](scan.md)", "[relit, sample](relit.md)", "[relit, six people](relit.md)"]
     return prose(markdown(head, rows), f"""
-        The true skin tone is given to all; on people like people each picture gets one gain per channel on top. On
+        The true skin tone is given to all; in the first column each picture gets one gain per channel on top. On
         sample and scan the filmed frames stand for their texture. A face takes [{minutes.standard.minutes:.1f} minutes
         on 2 cores](costs.md), of 300 frames {minutes["frames-300"].minutes:.1f}.
         """)
@@ -92,7 +94,8 @@ def spread(state: Figures) -> str:
         mean), and {solved.psnr_shared.difference:+.2f} ± {solved.psnr_shared.error:.2f} dB on the map up to one shared
         light: from {least:+.2f} dB (`{worst}`) to {most:+.2f} dB (`{best}`). Where a person was filmed in several
         lights ({solved.agreement.people} of them) it adds {solved.agreement.difference:+.2f} dB to how well the albedos
-        agree. {worse_in_the_picture(gains["psnr"])} {the_synthetic(state.people.solved)} [The page](state.md).
+        agree. {worse_in_the_picture(gains["psnr"])} {the_synthetic(state.people.solved)} {gains_by_kind(state.people)}
+        [The page](state.md).
         """)
 
 
@@ -107,10 +110,27 @@ def worse_in_the_picture(gains: dict[str, float]) -> str:
 def the_synthetic(people: Iterable[str]) -> str:
     """How many people are of benchmarks/likenesses.py, and how many of benchmarks/people.py."""
     made = [name for name in people if not is_scanned(name)]
-    bald = [name for name in made if any(f"{name}_".startswith(f"{person.name}_") for person in PEOPLE)]
+    bald = [name for name in made if is_bald(name)]
     kinds = [(len(made) - len(bald), "with strands, eyes and a phone's pipeline"),
              (len(bald), "bald, by true cameras")]
     return f"The others are synthetic: {', '.join(f'{count} {what}' for count, what in kinds if count)}."
+
+
+def gains_by_kind(people: Figures) -> str:
+    """What the solve adds in the picture to the bald, and to all others; '' where there are not some of both."""
+    kinds: dict[bool, list[float]] = {True: [], False: []}
+    for name, solved in people.solved.items():
+        kinds[is_bald(name)].append(solved["psnr"] - people["delit texture"][name]["psnr"])
+    if min(map(len, kinds.values())) < 2:
+        return ""
+    bald, others = (f"{np.mean(gains):+.2f} ± {np.std(gains, ddof=1) / len(gains) ** 0.5:.2f} dB"
+                    for gains in kinds.values())
+    return f"To the bald, of the generator that trained the networks, the solve adds {bald}, to the others {others}."
+
+
+def is_bald(name: str) -> bool:
+    """Whether a person is of benchmarks/people.py."""
+    return any(f"{name}_".startswith(f"{person.name}_") for person in PEOPLE)
 
 
 def is_scanned(name: str) -> bool:

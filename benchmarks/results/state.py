@@ -12,8 +12,8 @@ TITLE = "The state of the albedo"
 SAYS = ("People like people, by the measures that tell light from skin, beside answers that do nothing or know the "
         "light.")
 RECORDS = ("state",)
-CHOSEN = ("How far the fitted light counts in the delit texture was chosen on these people among others; what it is "
-          "worth to people who are left out of the choice is on [the page of answers](answers.md).")
+CHOSEN = ("How far the fitted light counts in the delit texture was chosen on these people but the six bald, and on "
+          "others; what it is worth to people who are left out of the choice is on [the page of answers](answers.md).")
 
 
 def sections(record: Figures) -> Sections:
