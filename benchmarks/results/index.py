@@ -35,9 +35,9 @@ def sections(*records: Figures) -> Sections:
     return [("", prose("""
         Every page has command, commit and day of its figures, all on 2 cores of a shared machine (25 GB; each page
         names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only, and may be
-        older. The sample and the state of the albedo are by delighter and solver as they are; relit rows and teaser are
-        by a delighter that left more of a shadow's outline, the delighter's answers by one that took short beards for
-        shade, too.
+        older. The sample and the state of the albedo are by delighter and solver as they are; relit rows are by a
+        delighter that left more of a shadow's outline, the delighter's answers by one that took short beards for shade,
+        too.
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),
