@@ -22,7 +22,7 @@ PYTHON3.13 ?= $(firstword $(shell python3.13 -c 'import sys; print(sys.executabl
 .blenders/5.1.% .blenders/5.2.%: OWN_PYTHON = $(PYTHON3.13)
 
 # What of the tests needs Blender.
-IN_BLENDER = addon artists_work captures setup evidence choices eyedropper white_card paint paint_session paint_left operators job_life live relight working_space skin_material skin_kept reel groom gaze close_up close_up_kept make next_step refusals draw translations sending acting acting_changed cut_open updates delete_face save_report batch_panel batch_walk
+IN_BLENDER = addon artists_work captures setup evidence choices eyedropper white_card paint paint_session paint_left operators job_life live relight working_space skin_material skin_kept reel groom gaze close_up close_up_kept tongue make next_step refusals draw translations sending acting acting_changed cut_open updates delete_face save_report batch_panel batch_walk
 
 .PHONY: demo test test-failed results test-blenders test-gui test-gui-newest zip site clean
 

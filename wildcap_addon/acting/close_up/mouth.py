@@ -11,39 +11,18 @@ import bpy
 import numpy as np
 
 from ..asset import FaceUnits, load
-from . import ball, materials, mouth_shapes, nodes
-
-SHOWN_M, FARTHEST_M = 0.001, 0.006
-"""How far the upper teeth end below where the lips meet, as most people's do, and how far they are moved for it at
-most: the bands of the built-in head are carried by the face around them, which knows nothing of where lips end."""
-WIDE_M = 0.009
-"""Half the width of the upper front teeth that are looked at for it."""
-LEAST_M = 3e-4
-"""A unit that moves jaw and tongue by less moves the lips alone."""
-OUT, OVER = "tongueOut", "tongueOver"
-RISE_M, OVER_M = 0.004, 0.006
-"""How much higher than by the unit the tip lies when the tongue is out, and how far it rises on its way: over the lower
-teeth and the lip."""
-OUT_BY = "min(tongueOut, jawOpen)"
-"""Through closed lips no tongue comes: it goes as far as the jaw is open."""
+from . import materials, mouth_shapes, nodes, tongue
+from .jaws import LEAST_M, find_jaws
 
 
 def build(obj, keep) -> None:
     """Makes or renews teeth and tongue; `keep(kind, data, finish)` is as the eyes have it."""
     asset = load()
-    upper, lower, tongue = mouth_shapes.bands(asset)
-    first = len(asset.template) + len(asset.copies)
-    keys = obj.data.shape_keys.key_blocks
-    rest = ball.places(keys[0])[first:]
-    moves = {name: ball.places(keys[name])[first:] - rest for name in asset.units}
-    moves = {name: moved for name, moved in moves.items()
-             if np.abs(moved[np.concatenate([lower, tongue])]).max() > LEAST_M}
     shape = mouth_shapes.teeth_and_gums(asset)
-    placed = _affine(asset.parts[np.concatenate([upper, lower])], rest[np.concatenate([upper, lower])], shape.vertices)
-    lower_by = _lowering(asset, ball.places(keys[0]), placed[~shape.lower])
-    placed = placed + lower_by
-    turned = {name: np.where(shape.lower[:, None], _affine(rest[lower], moved[lower], placed), 0)
-              for name, moved in moves.items()}
+    jaws = find_jaws(obj, shape)
+    placed = jaws.placed(shape.vertices)
+    turned = {name: np.where(shape.lower[:, None], jaws.turned(name, placed), 0) for name in jaws.moves}
+    tongue_at_rest, tongue_moves = tongue.lay_tongue(obj, jaws, shape)
     front = float(placed[:, 1].min())
 
     def finish_teeth(thing):
@@ -52,45 +31,22 @@ def build(obj, keep) -> None:
 
     def finish_tongue(thing):
         materials.fill(thing, materials.tongue(obj.name, front))
-        _keyed(thing, obj, rest[tongue] + lower_by, _tongue_moves(moves, tongue),
-               {OUT: OUT_BY, OVER: f"4 * {OUT_BY} * (1 - {OUT_BY})"})
+        _keyed(thing, obj, tongue_at_rest, tongue_moves, tongue.LED_BY)
         modifier = thing.modifiers.get("Subdivision") or thing.modifiers.new("Subdivision", 'SUBSURF')
         modifier.levels, modifier.render_levels = 1, 2
 
     keep("Teeth", _data(f"{obj.name} Teeth and Gums", placed, shape.faces, shape.slots), finish_teeth)
     nodes.modify(obj, nodes.lids_on_eyes(), Lining=materials.gums(obj.name, front))
-    faces = [[int(where) for where in np.searchsorted(tongue, [i - first for i in face if i >= 0])]
-             for face in _faces(asset, first, tongue)]
-    keep("Tongue", _data(f"{obj.name} Tongue", rest[tongue] + lower_by, faces, np.zeros(len(faces))), finish_tongue)
+    faces = _faces(asset, jaws.tongue)
+    keep("Tongue", _data(f"{obj.name} Tongue", tongue_at_rest, faces, np.zeros(len(faces))), finish_tongue)
 
 
-def _tongue_moves(moves: dict[str, np.ndarray], tongue: np.ndarray) -> dict[str, np.ndarray]:
-    """What each unit adds to the tongue's vertices; the one that puts it out has a second key, which is there half way
-    alone."""
-    moves = {name: moved[tongue] for name, moved in moves.items()}
-    ahead = np.clip(-moves[OUT][:, 1:2], 0, None)
-    up = ahead / ahead.max() * [0, 0, 1.0]
-    return moves | {OUT: moves[OUT] + RISE_M * up, OVER: OVER_M * up}
-
-
-def _lowering(asset: FaceUnits, head: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """The way [3] from where the upper teeth [N, 3] were carried to where the lips of the head at rest meet before
-    them."""
-    lips = asset.copies[asset.seam == 0]
-    meet = head[lips[np.abs(asset.template[lips, 0]).argmin()]]
-    edge = upper[np.abs(upper[:, 0] - meet[0]) < WIDE_M, 2].min()
-    return np.array([0, 0, np.clip(meet[2] - SHOWN_M - edge, -FARTHEST_M, FARTHEST_M)])
-
-
-def _affine(before: np.ndarray, after: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Where the affine map that takes places [N, 3] to others (or to displacements) takes points [M, 3]."""
-    one = np.concatenate([before, np.ones((len(before), 1))], 1)
-    return np.concatenate([points, np.ones((len(points), 1))], 1) @ np.linalg.lstsq(one, after, rcond=None)[0]
-
-
-def _faces(asset: FaceUnits, first: int, rows: np.ndarray) -> list[list[int]]:
+def _faces(asset: FaceUnits, rows: np.ndarray) -> list[list[int]]:
+    """Those of some inner vertices, counted by themselves."""
+    first = len(asset.template) + len(asset.copies)
     inside = np.isin(asset.faces[:, 0] - first, rows)
-    return asset.faces[inside].tolist()
+    return [[int(where) for where in np.searchsorted(rows, [i - first for i in face if i >= 0])]
+            for face in asset.faces[inside].tolist()]
 
 
 def _data(name: str, vertices: np.ndarray, faces: list, slots: np.ndarray):

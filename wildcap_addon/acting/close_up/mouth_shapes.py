@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shapes of a mouth: single teeth in their gums, along the bands that stand for teeth in the built-in head and within
-their outsides; its tongue, rounder.
+their outsides.
 
 Lengths in metres, in the template's axes: -y is ahead, z up."""
 
@@ -44,7 +44,7 @@ class Mouth:
 
 
 @dataclass(frozen=True)
-class _Arch:
+class Arch:
     """The band's outer edge from one end to the other: places [N, 3], and their distances from the middle [N], metres,
     negative to the right."""
 
@@ -60,6 +60,17 @@ class _Arch:
         run = after - before
         out = np.stack([run[..., 1], -run[..., 0], 0 * run[..., 0]], -1)
         return place, out / np.linalg.norm(out, axis=-1, keepdims=True)
+
+    def beside(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of points [N, 3]: the distance along the arch of what they are beside of [N], how far within it they are [N],
+        how far behind its ends [N], and the way outwards [N, 3]."""
+        nearest = np.linalg.norm((points[:, None] - self.places)[..., :2], axis=2).argmin(1)
+        along = self.along[nearest]
+        place, out = self.at(along)
+        arm = (points - place) * [1, 1, 0]
+        inward = -(arm * out).sum(1)
+        behind = np.linalg.norm(arm + inward[:, None] * out, axis=1)
+        return along, inward, behind, out
 
 
 def bands(asset: FaceUnits) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -83,6 +94,10 @@ def bands(asset: FaceUnits) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return upper, lower, groups[2]
 
 
+def lower_arch(asset: FaceUnits) -> Arch:
+    return _arch(asset.parts[bands(asset)[1]], -1.0)
+
+
 def teeth_and_gums(asset: FaceUnits) -> Mouth:
     """Both rows of teeth in their gums."""
     upper, lower, _ = bands(asset)
@@ -100,7 +115,7 @@ def teeth_and_gums(asset: FaceUnits) -> Mouth:
     return Mouth(np.concatenate(vertices), faces, np.array(slots), np.concatenate(below))
 
 
-def _arch(band: np.ndarray, up: float) -> _Arch:
+def _arch(band: np.ndarray, up: float) -> Arch:
     """The biting edge of a band [N, 3], smooth, from the right end to the left one."""
     outer = []
     # the outermost and farthest from the root, along the left side
@@ -119,10 +134,10 @@ def _arch(band: np.ndarray, up: float) -> _Arch:
     padded = np.concatenate([2 * places[:1] - places[15:0:-1], places, 2 * places[-1:] - places[-2:-17:-1]])
     places = np.stack([np.convolve(column, kernel, 'valid') for column in padded.T], -1)
     along = np.append(0, np.linalg.norm(np.diff(places, axis=0), axis=1).cumsum())
-    return _Arch(places, along - along[-1] / 2)
+    return Arch(places, along - along[-1] / 2)
 
 
-def _sizes(jaw: str, arch: _Arch) -> tuple[np.ndarray, float]:
+def _sizes(jaw: str, arch: Arch) -> tuple[np.ndarray, float]:
     """Where each tooth of a side begins and ends along the arch [7], and how much larger than life they are to fill
     it."""
     widths = np.append(0, np.cumsum(WIDTHS_MM[jaw])) / 1000
@@ -130,7 +145,7 @@ def _sizes(jaw: str, arch: _Arch) -> tuple[np.ndarray, float]:
     return widths * larger, larger
 
 
-def _teeth(jaw: str, arch: _Arch, up: float) -> list[tuple[np.ndarray, np.ndarray]]:
+def _teeth(jaw: str, arch: Arch, up: float) -> list[tuple[np.ndarray, np.ndarray]]:
     """Vertices and quads of each tooth: rings from within the gum to the edge, and a cap."""
     ends, larger = _sizes(jaw, arch)
     turn = np.arange(AROUND) * 2 * np.pi / AROUND
@@ -173,7 +188,7 @@ def _teeth(jaw: str, arch: _Arch, up: float) -> list[tuple[np.ndarray, np.ndarra
     return teeth
 
 
-def _gum(jaw: str, arch: _Arch, up: float) -> tuple[np.ndarray, np.ndarray]:
+def _gum(jaw: str, arch: Arch, up: float) -> tuple[np.ndarray, np.ndarray]:
     """The gum's sheet over the necks: from the fold before the teeth down to a margin in arcs, and behind them up
     again."""
     ends, larger = _sizes(jaw, arch)
