@@ -95,6 +95,7 @@ def bands(asset: FaceUnits) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def lower_arch(asset: FaceUnits) -> Arch:
+    """The biting edge of the lower band."""
     return _arch(asset.parts[bands(asset)[1]], -1.0)
 
 

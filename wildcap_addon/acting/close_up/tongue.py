@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the close-up's tongue lies: within the lower teeth, with which it goes wherever the jaw does, and down in them
-when the mouth is open.
+"""Where the close-up's tongue lies: within the lower teeth, with which it goes wherever the jaw does, and down
+between them when the mouth is open.
 
 Behind closed lips a tongue reaches up to the palate. Its tip keeps to the jaw, its root to the hyoid bone: an opening
 jaw does not turn the whole tongue along, or its back would stand before the throat. Lengths in metres.
