@@ -91,6 +91,10 @@ def main() -> int:
         with np.load(kept) as stored:
             judged[name] = Judged(person, *(stored[key].astype(np.float32) for key in ANSWERS))
         print(f"{name}: read", file=sys.stderr, flush=True)
+    if len({each.person for each in judged.values()}) < 2:
+        parser.error(f"{asked.folder} holds textures of fewer than two people whose albedo is known; the choice is "
+                     "judged on those who are left out of it. `python -m benchmarks.state FOLDER --run` makes the "
+                     "textures; --sample and --eyes name others.")
     rows, chosen = score(judged)
     print(table(rows), "", choices(chosen), sep="\n")
     if asked.json:

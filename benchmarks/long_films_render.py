@@ -15,13 +15,17 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import bpy
 import numpy as np
 
 from core.geometry import meshes, raster
 from core.imaging import images
-from core.synthetic.people.render import build
-from core.synthetic.render import add_camera, render_frames
+from core.synthetic.blender_module import without_numpy_1
+
+with without_numpy_1():
+    import bpy
+
+    from core.synthetic.people.render import build
+    from core.synthetic.render import add_camera, render_frames
 
 PERSON = ("skin", "left_eye", "right_eye", "shirt")
 RAYS, SUN_RAYS = 96, 24

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import io
 import os
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+
+from core.synthetic.blender_module import without_numpy_1
 
 ROOT = Path(__file__).resolve().parent.parent
 EXTENSION = "bl_ext.user_default.wildcap"
@@ -62,19 +62,6 @@ def extension() -> Iterator[None]:
             yield
         finally:
             addon_utils.disable(EXTENSION)  # a class left registered crashes the wheel at exit
-
-
-@contextlib.contextmanager
-def without_numpy_1() -> Iterator[None]:
-    """While Blender's module is imported: keeps back NumPy 2's pages on its audio module, which is made for NumPy 1 in
-    every module for Python 3.11, and not used here. Anything else that is said comes out."""
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(said):
-            yield
-    finally:
-        if "compiled using NumPy 1.x" not in said.getvalue():
-            sys.stderr.write(said.getvalue())
 
 
 if __name__ == "__main__":

@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender as a module beside the worker's NumPy: what `make demo` says on the terminal."""
+"""Blender as a module beside the worker's NumPy: what `make demo`, and whoever renders a subject, reads on the
+terminal."""
 
 import subprocess
 import sys
 
 import pytest
 
-from benchmarks.render_capture import without_numpy_1
+from core.synthetic.blender_module import without_numpy_1
 
 from .conftest import ROOT
 
@@ -25,6 +26,15 @@ def test_the_extension_is_enabled_without_a_word_of_numpys():
     ran = subprocess.run([sys.executable, "-c", ENABLED], capture_output=True, text=True, cwd=ROOT)
     assert ran.returncode == 0 and "\nin " in f"\n{ran.stdout}", ran.stdout + ran.stderr
     assert "NumPy" not in ran.stderr and "Traceback" not in ran.stderr, ran.stderr
+
+
+@pytest.mark.parametrize("renderer", ["core.synthetic.render", "core.synthetic.people.render",
+                                      "benchmarks.long_films_render"])
+def test_subjects_are_rendered_without_a_word_of_numpys(renderer):
+    pytest.importorskip("bpy")
+    ran = subprocess.run([sys.executable, "-c", f"import os, {renderer}; os._exit(0)"], capture_output=True, text=True,
+                         cwd=ROOT)
+    assert ran.returncode == 0 and not ran.stderr, ran.stderr
 
 
 def test_other_words_and_failures_of_the_import_come_out(capsys):

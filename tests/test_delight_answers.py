@@ -47,6 +47,14 @@ def test_people_count_alike_however_often_they_were_filmed():
     assert means["frames"] == pytest.approx(0.2) and "| **over people** | 0.200 |" in delight_answers.table(rows)
 
 
+def test_captures_without_a_texture_are_no_people_to_choose_on(tmp_path, capsys, monkeypatch):
+    (tmp_path / "anna.wildcap").mkdir()
+    monkeypatch.setattr("sys.argv", ["delight_answers", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        delight_answers.main()
+    assert "fewer than two people" in capsys.readouterr().err
+
+
 def test_an_answer_that_knows_nothing_is_left_out():
     _, chosen = delight_answers.score({name: judged(name, 0.1, 1.0) for name in ("anna", "ben", "cleo")})
     assert chosen["fitted"]["best"] > 0.97 * chosen["fitted"]["without"]

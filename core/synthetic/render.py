@@ -17,11 +17,14 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import bpy
 import numpy as np
-from mathutils import Matrix, Vector
 
 from ..geometry.meshes import Mesh, read_obj
+from .blender_module import without_numpy_1
+
+with without_numpy_1():
+    import bpy
+    from mathutils import Matrix, Vector
 
 
 def main() -> None:

@@ -14,12 +14,16 @@ import json
 import sys
 from pathlib import Path
 
-import bpy
 import numpy as np
-from mathutils import Matrix
 
 from ...geometry.meshes import read_obj
-from ..render import add_camera, add_lights, add_mesh, add_room, apply_settings, plain, principled, render_frames
+from ..blender_module import without_numpy_1
+
+with without_numpy_1():
+    import bpy
+    from mathutils import Matrix
+
+    from ..render import add_camera, add_lights, add_mesh, add_room, apply_settings, plain, principled, render_frames
 
 GLOSS = {"skin": None, "eyes": (0.06, 0.5), "cloth": (0.9, 0.2)}
 """Roughness and Specular IOR Level; the skin has maps of its own."""
