@@ -83,18 +83,18 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="where the figures go")
     asked = parser.parse_args()
     work = asked.folder.resolve() / "answers"
-    judged = {}
-    for name, person, capture, truth in known_captures(asked):
+    judged, known = {}, known_captures(asked)
+    if len({person for _, person, _, _ in known}) < 2:
+        parser.error(f"The captures in {asked.folder} that have a texture and a known albedo show fewer than two "
+                     "people, and each person is judged by what the others choose. `python -m benchmarks.state FOLDER "
+                     "--run` makes textures; --sample and --eyes add people.")
+    for name, person, capture, truth in known:
         kept = work / f"{name}.npz"
         if not kept.is_file():
             keep_answers(kept, capture, *truth())
         with np.load(kept) as stored:
             judged[name] = Judged(person, *(stored[key].astype(np.float32) for key in ANSWERS))
         print(f"{name}: read", file=sys.stderr, flush=True)
-    if len({each.person for each in judged.values()}) < 2:
-        parser.error(f"{asked.folder} holds textures of fewer than two people whose albedo is known; the choice is "
-                     "judged on those who are left out of it. `python -m benchmarks.state FOLDER --run` makes the "
-                     "textures; --sample and --eyes name others.")
     rows, chosen = score(judged)
     print(table(rows), "", choices(chosen), sep="\n")
     if asked.json:

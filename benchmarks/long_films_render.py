@@ -20,12 +20,11 @@ import numpy as np
 from core.geometry import meshes, raster
 from core.imaging import images
 from core.synthetic.blender_module import without_numpy_1
+from core.synthetic.people.render import build
+from core.synthetic.render import add_camera, render_frames
 
 with without_numpy_1():
     import bpy
-
-    from core.synthetic.people.render import build
-    from core.synthetic.render import add_camera, render_frames
 
 PERSON = ("skin", "left_eye", "right_eye", "shirt")
 RAYS, SUN_RAYS = 96, 24

@@ -47,8 +47,9 @@ def test_people_count_alike_however_often_they_were_filmed():
     assert means["frames"] == pytest.approx(0.2) and "| **over people** | 0.200 |" in delight_answers.table(rows)
 
 
-def test_captures_without_a_texture_are_no_people_to_choose_on(tmp_path, capsys, monkeypatch):
-    (tmp_path / "anna.wildcap").mkdir()
+@pytest.mark.parametrize("people", [[], ["anna", "anna"]])
+def test_one_person_cannot_be_judged_by_the_others_and_nothing_is_asked(people, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(delight_answers, "known_captures", lambda asked: [(name, name, None, None) for name in people])
     monkeypatch.setattr("sys.argv", ["delight_answers", str(tmp_path)])
     with pytest.raises(SystemExit):
         delight_answers.main()

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of a synthetic subject, path-traced by Cycles. The one file of core that imports bpy; a process of its own:
+"""Frames of a synthetic subject, path-traced by Cycles. With people/render.py the only file of core that imports
+bpy; a process of its own:
 
     python -m core.synthetic.render JOB.json
 

@@ -18,12 +18,11 @@ import numpy as np
 
 from ...geometry.meshes import read_obj
 from ..blender_module import without_numpy_1
+from ..render import add_camera, add_lights, add_mesh, add_room, apply_settings, plain, principled, render_frames
 
 with without_numpy_1():
     import bpy
     from mathutils import Matrix
-
-    from ..render import add_camera, add_lights, add_mesh, add_room, apply_settings, plain, principled, render_frames
 
 GLOSS = {"skin": None, "eyes": (0.06, 0.5), "cloth": (0.9, 0.2)}
 """Roughness and Specular IOR Level; the skin has maps of its own."""
