@@ -8,8 +8,8 @@ code and weights.
     python -m benchmarks.state OUT --truths FOLDER --json docs/figures/state_0_1_0.json
     python -m benchmarks.freeze OUT KEPT
 
-FOLDER and the truths are those of benchmarks/state.py; OUT/NAME.wildcap is a capture of 0.1.0. What is solved there
-already is not solved again.
+FOLDER and the truths are those of benchmarks/state.py, of which nothing behind the head is needed; OUT/NAME.wildcap is
+a capture of 0.1.0. What is solved there already is not solved again.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from pathlib import Path
 from core.contract.capture import Capture
 from core.contract.files import replacing_folder, write_json
 
-from .state_captures import add_captures, captures_asked
+from .state_captures import add_captures
 
 SOLVE = """
 import sys
@@ -45,13 +45,20 @@ def main() -> int:
     checkout, out = arguments.checkout.resolve(), arguments.out.resolve()
     if not (checkout / "core" / "capture.py").is_file():
         parser.error(f"{checkout} holds no code of 0.1.0: that has core/capture.py.")
+    folder = arguments.folder.resolve()
+    truths = (arguments.truths or folder).resolve()
+    asked = [capture for capture in map(Capture, sorted(folder.glob("*.wildcap")))
+             if capture.root.stem.startswith(tuple(arguments.only)) and capture.head.is_file()
+             and (truths / capture.root.stem / "albedo").is_dir()]
+    if not asked:
+        parser.error(f"{folder} holds no capture with a head and a truth.")
     failed = 0
-    for filmed in captures_asked(parser, arguments):
-        copy = copy_inputs(filmed.capture, out / filmed.capture.root.name)
-        ended = subprocess.run([sys.executable, "-c", SOLVE, str(copy.root), str(filmed.truth)], cwd=checkout,
+    for capture in asked:
+        name, copy = capture.root.stem, copy_inputs(capture, out / capture.root.name)
+        ended = subprocess.run([sys.executable, "-c", SOLVE, str(copy.root), str(truths / name)], cwd=checkout,
                                env={**os.environ, "PYTHONPATH": str(checkout)}, check=False)
         failed += ended.returncode != 0
-        print(f"{filmed.name}: {'not solved' if ended.returncode else 'solved'}", flush=True)
+        print(f"{name}: {'not solved' if ended.returncode else 'solved'}", flush=True)
     return 1 if failed else 0
 
 

@@ -54,6 +54,17 @@ def test_an_earlier_version_gets_frames_cameras_and_head_and_nothing_else(folder
     assert json.loads((made / "capture.json").read_text()) == {"format": 1, "source": "", "stages": {}}
 
 
+def test_a_head_is_enough_for_it_and_without_one_there_is_nothing_to_solve(folders, monkeypatch, capfd):
+    (folders[1] / "anna.wildcap" / "texture.exr").unlink()
+    (folders[1] / "ben.wildcap" / "head.obj").unlink()
+    assert run(monkeypatch, *folders) == 0
+    assert capfd.readouterr().out == "anna: solved\n"
+    (folders[1] / "anna.wildcap" / "head.obj").unlink()
+    with pytest.raises(SystemExit):
+        run(monkeypatch, *folders)
+    assert "no capture with a head and a truth" in capfd.readouterr().err
+
+
 def test_one_that_fails_is_named_and_the_others_go_on(folders, monkeypatch, capfd):
     (folders[1] / "ben.wildcap").rename(folders[1] / "aaron.wildcap")  # the first in order
     (folders[1] / "ben").rename(folders[1] / "aaron")

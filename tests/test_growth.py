@@ -75,6 +75,18 @@ def test_a_bare_chin_that_the_parser_doubts_has_no_beard_whatever_moles_it_has()
     assert where[mole > 0].all() and seen.beard[where].mean() < 0.01 and seen.beard[mole > 0].max() < 0.1
 
 
+def test_of_stubble_the_parser_is_as_sure_as_it_is_in_the_middle_of_it():
+    """A shade without strokes, which it doubts all over and more so on the upper half."""
+    where = regions()[1]
+    upper = where & (np.mgrid[0:SIZE, 0:SIZE][0] < np.median(np.nonzero(where)[0]))
+    parts = answer(brows=0.8, beard=0.6)
+    parts[..., 1] = np.where(where, parts[..., 1], 0.08 * template.mask("face", SIZE))
+    parts[upper, 1] = 0.35
+    seen = found(LIGHT, [(strewn(regions()[0], 0.6, 0.3, 1), BLACK), (0.1 * where, BLACK)], parts)
+    assert seen.beard[upper].mean() > 0.7 * seen.beard[where & ~upper].mean() > 0.03
+    assert seen.beard[~where].mean() < 0.005
+
+
 def test_hair_of_the_colour_of_its_skin_is_as_usual_where_the_parser_is_sure():
     where = regions()[0]
     seen = found(LIGHT, [], answer(brows=0.9))

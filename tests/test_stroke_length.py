@@ -61,6 +61,21 @@ def test_strokes_across_the_beard_are_none_of_its_hairs():
     assert stroke_length.measure_stroke_length(painted(3.0, across=True), *chin(), texel()) == 0
 
 
+def test_what_lies_beside_the_beard_is_none_of_its_strokes():
+    for beside in (-1.0, 1.0):
+        light = (painted(1.2) + beside * ~chin()[0].mask).astype(np.float32)
+        assert stroke_length.measure_stroke_length(light, *chin(), texel()) == pytest.approx(1.2, rel=0.4)
+
+
+def test_of_a_beard_that_is_nowhere_wide_all_is_measured():
+    texels, _ = chin()
+    rows = np.nonzero(texels.mask)[0]
+    band = texels.mask & (np.abs(np.mgrid[0:SIZE, 0:SIZE][0] - np.median(rows)) < 2.0 / texel())
+    narrow = strokes.lay_texels(surface(), band)
+    way = ways.usual("beard", narrow.position, template.landmark_points(surface().mesh))
+    assert stroke_length.measure_stroke_length(painted(1.2), narrow, way, texel()) == pytest.approx(1.2, rel=0.4)
+
+
 def beard(light: np.ndarray) -> np.ndarray:
     """Lengths in mm of the beard that is grown where half of the chin is hair, by the albedo of that light."""
     mask = 0.5 * chin()[0].mask.astype(np.float32)

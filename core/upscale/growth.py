@@ -73,7 +73,8 @@ def find(light: np.ndarray, seen: np.ndarray, zones: dict[str, np.ndarray], surf
              for name, reach in ALIKE_MM.items()}
     bearded = _present(_likely("beard", part_shares, power) * _bearable(zones["beard"]), power["beard"], seen > 0)
     return Growth(
-        _faded(_likely("brows", part_shares, power)) * _near_brows(surface), _faded(bearded), head, grain, True
+        _faded(_likely("brows", part_shares, power)) * _near_brows(surface), _faded(_over_usual(bearded)), head, grain,
+        True
     )
 
 
@@ -92,6 +93,13 @@ def _present(bearded: np.ndarray, power: np.ndarray, seen: np.ndarray) -> np.nda
     if there.any() and np.log(power[there]).mean() > np.log(STROKES_RATIO):
         return bearded
     return keep_beard(bearded, bearded[:, ::-1], seen & seen[:, ::-1])
+
+
+def _over_usual(bearded: np.ndarray) -> np.ndarray:
+    """The probabilities of a beard that is there [S, S], over what they are in the middle of it: of stubble the parser
+    is half as sure as of a full beard, wherever it grows, and what that doubts, whether there is any, is settled."""
+    sure = bearded[bearded > bearded.max() / 2]
+    return bearded / np.median(sure) if len(sure) else bearded
 
 
 def _bearable(zone: np.ndarray) -> np.ndarray:

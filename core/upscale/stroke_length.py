@@ -36,9 +36,10 @@ def measure_stroke_length(light: np.ndarray, texels: HairTexels, way: np.ndarray
     texel : its width in mm
     """
     fine = (light - cv2.GaussianBlur(light, (0, 0), PATCHES_MM / texel)).astype(np.float32)
-    flat = texels.flatten(way)
-    along = _covariances(fine, texels.mask, flat, texel)
-    across = _covariances(fine, texels.mask, np.stack([-flat[:, 1], flat[:, 0]], 1), texel)
+    inner = _away_from_border(texels.mask, PATCHES_MM / texel)
+    flat = texels.flatten(way)[inner[texels.mask]]
+    along = _covariances(fine, inner, flat, texel)
+    across = _covariances(fine, inner, np.stack([-flat[:, 1], flat[:, 0]], 1), texel)
     excess = along - across
     if np.sum(excess) <= 0:
         return 0.0
@@ -46,6 +47,14 @@ def measure_stroke_length(light: np.ndarray, texels: HairTexels, way: np.ndarray
     shapes = [_excess_of(length, sharp) for length in LENGTHS_MM]
     fits = [(shape @ excess) / np.sqrt(shape @ shape) for shape in shapes]  # the best amplitude each
     return float(LENGTHS_MM[int(np.argmax(fits))])
+
+
+def _away_from_border(mask: np.ndarray, texels: float) -> np.ndarray:
+    """What of a mask [S, S] lies so far within it: nearer, what is beside the hair is among the patches, and the edge
+    of a lip would be a long stroke. All of a mask that is nowhere so wide."""
+    inside = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    deep = inside > texels
+    return deep if deep.any() else mask
 
 
 def _covariances(fine: np.ndarray, mask: np.ndarray, way: np.ndarray, texel: float) -> np.ndarray:
