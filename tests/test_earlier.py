@@ -95,3 +95,10 @@ def test_people_are_compared_on_the_same_captures():
                                                                            "solved": ["ann", "bob"]}
     assert scores["solved"]["ann"]["psnr"] == 27.0 and scores["solved"]["bob"]["psnr"] == 24.0
     assert scores["solved"]["bob"]["psnr_shared"] == 26.0, "of one capture, the light that is shared is its own"
+
+
+def test_the_page_names_the_captures_that_were_left_out():
+    today = Figures.of({"captures": {"ann": {}, "ann_below": {}, "bob": {}}})
+    assert state_0_1_0.left_out(Figures.of({"captures": {"ann": {}}}), today) == (
+        "Not taken through it were ann_below, bob.")
+    assert state_0_1_0.left_out(today, today) == "None was left out."

@@ -21,14 +21,19 @@ COMPARED = {name: state.TABLES[table][name]
 
 
 def sections(before: Figures, now: Figures) -> Sections:
-    return [("", prose("""
+    return [("", prose(f"""
         `python -m benchmarks.earlier` took the captures of [the state](state.md) through 0.1.0's own code and weights,
-        from the delighter on; frames, cameras and heads are today's. The tables below the first are those of that page;
-        the steps along shadows in them are by older true shadows: those of leaves and window bars swayed with the heads
-        of the fringed and the stubbled person, some millimetres off.
+        from the delighter on; frames, cameras and heads are today's. {left_out(before, now)} The tables below the first
+        are those of that page.
         """)),
             ("What has changed", changes(before, now)),
             *((title or "By 0.1.0 alone", text) for title, text in state.sections(before.people, before.captures))]
+
+
+def left_out(before: Figures, now: Figures) -> str:
+    """Which captures of today's page 0.1.0 was not measured on."""
+    missing = [name for name in now.captures if name not in before.captures]
+    return f"Not taken through it were {', '.join(missing)}." if missing else "None was left out."
 
 
 def changes(before: Figures, now: Figures) -> str:
