@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import earlier
+from benchmarks import earlier, state, state_captures
 from benchmarks.figures import Figures
 from benchmarks.results import state_0_1_0
 from core.contract.capture import Capture
@@ -80,6 +80,16 @@ def test_a_checkout_of_another_version_is_refused(folders, monkeypatch, capsys):
     with pytest.raises(SystemExit):
         run(monkeypatch, *folders)
     assert "holds no code of 0.1.0" in capsys.readouterr().err
+
+
+def test_its_captures_were_made_by_one_code_whatever_their_inputs(folders):
+    for name in ("anna", "ben"):
+        path = folders[1] / f"{name}.wildcap" / "capture.json"
+        record = json.loads(path.read_text())
+        record["stages"]["solve"] = {"key": f"of {name}", "seconds": 1.0}
+        path.write_text(json.dumps(record))
+    captures = state_captures.find(folders[1], folders[1], folders[1] / "state")
+    assert len(captures) == 2 and state.code_of(captures)["solve"] == "0.1.0"
 
 
 def test_people_are_compared_on_the_same_captures():

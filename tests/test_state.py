@@ -259,16 +259,6 @@ def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
     assert len(after["measures"]) == 12
 
 
-def test_captures_of_0_1_0_were_made_by_one_code_whatever_their_inputs(tmp_path):
-    for name in ("anna", "ben"):
-        filled(tmp_path, name, name)
-        record = json.loads((tmp_path / f"{name}.wildcap" / "capture.json").read_text())
-        record["stages"]["solve"] = {"key": f"of {name}", "seconds": 1.0}
-        (tmp_path / f"{name}.wildcap" / "capture.json").write_text(json.dumps(record))
-    captures = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
-    assert len(captures) == 2 and state.code_of(captures)["solve"] == "0.1.0"
-
-
 def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path, monkeypatch, capsys):
     def fail(capture, truth, until, quality):
         raise SystemExit("There is no head.")
