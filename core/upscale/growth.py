@@ -96,8 +96,8 @@ def _present(bearded: np.ndarray, power: np.ndarray, seen: np.ndarray) -> np.nda
 
 
 def _over_usual(bearded: np.ndarray) -> np.ndarray:
-    """The probabilities of a beard that is there [S, S], over what they are in the middle of it: of stubble the parser
-    is half as sure as of a full beard, wherever it grows, and what that doubts, whether there is any, is settled."""
+    """The probabilities of a beard that is there [S, S], over what they are in the middle of it. Of stubble the parser
+    is half as sure as of a full beard, wherever it grows: it doubts whether there is any, and that is settled."""
     sure = bearded[bearded > bearded.max() / 2]
     return bearded / np.median(sure) if len(sure) else bearded
 
