@@ -11,6 +11,8 @@ import pytest
 
 pytest.importorskip("bpy")  # the add-on carries them
 
+from core.face import template  # noqa: E402
+
 ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft
 cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight eyeLookInLeft eyeLookInRight
 eyeLookOutLeft eyeLookOutRight eyeLookUpLeft eyeLookUpRight eyeSquintLeft eyeSquintRight eyeWideLeft
@@ -52,6 +54,29 @@ def dense(rest, unit) -> np.ndarray:
     moved = np.zeros_like(rest)
     moved[unit[0]] = unit[1]
     return moved
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_lines_the_mouth_keeps_its_shape_in_every_head(enabled_extension, asset, seed):
+    """Neither stretched nor folded: the throat's left side stays left of its right side."""
+    acting = f"{enabled_extension}.wildcap_addon.acting"
+    components = template.identity()
+    head = asset.template + np.tensordot(np.random.default_rng(seed).normal(0, 0.7, len(components)), components, 1)
+    rest, units = import_module(f"{acting}.carrying").carried(asset, head)
+    rows = import_module(f"{acting}.asset").lining(asset)
+    first = len(asset.template) + len(asset.copies)
+    other = asset.mirror[first + rows] - first
+    left = asset.parts[rows, 0] > asset.parts[other, 0]
+    for unit in (None, "jawOpen"):
+        inner = (rest if unit is None else rest + dense(rest, units[unit]))[first:]
+        assert (inner[rows[left], 0] > inner[other[left], 0]).all()
+    edges = np.concatenate([asset.faces[:, :2], asset.faces[:, 1:3]]) - first
+    edges = edges[np.isin(edges, rows).all(1)]
+    before, after = (np.linalg.norm(np.diff(places[edges], axis=1)[:, 0], axis=1)
+                     for places in (asset.parts, rest[first:]))
+    long = before > 0.001
+    ratio = after[long] / before[long]
+    assert len(ratio) > 1000 and ratio.min() > 0.5 and ratio.max() < 1.6
 
 
 def test_every_name_of_arkit_is_there_and_two_that_open_the_lids(asset):

@@ -17,6 +17,8 @@ SOFT, LEFT_EYE, RIGHT_EYE, JAWS = range(4)
 SIDES = ("Left", "Right")
 HALF = "eyesHalf"
 """With a side the name of a key that is no unit: it is driven, and bends the way of the lids around the ball."""
+MOUTH_SLOT = 2
+"""Of the head's materials, the one of its mouth's inside (materials.py)."""
 SOCKETS_M = -0.02
 """Height below the eyes' middle above which what is soft inside is a socket, and not the mouth
 (core/face/eye_asset.py)."""
@@ -67,6 +69,15 @@ def load() -> FaceUnits:
 def sockets(asset: FaceUnits) -> np.ndarray:
     """Which inner vertices [n] line the sockets behind the lids, of P."""
     return np.flatnonzero((asset.kind == SOFT) & (asset.parts[:, 2] > SOCKETS_M))
+
+
+def lining(asset: FaceUnits) -> np.ndarray:
+    """Which inner vertices [n] line the mouth, of P. Some of the palate's lie as high as a socket."""
+    first = len(asset.template) + len(asset.copies)
+    corners = asset.faces[asset.slots == MOUTH_SLOT] - first
+    deep = np.zeros(len(asset.parts), bool)
+    deep[corners[corners >= 0]] = True
+    return np.flatnonzero((asset.kind == SOFT) & (deep | (asset.parts[:, 2] <= SOCKETS_M)))
 
 
 def _unit(stored, name: str, mirror: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:

@@ -12,13 +12,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from .asset import HALF, JAWS, LEFT_EYE, RIGHT_EYE, SIDES, SOFT, FaceUnits
+from .asset import HALF, JAWS, LEFT_EYE, RIGHT_EYE, SIDES, SOFT, FaceUnits, lining
 from .filmed import FilmedEyes
 
 STEPS = 80  # of averaging: each neighbourhood reaches some 7 (lids) to 20 mm (cheeks)
 CORNEA = (0.06, 0.52)  # how far it stands out, as a share of the radius, and how wide it is, radians
 CLEAR_M = 0.0005  # metres between eyeball and lids
 BEHIND_M = 0.002  # metres between teeth and lips
+HELD_M = 0.01
+"""Metres behind a rim at which what lines the mouth goes along with the jaws as much as with the rim: over so much is
+a rim's neighbourhood fitted, and a throat hung ten times as far behind it would swing by centimetres."""
 
 
 def carried(asset: FaceUnits, head: np.ndarray,
@@ -53,11 +56,20 @@ def carried(asset: FaceUnits, head: np.ndarray,
     middle = asset.parts[rows].mean(0)
     matrix, centre = _similarity(asset, head, middle, 0.045, middle)
     parts[rows], turns[rows] = centre + (asset.parts[rows] - middle) @ matrix.T, matrix
-    parts[rows] += _behind_lips(asset, head, parts[rows])
+    back = _behind_lips(asset, head, parts[rows])
+    parts[rows] += back
+    rows = lining(asset)
+    away = np.linalg.norm(asset.parts[rows, None] - asset.template[asset.anchors[rows]], axis=2)
+    away = (asset.weights[rows] * away).sum(1)[:, None]
+    deep = away**2 / (away**2 + HELD_M**2)
+    parts[rows] += deep * (centre + (asset.parts[rows] - middle) @ matrix.T + back - parts[rows])
+    turns[rows] += deep[..., None] * (matrix - turns[rows])
     rest, turns = np.concatenate([head, head[asset.copies], parts]), np.concatenate([turn, turn[asset.copies], turns])
     units = {name: (rows, np.einsum("nij,nj->ni", turns[rows], moves)) for name, (rows, moves) in asset.units.items()}
     for side, ball in zip(SIDES, balls, strict=True):
         rows, moves = units[f"eyesOpen{side}"]
+        own = ~np.isin(rows, len(head) + len(asset.copies) + lining(asset))  # the highest of the palate is no lid
+        rows, moves = rows[own], moves[own]
         moves = (moves + _outwards(rest[rows] + moves, ball) if filmed is None
                  else _as_filmed(rest, rows, moves, filmed))
         units[f"eyesOpen{side}"], units[f"eyeBlink{side}"] = (rows, moves), (rows, -moves)

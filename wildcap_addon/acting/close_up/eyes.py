@@ -13,7 +13,7 @@ import numpy as np
 
 from ...data_blocks import read_field
 from .. import materials as of_the_head
-from ..asset import LEFT_EYE, SIDES, FaceUnits, load, sockets
+from ..asset import LEFT_EYE, SIDES, FaceUnits, lining, load, sockets
 from . import ball, keeping, materials, nodes, shapes
 
 REACH_M = 0.00042
@@ -73,7 +73,7 @@ def build(obj, keep, iris_m: tuple[float, float]) -> None:
         keep(f"{side} Caruncle", _caruncle(f"{obj.name} {side} Caruncle", rims, asset), finish_flesh)
         shells.append(shell)
     inner = len(asset.template) + len(asset.copies)
-    _mark(obj.data, inner + sockets(asset))
+    _mark(obj.data, inner + np.setdiff1d(sockets(asset), lining(asset)))
     nodes.modify(obj, nodes.lids_on_eyes(), Left=shells[0], Right=shells[1],
                  First=inner + int(np.flatnonzero(asset.kind == LEFT_EYE)[0]))
 

@@ -82,7 +82,7 @@ def flesh(name: str) -> bpy.types.Material:
         tree = material.node_tree
         on_ball = add(tree, 'ShaderNodeAttribute', attribute_name="onto").outputs["Fac"]
         tree.links.new(_mixed(tree, on_ball, materials.rgba(FLESH), materials.rgba(FOLD)), shader.inputs["Base Color"])
-        _uneven(tree, shader, 900.0, 0.3, 0.0005)
+        _uneven(tree, shader, 900.0, 0.3, 0.00015)
         _moist(shader, 0.4, (1.0, 0.4, 0.3), 0.0015, 0.8)
     return material
 

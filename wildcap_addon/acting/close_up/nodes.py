@@ -6,6 +6,7 @@ turns or reshapes the head."""
 import bpy
 
 from ...data_blocks import find
+from ..asset import MOUTH_SLOT
 
 LIDS, MARGIN, WET, CARUNCLE = "WildCap Lids on Eyes", "WildCap Lid Margin", "WildCap Wet Line", "WildCap Caruncle"
 CLEAR_M = 0.00015
@@ -20,8 +21,6 @@ FOOT_M = 0.0001
 """How far a lid's margin goes on within the ball."""
 SOCKET = "wildcap_socket"
 """Attribute of the head's vertices: those that line the sockets."""
-MOUTH_SLOT = 2
-"""Of the head's materials, the one of its mouth's inside (acting/materials.py)."""
 
 
 def add(tree, kind: str, inputs: dict | tuple = (), **settings):

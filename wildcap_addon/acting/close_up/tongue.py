@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-from ..asset import SOCKETS_M, SOFT, FaceUnits
+from ..asset import FaceUnits, lining
 from . import ball
 from .jaws import Jaws, find_edges
 from .mouth_shapes import Mouth, lower_arch
@@ -116,6 +116,6 @@ def _heights(floor: BVHTree, places: np.ndarray) -> np.ndarray:
 def _lining(asset: FaceUnits, places: np.ndarray) -> BVHTree:
     """The insides of the cheeks and the mouth's floor, of a head's places [V + C + P, 3]."""
     inside = np.zeros(len(places), bool)
-    inside[-len(asset.parts):] = (asset.kind == SOFT) & (asset.parts[:, 2] < SOCKETS_M)
+    inside[len(asset.template) + len(asset.copies) + lining(asset)] = True
     faces = asset.faces[inside[asset.faces[:, :3]].any(1)].tolist()
     return BVHTree.FromPolygons(places.tolist(), [[corner for corner in face if corner >= 0] for face in faces])
