@@ -20,7 +20,7 @@ GROUPS = {
     "The albedo": ("sample", "relit", "state", "state_0_1_0", "split", "scan", "gallery", "comparison", "rerender",
                    "controlled", "ablation", "prior", "confidence"),
     "Before the solve": ("geometry", "eyes", "delighters", "answers", "photographs", "shadows", "skin_tone"),
-    "After the solve": ("upscale", "whole_head", "hair", "even_light", "engines", "delivery",
+    "After the solve": ("head", "upscale", "whole_head", "hair", "even_light", "engines", "delivery",
                         "reimported"),
     "Time and memory": ("costs", "png_levels", "blender"),
 }

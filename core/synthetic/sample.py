@@ -62,7 +62,7 @@ def main() -> None:
 
 
 def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: bool = True,
-                  light: scene.SceneLight | None = None, suffix: str = ".png") -> None:
+                  light: scene.SceneLight | None = None, suffix: str = ".png", head: Mesh | None = None) -> None:
     """Renders a bald subject to work/NNNNN.png by Cycles in a process of its own; files that exist are kept.
 
     Parameters
@@ -74,11 +74,12 @@ def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: b
     leaves : whether they stand between the sun and the head
     light : instead of the sample's sun, sky and leaves
     suffix : .exr for linear light
+    head : of the built-in topology, instead of the subject's own
     """
     work.mkdir(parents=True, exist_ok=True)
     sun = scene.sun_of(seed)
     light = light or scene.SceneLight(scene.SKY, sun, scene.strew_leaves(seed, sun) if leaves else None)
-    meshes.write_obj(work / "head.obj", subject_mesh(seed))
+    meshes.write_obj(work / "head.obj", head or subject_mesh(seed))
     if light.blockers:
         meshes.write_obj(work / "leaves.obj", light.blockers)
     sky = light.sky
