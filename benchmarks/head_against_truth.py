@@ -48,7 +48,7 @@ def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: s
     frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
     ours = np.stack([v.centre for v in shared])
 
-    points, normals = _surface(mesh)
+    points, normals = sample_truth(mesh)
     points, normals = pose.apply(points), normals @ pose.rotation.T
     ours_mesh = (meshes.read_obj(capture.root / surface) if surface.endswith(".obj")
                  else meshes.read_ply(capture.root / surface))
@@ -57,12 +57,19 @@ def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: s
     figures = {"camera_centres_mm": _round(1e3 * np.median(np.linalg.norm(pose.apply(theirs) - ours, axis=1))),
                "points": len(hits)}
     figures["by_cameras"] = _percentiles(_distances(hits, tree, points, normals))
+    figures["after_icp"] = _percentiles(_distances(settle(hits, points, normals), tree, points, normals))
+    return figures
+
+
+def settle(hits: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Points [N, 3] of a surface, turned and shifted as one onto another one's points [M, 3] with normals [M, 3] (ICP
+    from point to plane)."""
+    tree = cKDTree(points)
     for _ in range(20):
         index = tree.query(hits, workers=-1)[1]
         gap = ((hits - points[index]) * normals[index]).sum(1)
         hits = _moved(hits, points[index], normals[index], np.abs(gap) < 3 * np.median(np.abs(gap)))
-    figures["after_icp"] = _percentiles(_distances(hits, tree, points, normals))
-    return figures
+    return hits
 
 
 def pose_of_truth(capture: Capture, truth: Path) -> tuple[Similarity, list[View], np.ndarray]:
@@ -76,8 +83,9 @@ def pose_of_truth(capture: Capture, truth: Path) -> tuple[Similarity, list[View]
     return similarity(theirs, ours, np.ones(len(ours))), shared, theirs
 
 
-def _surface(mesh: Path | None, count: int = 1_500_000) -> tuple[np.ndarray, np.ndarray]:
-    """Points and normals over the true surface, in the world of cameras.json."""
+def sample_truth(mesh: Path | None = None, count: int = 1_500_000) -> tuple[np.ndarray, np.ndarray]:
+    """Points and normals [count, 3] over the true surface, the sample's subject or a mesh, in the world of
+    cameras.json."""
     if mesh is None:
         subject = subject_mesh(RESERVED["sample"])
         loaded = trimesh.Trimesh(subject.vertices, subject.faces, process=False)

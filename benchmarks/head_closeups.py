@@ -43,6 +43,7 @@ from core.synthetic.skin import Skin, make_skin
 from . import figures
 from .closeups import LIGHTS
 from .gallery import write_small
+from .head_against_truth import sample_truth, settle
 from .measures.pictures import differences, face_box, with_gain
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -178,9 +179,12 @@ def read_frame(number: int) -> np.ndarray:
 
 
 def read_head(capture: Path) -> tuple[Skin, Mesh]:
-    """The skin that a capture's maps say, and its head where the true one is: by the similarity of their faces."""
-    head, true = meshes.read_obj(capture / "head.obj"), subject_mesh(sample.RESERVED["sample"])
-    placed = similarity(head.vertices, true.vertices, in_mask("face").astype(float)).apply(head.vertices)
+    """The skin that a capture's maps say, and its head where the true one is: by the similarity of the vertices of
+    their faces, then by ICP."""
+    head, true, face = meshes.read_obj(capture / "head.obj"), subject_mesh(sample.RESERVED["sample"]), in_mask("face")
+    own = head.vertices[face]
+    start = similarity(own, true.vertices[face], np.ones(len(own))).apply(own)
+    placed = similarity(own, settle(start, *sample_truth()), np.ones(len(own))).apply(head.vertices)
     diffuse = images.srgb_to_linear(images.read_srgb(capture / "maps" / "diffuse_albedo.png")[..., :3])
     specular, normal = (images.read_data(capture / "maps" / f"{name}.png") for name in ("specular_albedo", "normal"))
     nothing = np.zeros(diffuse.shape[:2], np.float32)

@@ -30,13 +30,12 @@ def sections(found: Figures) -> Sections:
             ("Beside the frame", prose(f"""
         Frame {found.frame} of the sample video, from the front; then in the same scene, from the same camera and under
         the same sun behind leaves the true skin on the true head, rendered anew, today's maps on the true head, and
-        both solved heads with their maps, laid over the true one by their faces. The scene's own material is taken,
-        which has no light below the skin, as the frame's has none. Over the face, after one gain per channel; below,
-        FLIP's maps. What the true skin misses is the film's noise and compression, and Cycles's.
+        both solved heads with their maps, laid over the true one by ICP of their faces. The scene's own material is
+        taken, which has no light below the skin, as the frame's has none. Over the face, after one gain per channel;
+        below, FLIP's maps. What the true skin misses is the film's noise and compression, and Cycles's.
         """, to_table(found.rows), """
-        What is missing is shape more than colour: on the true head the same maps come nearer. FLIP's lines lie under
-        the nose, on the lids, between the lips and along the jaw, where the registered head is off ([how
+        What is missing is shape as much as colour: on the true head the same maps come nearer. FLIP's lines lie under
+        the nose, on the lower lids, under the lower lip and at the chin, where the registered head is off ([how
         far](geometry.md)) and shadows fall elsewhere; 0.1.0's head has the same lines, and so nearly the same figures.
-        No leaf's shadow is left in either albedo.
-
+        Lips are too pale on either head. No leaf's shadow is left in either albedo.
         """, f"![{PICTURED}](../pictures/head_frame.jpg)"))]
