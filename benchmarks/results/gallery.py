@@ -20,8 +20,7 @@ def sections() -> Sections:
                 for name, words in SHOWN.items()]
     return [("", prose("""
         Made by `python -m benchmarks.people FOLDER`, then `python -m benchmarks.gallery FOLDER/NAME.wildcap OUT.jpg
-        --truth FOLDER/NAME/maps` for each. The pictures came in by commit 3110158 of 2026-11-22; the delighter and the
-        solver have changed since.
+        --truth FOLDER/NAME/maps` for each, by commit 1036f6da of 2026-11-28.
 
         Each picture: captured frame, delit frame, texture, shadow mask over it, solved albedo, true albedo, solved
         specular albedo; solved normals, shading, a close-up of the albedo beside the nose, and the head under three
