@@ -20,7 +20,7 @@ def sections() -> Sections:
                 for name, words in SHOWN.items()]
     return [("", prose("""
         Made by `python -m benchmarks.people FOLDER`, then `python -m benchmarks.gallery FOLDER/NAME.wildcap OUT.jpg
-        --truth FOLDER/NAME/maps` for each, by commit 1036f6da of 2026-11-28.
+        --truth FOLDER/NAME/maps` for each, on 2026-11-28, the people by commit 1036f6da and the sample by 4ce0418a.
 
         Each picture: captured frame, delit frame, texture, shadow mask over it, solved albedo, true albedo, solved
         specular albedo; solved normals, shading, a close-up of the albedo beside the nose, and the head under three

@@ -58,17 +58,17 @@ def carried(asset: FaceUnits, head: np.ndarray,
     parts[rows], turns[rows] = centre + (asset.parts[rows] - middle) @ matrix.T, matrix
     back = _behind_lips(asset, head, parts[rows])
     parts[rows] += back
-    rows = lining(asset)
-    away = np.linalg.norm(asset.parts[rows, None] - asset.template[asset.anchors[rows]], axis=2)
-    away = (asset.weights[rows] * away).sum(1)[:, None]
+    mouth = lining(asset)
+    away = np.linalg.norm(asset.parts[mouth, None] - asset.template[asset.anchors[mouth]], axis=2)
+    away = (asset.weights[mouth] * away).sum(1)[:, None]
     deep = away**2 / (away**2 + HELD_M**2)
-    parts[rows] += deep * (centre + (asset.parts[rows] - middle) @ matrix.T + back - parts[rows])
-    turns[rows] += deep[..., None] * (matrix - turns[rows])
+    parts[mouth] += deep * (centre + (asset.parts[mouth] - middle) @ matrix.T + back - parts[mouth])
+    turns[mouth] += deep[..., None] * (matrix - turns[mouth])
     rest, turns = np.concatenate([head, head[asset.copies], parts]), np.concatenate([turn, turn[asset.copies], turns])
     units = {name: (rows, np.einsum("nij,nj->ni", turns[rows], moves)) for name, (rows, moves) in asset.units.items()}
     for side, ball in zip(SIDES, balls, strict=True):
         rows, moves = units[f"eyesOpen{side}"]
-        own = ~np.isin(rows, len(head) + len(asset.copies) + lining(asset))  # the highest of the palate is no lid
+        own = ~np.isin(rows, len(head) + len(asset.copies) + mouth)  # the highest of the palate is no lid
         rows, moves = rows[own], moves[own]
         moves = (moves + _outwards(rest[rows] + moves, ball) if filmed is None
                  else _as_filmed(rest, rows, moves, filmed))
