@@ -18,6 +18,7 @@ import numpy as np
 
 from core.contract.capture import Capture
 from core.contract.files import write_json
+from core.contract.newest_maps import find_newest_maps
 from core.face import template
 from core.face.head import read_head
 from core.geometry.baking import Source, bake, bake_normals, places
@@ -102,11 +103,9 @@ def worn_by(capture: Capture, true: Worn, subject: Mesh) -> Worn:
 
 
 def read_rows(capture: Capture, true: Worn) -> dict[str, Worn]:
-    """`make_rows` of a solved capture and its subject's true maps; the delivered maps where they are as new as the
-    solved ones."""
-    delivered = [capture.maps_4k / "diffuse_albedo.png", capture.maps / "diffuse_albedo.png"]
-    newest = (capture.maps_4k if delivered[0].is_file() and delivered[0].stat().st_mtime >= delivered[1].stat().st_mtime
-              else capture.maps)
+    """`make_rows` of a solved capture and its subject's true maps; those at 4K where they were made of the solved
+    ones."""
+    newest = find_newest_maps(capture)[0].parent
     confidence = _sized(images.read_data(capture.texture_confidence)[..., 0], SIZE)
     raw, delit = (_sized(images.read_linear(path), SIZE) for path in (capture.texture_filmed, capture.texture))
     return make_rows(raw, delit, read_worn(newest), true, confidence * template.mask("skin", SIZE))

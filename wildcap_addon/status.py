@@ -13,7 +13,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.contract import consent, freshness, mask_edit, report, stages
+from ..core.contract import consent, freshness, mask_edit, newest_maps, report, stages
 from ..core.contract.capture import Capture
 from ..core.contract.messages import Problem
 from . import captures, properties
@@ -78,12 +78,13 @@ def look(capture: Capture, settings) -> Status:
     try:
         record = capture.read()
         verdicts = {stage.name: _verdict(capture, stage, record, settings) for stage in stages.STAGES}
+        worn = newest_maps.find_newest_maps(capture)
     except Problem as problem:
         return Status(problem=problem)
     except OSError as error:
         return Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error.strerror or error}).",
                                       "Check the disk, or open the capture from where it is now."))
-    maps_time = max(map(_time, delivered(capture)))
+    maps_time = max(map(_time, worn))
     render = max(capture.renders.glob("[!.]*.png"), key=_time, default=Path())
     states = {name: verdict.state for name, verdict in verdicts.items()}
     return Status(
@@ -93,17 +94,9 @@ def look(capture: Capture, settings) -> Status:
         seconds={name: done["seconds"] for name, done in record["stages"].items()},
         has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
         findings=tuple(report.findings(record)), interrupted=_interrupted(capture),
-        has_maps=all(path.is_file() for path in delivered(capture)), maps_time=maps_time,
+        has_maps=all(path.is_file() for path in worn), maps_time=maps_time,
         render=render.name if _time(render) >= maps_time else "", **_sending(capture, settings),
     )
-
-
-def delivered(capture: Capture) -> list[Path]:
-    """The three maps a material needs: of the 4K folder if it is complete and not older, else of the solved ones."""
-    names = ("diffuse_albedo.png", "specular_albedo.png", "normal.png")
-    solved, enlarged = [capture.maps / n for n in names], [capture.maps_4k / n for n in names]
-    newer = all(p.is_file() for p in enlarged) and min(map(_time, enlarged)) >= max(map(_time, solved))
-    return enlarged if newer else solved
 
 
 def _verdict(capture: Capture, stage: stages.Stage, record: dict, settings) -> freshness.Verdict:
@@ -167,7 +160,8 @@ def _stamp(capture: Capture, settings: str) -> tuple:
     """What a capture's status depends on: the settings, as text, and a few file times."""
     watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved,
                capture.checkpoints, capture.frames_json, capture.consent, capture.switchlight,
-               *delivered(capture), capture.renders)
+               *(folder / name for folder in (capture.maps, capture.maps_4k) for name in newest_maps.WORN),
+               capture.renders)
     return settings, *map(_changed, watched)
 
 

@@ -5,7 +5,8 @@
 import bpy
 
 from ...core.contract import sample_head
-from .. import captures, preferences, status
+from ...core.contract.newest_maps import find_newest_maps
+from .. import captures, preferences
 from ..base_operator import BaseOperator
 
 
@@ -23,7 +24,7 @@ class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
             bpy.ops.object.mode_set(mode='OBJECT')
         bpy.ops.wildcap.bring_in_head()
         # an artist's copy of it may be on its way to other maps
-        if all(path.is_file() for path in status.delivered(capture)):
+        if all(path.is_file() for path in find_newest_maps(capture)):
             bpy.ops.wildcap.assemble_material()
 
 

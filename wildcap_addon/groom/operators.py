@@ -10,8 +10,9 @@ import numpy as np
 
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
+from ...core.contract.newest_maps import find_newest_maps
 from ...core.contract.stages import STRANDS, advise_again
-from .. import captures, status
+from .. import captures
 from ..base_operator import HeadOperator
 from . import curves
 
@@ -76,14 +77,14 @@ def keep_up(obj, capture: Capture) -> None:
 
 def show_skin_below(capture: Capture) -> None:
     """Has the head's skin show what is below its hair, where that is known and the skin is assembled."""
-    if status.delivered(capture)[0].with_name("clean_albedo.png").is_file() and bpy.ops.wildcap.compare.poll():
+    if find_newest_maps(capture)[0].with_name("clean_albedo.png").is_file() and bpy.ops.wildcap.compare.poll():
         bpy.ops.wildcap.compare(show='SKIN')
 
 
 def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Of each part that has hair: points [M, K, 3] in the head's axes (metres), radii [M, K] in metres, linear colours
     [M, 3]. Raises Problem where there are none, or the file is damaged."""
-    path = status.delivered(capture)[0].with_name(STRANDS)
+    path = find_newest_maps(capture)[0].with_name(STRANDS)
     if not path.is_file():
         raise Problem("This capture has no hair to grow yet.",
                       "Switch on Hair among the settings of 4K Maps, and run that stage.")

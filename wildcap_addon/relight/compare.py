@@ -6,7 +6,8 @@ same light and at the same exposure."""
 import bpy
 
 from ...core.contract.messages import Problem
-from .. import captures, head, status
+from ...core.contract.newest_maps import find_newest_maps
+from .. import captures, head
 from ..base_operator import BaseOperator
 from . import material
 
@@ -42,7 +43,7 @@ class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
     def work(self, context):
         item = captures.require(context)
         name = SHOWN[self.show][1]
-        maps = status.delivered(captures.folder(item))[0].parent
+        maps = find_newest_maps(captures.folder(item))[0].parent
         path = (maps if self.show in ('SOLVED', 'SKIN') else captures.folder(item).comparison) / name
         if not path.is_file():
             raise Problem(f"This capture has no {name} to show.", REMEDIES[self.show == 'SKIN'])

@@ -14,7 +14,8 @@ import bpy
 
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
-from .. import captures, data_blocks, head, node_trees, status
+from ...core.contract.newest_maps import find_newest_maps
+from .. import captures, data_blocks, head, node_trees
 from . import asset, node_group, regions
 
 KEY = "wildcap_skin"
@@ -32,11 +33,11 @@ SET = "wildcap_set"
 
 
 def assemble(context, item) -> tuple[bpy.types.Material, str]:
-    """The skin material on the capture's head, from the 4K maps where they are newest, else from the solved ones; and
-    what else belongs to a finished head, with what is to be told of that."""
+    """The skin material on the capture's head, from the 4K maps where they are of the last solve, else from the solved
+    ones; and what else belongs to a finished head, with what is to be told of that."""
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
-    maps = status.delivered(capture)
+    maps = find_newest_maps(capture)
     missing = [path.name for path in maps if not path.is_file()]
     if missing:
         raise Problem(f"This capture has no {', '.join(missing)} yet.", "Click Solve first.")
