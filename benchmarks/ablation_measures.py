@@ -44,10 +44,11 @@ def measure_regions(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray,
     flip, _, _ = flip_evaluate(theirs, ours, "LDR", applyMagma=False, computeMeanError=False)
     pictures = {"ssim": ssim.mean(-1), "flip": np.squeeze(flip),
                 "features": feature_distance(ours * face[..., None], theirs * face[..., None])}
-    return {name: {"psnr": round(float(-10 * np.log10(((ours - theirs)[where] ** 2).mean())), 3),
-                   **{figure: round(float(picture[where].mean()), 4) for figure, picture in pictures.items()
-                      if picture is not None}}
-            for name, where in regions.items()}
+    with np.errstate(divide="ignore"):  # no error at all is infinite
+        return {name: {"psnr": round(float(-10 * np.log10(((ours - theirs)[where] ** 2).mean())), 3),
+                       **{figure: round(float(picture[where].mean()), 4) for figure, picture in pictures.items()
+                          if picture is not None}}
+                for name, where in regions.items()}
 
 
 def feature_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray | None:
