@@ -16,6 +16,7 @@ from benchmarks.costs import __main__ as terminal
 from benchmarks.costs import chain, meter
 from benchmarks.costs.rows import GROWTH, ROWS, WHOLES, StageRun, growth, table, together
 from benchmarks.costs.stage import measure_stage, over, preset
+from benchmarks.results.blender import acting_table
 from core.contract import stages
 from core.contract.capture import Capture
 from core.contract.files import write_json
@@ -28,6 +29,14 @@ def lines(text):
     """First cell of each row -> its other cells, of the last table that has it."""
     return {cells[0].strip(" *"): [cell.strip() for cell in cells[1:]] for line in text.splitlines()
             if (cells := line.strip("|").split("|"))}
+
+
+def test_what_a_face_that_was_filmed_with_open_eyes_had_already_is_no_click():
+    cost = {"plain": {"seconds": 10.2, "peak_mib": 1024.0}, "add_face_units": None,
+            "close_up": {"seconds": 4.12, "mib": 81.6}, "grow_hair": {"seconds": 1.3, "mib": 18.2},
+            "render": {"seconds": 11.0, "peak_mib": 1536.0}, "hairs": 9, "vertices": 8}
+    assert lines(acting_table(figures.Figures.of({"faces": {"a": cost}}).faces))["a"] == [
+        "with the material", "4.1 s, 82 MiB", "1.3 s, 18 MiB", "9", "8", "10 s, 1.0 GiB", "11 s, 1.5 GiB"]
 
 
 def test_table_says_what_was_measured_what_not_and_what_was_disturbed():

@@ -6,6 +6,7 @@
     python -m benchmarks.costs solver --json docs/figures/solver_speed.json
     python -m benchmarks.costs opendelight --json docs/figures/opendelight_cost.json
     python -m benchmarks.costs blender CAPTURE --json docs/figures/blender_memory.json
+    python -m benchmarks.costs acting CAPTURE --json docs/figures/acting_costs.json
 
 --help after any of these words tells what it measures and how. meter.py measures for all of them;
 benchmarks/figures.py describes the machine and writes the record.

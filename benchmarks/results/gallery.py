@@ -35,4 +35,8 @@ def sections() -> Sections:
         tone curve and sharpening, motion blur, a rolling shutter, the errors of structure from motion: cameras are the
         true ones, the head is the true one half a millimetre off, and the true skin tone is given. Faces and skins are
         by the generator that trained the networks, on other seeds; the light is Cycles's, which no training used.
+
+        What is wrong in them: lips come out too pale on most, brows too (least on *brown*), and the skins' own patches
+        fainter than they are. On *intermediate* a dark spot stays between the lips and a trace of the bar's edge on the
+        cheek, on *dark* one of the leaf on the forehead. On both, crumbs of the collar stay on the neck's rim.
         """, *pictures))]
