@@ -264,7 +264,7 @@ def by_capture_table(by_capture: dict[str, dict[str, Figures]]) -> str:
     head = ["capture", *(f"{method}" for method in METHODS), "solve adds",
             *(f"{method}, shared light" for method in (DELIT, SOLVED)), "solve adds"]
     lines = []
-    for name, rows in by_capture.items():
+    for name, rows in sorted(by_capture.items()):
         psnr, shared = ({method: row.get(measure) for method, row in rows.items()}
                         for measure in ("psnr", "psnr_shared"))
         lines.append([name, *(_text(psnr.get(method)) for method in METHODS), _gain(psnr),
