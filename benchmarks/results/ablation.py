@@ -7,7 +7,7 @@ from __future__ import annotations
 from ..ablation import table
 from ..figures import Figures
 from ..pages import Sections, prose
-from .relit import OLDER
+from .split import OLDER
 
 TITLE = "What each part of the solver is worth"
 SAYS = "Without the texel grid, the prior, the edge; other starts, grids, recipes, on problems in UV with known truth."

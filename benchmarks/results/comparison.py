@@ -7,7 +7,7 @@ from __future__ import annotations
 from ..comparison import table
 from ..figures import Figures
 from ..pages import Sections, prose
-from .relit import OLDER
+from .split import OLDER
 
 TITLE = "Albedo against the truth, beside other light models"
 SAYS = "Regions, one environment, no prior, or a blur divided out, instead of the paper's grid of lights."

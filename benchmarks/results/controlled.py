@@ -7,7 +7,7 @@ from __future__ import annotations
 from ..controlled import table
 from ..figures import Figures
 from ..pages import Sections, prose
-from .relit import OLDER
+from .split import OLDER
 
 TITLE = "The gap to a controlled capture, and studio input"
 SAYS = "The same people under a flash in a dark room, and before sixteen fixed cameras in even light."

@@ -35,9 +35,8 @@ def sections(*records: Figures) -> Sections:
     return [("", prose("""
         Every page has command, commit and day of its figures, all on 2 cores of a shared machine (25 GB; each page
         names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only, and may be
-        older. The sample and the state of the albedo are by delighter and solver as they are; relit rows are by a
-        delighter that left more of a shadow's outline, the delighter's answers by one that took short beards for shade,
-        too.
+        older. The sample, the state of the albedo and relit rows are by delighter and solver as they are; the
+        delighter's answers are by one that left more of a shadow's outline and took short beards for shade.
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),
@@ -146,8 +145,8 @@ def flat_wins(rows: Figures) -> bool:
 def losses(of: Figures) -> str:
     """What a reader should know before the tables."""
     answers, lamps, delit = of.state.summary, of.photographs.lamps.summary, of.comparison.people.delit
-    relit, scalp, dark = of.relit.sample, of.whole_head.synthetic.scalp, of.skin_tone.groups.dark
-    alone = of.whole_chain.rows["scan, network"]
+    relit, people, dark = of.relit.sample, of.relit_people.mean, of.skin_tone.groups.dark
+    alone, scalp = of.whole_chain.rows["scan, network"], of.whole_head.synthetic.scalp
     return prose(f"""
         - **In {sum(map(flat_wins, of.state.captures.values()))} of {len(of.state.captures)} captures one flat colour is
           as near to the truth** in the picture as our albedo (over people {answers["flat colour"].psnr.mean:.2f} and
@@ -161,8 +160,9 @@ def losses(of: Figures) -> str:
         - **Freer lights win on delit synthetic people**: regions by
           {delit["regions 10"].PSNR - delit.wildcap.PSNR:.1f} dB, one environment
           by {delit.environment.PSNR - delit.wildcap.PSNR:.1f} ([page](comparison.md)).
-        - **Relief and gloss do not help yet**: {relit.solved.psnr - relit.plain.psnr:+.2f} dB on a relit head
-          ([relit](relit.md)); normals and specular say no more than the mean face's ([prior](prior.md)).
+        - **Relief and gloss help little**: {relit.solved.psnr - relit.plain.psnr:+.2f} dB on the sample's relit head,
+          {people.solved.psnr - people.plain.psnr:+.2f} dB over six people ([relit](relit.md)); normals and specular say
+          no more than the mean face's ([prior](prior.md)).
         - **Brows and lips keep {answers.solved.kept_brows.mean:.2f} and {answers.solved.kept_lips.mean:.2f} of their
           contrast** ([state](state.md#features-kept)); edges of hard shadows leave a faint outline, the paper's own
           failure case.

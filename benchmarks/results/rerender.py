@@ -7,7 +7,7 @@ from __future__ import annotations
 from ..figures import Figures
 from ..pages import Sections, prose
 from ..rerender import table
-from .relit import OLDER
+from .split import OLDER
 
 TITLE = "Face reconstruction, as in the paper's Table 1"
 SAYS = "Albedo times shading against the frames it came from: a tie, which tells no light models apart."

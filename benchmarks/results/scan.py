@@ -7,7 +7,7 @@ from __future__ import annotations
 from ..albedo_score import table
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
-from .relit import OLDER
+from .split import OLDER
 
 TITLE = "A head scan under hard sun through leaves"
 SAYS = "The one real skin: albedo, cameras and head against the truth, and what the solve adds to each delighter."

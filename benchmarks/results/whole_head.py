@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
-from .relit import OLDER
+from .split import OLDER
 
 TITLE = "The whole head, and the hair's masks"
 SAYS = "Neck, ears and scalp that no camera saw; the masks of brows, lashes and beard, and the skin below."
