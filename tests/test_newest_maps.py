@@ -12,7 +12,7 @@ from core.contract import stages
 from core.contract.capture import Capture
 from core.contract.messages import Problem
 from core.contract.newest_maps import WORN, find_newest_maps
-from core.contract.settings import Settings
+from core.contract.settings import Settings, from_json
 
 from . import standin
 from .recorded import record
@@ -55,10 +55,8 @@ def test_maps_of_a_later_solve_are_worn_whatever_times_files_have(enlarged, name
 
 def test_other_settings_of_the_enlarging_do_not_take_its_maps_away(enlarged):
     assert enlarged.state(UPSCALE, Settings()) == "done"
-    told = enlarged.read()
-    told["stages"]["upscale"]["settings"]["size"] = 2048
-    enlarged.json.write_text(json.dumps(told), encoding="utf-8")
-    assert enlarged.state(UPSCALE, Settings()) == "stale" and is_at_4k(enlarged)
+    assert enlarged.state(UPSCALE, from_json({"upscale": {"size": 2048}})) == "stale"
+    assert is_at_4k(enlarged)
 
 
 def test_an_incomplete_folder_is_not_worn(enlarged):

@@ -31,7 +31,7 @@ def sections(window: Figures, memory: Figures, acting: Figures) -> Sections:
         What a click makes you wait, and the memory that Blender holds more after it; then a render by Cycles on the
         processor at {acting.resolution} px and {acting.samples} samples, before and after, with Blender's peak until
         then. How much slower Material Preview turns was not measured: no GPU was at hand.
-        """) + "\n\n" + acting_table(acting.faces))]
+        """, acting_table(acting.faces)))]
 
 
 def acting_table(faces: dict[str, Figures]) -> str:

@@ -37,6 +37,7 @@ def sections() -> Sections:
         by the generator that trained the networks, on other seeds; the light is Cycles's, which no training used.
 
         What is wrong in them: lips come out too pale on most, brows too (least on *brown*), and the skins' own patches
-        fainter than they are. On *intermediate* a dark spot stays between the lips and a trace of the bar's edge on the
-        cheek, on *dark* one of the leaf on the forehead. On both, crumbs of the collar stay on the neck's rim.
+        fainter than they are. On *intermediate* a dark spot stays on the lips and shade around the eye that lay under
+        the bar, on the sample a trace of a leaf beside the bridge of the nose. Crumbs of the collar stay on the neck's
+        rim of *intermediate* and *dark*.
         """, *pictures))]
