@@ -64,8 +64,6 @@ TABLES = {
     "Parts apart": {**{f"psnr_{part}": Column(f"{part}, dB") for part in SHOWN},
                     **{f"bias_{part}": Column(f"{part}, log", 3, 0)
                        for part in SHOWN}},
-    "Confidence as an uncertainty": {"likelihood_gained": Column("nats gained", 3),
-                                     "coverage": Column("within one sigma", 3, 0)},
 }
 WORDS = {
     "In the picture": "In the frames with a true albedo, on the face with its brows, lips and beard, after one gain "
@@ -89,9 +87,6 @@ WORDS = {
     "Parts apart": "PSNR, and the median of the grey log(answer / truth), in each part of the map after the whole "
                    "face's gain. True part masks where "
     "the subject has them, else the built-in head's.",
-    "Confidence as an uncertainty": "The solver's confidence as a sigma in proportion to 1.02 less the confidence, by "
-                                    "the best factor, against the best "
-    "constant; 0.683 of the errors should lie within one sigma.",
 }
 INTRODUCTION = ("Means over people ± their spread (standard deviation; one person's figure is the mean of its "
                 "captures), then the differences from the delit "

@@ -76,8 +76,7 @@ class Filmed:
         capture = self.capture
         return [path
                 for path in (capture.head, capture.texture_filmed, capture.texture, capture.texture_confidence,
-                             capture.maps / "diffuse_albedo.png",
-                             capture.maps / "confidence.png", self.truth / "cameras.json", self.truth / "head.obj")
+                             capture.maps / "diffuse_albedo.png", self.truth / "cameras.json", self.truth / "head.obj")
                 if path.is_file()]
 
     @cached_property

@@ -14,7 +14,6 @@ from core.imaging import images
 from .albedo_score import HeadInView
 from .delight_measures import stepping
 from .measures.agreement import agreement
-from .measures.calibration import calibrate
 from .measures.edges import score_edges
 from .measures.features_kept import contrast_kept, contrasts, joint
 from .measures.parts import score_parts
@@ -22,11 +21,8 @@ from .measures.pictures import detail, differences, face_box, log_green, shadow_
 from .measures.references import NOTHING, TRUE, face_height
 from .measures.shared_light import fit_light, log_ratio, without_light
 from .measures.slopes import slope
-from .measures.tone import psnr_after_gain, to_tone
-from .state_captures import SIZE, SOLVED, Filmed, landmarks_in_uv
-
-DOUBT = 1.02
-"""Confidence has no unit: sigma is taken as in proportion to this less the confidence, by the best factor."""
+from .measures.tone import psnr_after_gain
+from .state_captures import SIZE, Filmed, landmarks_in_uv
 
 Figures = dict[str, float | None]
 
@@ -64,8 +60,7 @@ def in_pictures(answers: dict[str, np.ndarray], looks: list[HeadInView]) -> dict
 
 def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
     """Method -> the measures of one capture in UV space: PSNR up to a light of its own and that light's deviation,
-    contrast kept, parts, calibration of the solver's confidence. maps: linear [SIZE, SIZE, 3], the true one among
-    them."""
+    contrast kept, parts. maps: linear [SIZE, SIZE, 3], the true one among them."""
     where, points = filmed.where, landmarks_in_uv()
     truth, normals = maps[TRUE], filmed.normals[where]
     true_contrasts = contrasts(images.linear_to_srgb(truth), points, where)
@@ -80,12 +75,6 @@ def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
         for name, part in score_parts(answer[where], truth[where], parts).items():
             figures |= {f"psnr_{name}": part.psnr, f"bias_{name}": part.bias}
         found[method] = figures
-    path = filmed.capture.maps / "confidence.png"
-    if SOLVED in maps and path.is_file():
-        error = log_ratio(to_tone(maps[SOLVED][where], truth[where].mean(0)), truth[where])
-        doubt = DOUBT - images.resize(images.read_mask(path), SIZE, SIZE)[where].clip(0, 1)
-        judged = calibrate(error, doubt * np.sqrt(np.mean((error / doubt) ** 2)))
-        found[SOLVED] |= {"likelihood_gained": judged.gained, "coverage": judged.coverage}
     return found
 
 

@@ -15,23 +15,13 @@ from core.contract.settings import Settings, from_json
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-from core.solve import confidence, initial
+from core.solve import initial
 from core.solve.prior import load
 from core.solve.recipes import RECIPES
 from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
 
 SIZE = 128
 TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
-
-
-@pytest.fixture(scope="module", autouse=True)
-def brief_confidence():
-    """In a module that imports this the short runs behind the confidence map are shorter still: at this size they would
-    take longer than the solve."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(confidence, "SHORT_RUNS", 2)
-        patched.setattr(confidence, "SHORT_RUN_STEPS", 2)
-        yield
 
 
 @pytest.fixture

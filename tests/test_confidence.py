@@ -1,60 +1,106 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The confidence of the solved maps: how well a texel was seen, less where an error is expected."""
+"""The confidence of the solved maps: how large an error is expected of a texel, less where it was seen less; and
+whether the benchmark finds deviations that were laid in."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 import torch
 
+from benchmarks import confidence as benchmark
+from benchmarks.confidence import Errors, fit_deviations, judge
+from core.imaging import images
 from core.solve import confidence
-from core.solve.confidence import estimate_confidence, sample_spread
-from core.solve.recipes import OURS
+from core.solve.confidence import PLAIN_DEVIATION, estimate_confidence
+from core.solve.evidence import Evidence
 
-from .test_sampler import observation, start
-
-SIZE = 32
-TONE = torch.tensor([0.42, 0.26, 0.18])[:, None, None].expand(3, SIZE, SIZE)
-SEEN, NO_SHADOW = torch.ones(SIZE, SIZE), torch.zeros(SIZE, SIZE)
+SIZE = 256
+PLANE = torch.ones(SIZE, SIZE)
+SKIN = np.full((SIZE, SIZE, 3), [0.42, 0.26, 0.18], np.float32)
 
 
-def told(seen: float = 1.0, explained: float = 0.0, darkened: float = 0.0, spread: float | None = None) -> float:
-    """Of a texel that was so well seen, whose light was so far taken away and whose albedo is so far below the mean
-    face's."""
-    varied = None if spread is None else torch.full((8, 8), spread)
-    found = estimate_confidence(seen * SEEN, explained + NO_SHADOW, TONE * (1 - darkened), TONE, varied)
-    assert found.shape == (SIZE, SIZE) and found.max() - found.min() < 1e-6
-    return float(found[0, 0])
+def plain_evidence(size: int, **changed: torch.Tensor) -> Evidence:
+    """Of skin that was seen well all over, lit as usual."""
+    ones, colours = torch.ones(size, size), torch.zeros(3, size, size)
+    plain = Evidence(colours, ones, 0 * ones, colours, ones > 0, ones, ones, ones, 0 * ones, 0 * ones, ones)
+    return replace(plain, **changed)
 
 
-def test_where_no_error_is_expected_it_is_how_well_a_texel_was_seen():
-    assert told() == told(spread=0.0) == 1 and told(seen=0.4) == pytest.approx(0.4) and told(seen=0.0) == 0
+def told(albedo: np.ndarray = SKIN, **changed: torch.Tensor) -> float:
+    """In the middle of the map."""
+    return float(estimate_confidence(plain_evidence(SIZE, **changed), albedo)[SIZE // 2, SIZE // 2])
 
 
-def test_what_is_unlike_the_mean_face_explained_as_light_or_uncertain_lowers_it():
-    for name, values in {"darkened": (0.0, 0.2, 0.8), "explained": (0.0, 0.3, 0.9), "spread": (0.0, 0.02, 0.1)}.items():
-        falling = [told(**{name: value}) for value in values]
-        assert falling == sorted(set(falling), reverse=True), name
-    half = confidence.HALF_CONFIDENCE_ERROR / confidence.ERROR_PER_SPREAD
-    assert told(spread=half) == pytest.approx(0.5) and told(seen=0.5, spread=half) == pytest.approx(0.25)
+def test_plain_skin_has_all_of_it_and_what_was_seen_less_has_less():
+    assert told() == pytest.approx(1) and told(weight=0.4 * PLANE) == pytest.approx(0.4)
+    assert told(weight=0 * PLANE) == 0
+    assert told(0.2 * SKIN) == pytest.approx(1), "dark skin is as sure as light skin"
 
 
-class Skins:
-    """The exact denoiser of independent texels of a mean of 0 and a deviation."""
+def test_variances_add_up():
+    """Each texel's confidence is the deviation of plain skin over its own."""
+    unlike = np.hypot(PLAIN_DEVIATION, confidence.UNLIKE_SKIN)
+    assert told(trust=0 * PLANE) == pytest.approx(PLAIN_DEVIATION / unlike)
+    quarter = np.hypot(confidence.WHOLE_FACE, 2 * confidence.WEAKLY_LIT)
+    assert told(filmed=PLANE / 4) == pytest.approx(PLAIN_DEVIATION / quarter)
+    assert told(filmed=4 * PLANE) == 1, "the light was never better than known"
+    # a checkerboard of single texels has no mean to vary about but its own: its deviation is its amplitude
+    rough = SKIN * np.exp(0.1 * (-1.0) ** np.indices((SIZE, SIZE)).sum(0))[..., None].astype(np.float32)
+    assert told(rough) == pytest.approx(PLAIN_DEVIATION / np.hypot(PLAIN_DEVIATION, 0.1 * confidence.VARIED), rel=0.01)
 
-    device = torch.device("cpu")
 
-    def __init__(self, deviation: float):
-        self.variance = deviation**2
+def test_how_bright_the_frames_were_is_over_the_skin_that_they_showed(tmp_path):
+    from benchmarks.uv_problems import make_plain_problem
+    from core.contract.capture import Capture
+    from core.face.head import read_filmed_head
+    from core.solve.evidence import read_evidence
 
-    def __call__(self, x, sigma, coords):
-        return x * self.variance / (self.variance + sigma**2)
+    capture = Capture(tmp_path)
+    make_plain_problem(9000, "self", SIZE).write(capture)
+    alone = read_evidence(capture, read_filmed_head(capture), SIZE)
+    skin = (alone.skin * alone.weight > 0.5).numpy()
+    assert np.median(alone.filmed.numpy()[skin]) == pytest.approx(1, rel=1e-3), "of the texture, where no other is"
+    lit = np.full((SIZE, SIZE, 3), 0.4, np.float32)
+    lit[:, :SIZE // 2] = 0.1
+    lit[:, SIZE // 2] = 0.2
+    images.write_srgb(capture.texture_filmed, images.linear_to_srgb(lit))
+    filmed = read_evidence(capture, read_filmed_head(capture), SIZE).filmed.numpy()
+    assert filmed[8, SIZE - 8] / filmed[8, 8] == pytest.approx(4, rel=0.02)
 
 
-def test_short_runs_vary_where_nobody_looked_and_where_skins_do():
-    weight = torch.ones(SIZE, SIZE)
-    weight[:, : SIZE // 2] = 0
-    begun = start()
-    spread = [sample_spread(Skins(deviation), observation(torch.full((3, SIZE, SIZE), 0.5), weight=weight),
-                            begun.denoised, begun.lights, OURS, 0) for deviation in (0.0, 0.3)]
-    assert spread[0].abs().max() == 0, "skins that are all alike"
-    unseen, seen = spread[1][:, : SIZE // 2].mean(), spread[1][:, SIZE // 2:].mean()
-    assert unseen > 0.02 and unseen > 4 * seen, (unseen, seen)
+def laid_in(seed: int, size: float, count: int = 60000) -> Errors:
+    """Errors with known deviations, all of them `size` times as large."""
+    rng = np.random.default_rng(seed)
+    parts = np.stack([np.ones(count), rng.exponential(0.002, count), rng.random(count) < 0.3,
+                      rng.uniform(0.5, 8, count)], 1)
+    sigma = size * np.sqrt(parts @ np.square(LAID_IN))
+    return Errors(f"person {seed}", rng.normal(0, sigma), parts, sigma)
+
+
+LAID_IN = np.array([0.08, 2.0, 0.15, 0.05])
+
+
+def test_deviations_that_were_laid_in_are_found(monkeypatch):
+    monkeypatch.setattr(benchmark, "FEW", 30000)
+    found = fit_deviations(laid_in(seed, size) for seed, size in ((0, 0.5), (1, 1.0), (2, 3.0)))
+    assert found == pytest.approx(LAID_IN, rel=0.15), "of the capture in the middle, whatever the others' size"
+
+
+def test_what_knows_the_errors_gains_likelihood_and_a_constant_does_not():
+    given = laid_in(3, 1.0)
+    known, constant = judge(given.error, given.blurred), judge(given.error, np.linspace(0.999, 1.001, len(given.error)))
+    root = np.sqrt(np.mean(given.blurred**2))
+    assert known["gained"] == pytest.approx(float(np.log(root) - np.mean(np.log(given.blurred))), abs=0.01)
+    assert known["coverage"] == pytest.approx(0.683, abs=0.01) == known["coverage_absolute"]
+    assert known["spearman"] > 0.15 and known["half"] < 0.8
+    assert constant["gained"] == pytest.approx(0, abs=1e-3)
+
+
+def test_the_page_compares_what_ships_with_those_who_were_left_out():
+    record = benchmark.measure({f"capture {seed}": laid_in(seed, 1.0, 8000) for seed in range(3)})
+    best, others = (record["summary"][name]["gained"]["mean"] for name in (benchmark.BLURRED, benchmark.LEFT_OUT))
+    assert best > 0.04 and others > best - 0.01, "three people with one law: what two tell holds for the third"
+    text = "\n".join(body for _, body in benchmark.sections(record))
+    assert "| left out |" in text and "| most likely |" in text and "capture 2" in text

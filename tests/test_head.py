@@ -15,7 +15,7 @@ from core.face import template
 from core.face.head import Head, read_head
 from core.geometry import meshes, raster
 
-from .painted_skin import SHORT, brief_confidence  # noqa: F401
+from .painted_skin import SHORT
 from .test_delight import SUN, render_frames, write_cameras
 
 SIZE = 64

@@ -16,7 +16,6 @@ from core.geometry import meshes
 from core.imaging import images
 
 from .own_heads import check_fitted, lay_over, person
-from .painted_skin import brief_confidence  # noqa: F401
 from .test_prior_layout import SIZE, capture, seen_layouts, settings  # noqa: F401
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"

@@ -18,7 +18,7 @@ from core.contract.stages import MAPS
 from core.imaging import images
 from core.solve.window import find_window
 
-from .painted_skin import brief_confidence, make, settings  # noqa: F401
+from .painted_skin import make, settings
 
 EDIT = (slice(60, 68), slice(40, 50))
 

@@ -17,7 +17,7 @@ from core.solve.network import UNet, UNetLayout
 from core.solve.recipes import Recipe
 from core.solve.sampler import Sampler, seed_noise
 
-from .painted_skin import brief_confidence, make, settings  # noqa: F401
+from .painted_skin import make, settings
 from .recorded import changed, record
 from .test_sampler import SmoothPrior, observation, shadow_problem, start
 

@@ -9,7 +9,7 @@ from core.contract.messages import Preview, Reporter
 from core.imaging import images
 from core.solve import drawing
 
-from .painted_skin import brief_confidence, make, settings  # noqa: F401
+from .painted_skin import make, settings
 
 
 def test_a_solve_shows_pictures_that_change_and_how_its_loss_falls(tmp_path, monkeypatch):

@@ -28,7 +28,7 @@ from core.solve.maps import Maps
 from core.solve.prior import WEIGHTS, load
 from core.solve.skin_tone import GIVEN, SkinTone
 
-from .painted_skin import SIZE, TONE, as_setting, brief_confidence, make  # noqa: F401
+from .painted_skin import SIZE, TONE, as_setting, make
 from .recorded import changed, record
 from .test_released_prior import weights_of, write
 
@@ -124,7 +124,7 @@ def round_trip(there: layout.Layout, albedo: np.ndarray, normal: np.ndarray) -> 
     up = torch.zeros(3, size, size)
     up[2] = 1
     e = layout.Evidence(torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, ones, 0 * ones,
-                        0 * ones)
+                        0 * ones, ones)
     return there.returned(solved, e, Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)), 1.0,
                           SkinTone.from_linear(TONE, GIVEN))
 

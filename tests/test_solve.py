@@ -25,7 +25,7 @@ from core.solve.recipes import RECIPES
 from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic.identities import reserved_seeds
 
-from .painted_skin import SIZE, TONE, as_setting, brief_confidence, brief_light, make, settings  # noqa: F401
+from .painted_skin import SIZE, TONE, as_setting, brief_light, make, settings  # noqa: F401
 
 
 @pytest.fixture

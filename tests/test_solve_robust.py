@@ -21,7 +21,7 @@ from core.imaging import images
 from core.worker.client import Worker
 from core.worker.job import write_job
 
-from .painted_skin import SHORT, SIZE, TONE, brief_confidence, make, settings  # noqa: F401
+from .painted_skin import SHORT, SIZE, TONE, make, settings
 from .tiny_chain import follow
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -105,19 +105,6 @@ def test_one_captures_figures(person):
         0, abs=1e-3
     )
     assert found[FLAT]["bias_brows"] - found[FLAT]["bias_skin"] == pytest.approx(-np.log(0.4), abs=0.02)
-    assert "coverage" not in found[SOLVED]
-
-
-def test_confidence_that_knows_the_errors_gains_likelihood(person):
-    capture, maps = person[0][0], person[1][0]
-    poor = np.random.default_rng(1).random((SIZE, SIZE)) < 0.3
-    noise = np.random.default_rng(2).standard_normal((SIZE, SIZE, 1))
-    solved = maps[TRUE] * np.exp(noise * np.where(poor, 0.1, 0.01)[..., None])
-    images.write_data(capture.capture.maps / "confidence.png", np.where(poor, 0.02, 0.92).astype(np.float32))
-    found = state_scores.in_uv(capture, {TRUE: maps[TRUE], SOLVED: solved.astype(np.float32)})[SOLVED]
-    assert found["coverage"] == pytest.approx(0.68, abs=0.03)
-    gained = np.log(np.sqrt(0.3 * 0.01 + 0.7 * 0.0001)) - 0.3 * np.log(0.1) - 0.7 * np.log(0.01)
-    assert found["likelihood_gained"] == pytest.approx(gained, abs=0.03)
 
 
 def test_pictures_are_judged_as_the_maps_are_seen():

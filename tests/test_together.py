@@ -17,7 +17,7 @@ from core.face import template
 from core.geometry import meshes
 from core.imaging import images
 
-from .painted_skin import SIZE, brief_confidence, brief_light, make, settings  # noqa: F401
+from .painted_skin import SIZE, brief_light, make, settings  # noqa: F401
 
 
 @pytest.fixture

@@ -12,12 +12,13 @@ import torch
 from core.contract.messages import Reporter
 from core.face import beard, template
 from core.solve.confidence import estimate_confidence
-from core.solve.evidence import FULL_CONFIDENCE
+from core.solve.evidence import BEARD_TRUST, FULL_CONFIDENCE
 from core.upscale import grain
 from core.upscale.maps import HeadMaps
 from core.upscale.whole_head import complete, seen_well
 
 from .hairy_head import SIZE, painted, surface
+from .test_confidence import plain_evidence
 
 WRONG = np.float32([1.4, 1.0, 0.8])
 """What the unseen part is off by: another tone, as the solver's mean face has it."""
@@ -175,14 +176,14 @@ def test_a_stray_patch_that_was_seen_at_a_glance_goes_and_a_mark_that_was_seen_w
 
 @pytest.mark.parametrize("darker", [0.4, 0.12])
 def test_a_beard_that_was_seen_well_keeps_its_bytes(truth, cut, darker):
-    """With the confidence that the solver itself gives a chin that is so much darker than the mean face's."""
+    """With the confidence that the solver itself gives a beard."""
     jaw = beard.zone(template.landmark_points(surface().mesh), surface().position)[..., None]
     diffuse = (cut.diffuse * (1 - jaw * (1 - darker))).astype(np.float32)
-    planes = [torch.from_numpy(np.ascontiguousarray(each.transpose(2, 0, 1))) for each in (diffuse, truth.diffuse)]
-    weight = torch.from_numpy(np.clip(cut.seen / FULL_CONFIDENCE, 0, 1))
-    confidence = estimate_confidence(weight, torch.zeros_like(weight), *planes, None).numpy()
+    evidence = plain_evidence(SIZE, weight=torch.from_numpy(np.clip(cut.seen / FULL_CONFIDENCE, 0, 1)),
+                              trust=torch.from_numpy((1 - (1 - BEARD_TRUST) * jaw[..., 0]).astype(np.float32)))
+    confidence = estimate_confidence(evidence, diffuse)
     bearded = (jaw[..., 0] > 0.99) & (seen_well(cut.seen, surface()) >= 1)
-    assert bearded.sum() > 100 and (darker > 0.2 or np.median(confidence[bearded]) < 0.3)
+    assert bearded.sum() > 100 and np.median(confidence[bearded]) < 0.7
     done = complete(replace(cut, diffuse=diffuse, confidence=confidence), surface(), Reporter("upscale"))
     assert np.array_equal(done.diffuse[bearded], diffuse[bearded])
     plain = hidden() & (template.mask("neck", SIZE) > 0.9)

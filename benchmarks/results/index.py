@@ -9,6 +9,7 @@ from importlib import import_module
 
 import numpy as np
 
+from ..confidence import SHIPPED
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
 from ..people import PEOPLE
@@ -146,6 +147,7 @@ def losses(of: Figures) -> str:
     """What a reader should know before the tables."""
     answers, lamps, delit = of.state.summary, of.photographs.lamps.summary, of.comparison.people.delit
     relit, people, dark = of.relit.sample, of.relit_people.mean, of.skin_tone.groups.dark
+    known = of.confidence.summary[SHIPPED]
     alone, scalp = of.whole_chain.rows["scan, network"], of.whole_head.synthetic.scalp
     return prose(f"""
         - **In {sum(map(flat_wins, of.state.captures.values()))} of {len(of.state.captures)} captures one flat colour is
@@ -168,8 +170,8 @@ def losses(of: Figures) -> str:
           failure case.
         - **Dark skin comes out {dark.scene.lightness:.1f} L* too light** where only the frames tell its tone
           ([skin tone](skin_tone.md)), and keeps highlights on raw frames ([comparison](comparison.md)).
-        - **The confidence map knows little**: it correlates by {of.confidence.correlation.mean:.2f} with the true
-          error, aim 0.4 ([page](confidence.md)).
+        - **The confidence map knows little**: {known.gained.mean:.2f} nats more than one sigma for all, aim 0.1
+          ([page](confidence.md)).
         - **In even studio light the solve makes the texture worse** ([controlled](controlled.md)).
         - **A scalp that nobody saw becomes bare skin** ({scalp.completed:.0f} of 255 off where hair was;
           [whole head](whole_head.md)); a cap, or a cloth of the skin's colour, is not told from hair or skin; a

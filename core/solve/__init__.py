@@ -27,7 +27,6 @@ from ..face.head import read_filmed_head
 from ..imaging import images
 from . import checkpoint, comparison, drawing, initial, iris, layout, maps
 from .checkpoint import Solution
-from .confidence import sample_spread
 from .draft import restore_maps
 from .edited import solve_edited
 from .evidence import REFERENCE_TEXELS, Evidence, read_evidence
@@ -39,7 +38,6 @@ from .sampler import Sampler, seed_noise
 from .skin_tone import SkinTone
 from .together import read_others
 from .tone import resolve_skin_tone
-from .window import average_down
 from .witnesses import confirm_marks
 
 FAINT_WEIGHT = 1.4
@@ -93,7 +91,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
                       drawing.draw_edges_and_marks(evidence, start.alpha, start.marks))
     stored = capture.checkpoints / "solve.safetensors"
     state = _sampled(capture, settings, start, denoiser, stored, _key(evidence, settings, start), report)
-    result, solution = _finished(denoiser, state, evidence, start, settings.seed, report)
+    result = maps.finish_maps(state, evidence, start)
+    solution = Solution(state.denoised, state.lights, evidence.alpha, start.alpha, start.tone, result.gain,
+                        start.exposure, start.local, start.recipe.linear > 0)
     delivered = (result if elsewhere is None
                  else elsewhere.returned(result, known, state.lights, start.exposure, start.tone))
     maps.write_maps(capture, delivered, solution, conditions)
@@ -128,17 +128,6 @@ def _sampled(capture: Capture, settings: Settings, start: initial.Start, denoise
     state = sample_within_memory(sampler, seen, state.to(denoiser.device), on_step, report.log)
     state.denoised = restore_maps(denoiser, state.denoised, seen[1].coords, settings.seed)
     return state.to("cpu")
-
-
-def _finished(prior: ConditionedPrior, state: State, evidence: Evidence, start: initial.Start, seed: int,
-              report: Reporter) -> tuple[maps.Maps, Solution]:
-    """The maps with their confidence, and what a later solve of a part needs."""
-    factor = max(start.observations)
-    varied = sample_spread(prior, start.observations[factor], average_down(start.reference, factor), state.lights,
-                           start.recipe, seed, report.check)
-    result = maps.finish_maps(state, evidence, start, varied)
-    return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain,
-                            start.exposure, start.local, start.recipe.linear > 0)
 
 
 def recipe_of(settings: Settings, prior: Prior) -> Recipe:

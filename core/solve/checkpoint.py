@@ -29,15 +29,13 @@ from .skin_tone import EARLIER, SkinTone
 @dataclass(frozen=True)
 class Solution:
     """What a solve ended with, all of the whole map: denoised x_0 [1, 7, S, S] before the maps' own gain, lights, the
-    mask as `painted` [S, S] and as it was used (`alpha`), the spread [H, W] of a coarser map that the confidence took;
-    the skin tone, gain [3] of the albedo, exposure of the texture; local [3, C, C]: initial.Start's; settled: whether
-    the split told the global light."""
+    mask as `painted` [S, S] and as it was used (`alpha`), the skin tone, gain [3] of the albedo, exposure of the
+    texture; local [3, C, C]: initial.Start's; settled: whether the split told the global light."""
 
     denoised: torch.Tensor
     lights: Lights
     painted: torch.Tensor
     alpha: torch.Tensor
-    spread: torch.Tensor
     tone: SkinTone
     gain: torch.Tensor
     exposure: float
@@ -49,7 +47,7 @@ def write_solution(path: Path, solution: Solution, conditions: dict[str, str]) -
     """`conditions` are mask_edit's: under others this state is of no use."""
     lights = {"glob": solution.lights.glob, "grid": solution.lights.grid, "chroma": solution.lights.chroma}
     tensors = {name: getattr(solution, name)
-               for name in ("denoised", "painted", "alpha", "spread", "gain", "local")} | lights
+               for name in ("denoised", "painted", "alpha", "gain", "local")} | lights
     tensors["tone"] = solution.tone.tensor
     tensors["settled"] = torch.tensor(solution.settled)
     tensors["exposure"] = torch.tensor(solution.exposure, dtype=torch.float64)

@@ -1,92 +1,58 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far each texel of the solved albedo can be trusted: an error that is expected from what the solve left behind,
-and how well the texel was seen.
+"""How far each texel of the solved albedo can be trusted: how large its error is expected to be.
 
-The constants of that expectation were fitted to synthetic subjects; benchmarks/confidence.py measures it on others.
+Four errors are taken for independent, so their variances add up: light of the whole face that is taken for skin, which
+no place is free of; edges of the skin's own that the frames' registration blurs or moves, the larger the more the
+albedo varies about a texel; what a delighter makes of brows, lips, hair and beards; and light that was weak, of which
+it has to make more. Each was measured on people whose albedo is known, and judged on those who were left out
+(benchmarks/confidence.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+import cv2
+import numpy as np
 
-import torch
-from torch.nn import functional
+from .evidence import Evidence
 
-from .lighting import Lights
-from .prior import ConditionedPrior
-from .problem import Observation, State, albedo
-from .recipes import Recipe
-from .sampler import Sampler, seed_noise
-
-ERROR_PER_SHARE, ERROR_PER_DIFFERENCE, ERROR_PER_SPREAD = 0.015, 0.55, 0.5
-"""Error of the albedo in sRGB that is expected per share explained as light, per difference from the mean face, per
-spread of the short runs: what the observation says against all expectation is a feature of this face, or light that was
-taken for one."""
-HALF_CONFIDENCE_ERROR = 0.03
-"""Expected error at which a texel that was well seen has a confidence of a half."""
-SHORT_RUNS, SHORT_RUN_STEPS = 3, 8
-"""Short runs, and the steps of each: closed form, on a map of a quarter of the size."""
+WHOLE_FACE, VARIED, UNLIKE_SKIN, WEAKLY_LIT = 0.086, 1.80, 0.137, 0.046
+"""Deviations in natural log: of light of the whole face; of edges, over the albedo's own deviation about a texel; of a
+texel whose colour says nothing of the light (Evidence.trust); of weak light, where it is as strong as usual."""
+PLAIN_DEVIATION = float(np.hypot(WHOLE_FACE, WEAKLY_LIT))
+"""Of even skin that was lit as usual, whose confidence is 1."""
+DETAIL_TEXELS, AROUND_TEXELS = 8.0, 12.0
+"""Deviations of Gaussians in texels of a 1024 map: what varies faster than the first is detail, and how much it varies
+about a texel is taken over the second."""
+DARKEST = 1e-3
 
 
-def estimate_confidence(observed: torch.Tensor, explained: torch.Tensor, albedo: torch.Tensor, reference: torch.Tensor,
-                        spread: torch.Tensor | None) -> torch.Tensor:
+def estimate_confidence(evidence: Evidence, albedo: np.ndarray) -> np.ndarray:
     """How far a texel of the albedo can be believed.
 
     Parameters
     ----------
-    observed : [S, S] in [0, 1], how far a texel's observation counts
-    explained : [S, S] in [0, 1], the share of light that the grid took away
-    albedo : [3, S, S], linear, as delivered
-    reference : [3, S, S], linear, the mean face of the tone
-    spread : `sample_spread`'s, of any size, or None
+    evidence : of the capture
+    albedo : [S, S, 3], linear
 
     Returns
     -------
-    [S, S] in [0, 1]: 1 for a texel that was well seen and where no error is expected, a half where
-    HALF_CONFIDENCE_ERROR is.
+    [S, S] in [0, 1]: PLAIN_DEVIATION over the deviation of the texel's error in natural log, less where it was seen
+    less, 0 where nobody looked.
     """
-    unlike = (to_display(albedo) - to_display(reference)).abs().mean(0)
-    varied = 0.0 if spread is None else enlarge_map(spread, observed.shape)
-    expected = ERROR_PER_SHARE * explained + ERROR_PER_DIFFERENCE * unlike + ERROR_PER_SPREAD * varied
-    return (observed / (1 + expected / HALF_CONFIDENCE_ERROR)).clamp(0, 1)
+    deviation = np.sqrt(variances(evidence, albedo) @ np.square([WHOLE_FACE, VARIED, UNLIKE_SKIN, WEAKLY_LIT]))
+    return (evidence.weight.numpy() * np.minimum(PLAIN_DEVIATION / deviation, 1)).astype(np.float32)
 
 
-def sample_spread(prior: ConditionedPrior, o: Observation, reference: torch.Tensor, lights: Lights, recipe: Recipe,
-                  seed: int, check: Callable[[], None] = lambda: None) -> torch.Tensor:
-    """Deviation of the albedo's lightness over short runs on a coarse map, each with a seed of its own, under the light
-    that was solved.
-
-    Parameters
-    ----------
-    prior : of the skin tone
-    o : the coarse map [H, W]
-    reference : [1, 7, H, W] in the network's range, the reference face at which the runs begin
-    lights : that were solved
-    recipe : of the solve; steps, guidance and phases are the short runs' own
-    seed : of the noise
-    check : may raise to cancel
-
-    Returns
-    -------
-    [H, W], in encoded sRGB.
-    """
-    short = replace(recipe, steps=SHORT_RUN_STEPS, guidance="proximal", coarse=(), candidates=1, phases=())
-    device, runs = prior.device, []
-    for run in range(SHORT_RUNS):
-        begun = State(0, None, reference.clone(), lights).to(device)
-        sampler = Sampler(prior, short, seed_noise(seed + 7919 * (run + 1), device))
-        state = sampler.sample({1: o.to(device)}, begun, lambda state, steps: check())
-        runs.append(to_display(albedo(state.denoised)).mean(0).cpu())
-    return torch.stack(runs).std(0)
+def variances(evidence: Evidence, albedo: np.ndarray) -> np.ndarray:
+    """[S, S, 4], of which the squares of WHOLE_FACE, VARIED, UNLIKE_SKIN and WEAKLY_LIT are the weights: 1, the
+    albedo's own variance about a texel, how little its colour says of the light, and how many times darker than usual
+    skin it was filmed. Arguments are those of `estimate_confidence`."""
+    log = np.log(np.maximum(albedo.mean(2), DARKEST)).astype(np.float32)
+    detail = log - _blur(log, DETAIL_TEXELS / evidence.texel)
+    varied = _blur(detail**2, AROUND_TEXELS / evidence.texel)
+    return np.stack([np.ones_like(log), varied, 1 - evidence.trust.numpy(), 1 / evidence.filmed.numpy()], 2)
 
 
-def to_display(linear: torch.Tensor) -> torch.Tensor:
-    """Linear colours [3, H, W] about as sRGB encodes them, in [0, 1]."""
-    return linear.clamp(0, 1).pow(1 / 2.2)
-
-
-def enlarge_map(image: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
-    """[H, W] at another size, bilinear."""
-    return functional.interpolate(image[None, None], size, mode="bilinear", align_corners=False)[0, 0]
+def _blur(image: np.ndarray, deviation: float) -> np.ndarray:
+    return cv2.GaussianBlur(image, (0, 0), max(deviation, 0.3))

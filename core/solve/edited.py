@@ -6,6 +6,7 @@ of them stays, bit by bit."""
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import torch
 
@@ -16,14 +17,12 @@ from ..contract.settings import Settings
 from ..face.head import Head
 from . import checkpoint, initial, maps
 from .checkpoint import Solution
-from .confidence import sample_spread
 from .evidence import REFERENCE_TEXELS, Evidence, grid_cells
-from .lighting import Lights
 from .prior import ConditionedPrior, Prior
 from .problem import State
 from .recipes import Recipe
 from .skin_tone import SkinTone
-from .window import Window, average_down, crop_observation, find_window, solve_inside
+from .window import Window, find_window, solve_inside
 from .witnesses import confirm_marks
 
 
@@ -64,7 +63,7 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     solution = (earlier if window is None
                 else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, window, report))
     state = State(0, None, solution.denoised, solution.lights)
-    result = maps.finish_maps(state, evidence, start, solution.spread, solution.gain)
+    result = maps.finish_maps(state, evidence, start, solution.gain)
     if window is None:
         report.log("The mask is the last solve's: nothing was solved again.")
     else:
@@ -78,15 +77,4 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
 def _sampled(settings: Settings, prior: ConditionedPrior, evidence: Evidence, earlier: Solution, start: initial.Start,
              window: Window, report: Reporter) -> Solution:
     denoised, lights = solve_inside(prior, start.observations, earlier, window, start.recipe, settings.seed, report)
-    factor = max(start.observations)
-    here = Lights(lights.glob, lights.grid[(..., *window.cells)], lights.chroma)
-    reference = average_down(start.reference[(..., *window.context)], factor)
-    patch = sample_spread(prior, crop_observation(start.observations[factor], window, factor), reference, here,
-                          start.recipe, settings.seed, report.check)
-    rows, columns = (slice(a.start // factor, a.stop // factor) for a in window.inside)
-    whole = earlier.spread.clone()
-    rest = tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor)
-                 for a, b in zip(window.inside, window.context, strict=True))
-    whole[rows, columns] = patch[rest]
-    return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure,
-                    earlier.local, earlier.settled)
+    return replace(earlier, denoised=denoised, lights=lights, painted=evidence.alpha, alpha=start.alpha)

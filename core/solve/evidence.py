@@ -30,6 +30,7 @@ FULL_CONFIDENCE = 0.2  # confidence from which a texel counts in full: below, it
 FEATURE_TRUST = 0.2
 BEARD_TRUST = 0.1  # of skin under a beard: the shade of a shaven one is as soft as a light's
 MASK_FADE_TEXELS = 2.0  # deviation in texels over which a hard mask's border fades
+MOST_TIMES_USUAL = 20.0  # brighter or darker than usual skin no texel counts as: beyond are noise and clipping
 # texels of REFERENCE_TEXELS over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels
 FACE_CROP_TEXELS = 768
 
@@ -68,6 +69,7 @@ class Evidence:
     trust: torch.Tensor
     protected: torch.Tensor
     edge: torch.Tensor
+    filmed: torch.Tensor
     shadow_colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
     extent: Extent = Extent()
     added: torch.Tensor | None = None
@@ -126,8 +128,19 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     bare = (1 - unlike_skin) * (1 - bearded)
     trust = np.minimum(1 - (1 - FEATURE_TRUST) * unlike_skin, 1 - (1 - BEARD_TRUST) * bearded)
     parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32))
-             for a in (skin, bare, trust, protected, np.zeros_like(alpha))]
+             for a in (skin, bare, trust, protected, np.zeros_like(alpha),
+                       _brightness(capture, texture, skin * weight > 0.5))]
     return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, added=torch.from_numpy(added))
+
+
+def _brightness(capture: Capture, texture: np.ndarray, skin: np.ndarray) -> np.ndarray:
+    """[S, S]: how bright the frames show a texel, over its median where `skin`; of the delit texture where no other is
+    there."""
+    filmed = (_sized(images.read_linear(capture.texture_filmed), len(skin)) if capture.texture_filmed.is_file()
+              else texture)
+    brightness = filmed.mean(2)
+    usual = np.median(brightness[skin]) if skin.any() else brightness.mean()
+    return np.clip(brightness / max(usual, 1e-6), 1 / MOST_TIMES_USUAL, MOST_TIMES_USUAL)
 
 
 def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:

@@ -39,8 +39,7 @@ class Maps:
     gain: torch.Tensor
 
 
-def finish_maps(state: State, evidence: Evidence, start: Start, spread: torch.Tensor | None = None,
-                gain: torch.Tensor | None = None) -> Maps:
+def finish_maps(state: State, evidence: Evidence, start: Start, gain: torch.Tensor | None = None) -> Maps:
     """Reads the maps out of \\hat x_0.
 
     The albedo is rescaled once so that the mean of the confident facial skin is the skin tone; the shading takes the
@@ -53,7 +52,6 @@ def finish_maps(state: State, evidence: Evidence, start: Start, spread: torch.Te
     state : of the sampler, at its end
     evidence : of the capture
     start : what the run began with
-    spread : [H, W], of any size, confidence.py's; none by default
     gain : [3], by which the albedo is rescaled if it was found before
     """
     shader = start.observations[1].shader
@@ -62,7 +60,6 @@ def finish_maps(state: State, evidence: Evidence, start: Start, spread: torch.Te
     with torch.no_grad():
         beside = enlarge_field(start.local, evidence.size).exp() / start.exposure
         shading = shader.total(state.lights).clamp_min(1e-3) * beside
-        main = shader.main(state.lights).clamp_min(1e-3) * beside
     diffuse = albedo(x[None])
     if start.marks:  # what is known to be no light is the skin's, be it ever so unlikely to the prior
         kept = torch.from_numpy(draw_cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
@@ -72,11 +69,10 @@ def finish_maps(state: State, evidence: Evidence, start: Start, spread: torch.Te
         gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone.tensor, start.recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
-    explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
     each = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], seen)  # the mean face is of the tone already
-    trusted = estimate_confidence(evidence.weight, explained, diffuse * each, albedo(start.reference), spread)
-    return Maps(to_picture((diffuse * each).clamp(MIN_ALBEDO, 1)), specular, to_picture(normal),
-                to_picture(shading / each), trusted.numpy(), gain)
+    delivered = to_picture((diffuse * each).clamp(MIN_ALBEDO, 1))
+    return Maps(delivered, specular, to_picture(normal), to_picture(shading / each),
+                estimate_confidence(evidence, delivered), gain)
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:

@@ -26,7 +26,7 @@ from .surface import HeadSurface
 
 UNSEEN_CONFIDENCE, SEEN_CONFIDENCE = 0.015, 0.09
 """The texture's confidence at which a texel counts as not seen, and from which on as seen well."""
-BELIEVED_CONFIDENCE = 0.3
+BELIEVED_CONFIDENCE = 0.5
 """The solver's confidence from which on skin is plain enough to learn its grain from: a beard is not."""
 SPECK_MM = 1.5
 """mm: darker lines and dots of it are strands before the face, not holes in what was seen."""
@@ -36,9 +36,9 @@ mean face; then comes the fade."""
 SURROUNDINGS_MM = 10.0
 """mm around a place on the scalp that count as its surroundings. A patch seen between hair, shadow and the border of
 the pictures is of another tone and another stubble than what is made up around it, and looks like a stain."""
-GLANCED_SHARE, WATCHED_SHARE = 0.5, 0.8
-"""Shares of usual skin's confidence: a scalp whose surroundings were seen with the first is made up, with the second
-kept."""
+GLANCED_SHARE, WATCHED_SHARE = 0.3, 0.5
+"""Shares of usual skin's confidence, of which a scalp that is seen as well has 0.6, for it may be hair: one whose
+surroundings were seen with the first is made up, with the second kept."""
 REACH_MM = 2.5
 """mm below which detail is no tone."""
 ODD_LOG = 0.20
