@@ -33,7 +33,7 @@ from core.face import template
 from core.face.head import read_filmed_head
 from core.geometry import raster
 from core.imaging import images
-from core.solve import initial, split
+from core.solve import confidence, initial, split
 from core.solve.evidence import read_evidence
 from core.solve.prior import load
 from core.solve.problem import albedo
@@ -69,16 +69,17 @@ WORDS = ("Means over people ± their spread, then differences from the delit tex
          "(`--beside`): *solved before* by commit c93b420, "
          "whose lights were held back by pulls chosen by hand, *solved together* by `core run - CAPTURE --from solve "
          "--until solve --with OTHERS`.")
-PARTS = ("![As filmed, delit, mean face; with traits, global light, local light; texture over light, solved, "
-         "true](../pictures/split.jpg)\n\n"
+PARTS = ("![As filmed, delit, mean face, with traits, global light; local light, texture over light, solved, true, "
+         "deviation](../pictures/split.jpg)\n\n"
          "A lamp from below (`python -m benchmarks.split FOLDER --only stubbled_below --picture "
-         "docs/pictures/split.jpg`). Above: as filmed, delit, "
-         "the mean face of the tone. Middle: with the traits that were found; the light of the whole face that the "
-         "delighter left, and what it left "
-         "locally. Below: the delit texture over that light, as solved, and the truth. What stays is mostly the "
-         "delighter's: noise in the dark, a nose "
-         "whose shadow was brightened too much.")
+         "docs/pictures/split.jpg`). Above: as filmed, delit, the mean face of the tone, that with the traits that "
+         "were found; the light of the whole face that the delighter left. Below: what it left locally, the delit "
+         "texture over the light of the whole face, as solved, the truth; and how large an error is expected, black "
+         "to a deviation of 0.4 in natural log. What stays is mostly the delighter's: noise in the dark, a nose whose "
+         "shadow was brightened too much.")
 BINS_MM = (0, 4, 8, 14, 20, 30, 40, 60)
+DOUBTFUL = 0.4
+"""Deviation in natural log that is white in the picture."""
 PLAIN = 0.5
 """Clip of a log ratio to the mean face: beyond is hair or paint."""
 
@@ -177,8 +178,9 @@ def divided(shapes: split.Shapes, fitted: split.Split, local: bool) -> np.ndarra
 
 
 def parts_side_by_side(filmed: Filmed) -> np.ndarray:
-    """As filmed, delit, mean face; mean face with traits, global and local light about a middle grey; the texture over
-    the global light, solved, true: sRGB, at the truth's tone."""
+    """As filmed, delit, mean face, that with traits, global light about a middle grey; local light, the texture over
+    the global light, solved, true, and the deviation of the error that is expected, black to DOUBTFUL: sRGB, at the
+    truth's tone."""
     shapes = shapes_of(filmed)
     found = split.split_captures([shapes])
     maps = small({method: answer for method in (NOTHING, DELIT, SOLVED, TRUE)
@@ -195,7 +197,11 @@ def parts_side_by_side(filmed: Filmed) -> np.ndarray:
     rows, columns = (np.flatnonzero(where.any(axis)) for axis in (1, 0))
     box = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1]
     shown = [images.linear_to_srgb(np.clip(part, 0, 1))[box] for part in (*toned[:4], *lights, *toned[4:])]
-    return np.vstack([np.hstack(shown[first:first + 3]) for first in (0, 3, 6)])
+    evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
+    sure = confidence.estimate_confidence(evidence, maps.get(SOLVED, maps[DELIT]))[box]
+    deviation = confidence.PLAIN_DEVIATION / np.maximum(sure, confidence.PLAIN_DEVIATION / DOUBTFUL)
+    shown.append(np.repeat(np.where(sure > 0, deviation / DOUBTFUL, 0)[..., None], 3, 2).astype(np.float32))
+    return np.vstack([np.hstack(shown[first:first + 5]) for first in (0, 5)])
 
 
 def solved_map(root: Path) -> np.ndarray | None:
