@@ -24,7 +24,8 @@ PLAIN_DEVIATION = float(np.hypot(WHOLE_FACE, WEAKLY_LIT))
 DETAIL_TEXELS, AROUND_TEXELS = 8.0, 12.0
 """Deviations of Gaussians in texels of a 1024 map: what varies faster than the first is detail, and how much it varies
 about a texel is taken over the second."""
-DARKEST = 1e-3
+DARKEST, DIMMEST = 1e-3, 0.05
+"""Linear albedo, and brightness in the frames over usual skin's: below is noise."""
 
 
 def estimate_confidence(evidence: Evidence, albedo: np.ndarray) -> np.ndarray:
@@ -51,7 +52,8 @@ def variances(evidence: Evidence, albedo: np.ndarray) -> np.ndarray:
     log = np.log(np.maximum(albedo.mean(2), DARKEST)).astype(np.float32)
     detail = log - _blur(log, DETAIL_TEXELS / evidence.texel)
     varied = _blur(detail**2, AROUND_TEXELS / evidence.texel)
-    return np.stack([np.ones_like(log), varied, 1 - evidence.trust.numpy(), 1 / evidence.filmed.numpy()], 2)
+    weakness = 1 / np.maximum(evidence.filmed.numpy(), DIMMEST)
+    return np.stack([np.ones_like(log), varied, 1 - evidence.trust.numpy(), weakness], 2)
 
 
 def _blur(image: np.ndarray, deviation: float) -> np.ndarray:

@@ -30,7 +30,6 @@ FULL_CONFIDENCE = 0.2  # confidence from which a texel counts in full: below, it
 FEATURE_TRUST = 0.2
 BEARD_TRUST = 0.1  # of skin under a beard: the shade of a shaven one is as soft as a light's
 MASK_FADE_TEXELS = 2.0  # deviation in texels over which a hard mask's border fades
-MOST_TIMES_USUAL = 20.0  # brighter or darker than usual skin no texel counts as: beyond are noise and clipping
 # texels of REFERENCE_TEXELS over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels
 FACE_CROP_TEXELS = 768
 
@@ -139,8 +138,7 @@ def _brightness(capture: Capture, texture: np.ndarray, skin: np.ndarray) -> np.n
     filmed = (_sized(images.read_linear(capture.texture_filmed), len(skin)) if capture.texture_filmed.is_file()
               else texture)
     brightness = filmed.mean(2)
-    usual = np.median(brightness[skin]) if skin.any() else brightness.mean()
-    return np.clip(brightness / max(usual, 1e-6), 1 / MOST_TIMES_USUAL, MOST_TIMES_USUAL)
+    return brightness / max(np.median(brightness[skin]) if skin.any() else brightness.mean(), 1e-6)
 
 
 def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:
