@@ -3,17 +3,14 @@
 """Skin or light: what the split of a texture's large shapes (core/solve/split.py) is worth, alone and under the solve,
 and what it takes for granted.
 
-    python -m benchmarks.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...] [--skins FOLDER]
-                               [--json PATH]
+    python -m benchmarks.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...] [--json PATH]
     python -m benchmarks.split FOLDER --only stubbled_below --picture docs/pictures/split.jpg
                                the parts of that capture, side by side
 
 FOLDER holds captures as benchmarks/state.py measures them, several lights of each person, solved. The closed form alone
 is a second of work: the texture over the global light that it finds, of each capture alone and of all captures of a
 person together; and with the scales' prior halved and doubled. --beside names folders with the same captures solved in
-another way (an earlier solver, `core run --with`). --skins: painted skins that `core train carry` brought into our UVs;
-their large shapes say how far traits reach and how alike the two sides are. Likenesses stay where they are; only
-figures are written.
+another way (an earlier solver, `core run --with`). Likenesses stay where they are; only figures are written.
 """
 
 from __future__ import annotations
@@ -29,16 +26,13 @@ import torch
 
 from core.contract.capture import Capture
 from core.contract.messages import Problem
-from core.face import template
 from core.face.head import read_filmed_head
-from core.geometry import raster
 from core.imaging import images
 from core.solve import confidence, initial, split
 from core.solve.evidence import read_evidence
 from core.solve.prior import load
 from core.solve.problem import albedo
 from core.solve.skin_tone import parse_skin_tone
-from core.training.skins import carried_names, clusters
 
 from . import figures, people
 from .measures.references import NOTHING, TRUE
@@ -77,11 +71,8 @@ PARTS = ("![As filmed, delit, mean face, with traits, global light; local light,
          "texture over the light of the whole face, as solved, the truth; and how large an error is expected, black "
          "to a deviation of 0.4 in natural log. What stays is mostly the delighter's: noise in the dark, a nose whose "
          "shadow was brightened too much.")
-BINS_MM = (0, 4, 8, 14, 20, 30, 40, 60)
 DOUBTFUL = 0.4
 """Deviation in natural log that is white in the picture."""
-PLAIN = 0.5
-"""Clip of a log ratio to the mean face: beyond is hair or paint."""
 
 
 def main() -> int:
@@ -89,7 +80,6 @@ def main() -> int:
     add_captures(parser)
     parser.add_argument("--beside", nargs="+", default=[], metavar="NAME=FOLDER",
                         help="the same captures, solved in another way")
-    parser.add_argument("--skins", type=Path, help="carried skins, for the traits' reach")
     parser.add_argument("--picture", type=Path,
                         help="draw the parts of the first capture instead of measuring; of synthetic people only in "
                              "the docs")
@@ -102,8 +92,6 @@ def main() -> int:
     beside = dict(pair.split("=", 1) for pair in asked.beside)
     scores, by_capture, scales = measure(captures, {name: Path(path) for name, path in beside.items()})
     record = {**to_record(summarise(scores, COLUMNS, DELIT), scores), "captures": by_capture, "scales": scales}
-    if asked.skins:
-        record["skins"] = reach_of_traits(asked.skins)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in sections(record)))
     if asked.json:
         figures.write_record(asked.json, "split", COMMAND, record)
@@ -118,7 +106,7 @@ def sections(record: dict) -> Sections:
              ("All people", format_table(found, COLUMNS, "taken for albedo", DELIT)),
              ("Capture by capture, up to the person's shared light, dB", capture_table(captures)),
              ("The scales that were found", scale_table(record["scales"]))]
-    return parts + ([("How far traits reach", reach_table(record["skins"]))] if "skins" in record else [])
+    return parts
 
 
 def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, dict, dict]:
@@ -209,39 +197,6 @@ def solved_map(root: Path) -> np.ndarray | None:
     return images.read_linear(path) if path.is_file() else None
 
 
-def reach_of_traits(folder: Path) -> dict:
-    """Of painted skins, one of each cluster: deviation of the grey log ratio to their mean over the facial skin, and
-    its correlation by distance, with the same side and with the mirror image of the other."""
-    count, names = 64, carried_names(folder)
-    mesh = template.load()
-    face, bary = raster.rasterize_uv(mesh, count)
-    bare = np.prod([1 - images.resize(template.mask(name, SIZE), count, count)
-                    for name in ("brows", "lips", "eyes", "nostrils", "scalp", "ears")], 0)
-    where = (face >= 0) & (images.resize(template.mask("face", SIZE), count, count) * bare > 0.7)
-    chosen = [cluster[0] for cluster in clusters(folder, names)]
-    skins = [images.resize(images.read_linear(folder / f"{name}.png"), count, count) for name in chosen]
-    logs = np.stack([np.log(np.maximum(skin, 1e-3)).mean(-1)[where] for skin in skins])
-    logs -= np.median(logs, 1, keepdims=True)
-    logs = np.clip(logs - np.median(logs, 0), -PLAIN, PLAIN)
-    logs -= logs.mean(1, keepdims=True)
-    places = raster.interpolate(mesh.vertices, mesh.faces, face, bary)[where]
-    rng = np.random.default_rng(0)
-    i, j = rng.integers(0, len(places), (2, 200000))
-    product = (logs[:, i] * logs[:, j]).mean(0) / np.square(logs).mean()
-    apart = 1e3 * np.linalg.norm(places[i] - places[j], axis=1)
-    mirrored = 1e3 * np.linalg.norm(places[i] - places[j] * [-1, 1, 1], axis=1)
-    across = (places[i, 0] * places[j, 0] < 0) & (np.abs(places[i, 0]) > 0.012)
-    return {"skins": len(chosen), "deviation": round(float(np.sqrt(np.square(logs).mean())), 4),
-            "same side": correlation_by_distance(product, apart),
-            "mirror image": correlation_by_distance(product[across], mirrored[across])}
-
-
-def correlation_by_distance(product: np.ndarray, apart_mm: np.ndarray) -> dict[str, float]:
-    """The mean of products [N] of pairs, over the variance, by their distance [N]."""
-    return {f"{low} to {high} mm": round(float(product[(apart_mm >= low) & (apart_mm < high)].mean()), 3)
-            for low, high in zip(BINS_MM, BINS_MM[1:], strict=False)}
-
-
 def capture_table(by_capture: dict[str, dict[str, float]]) -> str:
     methods = list(dict.fromkeys(method for row in by_capture.values() for method in row if method not in (LESS, MORE)))
     rows = [[name, *(f"{row[method]:.2f}" if method in row else None for method in methods),
@@ -254,14 +209,6 @@ def scale_table(scales: dict[str, dict[str, float]]) -> str:
     return ("Deviations in natural log along the axis of brightness (times 0.58 in each channel).\n\n"
             + figures.markdown(["capture", *names],
                                [[name, *(f"{value:.3f}" for value in row.values())] for name, row in scales.items()]))
-
-
-def reach_table(record: dict) -> str:
-    sides = ("same side", "mirror image")
-    return (f"Correlation of the grey log ratio of {record['skins']} painted skins to their mean, whose deviation is "
-            f"{record['deviation']:.2f}, by distance; the model takes exp(-distance / {1e3 * split.TRAIT_REACH_M:.0f} "
-            f"mm), and {split.MIRROR_CORRELATION} of it with the mirror image.\n\n"
-            + figures.markdown(["", *record[sides[0]]], [[side, *record[side].values()] for side in sides]))
 
 
 if __name__ == "__main__":

@@ -58,7 +58,7 @@ def drawn(seed, scales, parts=("traits",)):
     """Log fields [3, S, S] drawn from the model's own Gaussians, at its cells."""
     normal, skin = face()
     cells = average_cells(Shapes(TONE.expand(3, SIZE, SIZE), TONE.expand(3, SIZE, SIZE), normal, skin), 24)
-    everywhere = skin_or_light.Places(cells.places, cells.normal, np.zeros(len(cells.places), int))
+    everywhere = skin_or_light.Places(cells.places, cells.normal, cells.varied, np.zeros(len(cells.places), int))
     model = skin_or_light.model_covariances(everywhere, everywhere)
     rng, values = np.random.default_rng(seed), np.zeros((3, len(cells.places)))
     for part in parts:

@@ -5,11 +5,12 @@
 In the logarithm a texture is the mean face of the tone, plus this person's traits, plus light, plus noise, and each of
 these is taken for a Gaussian:
 
-    traits         broad (TRAIT_REACH_M) and mostly alike on the face's two sides (MIRROR_CORRELATION), whichever way
-    the skin faces
-    global light   second-order spherical harmonics of the normal, their level free
-    local light    what a light leaves that the normal does not tell (a soft shadow, a delighter's mistake): nearly as
-    broad as traits, but of one side noise          narrow: fine detail, and what the frames' registration leaves of it
+    traits: broad (TRAIT_REACH_M) and mostly alike on the face's two sides (MIRROR_CORRELATION), whichever way the skin
+      faces; larger where skins differ more (weights/traits.json)
+    global light: second-order spherical harmonics of the normal, their level free
+    local light: what a light leaves that the normal does not tell (a soft shadow, a delighter's mistake), about as
+      broad as traits, but of one side
+    noise: narrow; fine detail, and what the frames' registration leaves of it
 
 So the split is linear algebra (Gaussian process regression; Rasmussen and Williams 2006, chapter 2). How large each of
 the four is on this face is not known: the most probable scales are taken, by the evidence of the texture itself (ibid.,
@@ -21,9 +22,11 @@ outcome.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cache
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -39,9 +42,12 @@ CELLS, FIRST_CELLS = 48, 24
 face each."""
 MIN_CELL_TEXELS = 8
 """Fewest texels along a cell's side: a small map has fewer cells."""
-TRAIT_REACH_M, MIRROR_CORRELATION = 0.022, 0.8
+TRAIT_REACH_M, MIRROR_CORRELATION = 0.016, 0.72
 """Distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of
-painted skins (benchmarks/split.py)."""
+painted skins, midway between taking what light is painted into them for traits and taking it out
+(benchmarks/traits.py)."""
+DATA_FILES = ("weights/traits.json",)
+TRAITS_FILE = Path(__file__).parents[1] / DATA_FILES[0]
 LOCAL_REACH_M, NOISE_REACH_M = 0.020, 0.005
 COLOUR_AXES = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
 """Axes of a log colour along which the parts are taken for independent: brightness, red against blue, green against
@@ -106,12 +112,13 @@ class Split:
 
 @dataclass(frozen=True)
 class Cells:
-    """places [N, 3] in metres on the built-in head and normal [N, 3] of all cells of a head; observed [K]: which of
-    them tell of the skin; log_ratio [K, 3] there: log(texture / reference) along COLOUR_AXES; covered [C, C]: where the
-    N lie."""
+    """places [N, 3] in metres on the built-in head and normal [N, 3] of all cells of a head; varied [N]: the traits'
+    deviation there over that of the whole face; observed [K]: which of them tell of the skin; log_ratio [K, 3] there:
+    log(texture / reference) along COLOUR_AXES; covered [C, C]: where the N lie."""
 
     places: np.ndarray
     normal: np.ndarray
+    varied: np.ndarray
     observed: np.ndarray
     log_ratio: np.ndarray
     covered: np.ndarray
@@ -119,10 +126,12 @@ class Cells:
 
 @dataclass(frozen=True)
 class Places:
-    """at [N, 3] in metres on the built-in head, normal [N, 3], and own [N]: the number of the capture."""
+    """at [N, 3] in metres on the built-in head, normal [N, 3], varied [N] as of Cells, and own [N]: the number of the
+    capture."""
 
     at: np.ndarray
     normal: np.ndarray
+    varied: np.ndarray
     own: np.ndarray
 
 
@@ -166,7 +175,14 @@ def average_cells(shapes: Shapes, count: int) -> Cells:
     normal = _shrunk(shapes.normal.numpy().transpose(1, 2, 0), count)[covered].astype(np.float64)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
     seen = np.flatnonzero(share[covered] > MIN_SEEN_SHARE)
-    return Cells(places, normal, seen, mean[covered][seen].astype(np.float64) @ COLOUR_AXES.T, covered)
+    varied = _shrunk(read_variation(), count)[covered].astype(np.float64)
+    return Cells(places, normal, varied, seen, mean[covered][seen].astype(np.float64) @ COLOUR_AXES.T, covered)
+
+
+@cache
+def read_variation() -> np.ndarray:
+    """[C, C]: how far skins differ from their mean at places of the built-in map, over the face's own mean."""
+    return np.array(json.loads(TRAITS_FILE.read_text(encoding="utf-8"))["deviation"])
 
 
 @cache
@@ -181,7 +197,7 @@ def join_seen(captures: list[Cells]) -> tuple[Places, np.ndarray]:
     """All cells that were observed, and their values [K, 3]."""
     own = np.repeat(np.arange(len(captures)), [len(cells.observed) for cells in captures])
     return Places(*(np.concatenate([getattr(cells, name)[cells.observed] for cells in captures])
-                    for name in ("places", "normal")), own), \
+                    for name in ("places", "normal", "varied")), own), \
         np.concatenate([cells.log_ratio for cells in captures])
 
 
@@ -194,7 +210,7 @@ def model_covariances(rows: Places, columns: Places) -> Covariances:
     variances = [1 + MIRROR_CORRELATION * np.exp(-2 * np.abs(places.at[:, 0]) / TRAIT_REACH_M)
                  for places in (rows, columns)]
     traits = np.exp(-apart / TRAIT_REACH_M) + MIRROR_CORRELATION * np.exp(-mirrored / TRAIT_REACH_M)
-    traits = traits / np.sqrt(np.multiply.outer(*variances))
+    traits *= np.multiply.outer(rows.varied, columns.varied) / np.sqrt(np.multiply.outer(*variances))
     light = (SH_SCALE**2 * sh_basis(rows.normal) * ORDER_DEVIATIONS**2) @ sh_basis(columns.normal).T
     return Covariances(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same,
                        np.exp(-apart / NOISE_REACH_M) * same, same)
@@ -248,7 +264,7 @@ def infer_split(captures: list[Cells], scales: Scales) -> Split:
     """The posterior mean of each part of the first capture, under the scales."""
     first, (seen, ratios) = captures[0], join_seen(captures)
     among = model_covariances(seen, seen)
-    beyond = model_covariances(Places(first.places, first.normal, np.zeros(len(first.places), int)), seen)
+    beyond = model_covariances(Places(first.places, first.normal, first.varied, np.zeros(len(first.places), int)), seen)
     basis = SH_SCALE * sh_basis(first.normal[first.observed])
     traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
     for axis, size in enumerate(AXIS_DEVIATIONS):
