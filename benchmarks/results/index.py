@@ -172,7 +172,6 @@ def losses(of: Figures) -> str:
           ([skin tone](skin_tone.md)), and keeps highlights on raw frames ([comparison](comparison.md)).
         - **The confidence map knows little**: {known.gained.mean:.2f} nats more than one sigma for all, aim 0.1
           ([page](confidence.md)).
-        - **In even studio light the solve makes the texture worse** ([controlled](controlled.md)).
         - **A scalp that nobody saw becomes bare skin** ({scalp.completed:.0f} of 255 off where hair was;
           [whole head](whole_head.md)); a cap, or a cloth of the skin's colour, is not told from hair or skin; a
           beard's length is not measured, and stubble is told from it by a rule made with four people in view
