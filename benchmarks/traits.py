@@ -32,7 +32,7 @@ from .pages import Sections, prose
 COMMAND = "python -m benchmarks.traits SKINS --json docs/figures/traits.json"
 BINS_MM = (0, 4, 8, 14, 20, 30, 40, 60)
 PAINTED, UNLIT = "as painted", "light taken out"
-BROW, NOSE_TIP, MOUTH, CHIN = 9, 1, 13, 152
+BROW, NOSE_TIP, MOUTH = 9, 1, 13
 """Landmarks on the face's middle."""
 NOSE_M = 0.014
 PAIRS = 200_000

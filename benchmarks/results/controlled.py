@@ -36,7 +36,7 @@ def sections(controlled: Figures) -> Sections:
         the known light and stays in the flash's maps.
 
         **In the studio the solve adds {np.mean(added):+.2f} ± {np.std(added, ddof=1) / len(added) ** 0.5:.2f} dB after
-        one gain**
-        ({by_person(adds)}): the frames need no solve there, and of light that is not there nothing is explained away
-        since skin and light are [split](split.md) by what they are like; the solver before that lost 0.6 dB.
+        one gain** ({by_person(adds)}), {mean.studio.psnr - mean.studio_texture.psnr:+.2f} dB without it: such frames
+        need no solve. The rows *in the wild, solved* are the maps of [the state of the albedo](state.md), by the solver
+        of that page.
         """))]

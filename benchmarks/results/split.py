@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from .. import split
 from ..figures import Figures
-from ..pages import Sections
+from ..pages import Sections, prose
 
 TITLE = "Skin or light"
 SAYS = "What telling them apart is worth, with one capture of a person and with several."
@@ -19,4 +19,8 @@ OLDER = """
 
 
 def sections(record: Figures) -> Sections:
-    return split.sections(record)
+    return [("", prose("""
+        The split of that commit took traits to be as large everywhere, and to reach farther;
+        [what is measured of them now](prior.md#how-skins-differ) leaves hair out. The picture of the parts is by
+        today's, its solved map by the solver of [the state of the albedo](state.md).
+        """)), *split.sections(record)]

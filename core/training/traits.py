@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,7 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def read_shapes(folder: Path, change=lambda skin: skin) -> LargeShapes:
+def read_shapes(folder: Path, change: Callable[[np.ndarray], np.ndarray] = lambda skin: skin) -> LargeShapes:
     """The large shapes of a carried folder's skins, one of each cluster; `change` may take the light out of a skin
     [SIZE, SIZE, 3], linear. Raises Problem where it is no such folder."""
     mesh = template.load()
