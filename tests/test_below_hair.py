@@ -2,18 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light knows no brows: what the network says of them is replaced by what it says of the skin around."""
 
-import importlib
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from core.delight.below_hair import complete_shading, fill_features, fill_hair
 from core.delight.evening import ShadingEstimate
-from core.imaging import images
-
-network = importlib.import_module("core.delight.network")
 
 
 def slope(side: int = 40) -> np.ndarray:
@@ -44,31 +39,6 @@ def test_the_cells_of_a_brow_and_those_beside_it_take_the_skins_shading():
     leaky[17, 10:30] -= 1.0  # the answer is coarse: the row beside has a part of it
     assert fill_features(leaky, share) == pytest.approx(slope(), abs=0.02)
     assert np.array_equal(fill_features(leaky, np.full_like(share, 0.2)), leaky.astype(np.float32))
-
-
-def test_a_photograph_keeps_a_brow_where_the_parser_sees_one(monkeypatch):
-    """A network that takes two dark bars for shadow: the one that is a brow stays dark in the albedo, the other
-    leaves."""
-    picture = np.full((256, 256, 3), 0.5, np.float32)
-    brow, shadow = (slice(90, 102), slice(80, 120)), (slice(160, 172), slice(80, 120))
-    picture[brow] = picture[shadow] = 0.25
-    landmarks = np.array([[x, y, 0] for x in (60, 200) for y in (60, 200)] * 117, np.float32)
-    upper = np.indices(picture.shape[:2])[0] < 128
-    dark = np.where(upper, picture[..., 0] < 0.4, False).astype(np.float32)
-    parts = SimpleNamespace(of=lambda *names: dark)
-    monkeypatch.setattr(network.faces, "detect", lambda srgb: SimpleNamespace(landmarks=landmarks))
-    monkeypatch.setattr(network, "parser", SimpleNamespace(parse=lambda srgb, found: parts))
-    monkeypatch.setattr(network, "load_network", lambda device: None)
-
-    def look(net, box, crop):
-        log = np.log(images.srgb_to_linear(network.cv2.resize(crop, (128, 128), interpolation=network.cv2.INTER_AREA)))
-        return ShadingEstimate(box, log, 0 * log[..., 0], log)
-    monkeypatch.setattr(network, "_look", look)
-    albedo = images.srgb_to_linear(network.delight_photograph(picture, None)[0])
-    skin = albedo[130, 100].mean()
-    hair = images.srgb_to_linear(0.25) / images.srgb_to_linear(0.5)
-    assert albedo[96, 100].mean() / skin == pytest.approx(float(hair), rel=0.1)
-    assert albedo[166, 100].mean() / skin == pytest.approx(1, rel=0.1)
 
 
 def test_below_hair_the_mean_of_network_and_fit_counts_however_far_the_fit_counts_on_skin():

@@ -18,7 +18,7 @@ from core.delight.casts import remove_casts
 from core.delight.evening import ShadingEstimate
 from core.delight.lift import lift_shading, lift_share
 from core.delight.lit_head import MAX_ALBEDO
-from core.delight.network import WEIGHTS, _divided, _landmarks, crop, load_network, square_around
+from core.delight.network import WEIGHTS, _landmarks, crop, divide, load_network, square_around
 from core.delight.second_opinion import Weighing, continue_beyond, weigh_in
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.face import template
@@ -167,7 +167,7 @@ def test_how_bright_a_frame_came_out_is_told_by_its_skin_and_not_by_the_wall_beh
     srgb = images.linear_to_srgb(np.broadcast_to(linear, (96, 96, 3)))
     look = ShadingEstimate((0, 0, 96), np.full((32, 32, 3), np.log(light), np.float32), 0 * face,
                            np.zeros((32, 32, 3), np.float32), np.where(face > 0, 0, -1))
-    albedo, _ = _divided(srgb, look, face)
+    albedo, _ = divide(srgb, look, face)
     assert images.srgb_to_linear(albedo)[36:60, 40:56] == pytest.approx(expected, rel=0.01)
 
 

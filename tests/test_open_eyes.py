@@ -167,7 +167,7 @@ def test_the_eyes_of_another_face_are_not_read(person, monkeypatch):
         face = faces.Face((0, 0, 1000, 1000), np.concatenate([pixels, np.zeros((468, 1))], 1), 0.9)
         found.append((face, pair))
     detected, paired = iter(face for face, _ in found), iter(pair for _, pair in found)
-    monkeypatch.setattr(landmarks.images, "read_srgb", lambda path: np.zeros((1000, 1000, 3), np.float32))
+    monkeypatch.setattr(type(views[0]), "read", lambda view: np.zeros((1000, 1000, 3), np.float32))
     monkeypatch.setattr(landmarks.faces, "detect", lambda srgb: next(detected))
     monkeypatch.setattr(landmarks.faces, "find_eyes", lambda srgb, face: next(paired))
     marked = landmarks.find(views, QUIET, 100.0)

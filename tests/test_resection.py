@@ -12,16 +12,17 @@ import pytest
 
 from benchmarks.cameras_against_truth import similarity
 from core.cameras import _left_out, solving
-from core.cameras.bundle import TOLD_SIGMA_LOG, Observations, adjust
 from core.cameras.joint import FREE_SIGMA_LOG, as_bundle, refine
-from core.cameras.landmarks import fit_rays, pupils, template_landmarks
+from core.cameras.landmarks import fit_rays, pupils
 from core.cameras.matches import Matches, tracks
 from core.cameras.resection import resect
 from core.cameras.solving import Solved, worth
 from core.cameras.world import agreeing_faces, find_head
 from core.contract.frame_records import FrameRecord
 from core.contract.messages import Reporter
+from core.face.bundle import TOLD_SIGMA_LOG, Observations, adjust
 from core.face.faces import Face
+from core.face.landmark_model import template_landmarks
 from core.synthetic.painted_head import FOCAL, HEIGHT, WIDTH, place_camera
 
 AZIMUTHS = (-45, -20, 0, 25, 50)

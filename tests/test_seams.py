@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from core.delight.evening import ShadingEstimate
-from core.delight.network import _divided
+from core.delight.network import divide
 from core.delight.occlusion import remove_seams
 from core.imaging import images
 
@@ -40,6 +40,6 @@ def test_a_frames_seams_are_taken_out_where_it_shows_skin():
     look = ShadingEstimate((0.0, 0.0, 128.0), coarse, (log[..., 0] < 0).astype(np.float32), np.zeros_like(log))
     skin = np.zeros((64, 64), np.float32)
     skin[:32] = 1
-    came_out = images.srgb_to_linear(_divided(srgb, look, skin)[0])[..., 1]
+    came_out = images.srgb_to_linear(divide(srgb, look, skin)[0])[..., 1]
     off = np.abs(np.log(came_out / np.median(came_out)))[:, 56:76].mean(1)
     assert off[10:50].mean() < 0.8 * off[80:118].mean()

@@ -19,9 +19,9 @@ import pycolmap
 
 from ..contract.messages import Reporter
 from ..face import faces
+from ..face.bundle import TOLD_SIGMA_LOG, Bundle, Observations, adjust
+from ..face.landmark_model import template_landmarks
 from ..geometry.models import pose_of
-from .bundle import TOLD_SIGMA_LOG, Bundle, Observations, adjust
-from .landmarks import template_landmarks
 from .matches import Matches
 from .resection import LEAST_MATCHES, agreeing, place_by_matches
 from .world import PUPILS_M, agreeing_faces, find_head

@@ -9,8 +9,6 @@ elsewhere when lids are closed. Umeyama, Least-squares Estimation of Transformat
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import cv2
@@ -18,45 +16,14 @@ import numpy as np
 
 from ..contract.frame_records import FrameRecord
 from ..contract.messages import Reporter
-from ..face import faces, template
-from ..geometry import meshes
+from ..face import faces
+from ..face.landmark_model import INDEPENDENT_LANDMARKS, SIGMA_M, template_landmarks
 from ..imaging import images
 
 LEFT_LIDS, RIGHT_LIDS = faces.EYE_LINES
 PUPILS_PER_LIDS = 63.0 / 62.156 / 1.019
 """The template's pupils are 63 mm apart, the middles of its lids' outlines a little less; and the head that fits a
 net's landmarks came out 1.9 % too large over six synthetic heads of known size (benchmarks/head_scale.py)."""
-SIGMA_M = 0.003
-"""How far a landmark of the net lies from the same point of a person's head, roughly."""
-INDEPENDENT_LANDMARKS = 120
-"""How many of the landmarks count as independent: neighbours err together."""
-
-
-@dataclass(frozen=True)
-class TemplateLandmarks:
-    """The template's landmarks: mean [468, 3] and identity basis [K, 468, 3] in metres, outward normals [468, 3], trust
-    [468] in [0, 1]."""
-
-    mean: np.ndarray
-    basis: np.ndarray
-    normals: np.ndarray
-    trust: np.ndarray
-
-    def shape(self, coefficients: np.ndarray) -> np.ndarray:
-        """The landmarks [468, 3] of the head with these identity coefficients [K]."""
-        return self.mean + np.tensordot(coefficients, self.basis, 1)
-
-
-@cache
-def template_landmarks() -> TemplateLandmarks:
-    mesh, (face, bary) = template.load(), template.landmarks()
-
-    def at(vertex_values: np.ndarray) -> np.ndarray:
-        return (vertex_values[..., mesh.faces[face], :] * bary[..., None]).sum(-2)
-
-    normals = at(meshes.vertex_normals(mesh))
-    return TemplateLandmarks(at(mesh.vertices), at(template.identity()).astype(np.float64),
-                             normals / np.linalg.norm(normals, axis=1, keepdims=True), template.landmark_weights())
 
 
 def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporter,

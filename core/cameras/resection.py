@@ -19,15 +19,10 @@ import pycolmap
 
 from ..contract.messages import Reporter
 from ..face import faces
-from .bundle import FOCAL_SIGMA_LOG, TOLD_SIGMA_LOG, Bundle, Observations, adjust
-from .landmarks import template_landmarks
+from ..face.bundle import Bundle, Observations, adjust, place_by_landmarks
+from ..face.landmark_model import template_landmarks
 from .matches import Matches, tracks
 
-FOCAL_SHARES = np.geomspace(0.7, 3.0, 16)
-"""Focal lengths that are tried where no file tells one, as shares of a picture's longer side: 71 to 19 degrees of
-view."""
-PHONE_FOCAL_SHARE = 1.1
-"""A phone's, in the same unit."""
 AGREE_WIDTH_SHARES = (0.05, 0.025, 0.0125)
 """Shares of the face's width by which matches may miss, round by round, as the cameras get better."""
 MOST_TRACKS = 5000
@@ -78,7 +73,7 @@ def resect(
     pixels = {name: face_by_name[name].landmarks[:, :2].astype(np.float64) for name in names}
     width = float(np.median([face_by_name[name].box[2] - face_by_name[name].box[0] for name in names]))
     report.progress(0, 5, "placing cameras by the face")
-    bundle = _first(groups, group_of, names, pixels)
+    bundle = place_by_landmarks(groups, group_of, names, pixels)
     count = len(model.mean)
     landmarks = Observations(np.repeat(np.arange(len(names)), count), np.tile(np.arange(count), len(names)),
                              np.concatenate([pixels[n] for n in names]))
@@ -106,38 +101,6 @@ def _trusted(names: list[str], matches: Matches, used: list) -> bool:
     pairs = [(a, b, index) for (a, b), index in matches.pairs.items() if a in names and b in names]
     agree = [track_of.get((a, i), -1) == track_of.get((b, j), -2) for a, b, index in pairs for i, j in index.tolist()]
     return all(track_counts[name] >= ENOUGH_TRACKS for name in names) and np.mean(agree) > AGREED_SHARE
-
-
-def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -> Bundle:
-    """Poses of the template's mean head by PnP at each focal length of FOCAL_SHARES, shared by all groups whose own is
-    unknown; the one that fits best."""
-    model = template_landmarks()
-    trusted = model.trust > 0.2
-    best = None
-    for factor in FOCAL_SHARES if any(not group["focal_px"] for group in groups) else (1.0,):
-        focal = np.array([group["focal_px"] or factor * max(group["width"], group["height"]) for group in groups])
-        poses, total = [], 0.0
-        for name in names:
-            group = groups[group_of[name]]
-            matrix = np.array([[focal[group_of[name]], 0, group["width"] / 2],
-                               [0, focal[group_of[name]], group["height"] / 2], [0, 0, 1.0]])
-            _, turn, shift = cv2.solvePnP(model.mean[trusted], pixels[name][trusted], matrix, None,
-                                          flags=cv2.SOLVEPNP_SQPNP)
-            there = cv2.projectPoints(model.mean[trusted], turn, shift, matrix, None)[0][:, 0]
-            total += np.median(np.linalg.norm(there - pixels[name][trusted], axis=1)) / np.ptp(pixels[name][:, 0])
-            poses.append((cv2.Rodrigues(turn)[0], shift[:, 0]))
-        # a face far away looks much the same through any lens
-        total += len(names) * 0.002 * (np.log(factor / PHONE_FOCAL_SHARE) / 0.35) ** 2
-        if best is None or total < best[0]:
-            best = total, focal, poses
-    _, focal, poses = best
-    prior = np.array([group["focal_px"] or PHONE_FOCAL_SHARE * max(group["width"], group["height"])
-                      for group in groups])
-    return Bundle(np.array([r for r, _ in poses]), np.array([t for _, t in poses]), focal, prior,
-                  np.array([TOLD_SIGMA_LOG if group["focal_px"] else FOCAL_SIGMA_LOG for group in groups]),
-                  np.array([group_of[name] for name in names]),
-                  np.array([[groups[group_of[n]][side] / 2 for side in ("width", "height")] for n in names]),
-                  np.zeros(len(model.basis)), model.mean.copy())
 
 
 def agreeing(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -> tuple[tuple, list, Bundle]:

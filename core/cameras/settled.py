@@ -20,10 +20,11 @@ import pycolmap
 
 from ..contract.messages import Reporter
 from ..face import template
+from ..face.bundle import Bundle
+from ..face.landmark_model import template_landmarks
 from ..geometry.models import pose_of
-from .bundle import Bundle
 from .joint import as_bundle, rebuilt, straightened
-from .landmarks import similarity, template_landmarks
+from .landmarks import similarity
 from .matches import Matches
 from .resection import LEAST_MATCHES, agreeing, place_by_matches
 from .world import HeadFrame

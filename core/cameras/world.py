@@ -15,7 +15,8 @@ import pycolmap
 
 from ..contract.messages import Problem
 from ..face import faces
-from .landmarks import fit_rays, pupils, template_landmarks
+from ..face.landmark_model import template_landmarks
+from .landmarks import fit_rays, pupils
 
 ASTRAY_RATIO, ASTRAY_WIDTH_SHARE = 4.0, 0.1
 """A frame whose landmarks miss those of the others by so many times the usual, and by such a share of the face's width,

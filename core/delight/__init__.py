@@ -20,12 +20,12 @@ from ..contract.stages import advise_again
 from ..imaging import images
 from .contract import Delighter, Photographer
 from .folder import folder
-from .network import delight_photograph as delight_with_network
 from .network import network
 from .none import delight_photograph as leave_photograph
 from .none import none
 from .opendelight import delight_photograph as delight_with_opendelight
 from .opendelight import opendelight
+from .photograph import delight_photograph as delight_with_network
 from .shading import shading
 from .switchlight import switchlight
 
@@ -46,7 +46,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             images.write_srgb(delit / f"{stem}.png", result.image, bits=16)
             if result.shadow is not None:
                 images.write_data(delit / "shadow" / f"{stem}.png", result.shadow)
-            shown.append((result.view, _small(images.read_srgb(result.view.path)), _small(result.image)))
+            shown.append((result.view, _small(result.view.read()), _small(result.image)))
             report.check()
         if not shown:
             raise Problem("None of the frames that were chosen for the texture has a camera.",

@@ -6,8 +6,7 @@ known of the head.
 It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's
 pixels along its edges (lift.py), and the picture is divided by it, so pores are kept and none can be invented. In a
 capture the frames' answers are evened out over the head (evening.py) and brought together with the light that was
-fitted to all frames (second_opinion.py, below_hair.py); in a single photograph the skin around brows and eyes answers
-for them. `core train delighter` makes the weights.
+fitted to all frames (second_opinion.py, below_hair.py). `core train delighter` makes the weights.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ import torch
 
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
-from ..contract.settings import DelightSettings, Settings
-from ..face import faces, parser, template
+from ..contract.settings import Settings
+from ..face import template
 from ..face.head import read_head
 from ..face.networks import has_files, read_network
 from ..geometry.raster import interpolate, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
-from .below_hair import FEATURES, fill_features, fill_hair
+from .below_hair import fill_hair
 from .casts import remove_casts
 from .contract import Delit
 from .evening import ShadingEstimate, even_out
@@ -69,8 +68,8 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     for i, (view, look, skin) in enumerate(zip(answers.views, put_together(answers), answers.skins, strict=True)):
         report.progress(3 * len(answers.views) + i, 4 * len(answers.views),
                         f"Delighting frame {i + 1} of {len(answers.views)}")
-        srgb = images.read_srgb(view.path)
-        albedo, shadow = _divided(srgb, look, skin, light_in_frame(view, answers.head, srgb))
+        srgb = view.read()
+        albedo, shadow = divide(srgb, look, skin, light_in_frame(view, answers.head, srgb))
         yield Delit(view, albedo, shadow)
 
 
@@ -81,10 +80,10 @@ def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
     looks, fitted = [], []
     for i, view in enumerate(views):
         report.progress(2 * len(views) + i, 4 * len(views), f"Looking at frame {i + 1} of {len(views)}")
-        look, log = _look_at_view(net, view, head)
+        look, log = ask_of_view(net, view, head)
         looks.append(look)
         fitted.append(log)
-    skins, hair = ([_seen(head, shares, look) for look in looks] for shares in (head.skin, head.hair))
+    skins, hair = ([seen_in(head, shares, look) for look in looks] for shares in (head.skin, head.hair))
     return Answers(head, views, looks, fitted, skins, hair)
 
 
@@ -94,22 +93,6 @@ def put_together(answers: Answers) -> list[ShadingEstimate]:
     looks = weigh_in(own, answers.fitted, answers.skins)
     looks = [fill_hair(*told) for told in zip(looks, own, answers.fitted, answers.hair, strict=True)]
     return remove_casts(looks, answers.skins)
-
-
-def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, np.ndarray]:
-    """A single photograph [H, W, 3] (sRGB) of a face -> its albedo [H, W, 3] (sRGB) and its shadows [H, W]. Raises
-    Problem where no face is found."""
-    face = faces.detect(srgb)
-    if face is None:
-        raise Problem("No face was found in the photograph.",
-                      "Choose a photograph that shows the face from the front or half from the side.")
-    box = square_around(face.landmarks[:, :2])
-    look = _look(load_network("cpu"), box, crop(srgb, box, SIDE_PX))
-    parts = parser.parse(srgb, face.landmarks)
-    share, skin = (crop(parts.of(*names), box, len(look.shading)) for names in (FEATURES, ("skin",)))
-    look = replace(look, shading=fill_features(look.shading, share))
-    hull = _hull(face.landmarks[:, :2], look)
-    return _divided(srgb, remove_casts([look], [hull])[0], hull * skin)
 
 
 def load_network(device: str) -> DelightNet:
@@ -142,15 +125,15 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
                           borderMode=cv2.BORDER_REPLICATE)
 
 
-def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEstimate, np.ndarray]:
+def ask_of_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEstimate, np.ndarray]:
     """What the network says of a frame, and the log-shading of the fitted light at the same size."""
     pixels, _ = view.project(_landmarks(head))
     box = square_around(pixels[np.isfinite(pixels).all(1)])
     face, bary = _hits(view, head, box, SIDE_PX)
     ambient, direct, free, normal = head.at(face, bary)
     geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, (face >= 0).astype(np.float32))
-    picture = crop(images.read_srgb(view.path), box, SIDE_PX)
-    look = _look(net, box, picture, geometry)
+    picture = crop(view.read(), box, SIDE_PX)
+    look = look_at(net, box, picture, geometry)
     light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary,
                           round(max(view.width, view.height) * SIDE_PX / box[2]))
     cell_face, cell_bary = _hits(view, head, box, SIDE_PX // 2)
@@ -167,8 +150,8 @@ def _hits(view: View, head: LitHead, box: tuple[float, float, float], side: int)
 
 
 @torch.inference_mode()
-def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
-          geometry: tuple = ()) -> ShadingEstimate:
+def look_at(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
+            geometry: tuple = ()) -> ShadingEstimate:
     """The mean of what the network says of a square picture and of its mirror image."""
     layers, middle = network_input(picture, *geometry)
     mirrored = layers[:, :, ::-1].copy()
@@ -182,23 +165,13 @@ def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
     return ShadingEstimate(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, MIN_LINEAR)))
 
 
-def _seen(head: LitHead, vertex_values: np.ndarray, look: ShadingEstimate) -> np.ndarray:
+def seen_in(head: LitHead, vertex_values: np.ndarray, look: ShadingEstimate) -> np.ndarray:
     """Values [V] of the head where a look shows it, [h, h]."""
     return interpolate(vertex_values[:, None], head.mesh.faces, look.face, look.bary)[..., 0]
 
 
-def _hull(points: np.ndarray, look: ShadingEstimate) -> np.ndarray:
-    """The face within its landmarks [N, 2] (pixels), [h, h] in {0, 1}. Brows, eyes and lips are in it: they are few,
-    and unlike skin."""
-    side = len(look.shading)
-    inside = np.zeros((side, side), np.uint8)
-    cv2.fillConvexPoly(inside,
-                       cv2.convexHull(np.round((points - look.box[:2]) * side / look.box[2] - 0.5).astype(np.int32)), 1)
-    return inside.astype(np.float32)
-
-
-def _divided(srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray,
-             fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+def divide(srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray,
+           fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
     """A picture without its shading, and its shadows at its own size. On `skin` [h, h] in [0, 1] no outline of a shadow
     stays, and it tells how bright the picture came out: the wall behind may be whiter. Beyond the square `fitted` (of
     light_in_frame) is taken; without it the shading is that of the square's border, and nothing is said of shadows.

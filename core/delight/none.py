@@ -12,7 +12,6 @@ from ..contract.capture import Capture
 from ..contract.messages import Reporter
 from ..contract.settings import DelightSettings, Settings
 from ..geometry.views import read_views
-from ..imaging import images
 from .contract import Delit
 
 
@@ -21,7 +20,7 @@ def none(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Del
     views = read_views(capture, selected_only=True)
     for i, view in enumerate(views):
         report.progress(i, len(views), "Copying frames")
-        yield Delit(view, images.read_srgb(view.path))
+        yield Delit(view, view.read())
 
 
 def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, None]:

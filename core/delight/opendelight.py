@@ -20,7 +20,6 @@ from ..contract.messages import Problem, Reporter
 from ..contract.settings import DelightSettings, Settings
 from ..face.faces import Face, detect, segment_person
 from ..geometry.views import read_views
-from ..imaging import images
 from .contract import Delit
 from .face_crop import cut_face, face_mask, ffhq_alignment, put_face_back
 from .opendelight_checkpoint import Checkpoint, load
@@ -41,7 +40,7 @@ def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Itera
             report.progress(i, len(views), f"Delighting frame {i + 1} of {len(views)}")
 
         step()
-        srgb = images.read_srgb(view.path)
+        srgb = view.read()
         face = detect(srgb, face)
         if face is None:
             report.log(f"No face was found in frame {view.name}; it is left out.")

@@ -35,7 +35,7 @@ def shading(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
 
 
 def _delight(view: View, head: LitHead) -> Delit:
-    srgb = images.read_srgb(view.path)
+    srgb = view.read()
     shadow = np.zeros(srgb.shape[:2], np.float32)
     if (seen := light_in_frame(view, head, srgb)) is not None:
         box, lit, share, here = seen

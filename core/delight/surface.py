@@ -70,7 +70,7 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
         inside = ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
         candidates = np.flatnonzero(inside & (cosine > MIN_FACING_COSINE))
         candidates = candidates[visible_from(head.caster, mesh.vertices[candidates], normals[candidates], view.centre)]
-        picture = images.read_srgb(view.path)
+        picture = view.read()
         srgb = sample(picture, pixels[candidates])
         unburnt = srgb.max(1) < 0.99  # what is burnt out has lost its colour
         seen_colours[i, candidates[unburnt]] = images.srgb_to_linear(srgb[unburnt])

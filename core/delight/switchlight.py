@@ -123,5 +123,5 @@ def fitted(answer: np.ndarray, view: View) -> np.ndarray:
         answer = images.resize(answer, view.width, view.height).reshape(view.height, view.width, -1)
     colour = answer[..., :3] if answer.shape[2] >= 3 else np.repeat(answer[..., :1], 3, 2)
     if answer.shape[2] in (2, 4):  # OpenImageIO hands out colours that are multiplied by alpha
-        colour = colour + (1 - np.clip(answer[..., -1:], 0, 1)) * images.read_srgb(view.path)
+        colour = colour + (1 - np.clip(answer[..., -1:], 0, 1)) * view.read()
     return np.clip(colour, 0, 1)

@@ -18,6 +18,7 @@ from ..contract.frame_records import read_frames
 from ..contract.json_files import plain_name
 from ..contract.messages import Problem
 from ..contract.stages import advise_again
+from ..imaging import images
 from .models import pose_of, read_model
 
 
@@ -49,6 +50,10 @@ class View:
     def axis(self) -> np.ndarray:
         """Unit viewing direction in the world [3]."""
         return self.rotation[2]
+
+    def read(self) -> np.ndarray:
+        """The picture, sRGB [H, W, 3]. Raises Problem where it cannot be read."""
+        return images.read_srgb(self.path)
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """World points [N, 3] -> pixels [N, 2] (lens distortion applied; nan behind the camera) and depths [N] in

@@ -68,7 +68,7 @@ def _eye(view: View, shares: EyeShares | None, opened: OpenHead, eye: int, side:
     ball = opened.balls[eye]
     (middle,), (depth,) = view.project(ball.centre[None])
     reach = 1.4 * ball.radius * view.camera.mean_focal_length() / depth
-    srgb = images.read_srgb(view.path)
+    srgb = view.read()
     scale = side / (2 * reach)
     full = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
     # cv2 counts from pixel centres
@@ -101,7 +101,7 @@ def three_views(views: list[View], landmarks: Landmarks) -> list[View]:
 
 
 def _one(view, mesh, caster, normals, edges, landmarks, height):
-    srgb = images.read_srgb(view.path)
+    srgb = view.read()
     scale = height / view.height
     canvas = np.ascontiguousarray(images.resize(srgb, round(view.width * scale), height))
     pixels, _ = view.project(mesh.vertices)

@@ -12,7 +12,6 @@ from ..contract.messages import Reporter
 from ..face.eye_reader import EyeShares, read_eye
 from ..face.faces import LEFT_EYE, RIGHT_EYE, Eye, shows_eye
 from ..geometry.views import View
-from ..imaging import images
 from .landmarks import Landmarks
 
 CORNERS = (LEFT_EYE[::-1], RIGHT_EYE)
@@ -45,7 +44,7 @@ def look(views: list[View], landmarks: Landmarks, report: Reporter) -> tuple[lis
         if view.name not in use[0] | use[1]:
             continue
         report.check()
-        srgb = images.read_srgb(view.path)
+        srgb = view.read()
         shrink = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
         pixels = landmarks.images[view.name][0]
         for side, corners in enumerate(CORNERS):

@@ -11,7 +11,6 @@ from ..face import parser, template
 from ..geometry import raster
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
-from ..imaging import images
 from .landmarks import spread
 
 MOST_VIEWS = 12
@@ -67,7 +66,7 @@ def hidden_share(points: np.ndarray, normals: np.ndarray, views: list[View], hea
         pixels, _ = view.project(marks)
         if not view.path.is_file() or not np.isfinite(pixels).all():
             continue
-        srgb = images.read_srgb(view.path)
+        srgb = view.read()
         scale = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
         parts = parser.parse(srgb, pixels * scale)
         at, depth = view.project(points)

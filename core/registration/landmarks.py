@@ -14,7 +14,6 @@ from ..face import faces, template
 from ..geometry.meshes import Mesh
 from ..geometry.raster import RayCaster
 from ..geometry.views import View
-from ..imaging import images
 from . import eyes
 
 MOST_VIEWS = 32
@@ -50,7 +49,7 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
     chosen, detections, seen = spread(views, MOST_VIEWS), [], {}
     for i, view in enumerate(chosen):
         report.progress(0.1 * steps * i / len(chosen), steps, f"looking for the face in {view.name}")
-        srgb = images.read_srgb(view.path)
+        srgb = view.read()
         face = faces.detect(srgb)
         if face is not None:
             scale = np.array([view.width / srgb.shape[1], view.height / srgb.shape[0]])

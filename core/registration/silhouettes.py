@@ -53,7 +53,7 @@ def prepare(view: View, mesh: Mesh, follow: np.ndarray, scale: float = 1.0) -> O
     follow : [V] in [0, 1], above 0.5 the followed part
     scale : of the picture that is worked on
     """
-    picture = images.read_srgb(view.path)
+    picture = view.read()
     height, width = round(view.height * scale), round(view.width * scale)
     picture = images.resize(picture, width, height) if (height, width) != picture.shape[:2] else picture
     person = faces.segment_person(picture)

@@ -19,7 +19,6 @@ from ..contract.messages import Reporter
 from ..face import faces
 from ..geometry import raster
 from ..geometry.views import View
-from ..imaging import images
 from .fusion import Fused, fuse
 from .pairs import BASELINES_DEG, choose_pairs
 from .stereo import DepthMap, match_pair
@@ -97,7 +96,7 @@ def _match(views: list[View], plan: list, scale: float, box: np.ndarray, guide: 
             del pictures[i]
         for i in pair:
             if i not in pictures:
-                picture = images.read_srgb(views[i].path)
+                picture = views[i].read()
                 pictures[i] = picture, mask(i, picture)
         a, b = pair
         seen = match_pair(views[a], views[b], (pictures[a][0], pictures[b][0]), (pictures[a][1], pictures[b][1]), box,

@@ -23,7 +23,6 @@ from ..contract.messages import Problem, Reporter
 from ..face import faces
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
-from ..imaging import images
 from .fusion import Fused, fuse
 from .stereo import DepthMap, warp
 
@@ -135,7 +134,7 @@ def train(start: Mesh, photographs: list[UndistortedFrame], rasterize: Callable,
 
 def _photograph(view: View) -> UndistortedFrame:
     focal, origin = view.camera.mean_focal_length(), -np.array([view.width, view.height]) / 2
-    picture = images.read_srgb(view.path)
+    picture = view.read()
     person = faces.segment_person(picture) > 0.5
     shown, mask = warp(view, picture, person, view.rotation, focal, origin,
                        np.zeros((view.height, view.width), np.float32))

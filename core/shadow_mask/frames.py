@@ -56,7 +56,7 @@ def shadow_frames(capture: Capture, settings: Settings, source: str) -> tuple[in
     if source == "softened":
         pairs = pictures_of(capture, settings.shadow_mask.softened, source)
         return len(pairs), ((view,
-                             filtered(softening(images.read_srgb(view.path), read_picture(path, view, source)),
+                             filtered(softening(view.read(), read_picture(path, view, source)),
                                       threshold)) for view, path in pairs)
     views = [(view, path) for view in read_views(capture)
              if (path := shadow_path(capture.delit / "shadow", view)).is_file()]

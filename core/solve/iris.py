@@ -175,7 +175,7 @@ def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarr
 def _in_frame(view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray,
               skin_albedo: np.ndarray) -> np.ndarray | None:
     """The iris' albedo [3] by one frame; None where that does not show it, or not enough of the skin around."""
-    frame = images.read_srgb(view.path)
+    frame = view.read()
     linear, whole = images.srgb_to_linear(frame), frame.max(-1)
     corners = view.project(head.mesh.vertices[list(lids.corners()[side])])[0]
     seen = read_eye(frame, corners * [frame.shape[1] / view.width, frame.shape[0] / view.height], side == 0)

@@ -97,7 +97,7 @@ def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter
     around = []
     for i, view in enumerate(views):
         report.progress(0, len(views), f"looking at the skin in frame {i + 1} of {len(views)}")
-        frame = images.read_srgb(view.path)
+        frame = view.read()
         seen[i] = _seen(view, frame, head.caster, mesh.vertices[points], normals[points])
         around.append(_surroundings(frame))
     known = np.isfinite(seen[..., 0]).sum(0) >= min(2, len(views))

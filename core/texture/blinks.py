@@ -13,7 +13,6 @@ from ..contract.messages import Reporter
 from ..face import faces, lids
 from ..face.head import Unfolded
 from ..geometry.views import View
-from ..imaging import images
 from .projection import UnwrappedView
 
 REACH_RADII = 1.7
@@ -67,7 +66,7 @@ def leave_out_blinks(capture: Capture, observations: list[UnwrappedView], surfac
 
 def _eyes_in(view: View) -> tuple[float, faces.Eye, faces.Eye] | None:
     """The head's yaw and the left and the right eye in a view's frame; None where no face is found."""
-    srgb = images.read_srgb(view.path)
+    srgb = view.read()
     face = faces.detect(srgb)
     return None if face is None else (face.yaw_deg, *faces.find_eyes(srgb, face)[::-1])
 

@@ -40,7 +40,7 @@ def draw_scan_sheet(capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: n
     """
     around = sorted(views, key=lambda view: abs(np.arctan2(view.centre[0], -view.centre[1])))
     view = around[0]
-    frame = images.read_srgb(view.path)
+    frame = view.read()
     width = round(frame.shape[1] * height / frame.shape[0])
     shots = [images.resize(frame, width, height)]
     caster = raster.RayCaster(mesh)

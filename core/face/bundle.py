@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from .landmarks import INDEPENDENT_LANDMARKS, SIGMA_M, template_landmarks
+from .landmark_model import INDEPENDENT_LANDMARKS, SIGMA_M, template_landmarks
 
 OFFSET_M = 0.002
 """How far a landmark of a person strays from the nearest head of the identity space."""
@@ -22,6 +22,11 @@ FOCAL_SIGMA_LOG = 0.35
 """Deviation of the logarithm of an unknown focal length from its prior: from a phone's wide to its portrait lens."""
 TOLD_SIGMA_LOG = 0.03
 """The same of one that a file told: a whole number of millimetres, and focusing changes it."""
+FOCAL_SHARES = np.geomspace(0.7, 3.0, 16)
+"""Focal lengths that are tried where no file tells one, as shares of a picture's longer side: 71 to 19 degrees of
+view."""
+PHONE_FOCAL_SHARE = 1.1
+"""A phone's, in the same unit."""
 FEATURE_PX = 1.5
 """Deviation of a match in cameras that come from the face, where what agrees is little and may be wrong."""
 LEAST_LANDMARK_COSINE = 0.15
@@ -63,6 +68,38 @@ class Observations:
     camera: np.ndarray
     point: np.ndarray
     pixel: np.ndarray
+
+
+def place_by_landmarks(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -> Bundle:
+    """Poses of the template's mean head by PnP at each focal length of FOCAL_SHARES, shared by all groups whose own is
+    unknown; the one that fits best."""
+    model = template_landmarks()
+    trusted = model.trust > 0.2
+    best = None
+    for factor in FOCAL_SHARES if any(not group["focal_px"] for group in groups) else (1.0,):
+        focal = np.array([group["focal_px"] or factor * max(group["width"], group["height"]) for group in groups])
+        poses, total = [], 0.0
+        for name in names:
+            group = groups[group_of[name]]
+            matrix = np.array([[focal[group_of[name]], 0, group["width"] / 2],
+                               [0, focal[group_of[name]], group["height"] / 2], [0, 0, 1.0]])
+            _, turn, shift = cv2.solvePnP(model.mean[trusted], pixels[name][trusted], matrix, None,
+                                          flags=cv2.SOLVEPNP_SQPNP)
+            there = cv2.projectPoints(model.mean[trusted], turn, shift, matrix, None)[0][:, 0]
+            total += np.median(np.linalg.norm(there - pixels[name][trusted], axis=1)) / np.ptp(pixels[name][:, 0])
+            poses.append((cv2.Rodrigues(turn)[0], shift[:, 0]))
+        # a face far away looks much the same through any lens
+        total += len(names) * 0.002 * (np.log(factor / PHONE_FOCAL_SHARE) / 0.35) ** 2
+        if best is None or total < best[0]:
+            best = total, focal, poses
+    _, focal, poses = best
+    prior = np.array([group["focal_px"] or PHONE_FOCAL_SHARE * max(group["width"], group["height"])
+                      for group in groups])
+    return Bundle(np.array([r for r, _ in poses]), np.array([t for _, t in poses]), focal, prior,
+                  np.array([TOLD_SIGMA_LOG if group["focal_px"] else FOCAL_SIGMA_LOG for group in groups]),
+                  np.array([group_of[name] for name in names]),
+                  np.array([[groups[group_of[n]][side] / 2 for side in ("width", "height")] for n in names]),
+                  np.zeros(len(model.basis)), model.mean.copy())
 
 
 def adjust(bundle: Bundle, observations: Observations, rounds: int = 15) -> Bundle:
