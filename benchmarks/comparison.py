@@ -52,11 +52,10 @@ from core.solve.witnesses import confirm_marks
 from . import figures, light_models
 from .ablation import fit_texels
 from .albedo_score import looks, score_map
+from .comparison_table import INPUTS, OURS, means, paired_table, table
 from .continued import run_stages
 from .people import PEOPLE, skin_tone
 
-INPUTS = ("delit", "raw")
-OURS = "wildcap"
 SEEDS = {OURS: (0, 1)}
 LIGHTS: dict[str, Callable] = {
     "regions 5": partial(light_models.light_by_regions, count=5),
@@ -97,7 +96,7 @@ def main() -> None:
     if asked.json:
         figures.write_record(asked.json, "comparison", "python -m benchmarks.comparison FOLDER --scan CAPTURE TRUTH",
                              found)
-    print(table(found))
+    print(f"{table(found)}\n\n{paired_table(found['subjects'])}")
 
 
 def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
@@ -224,64 +223,6 @@ def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
 @cache
 def _prior():
     return load()
-
-
-COLUMNS = {"PSNR": lambda s: s["raw"]["psnr"], "after one gain": lambda s: s["gain"]["psnr"],
-           "SSIM": lambda s: s["gain"]["ssim"],
-           "FLIP": lambda s: s["gain"]["flip"], "detail": lambda s: s["detail"],
-           "shadow step": lambda s: s["shadow_step"]}
-FORMATS = {"PSNR": "{:.2f}", "after one gain": "{:.2f}", "SSIM": "{:.3f}", "FLIP": "{:.3f}", "detail": "{:.2f}",
-           "shadow step": "{:.2f}"}
-
-
-def means(subjects: list[dict]) -> dict:
-    """Of several subjects' figures: input -> method -> column -> mean of the first seed; and 'spread': half of what two
-    seeds of ours differ by."""
-    out: dict = {given: {method: {column: _mean([value(one[given][method]["0"]) for one in subjects])
-                                  for column, value in COLUMNS.items()}
-                         for method in subjects[0][given]} for given in subjects[0]}
-    two = [one["delit"][OURS] for one in subjects]
-    return out | {"spread": {column: _mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two
-                                            if value(s["0"]) is not None])
-                             for column, value in COLUMNS.items()}}
-
-
-def table(record: dict) -> str:
-    """Markdown: a line per row with the means over the people, of each input's rows the best of each column and what
-    ties with it in bold; then the scan's."""
-    parts = []
-    for key, title in (("people", "mean of the people"), ("scan", "head scan")):
-        if key not in record:
-            continue
-        lines, spread = [], record[key]["spread"]
-        for given in INPUTS:
-            rows = record[key].get(given, {})
-            for method, cells in rows.items():
-                line = [_cell(column, cells[column], [r[column] for r in rows.values()], spread[column])
-                        for column in COLUMNS]
-                lines.append([f"{given}: {method}", *line])
-        lines.append(["*spread over seeds*", *(_text(column, spread[column]) for column in COLUMNS)])
-        parts.append(figures.markdown([title, *COLUMNS], lines))
-    return "\n\n".join(parts)
-
-
-def _cell(column: str, figure: float | None, column_values: list[float | None], spread: float | None) -> str:
-    known = [_badness(column, v) for v in column_values if v is not None]
-    text = _text(column, figure)
-    return f"**{text}**" if figure is not None and _badness(column, figure) <= min(known) + (spread or 0) else text
-
-
-def _badness(column: str, figure: float) -> float:
-    return abs(figure) if column == "shadow step" else figure if column == "FLIP" else -figure
-
-
-def _text(column: str, figure: float | None) -> str:
-    return "-" if figure is None else FORMATS[column].format(figure)
-
-
-def _mean(scores: list[float | None]) -> float | None:
-    known = [v for v in scores if v is not None]
-    return float(np.mean(known)) if known else None
 
 
 if __name__ == "__main__":

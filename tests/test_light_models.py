@@ -6,9 +6,10 @@ table names what is best."""
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import torch
 
-from benchmarks import comparison, light_models, rerender
+from benchmarks import comparison, comparison_table, light_models, rerender
 from benchmarks.albedo_score import AlbedoTruth, HeadInView
 from core.solve.initial import Start
 from core.solve.lighting import Lights, Shader, constant_light
@@ -98,6 +99,20 @@ def test_the_table_marks_the_best_and_its_ties():
         and "| 29.00 |" in lines["delit: texture"]
         and "| - |" in lines["delit: texture"]
     )
+
+
+def test_differences_are_taken_person_by_person():
+    """Two people who differ by 10 dB, and ours ahead of the texture by 2 dB in one and by 1 in the other."""
+    def score(psnr, flip):
+        return {"raw": {"psnr": psnr}, "gain": {"psnr": psnr, "flip": flip}}
+
+    people = {name: {"delit": {"wildcap": {"0": score(base + ahead, 0.1)}, "texture": {"0": score(base, 0.1 + less)}}}
+              for name, base, ahead, less in (("a", 30.0, 2.0, -0.02), ("b", 20.0, 1.0, -0.01))}
+    mean, error = comparison_table.paired(people)["delit"]["texture"]["PSNR, dB"]
+    assert (mean, error) == (pytest.approx(1.5), pytest.approx(0.5))
+    line = comparison_table.paired_table(people).splitlines()[-1]
+    assert "**+1.50 ± 0.50**" in line, "better by more than two standard errors"
+    assert "*+0.0150 ± 0.0050*" in line and "**+0.0150" not in line, "a larger FLIP is worse"
 
 
 def test_a_rendering_that_is_the_frame_scores_and_a_wrong_one_does_not():

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..comparison import table
+from ..comparison_table import table
 from ..figures import Figures
 from ..pages import Sections, prose
 from .split import OLDER

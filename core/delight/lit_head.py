@@ -98,7 +98,7 @@ def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.n
     light, lit, inlier = fit_light(colours[drawn], normals[drawn], transfer[drawn], reaches, weights[drawn],
                                    step=lambda done, of: report.progress(3 * of + done, 8 * of, "Fitting the light"))
     expected = light.ambient(transfer[drawn]) + lit[:, None] * light.direct(normals[drawn])
-    residual = np.abs(np.log(colours[drawn] / expected)).mean(1)
+    residual = np.abs(np.log(colours[drawn] / np.maximum(expected, 1e-4))).mean(1)
     report.figure("inlier_percent", round(100 * float(inlier.mean()), 1))
     report.figure("residual_log", round(float(np.median(residual[inlier > 0.5])), 3))
     report.figure("environment_sh", np.round(light.environment, 4).tolist())
