@@ -45,7 +45,7 @@ from core.solve.prior import WEIGHTS, load
 from core.solve.problem import State, albedo, photometric_loss
 from core.solve.recipes import OURS, RECIPES, Recipe
 from core.solve.sampler import Sampler, seed_noise
-from core.solve.skin_tone import SkinTone
+from core.solve.skin_tone import GIVEN, SkinTone
 
 from . import figures
 from .ablation_measures import measure_regions, summary, table
@@ -134,6 +134,8 @@ def solve_all(options: argparse.Namespace, done: dict) -> None:
                 tasks.append((subject, shadows, wanted))
     with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
         for future in as_completed([pool.submit(_solve_problem, *task, options) for task in tasks]):
+            if future.exception():
+                pool.shutdown(cancel_futures=True)
             done.update(future.result())
             temporary = options.out.with_name(f".{options.out.name}")
             temporary.write_text(json.dumps(done, indent=0), encoding="utf-8")
@@ -261,11 +263,11 @@ def fit_texels(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Ca
 
 
 def tone_error(uv_problem: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
-    """CIEDE2000 between a requested skin tone and the mean of the solved facial skin: as it is delivered, and before
-    the mean is brought to the request."""
-    skin, found = skin_weight(len(uv_problem.albedo)), []
+    """CIEDE2000 between a requested skin tone (sRGB) and the mean of the solved facial skin: as it is delivered, and
+    before the mean is brought to the request."""
+    skin, found, asked = skin_weight(len(uv_problem.albedo)), [], SkinTone.from_srgb(tone, GIVEN)
     for rescale in (OURS.rescale, "none"):
-        albedo = solve_problem(uv_problem, replace(OURS, steps=steps, rescale=rescale), np.array(tone))
+        albedo = solve_problem(uv_problem, replace(OURS, steps=steps, rescale=rescale), asked)
         mean = images.linear_to_srgb((albedo * skin[..., None]).sum((0, 1)) / skin.sum())
         found.append(round(float(deltaE_ciede2000(rgb2lab(mean), rgb2lab(np.array(tone)))), 3))
     return found[0], found[1]
