@@ -19,7 +19,8 @@ def sections(ablation: Figures) -> Sections:
 
     def told(row: str) -> str:
         """What a row changes in the shadow, in the band and outside."""
-        return ", ".join(f"{part[row].to_first:+.1f}" for part in (shadow, band, outside)) + " dB"
+        changes = (f"{part[row].to_first:+.1f}" for part in (shadow, band, outside))
+        return ", ".join("0.0" if float(change) == 0 else change for change in changes) + " dB"
 
     return [("", prose("""
         ![texture, without texel grid, without prior, full method, truth](../pictures/ablation.jpg)

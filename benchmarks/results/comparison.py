@@ -4,66 +4,60 @@
 
 from __future__ import annotations
 
-from ..comparison_table import table
+from ..comparison_table import paired, paired_table, table
 from ..figures import Figures
 from ..pages import Sections, prose
-from .split import OLDER
 
 TITLE = "Albedo against the truth, beside other light models"
 SAYS = "Regions, one environment, no prior, or a blur divided out, instead of the paper's grid of lights."
 RECORDS = ("comparison",)
+FREE = "environment, no prior"
 
 
 def sections(comparison: Figures) -> Sections:
-    raw, delit, scan = comparison.people.raw, comparison.people.delit, comparison.scan
-    one = {name: {kind: subject[kind] for kind in ("raw", "delit")} for name, subject in comparison.subjects.items()}
-
-    def single(name: str, kind: str, row: str) -> float:
-        return one[name][kind][row]["0"].raw.psnr
-
-    ahead = {name: single(name, "delit", "environment") - single(name, "delit", "wildcap")
-             for name in one if name != "scan"}
+    raw, scan = comparison.people.raw, comparison.scan
+    people = {name: subject for name, subject in comparison.subjects.items() if name != "scan"}
     rival = max((row for row in scan.raw if row != "wildcap"), key=lambda row: scan.raw[row].PSNR)
+
+    def ours_less(kind: str, row: str) -> str:
+        """Ours less another method's PSNR over the people."""
+        return "{:+.2f} ± {:.2f} dB".format(*paired(people)[kind][row]["PSNR, dB"])
+
+    def each(kind: str, row: str) -> str:
+        """The same, person by person."""
+        return by_person({name: subject[kind].wildcap["0"].raw.psnr - subject[kind][row]["0"].raw.psnr
+                          for name, subject in people.items()})
 
     return [("", prose(f"""
         The baselines are of our own writing (`benchmarks/light_models.py`), not those authors' code, and put other
-        light models behind our solver: the same prior, guidance, start and pulls. *Regions*: five or ten soft regions
-        with an SH light each; where they lie is learned, as in DeFace, and begins as clusters of place and lightness,
-        so they are a shadow mask of sorts. *Environment*: one diffuse cubemap for the whole face, as in FLARE. *No
-        prior*: its albedo's texels follow the frames alone, smoothly. *Over its blur*: the texture divided by its own
-        blur, what one does by hand. All maps have {comparison.size} texels a side; the mean is over the six people of
-        the [gallery](gallery.md); a row's best and its ties (within half of what two seeds of ours differ by) are bold,
-        for each input apart. SSIM and FLIP are those after one gain.
-        """, OLDER, table(comparison))),
-        ("Read honestly", prose(f"""
-        **We do not lead everywhere.** What the paper's light model is for, light that is still in the frames, it does:
-        on raw frames it is {raw.wildcap.PSNR - raw.texture.PSNR:.1f} dB over the texture and
-        {raw.wildcap.PSNR - raw.environment.PSNR:.1f} dB over one environment; regions that learn where the shadows lie
-        are as good (five {raw["regions 5"].PSNR - raw.wildcap.PSNR:+.2f} dB in PSNR, ten
-        {raw["regions 10"].PSNR - raw.wildcap.PSNR:+.2f} dB, FLIP {raw["regions 5"].FLIP:.3f} and
-        {raw["regions 10"].FLIP:.3f} to our {raw.wildcap.FLIP:.3f}), and leave less of a shadow's edge. On the one real
-        skin, the head scan, it leads by {scan.raw.wildcap.PSNR - scan.raw[rival].PSNR:.1f} dB on raw frames, and
-        is the best light model on delit ones, {scan.delit.wildcap.PSNR - scan.delit["regions 10"].PSNR:.1f} dB over
-        regions and {scan.delit.wildcap.PSNR - scan.delit.environment.PSNR:.1f} dB over the environment; the texture
-        taken as it is beats it there by {scan.delit.texture.PSNR - scan.delit.wildcap.PSNR:.1f} dB.
+        light models behind our solver: the same prior, guidance and start. *Regions*: five or ten soft regions with an
+        SH light each; where they lie is learned, as in DeFace, and begins as clusters of place and lightness, so they
+        are a shadow mask of sorts. *Environment*: one diffuse cubemap for the whole face, as in FLARE. *No prior*: its
+        albedo's texels follow the frames alone, smoothly. *Over its blur*: the texture divided by its own blur, what
+        one does by hand. All maps have {comparison.size} texels a side; the mean is over the six people of the
+        [gallery](gallery.md); a row's best and its ties (within half of what two seeds of ours differ by) are bold, for
+        each input apart. SSIM and FLIP are those after one gain.
+        """, table(comparison))),
+        ("Person by person", prose("""
+        Ours less each other method, the mean over the six people ± its standard error: bold where ours is better by
+        more than two of those, italic where it is worse by more than one.
+        """, paired_table(people))),
+        ("How we read it", prose(f"""
+        **On raw frames**, which is what the paper's light model is for, ours is {ours_less("raw", "texture")} over the
+        texture, {ours_less("raw", "environment")} over one environment ({each("raw", "environment")}) and
+        {ours_less("raw", "regions 10")} over ten regions that learn where the shadows lie
+        ({each("raw", "regions 10")}); these leave {raw["regions 10"]["shadow step"]:.2f} of a shadow's edge, ours
+        {raw.wildcap["shadow step"]:.2f}. On the head scan ours has {scan.raw.wildcap.PSNR:.1f} dB, the best of the
+        others, *{rival}*, {scan.raw[rival].PSNR:.1f} dB.
 
-        **On delit synthetic people freer lights are ahead**: regions by
-        {delit["regions 10"].PSNR - delit.wildcap.PSNR:.1f} dB, the environment by
-        {delit.environment.PSNR - delit.wildcap.PSNR:.1f} dB ({by_person(ahead)}). Where the delighter left most of the
-        light (tan, three mixed lamps: {single("tan", "delit", "texture"):.1f} dB as a texture) the environment gains
-        {single("tan", "delit", "environment") - single("tan", "delit", "texture"):.1f} dB, ours
-        {single("tan", "delit", "wildcap") - single("tan", "delit", "texture"):.1f} dB. After a delighter our lights
-        were held back, because on the scan a free light takes the beard and the cheeks for light; on these people a
-        free light is right: they come from the generator that made the prior's mean face and have few large traits of
-        their own. The regions'
-        shared light was held as ours was, their own lights towards none; the environment is held by its smoothness.
+        **On delit frames** little light is left to explain: ours is {ours_less("delit", "texture")} over the texture
+        ({each("delit", "texture")}), {ours_less("delit", "regions 10")} over ten regions and
+        {ours_less("delit", "environment")} over one environment ({each("delit", "environment")}), which is held by its
+        smoothness alone. On the head scan the texture has {scan.delit.texture.PSNR:.1f} dB, ours
+        {scan.delit.wildcap.PSNR:.1f} dB, the environment {scan.delit.environment.PSNR:.1f} dB.
 
-        **On raw frames of dark skin** (dark: {single("dark", "raw", "wildcap"):.1f} dB, regions
-        {single("dark", "raw", "regions 5"):.1f} dB) highlights stay in our albedo: local light may only darken, and
-        only inside the mask.
-
-        **What would change it**: a prior that has seen many real people, beards among them; local light that may
-        brighten; and more heads to choose on than these eight. The first needs data that may be trained on and a GPU.
+        **Without the prior**, one environment and free texels are {ours_less("raw", FREE)} on raw frames and
+        {ours_less("delit", FREE)} on delit ones, ours less theirs.
         """))]
 
 

@@ -9,6 +9,7 @@ from importlib import import_module
 
 import numpy as np
 
+from ..comparison_table import paired
 from ..confidence import SHIPPED
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
@@ -145,7 +146,8 @@ def flat_wins(rows: Figures) -> bool:
 
 def losses(of: Figures) -> str:
     """What a reader should know before the tables."""
-    answers, lamps, delit = of.state.summary, of.photographs.lamps.summary, of.comparison.people.delit
+    answers, lamps = of.state.summary, of.photographs.lamps.summary
+    against = paired({name: one for name, one in of.comparison.subjects.items() if name != "scan"})["delit"]
     relit, people, dark = of.relit.sample, of.relit_people.mean, of.skin_tone.groups.dark
     known = of.confidence.summary[SHIPPED]
     alone, scalp = of.whole_chain.rows["scan, network"], of.whole_head.synthetic.scalp
@@ -159,9 +161,9 @@ def losses(of: Figures) -> str:
           {lamps["flat colour"].psnr.mean:.1f} ([photographs](photographs.md)). On the head scan the solve takes beard
           and cheeks for light, and loses {alone.solve_off.psnr - alone.solved.psnr:.1f} dB to the delit texture
           ([scan](scan.md)).
-        - **Freer lights win on delit synthetic people**: regions by
-          {delit["regions 10"].PSNR - delit.wildcap.PSNR:.1f} dB, one environment
-          by {delit.environment.PSNR - delit.wildcap.PSNR:.1f} ([page](comparison.md)).
+        - **On delit synthetic people one environment is as good a light as ours**: ours less it
+          {"{:+.1f} ± {:.1f}".format(*against["environment"]["PSNR, dB"])} dB, less ten regions
+          {"{:+.1f} ± {:.1f}".format(*against["regions 10"]["PSNR, dB"])} ([page](comparison.md)).
         - **Relief and gloss help little**: {relit.solved.psnr - relit.plain.psnr:+.2f} dB on the sample's relit head,
           {people.solved.psnr - people.plain.psnr:+.2f} dB over six people ([relit](relit.md)); normals and specular say
           no more than the mean face's ([prior](prior.md)).
