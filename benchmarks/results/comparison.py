@@ -36,7 +36,9 @@ def sections(comparison: Figures) -> Sections:
         albedo's texels follow the frames alone, smoothly. *Over its blur*: the texture divided by its own blur, what
         one does by hand. All maps have {comparison.size} texels a side; the mean is over the six people of the
         [gallery](gallery.md); a row's best and its ties (within half of what two seeds of ours differ by) are bold, for
-        each input apart. SSIM and FLIP are those after one gain.
+        each input apart. SSIM and FLIP are those after one gain. The head scan is filmed under the sun behind leaves
+        (`python -m benchmarks.scan_captures DATA FOLDER --lights leaves`); its own map, which stands for the truth,
+        holds light itself.
         """, table(comparison))),
         ("Person by person", prose("""
         Ours less each other method, the mean over the six people ± its standard error: bold where ours is better by
