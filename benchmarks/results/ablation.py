@@ -43,21 +43,22 @@ def sections(ablation: Figures) -> Sections:
 
         - **The texel grid and the prior carry the method**: without either {lost[0]:.0f} to {lost[1]:.0f} dB are lost
           in the shadow and about its border.
-        - **20 steps and 75**: {told("75 steps")}. More steps were to be never worse, and here they are. The default is
-          20.
+        - **75 steps instead of 20**: {told("75 steps")}. More steps were to be never worse, and here in PSNR they are.
+          The default is 20.
         - **Fitting the shadow's edge** helps: without it {told("mask as painted, no edge fitted")}.
         - **The grain of the grid hardly matters between 24 and 384 cells** ({told("24 cells")}; {told("384 cells")});
           one cell loses ({told("1 cell")}).
-        - **A grid on the whole face** ({told("grid on the whole face")}), or one that reaches outside of M
-          ({told("grid reaches outside M")}), explains what no second-order light does, around eyes and nose. It also
-          takes away shadows that nobody painted, so the mask would no longer be the artist's; it stays off.
+        - **A grid on the whole face**: {told("grid on the whole face")}; one that reaches outside of M:
+          {told("grid reaches outside M")}. Either takes away shadows that nobody painted, so the mask would no longer
+          be the artist's; both stay off.
         - **Start at T instead of 0.6 T**: {told("start at T")}. We keep the paper's 0.6.
         - **Mean face, nearest of 16 skins, uniform tone**: {told("start from the nearest skin")} and
           {told("start from a uniform tone")}. With a prior that is told the skin tone the start matters little.
         - **Features and moles**: light that may explain brows, lips and hair as freely as skin
           {told("light explains features too")}; moles that are not kept from the light {told("moles not protected")}.
         - **The light as the split of skin and light told it**, though it is strong: {told("light as split from skin")}.
-          Its logarithm is taken for linear, which raw light is not; so here the global light is free.
+          Its logarithm is taken for linear, which raw light is not; so here the global light is free, though on
+          these problems nothing would be lost.
         - **Guidance in closed form**, without the network's gradient: {told("proximal guidance")}.
         - **The recipes of the paper and of the released code**, with our weights: {told("recipe paper")} and
           {told("recipe released")}.
