@@ -36,8 +36,8 @@ def sections(delight: Figures) -> Sections:
         ([the sample](sample.md) is by today's).
 
         The rows of one photograph are older than the head that is fitted to it, and than what keeps brows and eyes
-        in it: [single photographs](photographs.md) has today's figures. Two of the 36 subjects were sorted without their skin's
-        saturation, and count in the group beside theirs.
+        in it: [single photographs](photographs.md) has today's figures. Two of the 36 subjects were sorted without
+        their skin's saturation, and count in the group beside theirs.
 
         The network beats the picture as it is in every figure of every set and group of skin tone, but detail on the
         real photographs ({photograph.detail:.2f} against {untouched.detail:.2f}). On the two captures it beats
