@@ -35,7 +35,7 @@ ROUNDS = 45
 """Of the adjustment; it mostly stops by itself before."""
 OUTLINES = dict(zip(FEATURES, (faces.BROW_LINES, faces.EYE_LINES), strict=True))
 OVERLOOKED = 0.25
-"""Share of an outline below which what the parser sees of it is chance: of a brow that it does see, more than half."""
+"""Share of an outline below which what the parser sees of it is chance: of one that it does see it finds about half."""
 
 
 @dataclass(frozen=True)
