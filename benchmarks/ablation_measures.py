@@ -21,6 +21,7 @@ from .figures import markdown
 
 REGIONS = ("shadow", "band", "outside")
 FIGURES = ("psnr", "ssim", "flip", "features")
+TITLES = {"ssim": "SSIM", "flip": "FLIP", "features": "features"}
 
 
 def measure_regions(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray,
@@ -97,17 +98,18 @@ def summary(done: dict[str, dict], rows: list[str], first: str) -> dict[str, dic
 
 def table(figures: dict[str, dict]) -> str:
     """Markdown of `summary`: per region a line per row. A distance to the first row that is smaller than the spread
-    over its seeds is a tie."""
+    over its seeds is a tie; a figure that no row has is left out."""
     if not figures[REGIONS[0]]:
         return "The first row was not solved yet."
     tables = []
+    known = [figure for figure in FIGURES[1:] if any(row[figure] is not None for row in figures[REGIONS[0]].values())]
     for region in REGIONS:
         spread, first = figures["spread"][region], next(iter(figures[region]))
-        tables.append(markdown([region, "problems x seeds", "PSNR", f"to {first}", "SSIM", "FLIP", "features",
+        tables.append(markdown([region, "problems x seeds", "PSNR", f"to {first}", *(TITLES[k] for k in known),
                                 "seconds"], [
             [row, f"{r['problems']} x {r['seeds']}", f"{r['psnr']:.2f}",
              "" if row == first else _compared(r["to_first"], spread),
-             *(None if r[figure] is None else f"{r[figure]:.3f}" for figure in FIGURES[1:]), f"{r['seconds']:.0f}"]
+             *(None if r[figure] is None else f"{r[figure]:.3f}" for figure in known), f"{r['seconds']:.0f}"]
              for row, r in figures[region].items()]))
     return "\n\n".join(tables)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks import comparison, comparison_table, light_models, rerender
+from benchmarks import comparison_table, light_models, rerender
 from benchmarks.albedo_score import AlbedoTruth, HeadInView
 from core.solve.initial import Start
 from core.solve.lighting import Lights, Shader, constant_light
@@ -90,7 +90,7 @@ def test_the_table_marks_the_best_and_its_ties():
 
     rows = {"delit": {"wildcap": {"0": score(30.0, -0.1), "1": score(30.4, -0.1)}, "regions 5": {"0": score(29.9, 0.2)},
                       "texture": {"0": score(29.0, None)}}}
-    text = comparison.table({"people": comparison.means([rows, rows])})
+    text = comparison_table.table({"people": comparison_table.means([rows, rows])})
     lines = {line.split("|")[1].strip(): line for line in text.splitlines()}
     assert "**30.00**" in lines["delit: wildcap"] and "**-0.10**" in lines["delit: wildcap"]
     assert "**29.90**" in lines["delit: regions 5"]  # within half of what two seeds differ by

@@ -52,14 +52,15 @@ def sections(comparison: Figures) -> Sections:
         {raw.wildcap["shadow step"]:.2f}. On the head scan ours has {scan.raw.wildcap.PSNR:.1f} dB, the best of the
         others, *{rival}*, {scan.raw[rival].PSNR:.1f} dB.
 
-        **On delit frames** little light is left to explain: ours is {ours_less("delit", "texture")} over the texture
+        **On delit frames** ours is {ours_less("delit", "texture")} over the texture
         ({each("delit", "texture")}), {ours_less("delit", "regions 10")} over ten regions and
         {ours_less("delit", "environment")} over one environment ({each("delit", "environment")}), which is held by its
         smoothness alone. On the head scan the texture has {scan.delit.texture.PSNR:.1f} dB, ours
         {scan.delit.wildcap.PSNR:.1f} dB, the environment {scan.delit.environment.PSNR:.1f} dB.
 
-        **Without the prior**, one environment and free texels are {ours_less("raw", FREE)} on raw frames and
-        {ours_less("delit", FREE)} on delit ones, ours less theirs.
+        **Without the prior**, under one environment and with free texels, what is solved lies behind ours by
+        {ours_less("raw", FREE)} on raw frames and by {ours_less("delit", FREE)} on delit ones: there is little light
+        left there to tell from skin.
         """))]
 
 

@@ -161,9 +161,9 @@ def losses(of: Figures) -> str:
           {lamps["flat colour"].psnr.mean:.1f} ([photographs](photographs.md)). On the head scan the solve takes beard
           and cheeks for light, and loses {alone.solve_off.psnr - alone.solved.psnr:.1f} dB to the delit texture
           ([scan](scan.md)).
-        - **On delit synthetic people one environment is as good a light as ours**: ours less it
-          {"{:+.1f} ± {:.1f}".format(*against["environment"]["PSNR, dB"])} dB, less ten regions
-          {"{:+.1f} ± {:.1f}".format(*against["regions 10"]["PSNR, dB"])} ([page](comparison.md)).
+        - **On delit synthetic people one environment is as good a light as ours**: ours is ahead of it by
+          {"{:+.2f} ± {:.2f}".format(*against["environment"]["PSNR, dB"])} dB, of ten regions by
+          {"{:+.2f} ± {:.2f}".format(*against["regions 10"]["PSNR, dB"])} dB ([page](comparison.md)).
         - **Relief and gloss help little**: {relit.solved.psnr - relit.plain.psnr:+.2f} dB on the sample's relit head,
           {people.solved.psnr - people.plain.psnr:+.2f} dB over six people ([relit](relit.md)); normals and specular say
           no more than the mean face's ([prior](prior.md)).
@@ -171,7 +171,7 @@ def losses(of: Figures) -> str:
           contrast** ([state](state.md#features-kept)); edges of hard shadows leave a faint outline, the paper's own
           failure case.
         - **Dark skin comes out {dark.scene.lightness:.1f} L* too light** where only the frames tell its tone
-          ([skin tone](skin_tone.md)), and keeps highlights on raw frames ([comparison](comparison.md)).
+          ([skin tone](skin_tone.md)).
         - **The confidence map knows little**: {known.gained.mean:.2f} nats more than one sigma for all, aim 0.1
           ([page](confidence.md)).
         - **A scalp that nobody saw becomes bare skin** ({scalp.completed:.0f} of 255 off where hair was;

@@ -4,8 +4,7 @@
 bundle adjustment.
 
 Feature matches that agree with these first cameras then refine them, and bring in frames where no face is found (full
-profiles). Terzakis and Lourakis, A Consistently Fast and Globally Optimal Solution to the Perspective-n-Point Problem
-(2020).
+profiles).
 """
 
 from __future__ import annotations

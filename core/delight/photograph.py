@@ -31,8 +31,6 @@ from .second_opinion import weigh_in
 from .unet import SIDE_PX
 
 NAME = "photograph"
-ROUNDS = 45
-"""Of the adjustment; it mostly stops by itself before."""
 OUTLINES = dict(zip(FEATURES, (faces.BROW_LINES, faces.EYE_LINES), strict=True))
 OVERLOOKED = 0.25
 """Share of an outline below which what the parser sees of it is chance: of one that it does see it finds about half."""
@@ -71,7 +69,7 @@ def fit_head(srgb: np.ndarray, points: np.ndarray) -> tuple[PhotographView, Head
     height, width = srgb.shape[:2]
     bundle = place_by_landmarks([{"names": [NAME], "width": width, "height": height, "focal_px": None}], {NAME: 0},
                                 [NAME], {NAME: points})
-    bundle = adjust(bundle, Observations(np.zeros(len(points), int), np.arange(len(points)), points), ROUNDS)
+    bundle = adjust(bundle, Observations(np.zeros(len(points), int), np.arange(len(points)), points))
     camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=width, height=height,
                              params=[bundle.focal[0], width / 2, height / 2])
     mesh = template.load()

@@ -71,8 +71,17 @@ class Observations:
 
 
 def place_by_landmarks(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -> Bundle:
-    """Poses of the template's mean head by PnP at each focal length of FOCAL_SHARES, shared by all groups whose own is
-    unknown; the one that fits best."""
+    """Cameras of the template's mean head by PnP at each focal length of FOCAL_SHARES, shared by all groups whose own
+    is unknown; those that fit best. Terzakis and Lourakis, A Consistently Fast and Globally Optimal Solution to the
+    Perspective-n-Point Problem (2020).
+
+    Parameters
+    ----------
+    groups : [{names, width, height, focal_px or null}], of one camera each
+    group_of : name -> the number of its group
+    names : of the frames that show a face
+    pixels : name -> its landmarks [468, 2], pixels
+    """
     model = template_landmarks()
     trusted = model.trust > 0.2
     best = None
@@ -89,7 +98,7 @@ def place_by_landmarks(groups: list[dict], group_of: dict, names: list[str], pix
             total += np.median(np.linalg.norm(there - pixels[name][trusted], axis=1)) / np.ptp(pixels[name][:, 0])
             poses.append((cv2.Rodrigues(turn)[0], shift[:, 0]))
         # a face far away looks much the same through any lens
-        total += len(names) * 0.002 * (np.log(factor / PHONE_FOCAL_SHARE) / 0.35) ** 2
+        total += len(names) * 0.002 * (np.log(factor / PHONE_FOCAL_SHARE) / FOCAL_SIGMA_LOG) ** 2
         if best is None or total < best[0]:
             best = total, focal, poses
     _, focal, poses = best
