@@ -59,7 +59,7 @@ def captured(capture: Capture) -> list[np.ndarray]:
     mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
     mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
     delit = images.read_srgb(capture.delit / f"{Path(view.name).stem}.png") * cover
-    return [images.read_srgb(view.path)[box], delit[box], texture,
+    return [view.read()[box], delit[box], texture,
             texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0])]
 
 

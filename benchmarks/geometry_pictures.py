@@ -51,7 +51,7 @@ def _spread(views: list[View], count: int) -> list[View]:
 
 def _row(view: View, casters: dict, texture: np.ndarray | None) -> np.ndarray:
     scale = HEIGHT / view.height
-    frame = images.resize(images.read_srgb(view.path), round(view.width * scale), HEIGHT)
+    frame = images.resize(view.read(), round(view.width * scale), HEIGHT)
     grey = np.full_like(frame, 0.5)
     scan = _shaded(casters["scan"], view, scale) if "scan" in casters else grey
     wires = _wires(casters["head"].mesh, casters["head"], view, frame, scale) if "head" in casters else grey

@@ -260,7 +260,7 @@ def _around(cover: np.ndarray, millimetres: float) -> np.ndarray:
 def _picture(figure: Figure, view: View, true: dict, grown: dict) -> np.ndarray:
     """The frame, true hair and grown hair on the bare skin, seen from the front, [H, W, 3] sRGB."""
     crop = slice(int(0.25 * view.height), int(0.8 * view.height)), slice(int(0.15 * view.width), int(0.85 * view.width))
-    shown = [images.read_srgb(view.path)[crop]]
+    shown = [view.read()[crop]]
     for hairs in (true, grown):
         chosen = [hairs[part] for part in ("brows", "lashes", "beard") if part in hairs]
         meshes = [figure.opened.skin, *(prisms(h) for h in chosen)]

@@ -113,7 +113,7 @@ def test_world_is_the_heads(solved):
     assert rotation[2, 2] > np.cos(np.radians(12))  # up is up; the woman holds her head a little askew
     assert (rotation @ [0, -1, 0])[1] < -np.cos(np.radians(35))  # and a flat picture of a turned head has no depth
     for view in (views[2], views[6]):
-        face = faces.detect(images.read_srgb(view.path))
+        face = faces.detect(view.read())
         eyes = np.array([face.landmarks[list(eye), :2].mean(0) for eye in (faces.RIGHT_EYE, faces.LEFT_EYE)])
         expected, _ = view.project(np.array([[-0.0315, 0, 0], [0.0315, 0, 0]]))
         assert np.linalg.norm(eyes - expected, axis=1).max() < 0.1 * np.linalg.norm(eyes[1] - eyes[0])

@@ -182,11 +182,11 @@ def profiles(folder, angles) -> Capture:
 def test_shading_finds_the_shadows_of_what_stands_beside_the_head(capture):
     """As its card says: leaves' stripes on skin that the head itself leaves in the sun."""
     render_frames(capture, sun=SUN_COLOUR)
-    lit = [images.read_srgb(view.path) for view in read_views(capture, selected_only=True)]
+    lit = [view.read() for view in read_views(capture, selected_only=True)]
     render_frames(capture, sun=SUN_COLOUR, stripes=True)
     run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
     for view, picture in zip(read_views(capture, selected_only=True), lit, strict=True):
-        stripes = (picture - images.read_srgb(view.path) > 0.1).any(-1)
+        stripes = (picture - view.read() > 0.1).any(-1)
         found = images.read_mask(capture.delit / "shadow" / view.name) > 0.5
         assert stripes.sum() > 1000 and found[stripes].mean() > 0.9
 

@@ -113,14 +113,13 @@ def test_a_cloth_at_the_neck_is_found_and_skin_is_not(head):
 def test_background_takes_a_views_weight_outside_the_face_only(head, tmp_path, monkeypatch):
     path = tmp_path / "frame.jpg"
     path.write_bytes(b"there")
-    monkeypatch.setattr(foreign.images, "read_srgb", lambda path: np.zeros((64, 64, 3), np.float32))
     pixels = np.stack(np.meshgrid(*[(np.arange(SIZE) + 0.5) / SIZE * 64] * 2), -1).astype(np.float32)
     ones = np.ones((SIZE, SIZE), np.float32)
 
     def seen(person):
         monkeypatch.setattr(foreign.faces, "segment_person", lambda srgb: person)
-        observation = texture.UnwrappedView(SimpleNamespace(name="x", path=path), hold(np.zeros((64, 64, 3))), pixels,
-                                            ones, ones, ones)
+        view = SimpleNamespace(name="x", path=path, read=lambda: np.zeros((64, 64, 3), np.float32))
+        observation = texture.UnwrappedView(view, hold(np.zeros((64, 64, 3))), pixels, ones, ones, ones)
         return foreign.leave_out_background([observation], Reporter("texture")), observation.weight
 
     person = np.ones((64, 64), np.float32)

@@ -75,7 +75,7 @@ def leave_out_background(observations: list[UnwrappedView], report: Reporter) ->
         if not observation.view.path.is_file():
             continue
         try:
-            person = faces.segment_person(images.read_srgb(observation.view.path))
+            person = faces.segment_person(observation.view.read())
         except Problem:
             return cut  # the network is not installed: the margin of the silhouette has to do
         height, width = observation.picture.shape[:2]

@@ -55,7 +55,7 @@ def _look(observation: UnwrappedView, surface: Unfolded) -> tuple[np.ndarray, np
     where nobody tells."""
     if not observation.view.path.is_file():
         return None
-    srgb = images.read_srgb(observation.view.path)
+    srgb = observation.view.read()
     landmarks = _landmarks(srgb, observation.view, surface.head)
     if landmarks is None:
         return None
