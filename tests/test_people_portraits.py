@@ -7,13 +7,16 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+import torch
 
 from core.contract.messages import Reporter
+from core.delight.unet import FARTHEST_LOG, network_input
 from core.face.parts import PARTS
 from core.imaging import images
-from core.synthetic.people import portraits, relightable
+from core.synthetic.people import markings, portraits, relightable
 from core.synthetic.people.figure import make_figure
 from core.training import people
+from core.training.portraits import LEAST_WEIGHT, PortraitBatch, repainted
 
 QUIET = Reporter("train", emit=lambda message: None)
 BEARDED = 1010
@@ -98,3 +101,51 @@ def test_batches_show_each_sight_under_two_lights_and_depend_on_the_seed_alone(t
     left = (albedo[0] - albedo[1])[:, both]
     light = (batch.shading[0] - batch.shading[1])[:, both]
     assert (left - left.mean(1, keepdim=True)).abs().mean() < 0.6 * (light - light.mean(1, keepdim=True)).abs().mean()
+
+
+def test_a_face_that_is_painted_over_keeps_its_light():
+    """Two lights on one albedo, half of it skin; the fitted light is the true one."""
+    side, rng = 64, np.random.default_rng(0)
+    albedo = np.full((side, side, 3), [0.35, 0.25, 0.2], np.float32)
+    lights = [np.linspace(0.3, 1.0, side, dtype=np.float32)[:, None, None] * np.ones((side, side, 3), np.float32) * tint
+              for tint in (1.0, 0.8)]
+    skin = np.zeros((1, side // 2, side // 2), np.float32)
+    skin[..., : side // 4] = 1
+    told = [network_input(images.linear_to_srgb(albedo * light), 0.3 * light, 0.3 * light,
+                          np.ones((side, side, 3), np.float32), np.ones((side, side), np.float32)) for light in lights]
+    shading = [np.log(light[::2, ::2]).transpose(2, 0, 1) - middle
+               for light, (_, middle) in zip(lights, told, strict=True)]
+    weight = np.stack([LEAST_WEIGHT + (1 - LEAST_WEIGHT) * skin] * 2)
+    batch = PortraitBatch(*(torch.from_numpy(np.stack(maps).astype(np.float32)) for maps in (
+        [layers for layers, _ in told], shading, weight, 0 * weight, 0 * weight)))
+    moved = 0.0
+    for _ in range(6):
+        painted = repainted(batch, rng)
+        linear, before = (images.srgb_to_linear((maps.layers[:, :3].numpy().transpose(0, 2, 3, 1) + 1) / 2)
+                          for maps in (painted, batch))
+        paint = np.log(linear / before)
+        assert np.allclose(paint[0], paint[1], atol=2e-3)  # one albedo under both lights
+        assert np.allclose(paint[:, :, side // 2 + 2:], 0, atol=1e-4)  # nothing off the skin
+        middles = [network_input(images.linear_to_srgb(picture))[1] for picture in linear]
+        for k, light in enumerate(lights):
+            there = painted.shading[k].numpy().transpose(1, 2, 0) + middles[k]
+            assert np.allclose(there, np.log(light[::2, ::2]), atol=2e-3)
+            rest = np.clip(np.log(linear[k]) - np.log(0.3 * light), -FARTHEST_LOG, FARTHEST_LOG)
+            assert np.allclose(painted.layers[k, 6:9].numpy().transpose(1, 2, 0), rest, atol=2e-3)
+        moved = max(moved, float(np.abs(paint).max()))
+    assert moved > 0.3
+
+
+@pytest.mark.parametrize("softest_dye, dyes", [(0.0, 0), (0.3, None), (9.0, 40)])
+def test_stains_up_to_a_hardness_are_dyes(monkeypatch, softest_dye, dyes):
+    """A grey patch with a hard edge is what a leaf's shadow looks like; a dye leaves one channel as it is."""
+    monkeypatch.setattr(markings, "HARD", softest_dye)
+    found, steps = [], []
+    for seed in range(40):
+        log = np.abs(markings.stains(256, np.random.default_rng(seed)))
+        found.append(log.max((0, 1)).min() == 0)
+        steps.append(np.abs(np.diff(log, axis=0)).max() / log.max())
+    if dyes is None:
+        assert np.median(np.array(steps)[found]) > 1.5 * np.median(np.array(steps)[np.logical_not(found)])
+    else:
+        assert sum(found) == dyes

@@ -20,6 +20,7 @@ SIDE_PX = 256  # of the picture it looks at
 CHANNELS = 16  # layers that `network_input` makes
 FINE = 24  # features at half the picture's resolution
 MIN_LINEAR = 0.004  # linear; below is noise
+FARTHEST_LOG = 2.5  # natural log: what is left of a picture under the fitted light, at most
 MULTIPLE_PX = 32  # of pixels, to be halved so often
 
 
@@ -48,8 +49,8 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     layers[3:6] = (log - middle).transpose(2, 0, 1)
     if ambient is not None:
         for first, light in ((6, ambient), (9, sunlit)):
-            layers[first:first + 3] = (np.clip(log - np.log(np.maximum(light, MIN_LINEAR / 4)), -2.5, 2.5)
-                                       * head[..., None]).transpose(2, 0, 1)
+            rest = log - np.log(np.maximum(light, MIN_LINEAR / 4))
+            layers[first:first + 3] = (np.clip(rest, -FARTHEST_LOG, FARTHEST_LOG) * head[..., None]).transpose(2, 0, 1)
         layers[12:15] = (normal * head[..., None]).transpose(2, 0, 1)
         layers[15] = head
     return layers, middle

@@ -28,7 +28,7 @@ from ..delight.unet import DelightNet
 from ..solve.prior import fast_dtype
 from . import command_line, descent
 from .people import People, is_prepared, prepare_people
-from .portraits import PortraitBatch, Portraits, mirrored, prepare
+from .portraits import PortraitBatch, Portraits, mirrored, prepare, repainted
 from .prior import named_data
 from .release import TrainingCard, again, release
 from .seeds import held_out_seeds, panorama_names, training_seeds
@@ -47,8 +47,9 @@ CONFIGS = {
                           "workers": 14}},
 }
 """`people`, and `skins` bald subjects, are seen from `views` sides each; a step shows `pairs` of them under two lights
-each. Every `echo` steps show the same, mirrored in turn: where making them costs as much as learning from them, twice
-is cheaper than new."""
+each. Every `echo` steps show the same, mirrored and painted over in turn: where making them costs as much as learning
+from them, twice is cheaper than new."""
+SCRATCH = "random weights"
 PEOPLE = 0.7
 """Share of the steps that show people; the others show bald subjects, whose maps are finer."""
 TONE, SLOPE, AGREEMENT, SHADOW = 0.25, 1.0, 0.25, 0.3
@@ -81,7 +82,7 @@ def train_delighter(config: str, out: Path, report: Reporter, run: descent.Train
     work, t, device = descent.work_folder(run, "delighter"), CONFIGS[config]["training"], descent.device_of(config)
     data = named_data(t, skins, held_out) | {
         "panoramas": panorama_names(hdri), "people": training_seeds(t["people"]),
-        "started": "the weights before" if start else "random weights"}
+        "started": "the weights before" if start else SCRATCH}
     if not run.growing:
         prepare_delighter(config, work, report)
     if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind])
@@ -191,6 +192,8 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
         "told the geometry or the picture only, beside the picture as it is; intersection over union of the shadows"
     )
     command = again("delighter", state) + (" --hdri hdri" if data["panoramas"] else "")
+    if data["started"] != SCRATCH:
+        command += " --start delighter.safetensors"
     # the others were not there yet
     ready = sum(is_prepared(seed, CONFIGS[state["config"]]["training"]["views"], work) for seed in data["people"])
     more = {"panoramas": data["panoramas"], "people": data["people"][:ready], "started": data["started"]}
@@ -214,8 +217,10 @@ class _DelighterSteps(Dataset):
         if self.drawn[0] != index:
             self.drawn = index, (self.people if rng.random() < PEOPLE
                                  else self.portraits).draw(self.options["pairs"], rng)
-        turned = step % 2 if self.options["echo"] > 1 else rng.random() < 0.5
-        return mirrored(self.drawn[1]) if turned else self.drawn[1]
+        if self.options["echo"] == 1:
+            return mirrored(self.drawn[1]) if rng.random() < 0.5 else self.drawn[1]
+        rng = np.random.default_rng((self.options["seed"], index, step))
+        return mirrored(repainted(self.drawn[1], rng)) if step % 2 else self.drawn[1]
 
 
 def main(arguments: list[str] | None = None) -> int:

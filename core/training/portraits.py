@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -17,23 +18,30 @@ import cv2
 import numpy as np
 import torch
 from safetensors.torch import load_file
+from torch.nn import functional
 
 from ..contract.files import replacing
 from ..contract.messages import Reporter
-from ..delight.unet import SIDE_PX, network_input
+from ..delight.unet import FARTHEST_LOG, SIDE_PX, network_input
 from ..geometry.meshes import vertex_normals
+from ..imaging import images
 from ..solve.prior import WEIGHTS
 from ..synthetic import sight
 from ..synthetic.environments import read_panoramas
 from ..synthetic.identities import subject_mesh
 from ..synthetic.olat import LightStage, light_stage
+from ..synthetic.people.markings import moles, stains, tufts
 from ..synthetic.portrait import Portrait, relight_sight, sample_sight
 from ..synthetic.skin import Skin
 from .skins import Skins, carried_skins, synthetic_skins
 
 WITH_GEOMETRY = 0.55
 """Share of the pictures whose geometry the network is told; single photographs have none."""
+SLIP_PX = 0.8, 2.0
+"""How far the head lies off its picture, in pixels of the network's square (standard deviation along each axis): one
+registered to a film, and one fitted to the landmarks of a single photograph."""
 LEAST = 0.01  # shading of which the logarithm is learnt; below is noise
+LEAST_WEIGHT = 0.25  # of what is no skin, beside skin's 1
 CARRIED = 0.35
 """Share of the subjects that wear a carried skin, where there are any."""
 
@@ -129,14 +137,14 @@ def make_example(
     registered head, and where it is [S, S]."""
     geometry = ()
     if rng.random() < WITH_GEOMETRY:
-        # a registered head lies a pixel off
-        slip = np.float32([[1, 0, rng.normal(0, 0.8)], [0, 1, rng.normal(0, 0.8)]])
+        off = SLIP_PX[int(rng.random() < 0.4)]
+        slip = np.float32([[1, 0, rng.normal(0, off)], [0, 1, rng.normal(0, off)]])
         geometry = [cv2.warpAffine(np.ascontiguousarray(array, np.float32), slip, (len(array), len(array)))
                     for array in geometry_maps]
     layers, middle = network_input(portrait.srgb, *geometry)
     sure = (_half(portrait.head) > 0.99) & (_half(portrait.albedo).min(-1) > 0.002)
     shading = np.log(np.maximum(_half(portrait.even), LEAST)) - middle
-    weight = sure * (0.25 + 0.75 * _half(portrait.skin))
+    weight = sure * (LEAST_WEIGHT + (1 - LEAST_WEIGHT) * _half(portrait.skin))
     strong = portrait.strong
     trust = 1.0 if strong > 0.4 or strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
     parts = (layers, shading.transpose(2, 0, 1), weight[None], _half(portrait.shadow)[None] * (strong > 0.2),
@@ -151,6 +159,38 @@ def mirrored(batch: PortraitBatch) -> PortraitBatch:
     layers[:, 12] *= -1
     return replace(batch, layers=layers,
                    **{name: getattr(batch, name).flip(-1) for name in ("shading", "weight", "shadow", "shadow_weight")})
+
+
+def repainted(batch: PortraitBatch, rng: np.random.Generator) -> PortraitBatch:
+    """The same faces in the same light with other pigment: stains, moles and tufts are painted over their skin, on both
+    pictures of a sight alike. The shading stays what it was, but for the picture's middle."""
+    layers, shading, side = batch.layers.clone(), batch.shading.clone(), batch.layers.shape[-1]
+    skin = ((batch.weight - LEAST_WEIGHT) / (1 - LEAST_WEIGHT)).clamp(0, 1)
+    skin = functional.interpolate(skin, scale_factor=2, mode="bilinear").numpy()[:, 0, ..., None]
+    for first in range(0, len(layers), 2):
+        paint = _paint(side, rng)
+        for k in (first, first + 1):
+            srgb = (layers[k, :3].numpy().transpose(1, 2, 0) + 1) / 2
+            painted = np.clip(images.srgb_to_linear(srgb) * np.exp(skin[k] * paint), 0, 1)
+            (before, middle), (after, moved) = (network_input(picture)
+                                                for picture in (srgb, images.linear_to_srgb(painted)))
+            change = torch.from_numpy(after[3:6] + moved - before[3:6] - middle)
+            layers[k, :6] = torch.from_numpy(after[:6])
+            for light in (6, 9):  # what is left of the logarithm under the fitted light
+                rest = (layers[k, light:light + 3] + change).clamp(-FARTHEST_LOG, FARTHEST_LOG)
+                layers[k, light:light + 3] = rest * layers[k, 15]
+            shading[k] += middle - moved
+    return replace(batch, layers=layers, shading=shading)
+
+
+def _paint(side: int, rng: np.random.Generator) -> np.ndarray:
+    """What a skin is painted with, [side, side, 3] as logarithms."""
+    face = np.array([[0.2, 0.2], [0.8, 0.85]]) * side  # about where it is in its square
+    log = np.zeros((side, side, 3), np.float32)
+    for make, odds in ((stains, 0.6), (moles, 0.5), (partial(tufts, landmarks=face), 0.5)):
+        if rng.random() < odds:
+            log += make(side, rng=rng)
+    return log
 
 
 def _half(picture: np.ndarray) -> np.ndarray:

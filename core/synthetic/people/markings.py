@@ -8,13 +8,19 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+HARD = 0.3  # of a stain's softness, from 0.02 to 1: below, its edge is as sharp as a cast shadow's may be
+
 
 def stains(side: int, rng: np.random.Generator) -> np.ndarray:
-    """Patches of another colour [S, S, 3] as logarithms: port-wine stains, vitiligo, paint; some with a hard edge."""
+    """Patches of another colour [S, S, 3] as logarithms: port-wine stains, vitiligo, paint. Those with a hard edge are
+    dyes, which leave one colour channel as it is: a grey patch with a hard edge is what a leaf's shadow looks like."""
     count = int(rng.integers(3, 14))
     field = cv2.resize(rng.normal(0, 1, (count, count)).astype(np.float32), (side, side), interpolation=cv2.INTER_CUBIC)
-    where = np.clip(0.5 + (field - rng.uniform(0.0, 1.2)) / np.exp(rng.uniform(np.log(0.02), np.log(1.0))), 0, 1)
+    softness = np.exp(rng.uniform(np.log(0.02), np.log(1.0)))
+    where = np.clip(0.5 + (field - rng.uniform(0.0, 1.2)) / softness, 0, 1)
     colour = rng.normal(-0.25, 0.45) + rng.normal(0, 0.25, 3)
+    if softness < HARD:
+        colour[rng.integers(3)] = 0
     return where[..., None] * colour.astype(np.float32)
 
 
