@@ -64,9 +64,9 @@ def test_a_lamp_half_hidden_by_an_edge_gives_half_its_light():
 def test_the_sun_of_a_panorama_is_taken_out_with_all_its_light():
     panorama = np.ones((128, 256, 3), np.float32)
     panorama[40, 100] = 9000
-    towards = environments._directions(128, 256)[40, 100]
+    towards = environments.panorama_directions(128, 256)[40, 100]
     made = environments.panorama_environment(panorama, np.random.default_rng(1))
-    solid = environments._solid_angles(128, 256)
+    solid = environments.solid_angles(128, 256)
     mean = float(made.radiance.mean())
     assert mean == pytest.approx(1, rel=1e-3)
     assert made.lamp[2] == pytest.approx(towards[2], abs=1e-3)  # it was turned about the vertical only

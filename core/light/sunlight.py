@@ -15,18 +15,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from .skylight import fibonacci_sphere
-from .spherical_harmonics import ORTHONORMAL, per_function
+from .spherical_harmonics import UNIFORM
 
 LUMINANCE_SIGMA_LOG = 0.2  # spread of skin about its tone, in log units: common to the three channels ...
 CHROMA_SIGMA_LOG = 0.08  # ... and of the differences between channels
 OUTLIER_SHARE = 0.05  # share of points that are neither (hair, highlights, misregistration)
 OUTLIER_RANGE_LOG = 3.0  # log units over which an outlier may lie, per channel
-TABLED = np.array([0.282095, *[0.488603] * 3, 1.092548, 1.092548, 2 * 3**0.5 * 0.315392, 1.092548, 2 * 0.546274])
-# The harmonics' band factors with the six digits that tables print: SH_RIDGE was chosen for coefficients of these, and
-# a delit frame shows any other ridge
-SH_RIDGE = np.array([0, *[0.5] * 3, *[2.0] * 5]) * (per_function(ORTHONORMAL) / TABLED) ** 2
-# Skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their
-# mean
+SKY_MEAN = np.array([0, 0, 0.41, 0, 0, 0, -0.11, 0, 0])
+SKY_DEVIATION = np.array([0, 0.44, 0.29, 0.44, 0.40, 0.30, 0.40, 0.30, 0.40])
+"""What environments are like without their sun or lamp: coefficients as shares of the first, the mean and deviation of
+35 panoramas turned about the vertical (python -m benchmarks.skies)."""
+_OFF_MEAN = np.eye(9)[1:] - np.outer(SKY_MEAN[1:], np.eye(9)[0])
+_SKY_PRECISION = _OFF_MEAN.T @ np.diag((UNIFORM * SKY_DEVIATION[1:]) ** -2) @ _OFF_MEAN
+# The prior's quadratic form [9, 9] in the coefficients of an environment of mean radiance one
+INDEPENDENT_SAMPLES = 15
+"""So many places of a face's bare skin are of their own tone, for skin's deviations reach 16 mm (core/solve/split.py,
+python -m benchmarks.skies)."""
 MIN_SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
 DIRECTIONS_AROUND = 12  # that are tried about the best so far: six on each of two rings
 FINER_DEG = (12.0, 4.0)  # how far about the best direction so far others are tried, one round after the other
@@ -180,8 +184,9 @@ def _weighted_fit(transfer, cosine, colour, lit, weights, has_sun, spread) -> tu
     """Relative least squares of colour [N] ~ transfer @ e + lit * cosine * sun, each point once as sunlit and once as
     shaded.
 
-    The higher bands have a prior (a ridge) whose weight grows with the `spread` of the skin about its tone, a variance
-    in log units: freckled, flushed or bearded skin must not be told as light.
+    The higher bands have the prior of skies. It counts as INDEPENDENT_SAMPLES tell of it, however many points there
+    are, and as the `spread` of the skin about its tone, a variance in log units: freckled, flushed or bearded skin must
+    not be told as light.
     """
     relative = 1 / np.maximum(colour, 0.1)
     a_lit = np.concatenate([transfer, cosine[:, None]], 1) * relative[:, None]
@@ -190,7 +195,8 @@ def _weighted_fit(transfer, cosine, colour, lit, weights, has_sun, spread) -> tu
     w1, w0 = weights * lit, weights * (1 - lit)
     normal = a_lit.T @ (a_lit * w1[:, None]) + a_shade.T @ (a_shade * w0[:, None])
     right = a_lit.T @ (target * w1) + a_shade.T @ (target * w0)
-    ridge = np.diag([*SH_RIDGE, 0.0]) * weights.sum() * spread
+    ridge = np.zeros((10, 10))
+    ridge[:9, :9] = _SKY_PRECISION * weights.sum() / INDEPENDENT_SAMPLES * spread
     if not has_sun:
         ridge[9, 9] = 1.0
     solution = np.linalg.solve(normal + ridge + 1e-9 * np.eye(10), right)

@@ -48,24 +48,29 @@ def panorama_environment(panorama: np.ndarray, rng: np.random.Generator) -> Envi
     turned = np.roll(panorama, rng.integers(panorama.shape[1]), 1)
     if rng.random() < 0.5:
         turned = turned[:, ::-1]
-    solid, directions = _solid_angles(*turned.shape[:2]), _directions(*turned.shape[:2])
-    luminance = turned.mean(-1)
-    mean = (luminance * solid).sum() / solid.sum()
-    hard = luminance > SUN_OVER_MEAN * mean
-    colour, lamp = np.zeros(3), np.array([0.0, -0.6, 0.8])
-    if hard.any():
-        excess = np.where(hard[..., None],
-                          turned - SUN_OVER_MEAN * mean * turned / np.maximum(luminance, 1e-6)[..., None], 0)
-        colour = (excess * solid[..., None]).sum((0, 1)) / np.pi
-        lamp = (directions * (excess.mean(-1) * solid)[..., None]).sum((0, 1))
-        lamp, turned = lamp / np.linalg.norm(lamp), turned - excess
+    turned, lamp, colour = without_lamp(turned)
     return _normalised(_gathered(turned), lamp, colour,
                        cv2.resize(turned, (WIDTH, WIDTH // 2), interpolation=cv2.INTER_AREA))
 
 
+def without_lamp(panorama: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A panorama [H, W, 3] without what is brighter than SUN_OVER_MEAN; the unit direction [3] from which that shines,
+    and its colour [3] as irradiance over pi (zeros: nothing is)."""
+    solid, directions = solid_angles(*panorama.shape[:2]), panorama_directions(*panorama.shape[:2])
+    luminance = panorama.mean(-1)
+    mean = (luminance * solid).sum() / solid.sum()
+    hard = luminance > SUN_OVER_MEAN * mean
+    if not hard.any():
+        return panorama, np.array([0.0, -0.6, 0.8]), np.zeros(3)
+    excess = np.where(hard[..., None],
+                      panorama - SUN_OVER_MEAN * mean * panorama / np.maximum(luminance, 1e-6)[..., None], 0)
+    lamp = (directions * (excess.mean(-1) * solid)[..., None]).sum((0, 1))
+    return panorama - excess, lamp / np.linalg.norm(lamp), (excess * solid[..., None]).sum((0, 1)) / np.pi
+
+
 def made_environment(rng: np.random.Generator) -> Environment:
     """Sky above, ground below, walls and windows of all colours, few or many; no panorama needed."""
-    directions = _directions(WIDTH // 2, WIDTH)
+    directions = panorama_directions(WIDTH // 2, WIDTH)
     height = directions[..., 2]
     sky, ground = _colour(rng, 0.25) * np.exp(rng.normal(0, 0.6)), _colour(rng, 0.4) * np.exp(rng.normal(-0.9, 0.7))
     edge = np.clip(0.5 + height / rng.uniform(0.05, 0.5), 0, 1)[..., None]
@@ -101,13 +106,13 @@ def _gathered(panorama: np.ndarray) -> np.ndarray:
     if height > WIDTH // 2:
         height, width = WIDTH // 2, WIDTH
         panorama = cv2.resize(panorama, (width, height), interpolation=cv2.INTER_AREA)
-    solid = _solid_angles(height, width).ravel()
+    solid = solid_angles(height, width).ravel()
     weight = np.bincount(_NEAREST, solid, len(DIRECTIONS))
     return np.stack([np.bincount(_NEAREST, solid * panorama[..., k].ravel(), len(DIRECTIONS)) for k in range(3)],
                     -1) / weight[:, None]
 
 
-def _directions(height: int, width: int) -> np.ndarray:
+def panorama_directions(height: int, width: int) -> np.ndarray:
     """Unit directions [H, W, 3] of an equirectangular panorama's texels."""
     polar = (np.arange(height) + 0.5)[:, None] / height * np.pi
     azimuth = ((np.arange(width) + 0.5)[None] / width - 0.5) * 2 * np.pi
@@ -115,7 +120,7 @@ def _directions(height: int, width: int) -> np.ndarray:
                      np.cos(polar) * np.ones_like(azimuth)], -1)
 
 
-def _solid_angles(height: int, width: int) -> np.ndarray:
+def solid_angles(height: int, width: int) -> np.ndarray:
     """Steradians [H, W] of an equirectangular panorama's texels."""
     polar = (np.arange(height) + 0.5)[:, None] / height * np.pi
     return np.broadcast_to(np.sin(polar) * (np.pi / height) * (2 * np.pi / width), (height, width))
@@ -127,4 +132,4 @@ def _colour(rng: np.random.Generator, spread: float) -> np.ndarray:
     return np.exp([0.6 * warm, green, -warm])
 
 
-_NEAREST = cKDTree(DIRECTIONS).query(_directions(WIDTH // 2, WIDTH).reshape(-1, 3))[1]
+_NEAREST = cKDTree(DIRECTIONS).query(panorama_directions(WIDTH // 2, WIDTH).reshape(-1, 3))[1]
