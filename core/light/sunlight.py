@@ -25,9 +25,9 @@ SKY_MEAN = np.array([0, 0, 0.41, 0, 0, 0, -0.11, 0, 0])
 SKY_DEVIATION = np.array([0, 0.44, 0.29, 0.44, 0.40, 0.30, 0.40, 0.30, 0.40])
 """What environments are like without their sun or lamp: coefficients as shares of the first, the mean and deviation of
 35 panoramas turned about the vertical (python -m benchmarks.skies)."""
+# The prior's quadratic form [9, 9] in the coefficients of an environment of mean radiance one
 _OFF_MEAN = np.eye(9)[1:] - np.outer(SKY_MEAN[1:], np.eye(9)[0])
 _SKY_PRECISION = _OFF_MEAN.T @ np.diag((UNIFORM * SKY_DEVIATION[1:]) ** -2) @ _OFF_MEAN
-# The prior's quadratic form [9, 9] in the coefficients of an environment of mean radiance one
 INDEPENDENT_SAMPLES = 15
 """So many places of a face's bare skin are of their own tone, for skin's deviations reach 16 mm (core/solve/split.py,
 python -m benchmarks.skies)."""

@@ -40,6 +40,7 @@ WITH_GEOMETRY = 0.55
 SLIP_PX = 0.8, 2.0
 """How far the head lies off its picture, in pixels of the network's square (standard deviation along each axis): one
 registered to a film, and one fitted to the landmarks of a single photograph."""
+FROM_LANDMARKS = 0.4  # share of the latter
 LEAST = 0.01  # shading of which the logarithm is learnt; below is noise
 LEAST_WEIGHT = 0.25  # of what is no skin, beside skin's 1
 CARRIED = 0.35
@@ -137,7 +138,7 @@ def make_example(
     registered head, and where it is [S, S]."""
     geometry = ()
     if rng.random() < WITH_GEOMETRY:
-        off = SLIP_PX[int(rng.random() < 0.4)]
+        off = SLIP_PX[int(rng.random() < FROM_LANDMARKS)]
         slip = np.float32([[1, 0, rng.normal(0, off)], [0, 1, rng.normal(0, off)]])
         geometry = [cv2.warpAffine(np.ascontiguousarray(array, np.float32), slip, (len(array), len(array)))
                     for array in geometry_maps]
