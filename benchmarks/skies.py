@@ -34,7 +34,7 @@ def main() -> int:
     panoramas = read_panoramas(parser.parse_args().folder)
     if not panoramas:
         raise Problem("The folder holds no panoramas.", "Name one with .hdr or .exr files.")
-    mean, deviation = summarise_skies(np.array([sky_shares(panorama) for panorama in panoramas]))
+    mean, deviation = summarise_skies(np.array([harmonic_shares(without_lamp(panorama)[0]) for panorama in panoramas]))
     print(f"{len(panoramas)} panoramas, shares of the first coefficient")
     print("mean     ", " ".join(f"{value:6.3f}" for value in mean))
     print("deviation", " ".join(f"{value:6.3f}" for value in deviation))
@@ -44,11 +44,10 @@ def main() -> int:
     return 0
 
 
-def sky_shares(panorama: np.ndarray) -> np.ndarray:
-    """Orthonormal coefficients [9] of a panorama's luminance [H, W, 3] without its lamp, as shares of the first."""
-    panorama, solid = without_lamp(panorama)[0], solid_angles(*panorama.shape[:2])
-    coefficients = np.einsum("ijk,ij->k", sh_basis(panorama_directions(*panorama.shape[:2])),
-                             panorama.mean(-1) * solid)
+def harmonic_shares(panorama: np.ndarray) -> np.ndarray:
+    """Orthonormal coefficients [9] of a panorama's luminance [H, W, 3], as shares of the first."""
+    size = panorama.shape[:2]
+    coefficients = np.einsum("ijk,ij->k", sh_basis(panorama_directions(*size)), panorama.mean(-1) * solid_angles(*size))
     return coefficients / coefficients[0]
 
 

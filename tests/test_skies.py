@@ -5,10 +5,11 @@
 import numpy as np
 import pytest
 
-from benchmarks.skies import count_independent, sky_shares, summarise_skies
+from benchmarks.skies import count_independent, harmonic_shares, summarise_skies
 from core.light import sunlight
-from core.light.spherical_harmonics import sh_basis
-from core.synthetic.environments import panorama_directions, solid_angles, without_lamp
+from core.light.skylight import fibonacci_sphere
+from core.light.spherical_harmonics import LAMBERT, per_function, sh_basis
+from core.synthetic.environments import panorama_directions, without_lamp
 
 DIRECTIONS = panorama_directions(64, 128)
 
@@ -18,16 +19,10 @@ def grey(luminance: np.ndarray) -> np.ndarray:
 
 
 def test_the_shares_of_a_sky_over_black_ground_are_known():
-    shares = sky_shares(grey((DIRECTIONS[..., 2] > 0).astype(float)))
+    shares = harmonic_shares(grey((DIRECTIONS[..., 2] > 0).astype(float)))
     expected = np.zeros(9)
     expected[[0, 2]] = 1, np.sqrt(3) / 2
     assert np.allclose(shares, expected, atol=5e-3)
-
-
-def lamp_share(panorama: np.ndarray) -> float:
-    """How far a panorama is from even with its lamp in it."""
-    whole = np.einsum("ijk,ij->k", sh_basis(DIRECTIONS), panorama.mean(-1) * solid_angles(*panorama.shape[:2]))
-    return float(np.linalg.norm(whole[1:] / whole[0]))
 
 
 def test_a_lamp_is_no_part_of_a_sky():
@@ -36,12 +31,13 @@ def test_a_lamp_is_no_part_of_a_sky():
     left, lamp, colour = without_lamp(lit)
     assert lamp @ towards > 0.999 and colour.min() > 0.5
     assert left.max() < lit.max() / 4 and left.min() == 1
-    assert np.linalg.norm(sky_shares(lit)[1:]) < 0.3 * lamp_share(lit)
+    with_lamp, without = (np.linalg.norm(harmonic_shares(panorama)[1:]) for panorama in (lit, left))
+    assert without < 0.3 * with_lamp
 
 
 def test_skies_count_as_turned_by_any_angle():
     basis = sh_basis(DIRECTIONS)
-    sky = [sky_shares(grey(1 + 0.5 * basis[..., 2] + basis[..., [1, 3]] @ (np.cos(a), np.sin(a)) * 0.3))
+    sky = [harmonic_shares(grey(1 + 0.5 * basis[..., 2] + basis[..., [1, 3]] @ (np.cos(a), np.sin(a)) * 0.3))
            for a in np.arange(8) * np.pi / 4]
     mean, deviation = summarise_skies(np.array(sky[:1]))
     around, spread = summarise_skies(np.array(sky))
@@ -63,3 +59,22 @@ def test_the_fit_expects_the_sky_above():
     assert expected @ precision @ expected == pytest.approx(0, abs=1e-9)
     assert upside_down @ precision @ upside_down * sunlight.UNIFORM ** 2 == pytest.approx(
         (2 * 0.41 / 0.29) ** 2 + (2 * 0.11 / 0.40) ** 2)
+
+
+@pytest.mark.parametrize("above", [0.3, 0.6])
+def test_an_overcast_sky_is_found_on_uneven_skin_and_no_sun_in_its_place(above):
+    """On a ball, whose transfer is known: shading by the fit against the true one, after a gain. What 600 points of
+    skin that varies by 0.1 tell of nine numbers is right to 0.012; with a sky held nearly even it was 0.025 and
+    0.055."""
+    normals = fibonacci_sphere(600)
+    transfer = sh_basis(normals) * per_function(LAMBERT)
+    sky = np.zeros((9, 3))
+    sky[0], sky[2] = sunlight.UNIFORM, above * sunlight.UNIFORM
+    true = transfer @ sky
+    uneven = np.exp(0.1 * np.random.default_rng(0).normal(size=(600, 1)))
+    light, reached, _ = sunlight.fit_light(0.4 * true * uneven, normals, transfer,
+                                           lambda direction: (normals @ direction > 0).astype(float), np.ones(600))
+    fitted = light.ambient(transfer) + reached[:, None] * light.direct(normals)
+    off = np.log(fitted / true)
+    assert (off - off.mean(0)).std() < 0.02
+    assert not light.has_sun

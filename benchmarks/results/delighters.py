@@ -44,8 +44,9 @@ def sections(delight: Figures) -> Sections:
           (`python -m benchmarks.likenesses FOLDER`), *scan_overcast* and *scan_lamps* of the head scan
           (`python -m benchmarks.scan_captures`), with true cameras.
 
-        The rows *before* are by the commit before the fitted light expected a sky
-        ([delighting](../method/delighting.md)). *features* was not measured anew.
+        Captures are named by `--sets TRUTH --capture TRUTH=CAPTURE`. The rows *before* are by the same command at
+        commit 3cc06ee0, before the fitted light expected a sky ([delighting](../method/delighting.md)). *features* was
+        not measured anew.
         """, table(delight), f"""
         **What the sky is worth**: to the frames that the network leaves of the six people
         {mean(gains):+.2f} ± {stdev(gains) / len(gains) ** 0.5:.2f} dB (each: {listed(gains)}), to those of *shading*

@@ -37,8 +37,8 @@ def sections(*records: Figures) -> Sections:
     return [("", prose("""
         Every page has command, commit and day of its figures, all on 2 cores of a shared machine (25 GB; each page
         names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only, and may be
-        older. The sample is by delighter and solver as they are; the state of the albedo and relit rows are by the
-        delighter before [it expected a sky](delighters.md), its answers by one that left more of a shadow's outline.
+        older. The sample is by delighter and solver as they are; all other pages with delit frames but the delighters'
+        and the photographs' are by a delighter that did not yet [expect a sky](delighters.md).
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),

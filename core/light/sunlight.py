@@ -29,7 +29,7 @@ SKY_DEVIATION = np.array([0, 0.44, 0.29, 0.44, 0.40, 0.30, 0.40, 0.30, 0.40])
 _OFF_MEAN = np.eye(9)[1:] - np.outer(SKY_MEAN[1:], np.eye(9)[0])
 _SKY_PRECISION = _OFF_MEAN.T @ np.diag((UNIFORM * SKY_DEVIATION[1:]) ** -2) @ _OFF_MEAN
 INDEPENDENT_SAMPLES = 15
-"""So many places of a face's bare skin are of their own tone, for skin's deviations reach 16 mm (core/solve/split.py,
+"""A face's bare skin counts as so many samples of its tone, for deviations from it reach 16 mm (core/solve/split.py,
 python -m benchmarks.skies)."""
 MIN_SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
 DIRECTIONS_AROUND = 12  # that are tried about the best so far: six on each of two rings

@@ -217,10 +217,10 @@ class _DelighterSteps(Dataset):
         if self.drawn[0] != index:
             self.drawn = index, (self.people if rng.random() < PEOPLE
                                  else self.portraits).draw(self.options["pairs"], rng)
-        if self.options["echo"] == 1:
-            return mirrored(self.drawn[1]) if rng.random() < 0.5 else self.drawn[1]
-        rng = np.random.default_rng((self.options["seed"], index, step))
-        return mirrored(repainted(self.drawn[1], rng)) if step % 2 else self.drawn[1]
+        turned = step % 2 if self.options["echo"] > 1 else rng.random() < 0.5
+        if not turned:
+            return self.drawn[1]
+        return mirrored(repainted(self.drawn[1], np.random.default_rng((self.options["seed"], index, step))))
 
 
 def main(arguments: list[str] | None = None) -> int:
