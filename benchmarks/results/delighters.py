@@ -66,10 +66,10 @@ def sections(delight: Figures) -> Sections:
         {sample.network.figures.psnr - sample[alone].figures.psnr:.1f} dB on the sample: what is beard and what is
         shade, one picture does not tell.
 
-        ![Synthetic people of six tones, their albedo, and four ways to delight them](../pictures/delighters.jpg)
+        ![Synthetic people of six tones, their albedo, and three answers](../pictures/delighters.jpg)
 
         *One portrait per group of skin tone: the picture, its true albedo, the picture as it is after a gain per
-        channel, the flat true tone, the network on one photograph (`--sets portraits --picture
+        channel, the flat true tone, the network on one photograph (`--sets portraits --quick --picture
         docs/pictures/delighters.jpg`).*
 
         `--quick` takes every fourth picture and leaves the feature distance out; `--weights FILE` measures other
