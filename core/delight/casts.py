@@ -14,11 +14,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..imaging import images
 from .evening import ShadingEstimate
 
 RIDGE = 0.01  # a feature's mean square at which half of its slope is taken, against pictures whose light hardly varies
 USUAL_HUE_LOG = 0.08  # natural log units of hue from which skin is something else: lips, make-up, a burnt highlight
 MIN_SKIN_CELLS = 200  # cells of skin below which nothing is said
+HUE_DEVIATION_LOG = 0.05
+"""Of a face's skin about its mean hue, in natural log: 0.045 by painted skins (core/solve/split.py), 0.03 to 0.05 where
+captures are bright."""
+CODE_VALUE = 1 / 255  # of a frame
 
 
 def remove_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[ShadingEstimate]:
@@ -40,6 +45,29 @@ def remove_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[
         trust = 1 / (1 + ((y - level - (x - centre) @ slopes) ** 2).sum(1) / USUAL_HUE_LOG**2)
     return [replace(look, shading=(look.shading + (f - centre) @ slopes).astype(np.float32))
             for look, f in zip(looks, features, strict=True)]
+
+
+def settle_dim_hues(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[ShadingEstimate]:
+    """The looks with skin that is too dark to tell its hue of the hue of the rest: the most probable one, where skin
+    deviates from its mean by HUE_DEVIATION_LOG and what a picture says from the truth by one code value (Wiener 1949).
+    skins: as for `remove_casts`."""
+    where = [skin > 0.5 for skin in skins]
+    if sum(int(w.sum()) for w in where) < MIN_SKIN_CELLS:
+        return looks
+    hues, doubts = [_hue(look.log - look.shading) for look in looks], [_doubt(look.log) for look in looks]
+    level = np.average(np.concatenate([hue[w] for hue, w in zip(hues, where, strict=True)]), axis=0,
+                       weights=np.concatenate([1 / (HUE_DEVIATION_LOG**2 + doubt[w])
+                                               for doubt, w in zip(doubts, where, strict=True)]))
+    moved = [skin * doubt / (HUE_DEVIATION_LOG**2 + doubt) for skin, doubt in zip(skins, doubts, strict=True)]
+    return [replace(look, shading=(look.shading + share[..., None] * (hue - level)).astype(np.float32))
+            for look, share, hue in zip(looks, moved, hues, strict=True)]
+
+
+def _doubt(log: np.ndarray) -> np.ndarray:
+    """Variance of a log colour's [..., 3] hue, in each channel, of which each is a code value off."""
+    linear = np.minimum(np.exp(log), 1)
+    step = np.log(images.srgb_to_linear(images.linear_to_srgb(linear) + CODE_VALUE) / linear)
+    return (step**2).mean(-1)
 
 
 def _features(look: ShadingEstimate, middle: float) -> np.ndarray:

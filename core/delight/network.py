@@ -29,7 +29,7 @@ from ..geometry.raster import interpolate, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
 from .below_hair import fill_hair
-from .casts import remove_casts
+from .casts import remove_casts, settle_dim_hues
 from .contract import Delit
 from .evening import ShadingEstimate, even_out
 from .lift import WINDOW_CELLS, lift_shading, lift_share
@@ -92,7 +92,7 @@ def put_together(answers: Answers) -> list[ShadingEstimate]:
     own = even_out(answers.head, answers.views, answers.looks)
     looks = weigh_in(own, answers.fitted, answers.skins)
     looks = [fill_hair(*told) for told in zip(looks, own, answers.fitted, answers.hair, strict=True)]
-    return remove_casts(looks, answers.skins)
+    return settle_dim_hues(remove_casts(looks, answers.skins), answers.skins)
 
 
 def load_network(device: str) -> DelightNet:

@@ -23,7 +23,7 @@ from ..face.bundle import Observations, adjust, place_by_landmarks
 from ..face.head import Head
 from ..geometry.views import View
 from .below_hair import FEATURES, fill_features
-from .casts import remove_casts
+from .casts import remove_casts, settle_dim_hues
 from .evening import ShadingEstimate
 from .lit_head import fit_lit_head
 from .network import ask_of_view, crop, divide, load_network, look_at, seen_in, square_around
@@ -60,7 +60,9 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
     share = np.max([_share_of(crop(parts.of(name), look.box, side), outlines[name]) for name in FEATURES], 0)
     look = replace(look, shading=fill_features(look.shading, share))
     within = _filled(cv2.convexHull(points.astype(np.float32))[:, 0], look.box, side)
-    return divide(srgb, remove_casts([look], [within])[0], within * crop(parts.of("skin"), look.box, side))
+    skin = within * crop(parts.of("skin"), look.box, side)
+    (look,) = settle_dim_hues(remove_casts([look], [within]), [skin])
+    return divide(srgb, look, skin)
 
 
 def fit_head(srgb: np.ndarray, points: np.ndarray) -> tuple[PhotographView, Head]:
