@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks import figures, groomed, open_eyes, pages, results
-from benchmarks.results import comparison, eyes, geometry, index, told
+from benchmarks.results import comparison, delighters, eyes, geometry, index, told
 from benchmarks.results import scan as scan_page
 from core.contract.messages import Problem
 
@@ -108,6 +108,22 @@ def test_the_page_of_the_state_says_whom_the_fitted_lights_weight_was_chosen_on(
     assert "chosen on these people but the six bald" in page and "[the page of answers](answers.md)" in page
     earlier = (ROOT / "docs" / "results" / "state_0_1_0.md").read_text(encoding="utf-8")
     assert "fitted light counts" not in earlier, "which weighed nothing"
+
+
+def test_what_survives_the_solve_is_told_of_captures_that_both_records_hold():
+    def record(**psnrs):
+        rows = {name: {"psnr": psnr} for name, psnr in psnrs.items()}
+        return figures.Figures.of({"captures": {name: {"delit texture": row, "solved": row}
+                                                for name, row in rows.items()}})
+
+    before = record(tan=20.0, tan_below=22.0, scan_below=25.0, scan_leaves=26.0)
+    now = record(tan=24.0, tan_below=21.0, scan_leaves=27.0, brown=30.0)
+    rows = delighters.paired(before, now)
+    assert rows["solved, before"] == {"tan": {"psnr": 21.0}, "scan": {"psnr": 26.0}}
+    assert rows["solved"] == {"tan": {"psnr": 22.5}, "scan": {"psnr": 27.0}} == rows["delit texture"]
+    text = " ".join(delighters.after_the_solve(before, now).split())
+    assert "2 of 3 came nearer to the truth in the picture, from -1.00 dB (`tan_below`) to +4.00 dB (`tan`)" in text
+    assert "Means over 2 people" in text and "| solved | **+1.25 ± 0.25** |" in text
 
 
 def test_the_page_of_hair_says_where_it_falls_short_and_what_strokes_are_worth():

@@ -6,17 +6,25 @@ from __future__ import annotations
 
 from statistics import mean, stdev
 
+from .. import likenesses, scan_captures, state
 from ..delight_measures import shortfalls, table
 from ..figures import Figures
+from ..measures.table import Scores, format_table, summarise
 from ..pages import Sections, prose
+from ..state_captures import DELIT, SOLVED
+from ..state_scores import mean_of
 
 TITLE = "Delighters"
 SAYS = "The network, shading and others on real photographs, portraits of six tones, the scan and the sample."
-RECORDS = ("delight",)
+RECORDS = ("delight", "state", "state_sky")
 PEOPLE = ("bearded_overcast", "closed_overcast", "dark_overcast", "fringed_overcast", "stubbled_below", "light_below")
+SURVIVING = {name: state.TABLES[title][name]
+             for title, names in (("In the picture", ("psnr", "ssim", "flip", "detail")),
+                                  ("Up to a light, and across lights", ("psnr_uv", "psnr_alone")))
+             for name in names}
 
 
-def sections(delight: Figures) -> Sections:
+def sections(delight: Figures, before: Figures, now: Figures) -> Sections:
     real, portraits, scan, sample = delight.faceolat, delight.portraits, delight.lps_sun, delight.sample
     alone = "network, one photograph"
     photograph, untouched, flat = real[alone].figures, real.none.figures, real["flat true tone"].figures
@@ -45,8 +53,8 @@ def sections(delight: Figures) -> Sections:
           (`python -m benchmarks.scan_captures`), with true cameras.
 
         Captures are named by `--sets TRUTH --capture TRUTH=CAPTURE`. The rows *before* are by the same command at
-        commit 3cc06ee0, before the fitted light expected a sky ([delighting](../method/delighting.md)). *features* was
-        not measured anew.
+        commit 3cc06ee0, before the fitted light expected a sky ([delighting](../method/delighting.md)) and hues in the
+        dark were settled, which these sets hardly show. *features* was not measured anew.
         """, table(delight), f"""
         **What the sky is worth**: to the frames that the network leaves of the six people
         {mean(gains):+.2f} ± {stdev(gains) / len(gains) ** 0.5:.2f} dB (each: {listed(gains)}), to those of *shading*
@@ -74,7 +82,42 @@ def sections(delight: Figures) -> Sections:
 
         `--quick` takes every fourth picture and leaves the feature distance out; `--weights FILE` measures other
         weights of our network, `--opendelight FOLDER` the authors' checkpoint.
-        """))]
+        """)), ("After the solve", after_the_solve(before, now))]
+
+
+def after_the_solve(before: Figures, now: Figures) -> str:
+    """What the sky is worth to textures and solved albedos, person by person on the captures of both records."""
+    rows = paired(before, now)
+    shared = [name for name in now.captures if name in before.captures]
+    gains = [now.captures[name][SOLVED].psnr - before.captures[name][SOLVED].psnr for name in shared]
+    most, least = (shared[gains.index(gain)] for gain in (max(gains), min(gains)))
+    return prose(f"""
+        How much of that the solve would have found by itself: {len(shared)} captures of [the state of the
+        albedo](state.md), rendered anew and taken through a delighter that expects a sky (`python -m benchmarks.state
+        FOLDER --run --json docs/figures/state_sky.json`), beside that page's own figures, *before*. Means over
+        {len(rows[SOLVED])} people, each the mean of its captures. Of the solved albedos
+        {sum(gain > 0 for gain in gains)} of {len(gains)} came nearer to the truth in the picture, from
+        {min(gains):+.2f} dB (`{least}`) to {max(gains):+.2f} dB (`{most}`). The solver is the same but for how far
+        skins' traits differ from place to place ([the prior](prior.md)); hues in the dark were not settled yet.
+        """) + "\n\n" + "\n\n".join(
+        format_table(summarise({row: rows[row] for row in (f"{method}, before", method)}, SURVIVING,
+                               f"{method}, before"), SURVIVING, "taken for albedo", f"{method}, before")
+        for method in (DELIT, SOLVED))
+
+
+def paired(before: Figures, now: Figures) -> Scores:
+    """Texture and solved albedo of both records -> person -> figures: means over the captures that both hold."""
+    shared = [name for name in now.captures if name in before.captures]
+    people = {person: [name for name in shared if person_of(name) == person] for person in map(person_of, shared)}
+    return {title: {person: mean_of([record.captures[name][method] for name in own]) for person, own in people.items()}
+            for method in (DELIT, SOLVED) for title, record in ((f"{method}, before", before), (method, now))}
+
+
+def person_of(capture: str) -> str:
+    """A capture's name without its light."""
+    for light in (*likenesses.LIGHTS, *scan_captures.LIGHTS):
+        capture = capture.removesuffix(f"_{light}")
+    return capture
 
 
 def listed(gains: list[float]) -> str:

@@ -37,8 +37,9 @@ def sections(*records: Figures) -> Sections:
     return [("", prose("""
         Every page has command, commit and day of its figures, all on 2 cores of a shared machine (25 GB; each page
         names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only, and may be
-        older. The sample is by delighter and solver as they are; all other pages with delit frames but the delighters'
-        and the photographs' are by a delighter that did not yet [expect a sky](delighters.md).
+        older. The sample is by delighter and solver as they are, but for hues in the dark; all other pages with delit
+        frames but the delighters' and the photographs' are by a delighter that did not yet [expect a
+        sky](delighters.md#after-the-solve).
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),
