@@ -77,7 +77,7 @@ class Forked:
             code = 70
             try:
                 os.close(self._stdin)
-                os.setsid()
+                os.setpgid(0, 0)
                 _redirect(end, log)
                 sys.addaudithook(self._hook(f"{root}/"))
                 work()
@@ -87,6 +87,7 @@ class Forked:
             finally:
                 sys.stderr.flush()
                 os._exit(code)
+        os.setpgid(self.pid, self.pid)  # both do it: whoever is first, there is a group from here on
         os.close(end)
 
     @property

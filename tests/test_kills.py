@@ -123,6 +123,13 @@ def test_a_process_is_struck_at_its_moment(tmp_path, moment):
     assert never.strike() is False
 
 
+def test_a_process_may_be_struck_as_soon_as_it_is_there(tmp_path):
+    for _ in range(20):
+        forked = kills_worker.Forked(lambda: time.sleep(60), tmp_path, tmp_path / "told",
+                                     kills_worker.Moment(after_s=0.0))
+        assert forked.strike() and forked.code == -signal.SIGKILL
+
+
 def test_a_camera_model_that_did_not_fit_on_the_disk_gets_no_name(tmp_path):
     """pycolmap writes what fits, and says nothing of the rest."""
     model = pycolmap.Reconstruction()
