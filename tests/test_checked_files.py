@@ -278,3 +278,17 @@ def test_a_pipe_among_a_capture_s_books_is_not_waited_for(tmp_path):
             read(tmp_path / "capture.json")
     with pytest.raises(FileNotFoundError):
         require_regular(tmp_path / "none")
+
+
+def test_a_picture_whose_orientation_is_text_is_upright(tmp_path):
+    """One flipped bit makes the tag of the date that of the orientation."""
+    path = tmp_path / "a.jpg"
+    images.write_srgb(path, np.zeros((8, 16, 3), np.float32))
+    stored = path.read_bytes()
+    date, orientation = (bytes([0x01, tag, 0, 2]) for tag in (0x32, 0x12))  # text of either byte order
+    if date not in stored:
+        date, orientation = (bytes([tag, 0x01, 2, 0]) for tag in (0x32, 0x12))
+    assert stored.count(date) == 1
+    path.write_bytes(stored.replace(date, orientation))
+    assert isinstance(oiio.ImageInput.open(str(path)).spec().getattribute("Orientation"), str)
+    assert images.read_srgb(path).shape == (8, 16, 3)

@@ -52,7 +52,7 @@ def read_pixels(path: Path) -> tuple[np.ndarray, int]:
     a file that is cut off or damaged, and for values that are no numbers."""
     image = open_picture(path)
     pixels = image.read_image(oiio.FLOAT)
-    error, turned = image.geterror(), image.spec().getattribute("Orientation") or 1
+    error, turned = image.geterror(), image.spec().getattribute("Orientation")
     image.close()
     jpeg = Path(path).suffix.lower() in (".jpg", ".jpeg")
     if pixels is None or error and (not jpeg or "Premature end" in error):  # libjpeg tells of harmless things as well
@@ -60,7 +60,7 @@ def read_pixels(path: Path) -> tuple[np.ndarray, int]:
     fault = find_fault(pixels, MOST_VALUE_CD_M2)
     if fault:
         raise Problem(f"{path} holds {fault}.", advise_remaking(path, SAVE_ANEW))
-    return pixels, int(turned)
+    return pixels, turned if isinstance(turned, int) else 1  # a damaged file may have text there
 
 
 def check_written(path: Path, pixels: np.ndarray, half: bool) -> None:
