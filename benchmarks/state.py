@@ -40,7 +40,7 @@ from .pages import write_page
 from .state_captures import DELIT, METHODS, SIZE, SOLVED, Filmed, find
 from .state_scores import Figures, in_pictures, in_uv, mean_of, of_person, small
 
-COMMAND = "python -m benchmarks.state FOLDER --page docs/results/state.md --json docs/figures/state.json"
+COMMAND = "python -m benchmarks.state FOLDER"
 SHOWN = "skin", "brows", "lips", "beard"
 """Parts: eyes are objects of their own, and under them lie lids that were completed from around."""
 TABLES = {
@@ -129,11 +129,11 @@ def main() -> int:
     text = sections(scores, by_capture)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
     if asked.page:
-        write_page(asked.page, "The state of the albedo", COMMAND, text)
+        write_page(asked.page, "The state of the albedo", f"{COMMAND} --page docs/results/{asked.page.name}", text)
     if asked.json:
         found = summarise(scores, {name: column for columns in TABLES.values() for name, column in columns.items()},
                           DELIT)
-        figures.write_record(asked.json, "state", COMMAND,
+        figures.write_record(asked.json, "state", f"{COMMAND} --json docs/figures/{asked.json.name}",
                              {**to_record(found, scores), "captures": by_capture, "code": code})
     return 0
 

@@ -92,9 +92,9 @@ def after_the_solve(before: Figures, now: Figures) -> str:
     gains = [now.captures[name][SOLVED].psnr - before.captures[name][SOLVED].psnr for name in shared]
     most, least = (shared[gains.index(gain)] for gain in (max(gains), min(gains)))
     return prose(f"""
-        How much of that the solve would have found by itself: {len(shared)} captures of [the state of the
-        albedo](state.md), rendered anew and taken through a delighter that expects a sky (`python -m benchmarks.state
-        FOLDER --run --json docs/figures/state_sky.json`), beside that page's own figures, *before*. Means over
+        How much of the sky's worth the solve would have found by itself: {len(shared)} captures of [the state of the
+        albedo](state.md), rendered anew and taken through a delighter that expects a sky (with `--run` first), beside
+        that page's own figures, *before*. Means over
         {len(rows[SOLVED])} people, each the mean of its captures. Of the solved albedos
         {sum(gain > 0 for gain in gains)} of {len(gains)} came nearer to the truth in the picture, from
         {min(gains):+.2f} dB (`{least}`) to {max(gains):+.2f} dB (`{most}`). The solver is the same but for how far

@@ -37,9 +37,9 @@ def sections(*records: Figures) -> Sections:
     return [("", prose("""
         Every page has command, commit and day of its figures, all on 2 cores of a shared machine (25 GB; each page
         names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only, and may be
-        older. The sample is by delighter and solver as they are, but for hues in the dark; all other pages with delit
-        frames but the delighters' and the photographs' are by a delighter that did not yet [expect a
-        sky](delighters.md#after-the-solve).
+        older. The sample is by today's solver and a delighter that did not yet settle [hues in the
+        dark](../method/delighting.md); all other pages with delit frames but the delighters' and the photographs' are
+        by one that did not yet [expect a sky](delighters.md#after-the-solve) either.
         """)),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),

@@ -6,6 +6,9 @@ and taken out.
 Sun and sky differ in colour, and a network learns the difference of usual ones. So the hue of the albedo is regressed
 on the brightness of the shading and on the shadow over all skin of the capture; what the regression explains is light
 and moves to the shading. Luminance is left alone: beards grow in shade.
+
+Where it is nearly dark a picture does not tell a hue: one code value more or less changes it by more than the skin of a
+face varies. There the hue of the rest counts.
 """
 
 from __future__ import annotations
@@ -21,8 +24,8 @@ RIDGE = 0.01  # a feature's mean square at which half of its slope is taken, aga
 USUAL_HUE_LOG = 0.08  # natural log units of hue from which skin is something else: lips, make-up, a burnt highlight
 MIN_SKIN_CELLS = 200  # cells of skin below which nothing is said
 HUE_DEVIATION_LOG = 0.05
-"""Of a face's skin about its mean hue, in natural log: 0.045 by painted skins (core/solve/split.py), 0.03 to 0.05 where
-captures are bright."""
+"""Of a face's skin about its mean, along each of a hue's two axes, in natural log: painted skins' traits have 0.045
+(TYPICAL_SCALES and AXIS_DEVIATIONS in core/solve/split.py)."""
 CODE_VALUE = 1 / 255  # of a frame
 
 
@@ -64,7 +67,8 @@ def settle_dim_hues(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> li
 
 
 def _doubt(log: np.ndarray) -> np.ndarray:
-    """Variance of a log colour's [..., 3] hue, in each channel, of which each is a code value off."""
+    """Variance [...] along each of a hue's two axes where every channel of a log colour [..., 3] is one code value
+    off."""
     linear = np.minimum(np.exp(log), 1)
     step = np.log(images.srgb_to_linear(images.linear_to_srgb(linear) + CODE_VALUE) / linear)
     return (step**2).mean(-1)
