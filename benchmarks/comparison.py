@@ -46,7 +46,7 @@ from core.solve import initial, maps, recipe_of
 from core.solve.evidence import Evidence, read_evidence
 from core.solve.prior import load
 from core.solve.sampler import Sampler, seed_noise
-from core.solve.skin_tone import parse_skin_tone
+from core.solve.skin_tone import read_given_tone
 from core.solve.witnesses import confirm_marks
 
 from . import figures, light_models
@@ -167,7 +167,7 @@ def solve_by_method(capture: Capture, settings: Settings, method: str,
         return *_by_hand(capture, evidence, settings, method), time.monotonic() - began
     prior = _prior()
     cell = evidence.cell_side(settings.solve.grid_cells)
-    tone = parse_skin_tone(settings.solve.skin_tone)
+    tone = read_given_tone(settings.solve.skin_tone)
     start = initial.start_solve(prior, evidence, tone, cell, recipe_of(settings, prior),
                                 callbacks=initial.Callbacks(
                                     lambda marks: confirm_marks(capture, head, marks, evidence.size)))
@@ -194,7 +194,7 @@ def _by_hand(capture: Capture, evidence: Evidence, settings: Settings, method: s
                           for a in (texture * weight, np.repeat(weight, 3, 2)))
         shading = np.maximum(blurred / np.maximum(share, 1e-3), 1e-3)
     skin = weight * evidence.skin.numpy()[..., None]
-    tone = np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
+    tone = np.array(read_given_tone(settings.solve.skin_tone).linear, np.float32)
     gain = tone * skin.sum() / np.maximum((texture / shading * skin).sum((0, 1)), 1e-6)
     return (texture / shading * gain).astype(np.float32), (shading / gain).astype(np.float32)
 

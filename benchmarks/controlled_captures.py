@@ -25,7 +25,7 @@ from core.solve import initial, maps, recipe_of
 from core.solve.evidence import read_evidence
 from core.solve.prior import load
 from core.solve.sampler import Sampler, seed_noise
-from core.solve.skin_tone import parse_skin_tone
+from core.solve.skin_tone import read_given_tone
 
 from .continued import begin_at_delight, run_stages
 from .flash_light import write_delit
@@ -51,7 +51,7 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     began, prior = time.monotonic(), _prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
-    start = initial.start_solve(prior, evidence, parse_skin_tone(settings.solve.skin_tone),
+    start = initial.start_solve(prior, evidence, read_given_tone(settings.solve.skin_tone),
                                 evidence.cell_side(settings.solve.grid_cells), recipe)
     sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(settings.seed))
     state = sampler.sample(start.observations, start.state)
@@ -103,7 +103,7 @@ def use_true_frames(source: Capture, truth: Path, work: Capture, settings: Setti
 def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
     """The texture whose confident facial skin has been brought to the skin tone, sRGB [S, S, 3]."""
     texture = images.read_linear(capture.texture)
-    tone = np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
+    tone = np.array(read_given_tone(settings.solve.skin_tone).linear, np.float32)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
     return images.linear_to_srgb(toned(texture, tone, skin))
 

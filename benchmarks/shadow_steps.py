@@ -27,7 +27,7 @@ from core.solve import border, initial
 from core.solve.evidence import REFERENCE_TEXELS, read_evidence
 from core.solve.prior import load
 from core.solve.recipes import OURS
-from core.solve.skin_tone import parse_skin_tone
+from core.solve.skin_tone import read_given_tone
 
 from . import figures, people
 from .measures.references import TRUE
@@ -61,7 +61,7 @@ def measure(filmed: Filmed) -> dict:
     seen."""
     capture = filmed.capture
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
-    tone = parse_skin_tone(people.skin_tone(filmed.truth))
+    tone = read_given_tone(people.skin_tone(filmed.truth))
     begun = initial.start_solve(load(), evidence, tone, evidence.cell_side(Settings().solve.grid_cells), OURS)
     luminance = {name: np.log(np.maximum(images.resize(np.ascontiguousarray(image, np.float32), REFERENCE_TEXELS,
                                                        REFERENCE_TEXELS).mean(-1), 1e-3))

@@ -6,33 +6,28 @@ balances:
     python -m benchmarks.skin_tone [--each 6] [--capture CAPTURE TONE.txt ...]
 
 Held-out subjects (seeds from 9000 up, and the reserved ones), at least `--each` a group, each in three lights by two
-phones. Rows: `before`, what auto took until the estimate was there (the best lit skin, as if a delighter had been
-perfect); `scene`, the estimate; `measured`, the same with a white card before the face. Columns: mean signed and root
-mean square error of L*, mean delta E 2000, the stated deviation of L*, and how often the truth lies within two of
+phones. Rows: `scene`, the estimate; `measured`, the same with a white card before the face. Columns: mean signed and
+root mean square error of L*, mean delta E 2000, the stated deviation of L*, and how often the truth lies within two of
 those. A capture is a finished one with the sRGB of its true tone in a text file.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
 import numpy as np
-import torch
 from skimage.color import deltaE_ciede2000
 
 from core.contract.capture import Capture
 from core.contract.messages import Reporter
-from core.contract.settings import Settings, from_json
+from core.contract.settings import Settings
 from core.face.head import read_head
 from core.imaging import images
 from core.solve.evidence import read_evidence
-from core.solve.look import Look
-from core.solve.population import TYPOLOGY_GROUPS, estimate_skin_tone, name_group, to_lab
-from core.solve.prior import WEIGHTS
-from core.solve.skin_tone import SkinTone
-from core.solve.tone import TONE_SIDE_TEXELS, estimate_from_frames, estimate_from_texture
+from core.solve.population import TYPOLOGY_GROUPS, estimate_from_scene, estimate_from_white, name_group, to_lab
+from core.solve.skin_tone import SCENE, SkinTone
+from core.solve.tone import TONE_SIDE_TEXELS, estimate_skin_tone
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.pigment import reflectance
 from core.synthetic.sample import RESERVED
@@ -41,7 +36,6 @@ from core.training.tones import PHONES, photographed, scenes_of
 
 from .figures import write_record
 
-BRIGHTEST = 0.85  # a delit picture's tone has no brighter channel: more than skin reflects
 MOST = 400  # subjects looked at until each group has enough
 
 
@@ -52,8 +46,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path,
                         help="where the figures go, such as docs/figures/skin_tone.json; those of other captures stay")
     asked = parser.parse_args()
-    known = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))["tones"]
-    rows: dict[str, list] = {"before": [], "scene": [], "measured": []}
+    rows: dict[str, list] = {"scene": [], "measured": []}
     subjects = dict.fromkeys((name for _, name in TYPOLOGY_GROUPS), 0)
     for seed in (*sorted(RESERVED["seeds"]), *range(HELD_OUT_SEED, HELD_OUT_SEED + MOST)):
         if min(subjects.values()) >= asked.each:
@@ -66,14 +59,14 @@ def main() -> None:
         for light, scene in enumerate(scenes):
             for phone in range(PHONES):
                 look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
-                for row, tone in (("before", before(look, known)), ("scene", estimate_skin_tone(look)),
-                                  ("measured", estimate_skin_tone(look, card))):
+                for row, tone in (("scene", estimate_from_scene(look.best, SCENE)),
+                                  ("measured", estimate_from_white(look.front, card))):
                     rows[row].append((name, *errors(tone, scene.tone)))
     print_table(rows, subjects)
     captures = {}
     for folder, truth in asked.capture:
         tone = np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")])
-        captures[Path(folder).stem] = of_capture(Capture(folder), tone, known)
+        captures[Path(folder).stem] = of_capture(Capture(folder), tone)
     if asked.json:
         write_record(asked.json, "skin_tone", "python -m benchmarks.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
                      {"groups": summary(rows, subjects), "captures": captures}, keep=True)
@@ -86,22 +79,15 @@ def expected(seed: int) -> str:
     return name_group(tones[0])
 
 
-def before(look: Look, tones: list) -> SkinTone:
-    """What auto took of a texture whose light was all taken out: the best lit skin."""
-    colour = torch.from_numpy(np.asarray(look.best * min(1, BRIGHTEST / look.best.max()), np.float32))
-    return estimate_from_texture(colour[:, None, None].expand(3, 8, 8).contiguous(), torch.ones(8, 8), tones)
-
-
 def errors(tone: SkinTone, truth: np.ndarray) -> tuple[float, float, float]:
-    """Signed error of L*, delta E 2000, and the stated deviation of L*, nan where none is stated."""
+    """Signed error of L*, delta E 2000, and the stated deviation of L*."""
     found, true = to_lab(np.array(tone.linear)), to_lab(truth)
-    return (float(found[0] - true[0]), float(deltaE_ciede2000(true, found)),
-            np.nan if tone.deviation is None else tone.deviation)
+    return float(found[0] - true[0]), float(deltaE_ciede2000(true, found)), tone.deviation
 
 
 def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
     """Group (and "all") -> subjects, and row -> mean signed and root mean square error of L*, mean delta E 2000, mean
-    stated deviation of L* and the share within two of those (both None where none is stated)."""
+    stated deviation of L* and the share within two of those."""
     found: dict[str, dict] = {}
     for name in (*subjects, "all"):
         of_group = {"subjects": subjects.get(name, sum(subjects.values()))}
@@ -109,11 +95,9 @@ def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
             chosen = np.array([values for group_name, *values in errors_of_row if name in (group_name, "all")])
             if len(chosen):
                 signed, colour, stated = chosen.T
-                known = bool(np.isfinite(stated).all())
                 of_group[row] = {"lightness": signed.mean(), "rms": np.sqrt((signed**2).mean()),
-                                 "delta_e": colour.mean(),
-                                 "stated": stated.mean() if known else None,
-                                 "within_two": np.mean(np.abs(signed) <= 2 * stated) if known else None}
+                                 "delta_e": colour.mean(), "stated": stated.mean(),
+                                 "within_two": np.mean(np.abs(signed) <= 2 * stated)}
         found[name] = of_group
     return found
 
@@ -125,28 +109,21 @@ def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
     for row in rows:
         for name, of_group in groups.items():
             if of := of_group.get(row):
-                stated = "".join(f" {'-':>7}" if value is None else f" {value:7.2f}"
-                                 for value in (of["stated"], of["within_two"]))
                 print(f"{row:9} {name:13} {of_group['subjects']:8} {of['lightness']:+8.2f} {of['rms']:7.2f} "
-                      f"{of['delta_e']:8.2f}{stated}")
+                      f"{of['delta_e']:8.2f} {of['stated']:7.2f} {of['within_two']:7.2f}")
 
 
-def of_capture(capture: Capture, srgb: np.ndarray, tones: list) -> dict:
-    """One finished capture: prints its name, then the earlier auto's and the estimate's error of L* and delta E, and
-    returns them with its true L*."""
-    truth = images.srgb_to_linear(srgb)
-    head = read_head(capture)
-    evidence, settings = read_evidence(capture, head, TONE_SIDE_TEXELS), from_json({}, Settings())
-    lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
-    by_row = {"before": estimate_from_texture(evidence.texture, lit, tones),
-              "scene": estimate_from_frames(capture, head, settings, evidence, Reporter("skin_tone"))}
-    found: dict = {"lightness": to_lab(truth)[0]}
-    for row, tone in by_row.items():
-        signed, colour, stated = errors(tone, truth)
-        print(f"{row:9} {capture.root.name:20} {name_group(truth):13} L* {to_lab(truth)[0]:.1f} error {signed:+.2f} "
-              f"delta E {colour:.2f} stated {stated:.2f}")
-        found[row] = {"lightness": signed, "delta_e": colour, "stated": stated if np.isfinite(stated) else None}
-    return found
+def of_capture(capture: Capture, srgb: np.ndarray) -> dict:
+    """The true L* of a finished capture, and the estimate's error of L*, delta E and stated deviation, which are
+    printed."""
+    truth, head = images.srgb_to_linear(srgb), read_head(capture)
+    evidence = read_evidence(capture, head, TONE_SIDE_TEXELS)
+    tone = estimate_skin_tone(capture, head, Settings(), evidence, Reporter("skin_tone"))
+    signed, colour, stated = errors(tone, truth)
+    lightness = to_lab(truth)[0]
+    print(f"{tone.source:9} {capture.root.name:20} {name_group(truth):13} L* {lightness:.1f} error {signed:+.2f} "
+          f"delta E {colour:.2f} stated {stated:.2f}")
+    return {"lightness": lightness, "scene": {"lightness": signed, "delta_e": colour, "stated": stated}}
 
 
 if __name__ == "__main__":

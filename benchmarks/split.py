@@ -32,7 +32,7 @@ from core.solve import confidence, initial, split
 from core.solve.evidence import read_evidence
 from core.solve.prior import load
 from core.solve.problem import albedo
-from core.solve.skin_tone import parse_skin_tone
+from core.solve.skin_tone import read_given_tone
 
 from . import figures, people
 from .measures.references import NOTHING, TRUE
@@ -151,7 +151,7 @@ prior = cache(load)
 def shapes_of(filmed: Filmed) -> split.Shapes:
     """What the solver would split of a capture, with the true tone."""
     evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
-    tone = parse_skin_tone(people.skin_tone(filmed.truth))
+    tone = read_given_tone(people.skin_tone(filmed.truth))
     if tone is None:
         raise Problem(f"{filmed.truth} has no skin tone.", "Give it a skin_tone.txt with sRGB R,G,B.")
     return initial.make_shapes(evidence, albedo(initial.make_reference(prior(), tone, evidence, "mean")))

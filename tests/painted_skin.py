@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from core.contract.capture import Capture
+from core.contract.colour_values import format_skin_tone
 from core.contract.settings import Settings, from_json
 from core.face import template
 from core.geometry import meshes
@@ -18,7 +19,7 @@ from core.imaging import images
 from core.solve import initial
 from core.solve.prior import load
 from core.solve.recipes import RECIPES
-from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
+from core.solve.skin_tone import GIVEN, SkinTone
 
 SIZE = 128
 TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
@@ -55,7 +56,7 @@ def settings(seed: int = 0, edited_part: bool = False, **options) -> Settings:
 
 def as_setting(tone: np.ndarray) -> str:
     """A linear colour as settings.solve.skin_tone."""
-    return format_skin_tone(SkinTone.from_linear(tone, GIVEN))
+    return format_skin_tone(SkinTone.from_linear(tone, GIVEN).srgb)
 
 
 SHORT = {"size": SIZE, "steps": 8, "guidance": "proximal", "skin_tone": as_setting(TONE), "checkpoint_every": 2}

@@ -93,7 +93,7 @@ def test_a_batch_whose_folder_cannot_be_written_is_refused_by_name(folder, capsy
     ("anna.mp4,CARL,,,,", "The name CARL is taken by Line 2"), ('anna.mp4,,"0.8,0.6",,,', "is not a colour"),
     ('anna.mp4,,"0.8,0.6,x",,,', "is not a colour"),
     ('anna.mp4,,"0.8,nan,0.5",,,', "is not a colour"), ("anna.mp4,,,white,,", "is not a colour"),
-    ("anna.mp4,,,,head.obj,", "no head mesh at"),
+    ("anna.mp4,,,,head.obj,", "no file or folder at"),
     ("anna.mp4,,,,,gone.json", "cannot be read"), ("anna.mp4,,,,,shots.csv", "cannot be read"),
     ("anna.mp4,,,,,,,extra", "more cells than there are columns"),
     ("anna.mp4,,0.8,0.6,0.5,,", "more cells than there are columns")])

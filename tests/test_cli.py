@@ -102,6 +102,8 @@ def test_run_until_then_on_then_status(tiny, capture, film):
 
 
 def test_options_reach_the_stages(tiny, capture, film, tmp_path):
+    for name in ("config.json", "ckpt.pth"):
+        (tmp_path / name).touch()
     core("run", film, capture.root, "--skin-tone", "0.6,0.5,0.4", "--delighter", "folder", "--folder", tmp_path,
          "--seed", "7", "--quality", "film", "--prior", tmp_path, cwd=tiny)
     record = capture.read()["stages"]
@@ -110,6 +112,18 @@ def test_options_reach_the_stages(tiny, capture, film, tmp_path):
     assert record["solve"]["settings"]["steps"] == preset("film").solve.steps
     assert record["delight"]["settings"].items() >= {"delighter": "folder",
                                                      "folder": ".."}.items(), "it travels with the capture"
+
+
+@pytest.mark.parametrize("option, said", [
+    (["--skin-tone", "pink"], "not a colour"), (["--skin-tone", "200,160,1400"], "not a colour"),
+    (["--white-point", "0,1,1"], "not a colour"), (["--with", "gone"], "--with (solve.together)"),
+    (["--template", "gone.obj"], "--template (registration.template)"), (["--prior", "gone"], "--prior (solve.prior)"),
+    (["--cameras", "gone"], "--cameras (cameras.import_from)"),
+    (["--delighter", "folder"], "--folder (delight.folder)"),
+    (["--softened", "gone"], "--softened (shadow_mask.softened)")])
+def test_what_a_later_stage_cannot_use_is_refused_before_the_first_one_runs(tiny, capture, film, option, said):
+    problem, _ = refused("run", film, capture.root, *option, cwd=tiny)
+    assert said in problem and not capture.read()["stages"] and not (capture.root / "frames").exists()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no other process can press Ctrl-C there")

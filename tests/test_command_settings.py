@@ -184,7 +184,8 @@ def test_all_settings_are_listed(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(" = ")[0] for line in lines if not line.startswith(" ")] == list(known_settings())
     assert "scan.voxel_mm = 1.0; 0.3 to 5 mm" in lines and "upscale.hair = on; on or off" in lines
-    assert "solve.skin_tone = auto; R,G,B or auto  (run --skin-tone R,G,B)" in lines and "    Sampling steps" in lines
+    assert "solve.white_point = auto; R,G,B or auto  (run --white-point R,G,B)" in lines
+    assert "    Sampling steps" in lines
     assert "deliver.size = 4096; 4096, 2048, 1024 px  (deliver --size VALUE)" in lines
     assert all(len(line) < 160 for line in lines)
 

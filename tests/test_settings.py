@@ -29,7 +29,8 @@ from .recorded import changed, record
 
 EVERY = [(stage, field) for stage, kind in STAGE_KINDS.items() for field in fields(kind)]
 PATHS = [name for name, field in known_settings().items() if "path" in field.metadata]
-METADATA = {"min", "max", "unit", "choices", "titles", "path", "form", "label", "flag", "per_face", "affects_result"}
+METADATA = {"min", "max", "unit", "choices", "titles", "path", "when", "required", "holds", "form", "parse", "label",
+            "flag", "per_face", "affects_result"}
 
 
 def test_every_stage_has_settings():

@@ -93,17 +93,22 @@ def test_operators_that_change_the_scene_are_steps_of_undo(addon):
 
 
 def test_the_panel_says_where_the_tone_comes_from(addon, capture, item):
-    words, set_tone = addon("solve.panel").tone_words, addon("solve.operators").set_tone
+    words, set_tone = (lambda item: addon("solve.panel").tone_words(item, None)), addon("solve.operators").set_tone
     root = addon("captures").root(item)
     set_tone(root,
              {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 6.4,
               "skin_tone_source": "scene"})
-    assert words(item) == "tan, ± 6 L*, by scene" and item.use_skin_tone
+    assert words(item) == "Skin tone: estimated, ±6. Choose it if it looks wrong." and item.use_skin_tone
     set_tone(root,
              {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 2.0,
               "skin_tone_source": "white point"})
     assert words(item) == "tan, ± 2 L*, by white point"
-    set_tone(root, {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_source": "texture"})
-    assert words(item) == "From the texture alone"
+    item.use_skin_tone = False
+    finding = {"stage": "solve", "problem": "Skin tone: estimated, ±7.", "remedy": "Choose it if it looks wrong.",
+               "stopped": False}
+    solved = addon("status").Status(findings=(finding,))
+    assert addon("solve.panel").tone_words(item, solved) == "Skin tone: estimated, ±7. Choose it if it looks wrong."
+    assert "when the maps are solved" in words(item)
+    item.use_skin_tone = True
     item.skin_tone = (0.6, 0.4, 0.3)
     assert words(item) == "Chosen by you: this wins"

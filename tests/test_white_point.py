@@ -10,6 +10,7 @@ import pytest
 from core.__main__ import main
 from core.contract import stages
 from core.contract.capture import Capture
+from core.contract.colour_values import parse_white_point
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import Settings, from_json
 from core.imaging import images
@@ -105,11 +106,11 @@ def test_the_command_says_what_is_missing(tmp_path, capsys, words, said):
 
 
 def test_a_white_point_that_is_none_is_refused():
-    assert white_point.parse_white("auto") is None
-    assert np.allclose(white_point.parse_white("0.9,0.8,1.6"), [0.9, 0.8, 1.6])
+    assert parse_white_point("auto") is None
+    assert np.allclose(parse_white_point("0.9,0.8,1.6"), [0.9, 0.8, 1.6])
     for wrong in ("white", "1,1", "0,1,1", "1,nan,1"):
         with pytest.raises(Problem, match="is not a colour"):
-            white_point.parse_white(wrong)
+            parse_white_point(wrong)
 
 
 def test_a_new_white_point_touches_the_solve_alone(tmp_path):

@@ -11,6 +11,8 @@ import bpy
 
 from ..core.contract import delighter_cards, delivery_presets, stages
 from ..core.contract import settings as core_settings
+from ..core.contract.colour_values import format_skin_tone, parse_skin_tone
+from ..core.contract.messages import Problem
 from ..core.contract.setting_values import absolute_path
 from ..core.contract.settings import STAGE_KINDS
 from . import captures, preferences
@@ -200,7 +202,7 @@ def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings)
     for stage, kind in STAGE_KINDS.items():
         for f in fields(kind):
             setattr(getattr(item, stage), f.name, getattr(getattr(chosen, stage), f.name))
-    tone = _colour(chosen.solve.skin_tone)
+    tone = _parsed_tone(chosen.solve.skin_tone)
     item.use_skin_tone = tone is not None
     item.skin_tone = tone or item.skin_tone
     item.seed, item.device = chosen.seed, chosen.device
@@ -209,18 +211,15 @@ def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings)
 def _tone(item: WILDCAP_PG_capture) -> str:
     """The skin tone as a job is told it: as the record wrote it from which the fields were taken, for as long as it is
     that tone."""
-    told = _colour(item.solve.skin_tone)
-    same = told is not None and max(abs(a - b) for a, b in zip(told, item.skin_tone, strict=True)) < 1e-4
-    return item.solve.skin_tone if same else ",".join(f"{c:.4f}" for c in item.skin_tone)
+    told, chosen = _parsed_tone(item.solve.skin_tone), format_skin_tone(item.skin_tone)
+    return item.solve.skin_tone if told is not None and format_skin_tone(told) == chosen else chosen
 
 
-def _colour(text: str) -> tuple[float, float, float] | None:
-    """R, G and B of a text; None where it has none."""
+def _parsed_tone(text: str) -> tuple[float, float, float] | None:
     try:
-        red, green, blue = map(float, text.split(","))
-    except ValueError:
+        return parse_skin_tone(text)
+    except Problem:
         return None
-    return red, green, blue
 
 
 def _value(group, field):

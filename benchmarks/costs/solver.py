@@ -39,7 +39,7 @@ from core.solve.evidence import read_evidence
 from core.solve.memory import sample_within_memory, spare_memory
 from core.solve.recipes import OURS
 from core.solve.sampler import Sampler, seed_noise
-from core.solve.skin_tone import parse_skin_tone
+from core.solve.skin_tone import read_given_tone
 
 from ..figures import write_record
 from .meter import GIB, peak, run_alone, spending
@@ -162,7 +162,7 @@ def single_steps(row: SolverVariant, capture: Capture, options: argparse.Namespa
     coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
     evidence = read_evidence(capture, read_head(capture), options.size)
-    begun = initial.start_solve(prior, evidence, parse_skin_tone(TONE), evidence.cell_side(96), recipe)
+    begun = initial.start_solve(prior, evidence, read_given_tone(TONE), evidence.cell_side(96), recipe)
     short = replace(begun.recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
     if options.compile:
         prior.network = torch.compile(prior.network)

@@ -149,7 +149,7 @@ def losses(of: Figures) -> str:
     """What a reader should know before the tables."""
     answers, lamps = of.state.summary, of.photographs.lamps.summary
     against = paired({name: one for name, one in of.comparison.subjects.items() if name != "scan"})["delit"]
-    relit, people, dark = of.relit.sample, of.relit_people.mean, of.skin_tone.groups.dark
+    relit, people, tones = of.relit.sample, of.relit_people.mean, of.skin_tone.groups
     known = of.confidence.summary[SHIPPED]
     alone, scalp = of.whole_chain.rows["scan, network"], of.whole_head.synthetic.scalp
     return prose(f"""
@@ -171,7 +171,8 @@ def losses(of: Figures) -> str:
         - **Brows and lips keep {answers.solved.kept_brows.mean:.2f} and {answers.solved.kept_lips.mean:.2f} of their
           contrast** ([state](state.md#features-kept)); edges of hard shadows leave a faint outline, the paper's own
           failure case.
-        - **Dark skin comes out {dark.scene.lightness:.1f} L* too light** where only the frames tell its tone
+        - **Dark skin comes out {tones.dark.scene.lightness:.1f} L* too light, very light skin
+          {-tones["very light"].scene.lightness:.1f} too dark**, where only the frames tell the tone
           ([skin tone](skin_tone.md)).
         - **The confidence map knows little**: {known.gained.mean:.2f} nats more than one sigma for all, aim 0.1
           ([page](confidence.md)).

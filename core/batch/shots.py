@@ -20,7 +20,9 @@ from ..contract import settings as known
 from ..contract.files import storage_problem
 from ..contract.json_files import plain_name
 from ..contract.messages import Problem
+from ..contract.setting_paths import check_paths
 from ..contract.setting_values import absolute_path
+from ..contract.stages import NAMES
 from ..worker.command_settings import read_file
 from .record import NAME, BatchFace
 
@@ -176,25 +178,9 @@ def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: d
     for column, (stage, setting) in COLUMNS.items():
         if row.get(column):
             value = absolute_path(row[column], folder.absolute()) if column == "template" else row[column]
-            if column != "template":
-                _check_colour(column, value)
             settings[stage] = {**settings.get(stage, {}), setting: value}
-    template = settings.get("registration", {}).get("template")
-    if template and not Path(template).exists():
-        raise Problem(f"There is no head mesh at {template}.",
-                      "Check its name, or leave the cell empty for the built-in head.")
     chosen = row.get("quality") or quality
-    known.from_json(settings, known.preset(chosen))
+    described = known.from_json(settings, known.preset(chosen))
+    # what is solved together may be captures that this batch makes
+    check_paths(known.from_json({"solve": {"together": ""}}, described), NAMES)
     return BatchFace(name, source, root / f"{name}.wildcap", chosen, settings)
-
-
-def _check_colour(column: str, text: str) -> None:
-    """Raises Problem for what is neither auto nor three numbers: the stage that reads it would find out only after
-    minutes."""
-    try:
-        parts = [float(channel) for channel in text.split(",")] if text != "auto" else [0.5] * 3
-    except ValueError:
-        parts = []
-    if len(parts) != 3 or not all(0 <= channel <= (1 if column == "tone" else 1e3) for channel in parts):
-        raise Problem(f"The {column} {text!r} is not a colour as R,G,B.",
-                      "Write three numbers as \"0.8,0.6,0.5\", or auto.")

@@ -24,7 +24,9 @@ def setting(default, **metadata):
     """A field whose type is that of its default (bool, int, float or str).
 
     A number has `min` and `max`, and may have a `unit`. A text has `choices`, or is a `path` ("file", "folder" or
-    "file_or_folder"), or has a `form` (how it is written, in a few words). `label` is its name in Blender where the one
+    "file_or_folder"), or has a `form` (how it is written, in a few words) and the function that reads it, `parse`,
+    which raises Problem. A path may say `when` it is used, a function of the stage's settings, whether it is `required`
+    then, and what a folder `holds`: names of files. `label` is its name in Blender where the one
     made of the field's does not do, `titles` are those of choices whose own does not do, `flag` is its short option of
     `core run` (of `core deliver` for what delivers). `per_face` is True for what a quality leaves as it is, as it
     leaves every path; `affects_result` is False for what no result depends on.
@@ -35,8 +37,8 @@ def setting(default, **metadata):
 def check_value(name: str, field: dataclasses.Field, value):
     """The value as the setting keeps it: a whole number becomes a float where one is wanted.
 
-    Raises Problem for a wrong type, for what is none of its choices, and for what lies outside of its range
-    (not-a-number does).
+    Raises Problem for a wrong type, for what is none of its choices or not of its form, and for what lies outside of
+    its range (not-a-number does).
     """
     expected, limits = type(field.default), field.metadata
     whole_for_float = expected is float and type(value) is int
@@ -47,6 +49,8 @@ def check_value(name: str, field: dataclasses.Field, value):
         raise Problem(f"{name} is {value!r}.", advise_values(field))
     if "min" in limits and not limits["min"] <= value <= limits["max"]:
         raise Problem(f"{name} is {value}.", advise_values(field))
+    if "parse" in limits:
+        limits["parse"](value)
     return float(value) if whole_for_float else value
 
 

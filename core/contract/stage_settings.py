@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from . import delivery_presets
+from .colour_values import parse_skin_tone, parse_white_point
 from .setting_values import setting
 
 
@@ -74,9 +75,10 @@ class DelightSettings:
     switchlight_preview: bool = setting(False, label="Small Pictures at Half the Credits", flag="--preview",
                                         per_face=True)
     """Have SwitchLight answer with pictures of at most 512 px, at half the credits: to see whether it helps"""
-    folder: str = setting("", path="folder", flag="--folder")
+    folder: str = setting("", path="folder", flag="--folder", when=lambda own: own.delighter == "folder", required=True)
     """Folder of delit pictures for the folder delighter, matched by name"""
-    checkpoint: str = setting("", path="folder", flag="--checkpoint")
+    checkpoint: str = setting("", path="file_or_folder", flag="--checkpoint", required=True,
+                              when=lambda own: own.delighter == "opendelight", holds=("base_delight_network.pth",))
     """OpenDelight's checkpoint as its authors publish it: the folder with base_delight_network.pth and
     unet_enhancer.pth"""
 
@@ -87,7 +89,7 @@ class TextureSettings:
     """Side of the texture"""
     perceptual: int = setting(0, min=0, max=2000, label="Perceptual Steps")
     """Steps that sharpen the texture until the head looks like the frames to a network, as the paper does; 0 is off"""
-    perceptual_network: str = setting("", path="file_or_folder")
+    perceptual_network: str = setting("", path="file_or_folder", when=lambda own: own.perceptual > 0)
     """VGG16 file, or folder with it and LPIPS's weights, for these steps; empty takes the small network of an installed
     package"""
 
@@ -117,12 +119,14 @@ class SolveSettings:
     """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast"""
     grid_cells: int = setting(96, min=1, max=512)
     """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
-    skin_tone: str = setting("auto", form="R,G,B or auto", flag="--skin-tone", per_face=True)
-    """Skin tone as sRGB R,G,B in 0..1 (linear mean over facial skin), or auto"""
-    white_point: str = setting("auto", form="R,G,B or auto", flag="--white-point", per_face=True)
+    skin_tone: str = setting("auto", form="R,G,B or #RRGGBB or auto", parse=parse_skin_tone, flag="--skin-tone",
+                             per_face=True)
+    """Skin tone in sRGB (linear mean over facial skin), as 0.69,0.54,0.46 or 176,138,118 or #B08A76; auto: estimated"""
+    white_point: str = setting("auto", form="R,G,B or auto", parse=parse_white_point, flag="--white-point",
+                               per_face=True)
     """What a white surface in the face's light is in the frames, linear R,G,B, from a ColorChecker, a grey card or
     white paper; auto: from the scene"""
-    prior: str = setting("", path="folder", flag="--prior")
+    prior: str = setting("", path="folder", flag="--prior", holds=("config.json", "ckpt.pth"))
     """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in
     whose UVs it works; empty: ours"""
     together: str = setting("", path="folder", label="Together With", flag="--with")

@@ -35,9 +35,8 @@ from .prior import ConditionedPrior, Prior, load_chosen
 from .problem import State, rms_residual
 from .recipes import RECIPES, Recipe, free_recipe
 from .sampler import Sampler, seed_noise
-from .skin_tone import SkinTone
 from .together import read_others
-from .tone import resolve_skin_tone
+from .tone import resolve_skin_tone, tell_skin_tone
 from .witnesses import confirm_marks
 
 FAINT_WEIGHT = 1.4
@@ -73,11 +72,13 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
               and elsewhere is None else None)
     if edited is not None:
         iris.measure_irises(capture, head, edited[0].diffuse, report)
-        _leave_figures(capture, evidence, *edited, report)
+        tell_skin_tone(edited[1], settings, report)
+        _leave_figures(capture, evidence, edited[0], report)
         return
     conditions = mask_edit.conditions(capture, settings)
     witness = (lambda marks: confirm_marks(capture, head, marks, evidence.size)) if elsewhere is None else list
-    tone = resolve_skin_tone(capture, head, settings, known, evidence, prior.tones, report)
+    tone = resolve_skin_tone(capture, head, settings, known, report)
+    tell_skin_tone(tone, settings, report)
     others = read_others(capture, settings, report)
     report.progress(0, recipe.steps, "telling skin from light and laying the mask on the shadow's edges")
     start = initial.start_solve(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, others,
@@ -100,7 +101,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     iris.measure_irises(capture, head, delivered.diffuse, report)
     comparison.write_comparison(capture, known, delivered.diffuse)
     maps.write_preview(capture, state, start.observations, report)
-    _leave_figures(capture, evidence, result, start.tone, report)
+    _leave_figures(capture, evidence, result, report)
     stored.unlink(missing_ok=True)
 
 
@@ -172,9 +173,7 @@ def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
     return digest.hexdigest()
 
 
-def _leave_figures(
-    capture: Capture, evidence: Evidence, solved_maps: maps.Maps, tone: SkinTone, report: Reporter
-) -> None:
+def _leave_figures(capture: Capture, evidence: Evidence, solved_maps: maps.Maps, report: Reporter) -> None:
     texture, weight = evidence.texture.numpy(), evidence.weight.numpy()
     explained = (solved_maps.diffuse * solved_maps.shading).transpose(2, 0, 1)
     error = images.linear_to_srgb(explained) - images.linear_to_srgb(texture)
@@ -182,7 +181,6 @@ def _leave_figures(
     report.figure("residual_psnr_db", round(-10 * np.log10(max(mean_square, 1e-10)), 1))
     report.figure("mask_share_of_face_percent",
                   round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1))
-    report.figure("skin_tone_srgb", [round(float(v), 3) for v in tone.srgb])
     side = min(evidence.size, REFERENCE_TEXELS // 2)
     small = [
         images.resize(image, side, side)

@@ -171,7 +171,7 @@ def fit_layout(capture: Capture, head: Head, e: Evidence, prior: Prior, report: 
                          lambda done: report.progress(done, 100, "laying the prior's UVs over the head"))
     if not layout.fits(e.skin.numpy()):
         raise strange
-    return layout, prior.with_face(layout.mean_face(), ours.tones)
+    return layout, prior.with_face(layout.mean_face())
 
 
 def make_layout(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor,

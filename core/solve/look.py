@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera shows of a person's skin, in three colours: the best lit skin, the skin that faces as the face does,
-and all that is not the person.
+"""What a camera shows of a person's skin, in two colours: the best lit skin, and the skin that faces as the face does.
 
 Over a capture's views each point of the head has one colour, a low quantile of what the views show: highlights move
 with the camera, the skin's own colour does not. Lips, brows, beard, shadow and what is burnt out do not count.
@@ -15,8 +14,8 @@ import cv2
 import numpy as np
 
 from ..contract.capture import Capture
-from ..contract.messages import Problem, Reporter
-from ..face import faces, template
+from ..contract.messages import Reporter
+from ..face import template
 from ..face.head import Head
 from ..geometry import raster
 from ..geometry.meshes import vertex_uvs
@@ -31,8 +30,6 @@ VIEW_QUANTILE = 0.3  # over the views: below the median, as every highlight brig
 BEST_LIT_QUANTILES = 0.75, 0.95
 BURNT_SRGB = 0.98  # sRGB from which a channel has lost its value
 MIN_SKIN_POINTS = 60  # points of skin
-PERSON_SHARE = 0.2  # sureness from which a pixel may be the person
-MIN_SURROUNDINGS_SHARE = 0.05  # least share of the frame that is surroundings
 SMOOTHING_SHARE = 0.003  # of the frame's longer side: what noise and a head that is off by a pixel amount to
 LIKE_RATIOS = 0.75, 1.35  # brightness over that of evenly lit skin, beyond which a point is shadow, mark or highlight
 LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB (IEC 61966-2-1)
@@ -45,15 +42,13 @@ BEARD_TOP_V = 0.42  # v of the texture below which a beard may grow, whose colou
 @dataclass(frozen=True)
 class Look:
     """Linear colours [3] as the camera shows them. best: skin in the best light; front: skin whose normal is -Y, the
-    way the face looks; surroundings: the mean of what is not the person, None where little of it is in view."""
+    way the face looks."""
 
     best: np.ndarray
     front: np.ndarray
-    surroundings: np.ndarray | None = None
 
 
-def summarise_look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray,
-                   surroundings: np.ndarray | None = None) -> Look:
+def summarise_look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> Look:
     """What points of facial skin show of its colour.
 
     Parameters
@@ -61,14 +56,16 @@ def summarise_look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray,
     colours : [N, 3], linear
     normals : [N, 3], unit, in the head's axes
     weight : [N] in [0, 1], 0 for what is shadowed or no skin
-    surroundings : [3], linear, the mean of what is around the head; None where it is not known
     """
-    brightness = colours @ LUMINANCE_WEIGHTS
-    order = np.argsort(brightness)
+    return Look(mean_best_lit(colours, weight), _facing_front(colours, normals, weight))
+
+
+def mean_best_lit(colours: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The mean [3] of the best lit of linear colours [N, 3] under weights [N], highlights left out."""
+    order = np.argsort(colours @ LUMINANCE_WEIGHTS)
     rank = np.cumsum(weight[order]) / weight.sum()
     best = order[(rank >= BEST_LIT_QUANTILES[0]) & (rank <= BEST_LIT_QUANTILES[1])]
-    return Look(np.average(colours[best], axis=0, weights=weight[best] + 1e-9), _facing_front(colours, normals, weight),
-                surroundings)
+    return np.average(colours[best], axis=0, weights=weight[best] + 1e-9)
 
 
 def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter) -> Look | None:
@@ -94,19 +91,14 @@ def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter
     weight = raster.sample_uv(weigh_skin(512, shadow), vertex_uvs(mesh))
     points = np.flatnonzero(weight > 0.05)
     seen = np.full((len(views), len(points), 3), np.nan)
-    around = []
     for i, view in enumerate(views):
         report.progress(0, len(views), f"looking at the skin in frame {i + 1} of {len(views)}")
-        frame = view.read()
-        seen[i] = _seen(view, frame, head.caster, mesh.vertices[points], normals[points])
-        around.append(_surroundings(frame))
+        seen[i] = _seen(view, view.read(), head.caster, mesh.vertices[points], normals[points])
     known = np.isfinite(seen[..., 0]).sum(0) >= min(2, len(views))
     if known.sum() < MIN_SKIN_POINTS:
         return None
     colours = _low_quantile(seen[:, known])
-    around = [each for each in around if each is not None]
-    surroundings = np.median(around, 0) if around else None
-    return summarise_look(colours, normals[points[known]], weight[points[known]], surroundings)
+    return summarise_look(colours, normals[points[known]], weight[points[known]])
 
 
 def weigh_skin(size: int, shadow: np.ndarray) -> np.ndarray:
@@ -148,18 +140,6 @@ def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.nd
         whole = raster.sample(frame.max(-1), pixels) < BURNT_SRGB
         colours[facing[whole]] = raster.sample(smooth, pixels[whole])
     return colours
-
-
-def _surroundings(frame: np.ndarray) -> np.ndarray | None:
-    """Mean linear colour [3] of what is not the person in an sRGB frame; None where that is little, or cannot be
-    told."""
-    side = max(frame.shape[:2])
-    small = images.resize(frame, round(256 * frame.shape[1] / side), round(256 * frame.shape[0] / side))
-    try:
-        away = faces.segment_person(small) < PERSON_SHARE
-    except Problem:  # the networks are not installed: the skin alone must do
-        return None
-    return images.srgb_to_linear(small)[away].mean(0) if away.mean() > MIN_SURROUNDINGS_SHARE else None
 
 
 def _low_quantile(colours: np.ndarray) -> np.ndarray:

@@ -35,8 +35,8 @@ class Prior:
 
     Ours models what differs from the mean face of the subject's skin tone: a dark patch alone cannot say whether its
     skin or its light is dark. mean_face [7, S, S] covers the UV square: albedo over skin tone, normal, 2 * specular -
-    1; spread [7]: deviation of skins from it, of the albedo in units of the tone; tones: those of the skins it was
-    trained on, N times linear RGB [3]; references [N, 7, R, R] are single skins in the mean face's form. The released
+    1; spread [7]: deviation of skins from it, of the albedo in units of the tone;
+    references [N, 7, R, R] are single skins in the mean face's form. The released
     priors have none of these and take no tone; their coordinates are not those of texel centres (`centred`), they bring
     the noise levels they were trained on (`sigmas`, least and largest), and know maps of one size only (`one_scale`).
     """
@@ -44,10 +44,9 @@ class Prior:
     centred, sigmas, one_scale = True, None, False
 
     def __init__(self, network: UNet, octaves: int = 0, mean_face: torch.Tensor | None = None,
-                 spread: torch.Tensor | None = None, tones: list | None = None, references: torch.Tensor | None = None):
+                 spread: torch.Tensor | None = None, references: torch.Tensor | None = None):
         self.network = network.eval().requires_grad_(False)
-        self.octaves, self.mean_face, self.spread, self.tones, self.references = (
-            octaves, mean_face, spread, tones or [], references)
+        self.octaves, self.mean_face, self.spread, self.references = octaves, mean_face, spread, references
         self.multiple = network.multiple
 
     @property
@@ -66,10 +65,10 @@ class Prior:
         """The prior of a person with this skin tone."""
         return ConditionedPrior(self, tone.tensor[None].to(self.device))
 
-    def with_face(self, mean_face: torch.Tensor, tones: list) -> Prior:
-        """The prior with a mean face and tones to start from."""
+    def with_face(self, mean_face: torch.Tensor) -> Prior:
+        """The prior with a mean face to start from."""
         given = copy.copy(self)
-        given.mean_face, given.tones = mean_face.to(self.device), tones
+        given.mean_face = mean_face.to(self.device)
         return given
 
     def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> Condition:
@@ -276,7 +275,7 @@ def _load_ours(path: Path) -> Prior:
                                      unpack_maps(tensors.pop("references"), tensors.pop("references_range")))
     network = build_network(card)
     network.load_state_dict(tensors)
-    return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, card["tones"], references)
+    return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, references)
 
 
 def _load_released(folder: Path) -> ReleasedPrior:

@@ -5,25 +5,23 @@ function."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 
-from ..contract.messages import Problem
+from ..contract import colour_values
 from ..imaging import images
 
 GIVEN, SCENE, WHITE_POINT, TEXTURE, EARLIER = "given", "scene", "white point", "texture", "earlier solve"
 """Where a tone comes from: the settings; an estimate from the frames as they were filmed, or with a measured white; one
 from the texture; the solve before."""
-DECIMALS = 5
-"""Of sRGB, in a setting and in an estimate from the frames: who types the tone that was estimated gets the same
-maps."""
 
 
 @dataclass(frozen=True)
 class SkinTone:
-    """The mean albedo of a person's facial skin.
+    """The mean albedo of a person's facial skin, to as many decimals as a setting has (colour_values.TONE_DECIMALS).
 
     linear: linear sRGB [3] in (0, 1], numbers of float32. source: where it comes from. Of an estimate from the frames,
     else None: deviation, one standard deviation of the lightness L*; error, the expected colour difference, delta E
@@ -39,12 +37,14 @@ class SkinTone:
     @classmethod
     def from_linear(cls, linear: np.ndarray | torch.Tensor, source: str, **other_fields) -> SkinTone:
         """Of linear sRGB [3]; `other_fields` are the other fields."""
-        return cls(tuple(float(value) for value in np.asarray(linear, np.float32)), source, **other_fields)
+        return cls.from_srgb(images.linear_to_srgb(np.asarray(linear, np.float32)), source, **other_fields)
 
     @classmethod
-    def from_srgb(cls, srgb: np.ndarray | list[float], source: str, **other_fields) -> SkinTone:
+    def from_srgb(cls, srgb: np.ndarray | Sequence[float], source: str, **other_fields) -> SkinTone:
         """Of encoded sRGB [3] in (0, 1]."""
-        return cls.from_linear(images.srgb_to_linear(np.asarray(srgb, np.float32)), source, **other_fields)
+        rounded = [round(float(channel), colour_values.TONE_DECIMALS) for channel in srgb]
+        linear = images.srgb_to_linear(np.array(rounded, np.float32))
+        return cls(tuple(map(float, linear)), source, **other_fields)
 
     @property
     def srgb(self) -> np.ndarray:
@@ -57,20 +57,7 @@ class SkinTone:
         return torch.tensor(self.linear)
 
 
-def parse_skin_tone(setting: str) -> SkinTone | None:
-    """settings.solve.skin_tone: 'R,G,B', sRGB in 0..1, or None for 'auto'. Raises Problem for what is neither."""
-    if setting == "auto":
-        return None
-    try:
-        channels = [float(text) for text in setting.split(",")]
-    except ValueError:
-        channels = []
-    if len(channels) != 3 or not all(0 < v <= 1 for v in channels):
-        raise Problem(f"The skin tone {setting!r} is not a colour.",
-                      "Give three numbers between 0 and 1 as sRGB, such as 0.69,0.54,0.45, or auto.")
-    return SkinTone.from_srgb(channels, GIVEN)
-
-
-def format_skin_tone(tone: SkinTone) -> str:
-    """The setting that `parse_skin_tone` reads as this tone."""
-    return ",".join(f"{value:.{DECIMALS}f}" for value in tone.srgb)
+def read_given_tone(setting: str) -> SkinTone | None:
+    """The tone of settings.solve.skin_tone, None for auto. Raises Problem for what is no colour."""
+    given = colour_values.parse_skin_tone(setting)
+    return None if given is None else SkinTone.from_srgb(given, GIVEN)

@@ -18,7 +18,7 @@ from . import initial
 from .evidence import read_evidence
 from .prior import load_chosen
 from .recipes import RECIPES
-from .skin_tone import parse_skin_tone
+from .skin_tone import read_given_tone
 from .tone import estimate_from_texture
 
 CELL_TEXELS = 8.0
@@ -33,8 +33,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     evidence = read_evidence(capture, read_filmed_head(capture), max(min(height, 1024) // 32, 4) * 32)
     report.progress(1, 2, "looking for the shadow's edges")
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
-    tone = parse_skin_tone(settings.solve.skin_tone)
-    tone = tone or estimate_from_texture(evidence.texture, initial.weigh_lit_skin(evidence), prior.tones)
+    tone = read_given_tone(settings.solve.skin_tone) or estimate_from_texture(evidence)
     start = initial.start_solve(prior, evidence, tone, CELL_TEXELS, recipe,
                                 callbacks=initial.Callbacks(check=report.check))
     snapped = np.clip(images.resize(start.alpha.numpy(), width, height), 0, 1)

@@ -100,17 +100,3 @@ def measure_card_white(srgb: np.ndarray, column: float, row: float, card: str) -
         raise Problem("That place is not of one colour.",
                       "Point at the middle of the card, away from its border and from writing.")
     return linear.mean(0) / CARDS[card]
-
-
-def parse_white(setting: str) -> np.ndarray | None:
-    """The white [3] of settings.solve.white_point, None for auto. Raises Problem for what is neither."""
-    if setting == "auto":
-        return None
-    try:
-        white = np.array([float(number) for number in setting.split(",")])
-    except ValueError:
-        white = np.zeros(0)
-    if white.shape != (3,) or not ((white > 1e-3) & (white < 100)).all():
-        raise Problem(f"The white point {setting!r} is not a colour.",
-                      "Give three numbers above 0 as linear light, as `core white` prints them, or auto.")
-    return white

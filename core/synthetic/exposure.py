@@ -11,8 +11,6 @@ de Weijer, "Computational color constancy", 2011).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from .pigment import LUMINANCE
@@ -21,18 +19,9 @@ SURFACES = 14  # in view beside the person
 MIDDLE_GREY = 0.18  # linear reflectance that a meter takes for the scene's mean
 
 
-@dataclass(frozen=True)
-class Exposure:
-    """gain [3]: what scene light is multiplied by in the picture (exposure and the cast that is left, linear);
-    surroundings [3]: the mean linear colour in the picture of all that is not the person."""
-
-    gain: np.ndarray
-    surroundings: np.ndarray
-
-
-def phone_exposure(rng: np.random.Generator, skin: np.ndarray, light: np.ndarray) -> Exposure:
-    """The picture that a phone takes of linear skin colours [N, 3] in light whose mean colour on a white surface is
-    `light` [3]."""
+def phone_exposure(rng: np.random.Generator, skin: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """What scene light is multiplied by in the picture that a phone takes of linear skin colours [N, 3], in light whose
+    mean colour on a white surface is `light` [3]: exposure and the cast that is left, linear [3]."""
     cast = _cast(rng)
     reflectance = np.clip(np.exp(rng.normal(np.log(0.2), 0.8, (SURFACES, 1)) + rng.normal(0, 0.25, (SURFACES, 3))),
                           0.02, 0.9)
@@ -44,8 +33,7 @@ def phone_exposure(rng: np.random.Generator, skin: np.ndarray, light: np.ndarray
     metered = face * float((skin @ LUMINANCE).mean()) + (1 - face) * float((share * behind).sum(0) @ LUMINANCE)
     level = MIDDLE_GREY * 2 ** rng.normal(0.5, 0.5) / metered
     level = min(level, rng.uniform(0.85, 1.15) / float(np.percentile((skin * cast).max(1), 98)))
-    gain = level * cast
-    return Exposure(gain, (share * np.minimum(behind * gain, 1)).sum(0))
+    return level * cast
 
 
 def _cast(rng: np.random.Generator) -> np.ndarray:

@@ -33,6 +33,7 @@ from ..contract.messages import (
     out_of_memory,
 )
 from ..contract.portable_paths import convert_settings, read_portable
+from ..contract.setting_paths import check_paths
 from ..contract.settings import Settings, from_json
 from ..contract.stages import Stage
 from .job import JobRequest, read_job
@@ -53,6 +54,8 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None,
             if job.tool is None:
                 _take_source(job, emit)
             _check_device(job.settings.device)
+            if job.tool is None:
+                _check_paths(job)
             _check_slimmed(job)
             if job.tool is not None:
                 stage = job.tool.name
@@ -238,6 +241,17 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
                   f"{source.name}.",
                   f"Choose another capture folder for another video, or run the stage {first.label} again (in a "
                   f"terminal: --from {first.name}) to replace everything but the painted masks.")
+
+
+def _check_paths(job: JobRequest) -> None:
+    """Raises Problem, before any stage runs, for what the settings name and a later stage would miss. What a finished
+    stage was made from may have gone since."""
+    for step in job.chain:
+        try:
+            check_paths(job.settings, [step.name])
+        except Problem:
+            if job.force or job.capture.state(step, job.settings) not in FINISHED:
+                raise
 
 
 def _check_device(device: str) -> None:

@@ -6,8 +6,9 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract import stages
-from .. import captures, jobs, properties, timings
-from ..base_panel import CapturePanel, WildcapPanel, draw_settings
+from ...core.contract.colour_values import describe_estimate
+from .. import captures, jobs, problems, properties, status, timings
+from ..base_panel import CapturePanel, WildcapPanel, draw_settings, region_width
 from . import preview
 
 
@@ -44,8 +45,7 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row.prop(item, "skin_tone")
         row.operator("wildcap.pick_skin_tone", text="", icon='EYEDROPPER')
         row.operator("wildcap.estimate_skin_tone")
-        if item.use_skin_tone:
-            layout.label(text=tone_words(item), icon='INFO')
+        problems.draw_text(layout, tone_words(item, status.of(item)), region_width(context), 'INFO')
         _draw_white_point(layout, item)
         layout.prop(item.solve, "together")
         layout.prop(item, "device")
@@ -58,13 +58,17 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
                 draw_settings(layout, item, stage, without=("skin_tone", "white_point", "together"))
 
 
-def tone_words(item) -> str:
+def tone_words(item, known: status.Status | None) -> str:
     """Where the skin tone comes from and how sure it is."""
+    if not item.use_skin_tone:
+        findings = [finding for finding in (known.findings if known else ())
+                    if finding["stage"] == "solve" and not finding["stopped"]]
+        return (" ".join(iface_(findings[-1][part]) for part in ("problem", "remedy")) if findings
+                else iface_("Estimated from the frames when the maps are solved"))
     if max(abs(a - b) for a, b in zip(item.skin_tone, item.estimated_tone, strict=True)) > 1e-4:
         return iface_("Chosen by you: this wins")
-    if not item.tone_group:
-        return iface_("From the texture alone")
-    # a sidebar is narrow
+    if item.tone_source != "white point":
+        return " ".join(map(iface_, describe_estimate(item.tone_deviation)))
     return iface_("{}, ± {} L*, by {}").format(iface_(item.tone_group), round(item.tone_deviation),
                                                iface_(item.tone_source))
 

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files and folders that settings name: those that a stage needs have to be there, others do not count."""
+
+import pytest
+
+from core.contract.messages import Problem
+from core.contract.setting_paths import check_paths
+from core.contract.settings import from_json
+from core.contract.stages import NAMES
+
+
+def check(stage: str, **values) -> None:
+    check_paths(from_json({stage: values}), NAMES)
+
+
+@pytest.mark.parametrize("stage, values", [
+    ("cameras", {"import_from": "gone"}), ("registration", {"template": "gone.obj"}),
+    ("delight", {"delighter": "folder", "folder": "gone"}), ("delight", {"delighter": "folder"}),
+    ("delight", {"delighter": "opendelight"}), ("delight", {"delighter": "opendelight", "checkpoint": "gone"}),
+    ("texture", {"perceptual": 10, "perceptual_network": "gone"}), ("shadow_mask", {"softened": "gone"}),
+    ("solve", {"prior": "gone"}), ("solve", {"together": "gone"})])
+def test_what_is_needed_and_missing_is_named(stage, values):
+    with pytest.raises(Problem, match=f"{stage}.{list(values)[-1] if 'gone' in values.values() else ''}"):
+        check(stage, **values)
+
+
+def test_what_is_not_used_may_be_missing():
+    check("delight", folder="gone", checkpoint="gone")
+    check("texture", perceptual_network="gone")
+    check_paths(from_json({"solve": {"prior": "gone"}}), ["frames", "cameras"])
+    check_paths(from_json({}), NAMES)
+
+
+def test_a_place_of_another_kind_or_without_what_it_holds_is_refused(tmp_path):
+    file = tmp_path / "a.txt"
+    file.touch()
+    with pytest.raises(Problem, match="is not a folder"):
+        check("shadow_mask", softened=str(file))
+    with pytest.raises(Problem, match=r"holds no config\.json"):
+        check("solve", prior=str(tmp_path))
+    (tmp_path / "config.json").touch()
+    (tmp_path / "ckpt.pth").touch()
+    check("solve", prior=str(tmp_path))
+    with pytest.raises(Problem, match="is no capture"):
+        check("solve", together=str(tmp_path))
+    (tmp_path / "capture.json").touch()
+    check("solve", together=str(tmp_path))
