@@ -171,9 +171,8 @@ def losses(of: Figures) -> str:
         - **Brows and lips keep {answers.solved.kept_brows.mean:.2f} and {answers.solved.kept_lips.mean:.2f} of their
           contrast** ([state](state.md#features-kept)); edges of hard shadows leave a faint outline, the paper's own
           failure case.
-        - **Dark skin comes out {tones.dark.scene.lightness:.1f} L* too light, very light skin
-          {-tones["very light"].scene.lightness:.1f} too dark**, where only the frames tell the tone
-          ([skin tone](skin_tone.md)).
+        - **Dark skin comes out {tones.dark.scene.lightness:.0f} L* too light, very light skin
+          {-tones["very light"].scene.lightness:.0f} too dark** by frames alone ([skin tone](skin_tone.md)).
         - **The confidence map knows little**: {known.gained.mean:.2f} nats more than one sigma for all, aim 0.1
           ([page](confidence.md)).
         - **A scalp that nobody saw becomes bare skin** ({scalp.completed:.0f} of 255 off where hair was;
