@@ -84,8 +84,14 @@ ROWS: dict[str, tuple[dict, int, str, bool]] = {
     "recipe released": ({}, CELLS, "painted", True),
 }
 NAMED = {"recipe paper": "paper", "recipe released": "released"}
-TONES = ((0.95, 0.80, 0.72), (0.85, 0.67, 0.56), (0.76, 0.57, 0.45), (0.62, 0.43, 0.32), (0.47, 0.31, 0.23),
-         (0.30, 0.20, 0.16))
+TONES = (
+    (0.95, 0.80, 0.72),
+    (0.85, 0.67, 0.56),
+    (0.76, 0.57, 0.45),
+    (0.62, 0.43, 0.32),
+    (0.47, 0.31, 0.23),
+    (0.30, 0.20, 0.16),
+)
 """sRGB, light to dark: asked for of one subject after the other, whatever its own is."""
 
 
@@ -114,8 +120,11 @@ def main() -> None:
     differences = [r["tone"] for r in done.values() if "tone" in r]
     if differences:
         found["tone"] = {"delivered": max(a for a, _ in differences), "sampled": max(b for _, b in differences)}
-        print("Skin tone, largest CIEDE2000 of the solved mean to the request over six tones, as delivered and by the "
-              "sampling alone:", found["tone"])
+        print(
+            "Skin tone, largest CIEDE2000 of the solved mean to the request over six tones, as delivered and by the "
+            "sampling alone:",
+            found["tone"],
+        )
     if options.json:
         figures.write_record(options.json, "ablation", "python -m benchmarks.ablation OUT.json", found)
 
@@ -168,8 +177,10 @@ def _solve_problem(subject: str, shadows: str, solves: list[tuple[str, int]], op
             about["tone"] = tone_error(given, TONES[int(row[5:])], options.steps)
         else:
             albedo = solve_row(given, row, seed, options.steps)
-            about |= {"seconds": round(time.monotonic() - began, 1),
-                      **measure_regions(albedo, given.albedo, given.face, given.regions())}
+            about |= {
+                "seconds": round(time.monotonic() - began, 1),
+                **measure_regions(albedo, given.albedo, given.face, given.regions()),
+            }
         found[_key(row, subject, shadows, options, seed)] = about
     return found
 
@@ -195,8 +206,15 @@ def solve_row(uv_problem: MaskedUvProblem, row: str, seed: int, steps: int) -> n
     return solve_problem(uv_problem, recipe, uv_problem.tone, seed, cells, mask, with_prior)
 
 
-def solve_problem(uv_problem: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS,
-                  mask: str = "painted", with_prior: bool = True) -> np.ndarray:
+def solve_problem(
+    uv_problem: MaskedUvProblem,
+    recipe: Recipe,
+    tone: SkinTone,
+    seed: int = 0,
+    cells: int = CELLS,
+    mask: str = "painted",
+    with_prior: bool = True,
+) -> np.ndarray:
     """Solves a problem under a recipe and a requested tone.
 
     Parameters
@@ -230,8 +248,13 @@ def solve_problem(uv_problem: MaskedUvProblem, recipe: Recipe, tone: SkinTone, s
     return maps.finish_maps(state, evidence, start).diffuse
 
 
-def fit_texels(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights,
-               smooth: float = 0.0) -> State:
+def fit_texels(
+    start: initial.Start,
+    recipe: Recipe,
+    updates: int = 600,
+    fit: Callable[..., None] = update_lights,
+    smooth: float = 0.0,
+) -> State:
     """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's
     ablation).
 
@@ -243,8 +266,9 @@ def fit_texels(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Ca
     fit : moves the lights after each
     smooth : weight of the albedo's L1 variation
     """
-    recipe = replace(recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0,
-                     updates=updates)
+    recipe = replace(
+        recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0, updates=updates
+    )
     o, state = start.observations[1], start.state
     x = state.denoised.clone().requires_grad_(True)
     adam = torch.optim.Adam([x], lr=0.01)

@@ -24,8 +24,9 @@ FIGURES = ("psnr", "ssim", "flip", "features")
 TITLES = {"ssim": "SSIM", "flip": "FLIP", "features": "features"}
 
 
-def measure_regions(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray,
-                    regions: dict[str, np.ndarray]) -> dict[str, dict[str, float]]:
+def measure_regions(
+    albedo: np.ndarray, truth: np.ndarray, face: np.ndarray, regions: dict[str, np.ndarray]
+) -> dict[str, dict[str, float]]:
     """Compares an albedo with the truth in sRGB, after the gain per channel (linear) that is best for the whole face.
 
     Parameters
@@ -43,13 +44,23 @@ def measure_regions(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray,
     theirs = images.linear_to_srgb(truth).astype(np.float32)
     _, ssim = structural_similarity(theirs, ours, channel_axis=2, data_range=1.0, full=True)
     flip, _, _ = flip_evaluate(theirs, ours, "LDR", applyMagma=False, computeMeanError=False)
-    pictures = {"ssim": ssim.mean(-1), "flip": np.squeeze(flip),
-                "features": feature_distance(ours * face[..., None], theirs * face[..., None])}
+    pictures = {
+        "ssim": ssim.mean(-1),
+        "flip": np.squeeze(flip),
+        "features": feature_distance(ours * face[..., None], theirs * face[..., None]),
+    }
     with np.errstate(divide="ignore"):  # no error at all is infinite
-        return {name: {"psnr": round(float(-10 * np.log10(((ours - theirs)[where] ** 2).mean())), 3),
-                       **{figure: round(float(picture[where].mean()), 4) for figure, picture in pictures.items()
-                          if picture is not None}}
-                for name, where in regions.items()}
+        return {
+            name: {
+                "psnr": round(float(-10 * np.log10(((ours - theirs)[where] ** 2).mean())), 3),
+                **{
+                    figure: round(float(picture[where].mean()), 4)
+                    for figure, picture in pictures.items()
+                    if picture is not None
+                },
+            }
+            for name, where in regions.items()
+        }
 
 
 def feature_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray | None:
@@ -59,8 +70,10 @@ def feature_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray | None
     if (network := _network()) is None:
         return None
     with torch.no_grad():
-        layers = [network.layers(torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1)))[None])
-                  for image in (first, second)]
+        layers = [
+            network.layers(torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1)))[None])
+            for image in (first, second)
+        ]
         total = 0
         for a, b in zip(*layers, strict=True):
             apart = (functional.normalize(a, dim=1) - functional.normalize(b, dim=1)) ** 2
@@ -87,12 +100,18 @@ def summary(done: dict[str, dict], rows: list[str], first: str) -> dict[str, dic
         shared = [p for p in results if p in full]
         for region in REGIONS if shared else ():
             mine, best = ([of[p][region] for p in shared] for of in (results, full))
-            means = {figure: float(np.mean([r[figure] for r in mine])) if figure in mine[0] else None
-                     for figure in FIGURES}
+            means = {
+                figure: float(np.mean([r[figure] for r in mine])) if figure in mine[0] else None for figure in FIGURES
+            }
             distance = float(np.mean([a["psnr"] - b["psnr"] for a, b in zip(mine, best, strict=True)]))
             problems, seeds = len({p[:-1] for p in shared}), len({p[-1] for p in shared})
-            found[region][row] = {"problems": problems, "seeds": seeds, "to_first": None if row == first else distance,
-                                  **means, "seconds": float(np.mean([results[p]["seconds"] for p in shared]))}
+            found[region][row] = {
+                "problems": problems,
+                "seeds": seeds,
+                "to_first": None if row == first else distance,
+                **means,
+                "seconds": float(np.mean([results[p]["seconds"] for p in shared])),
+            }
     return {**found, "spread": {region: seed_spread(list(full.values()), region) for region in REGIONS}}
 
 
@@ -105,12 +124,22 @@ def table(figures: dict[str, dict]) -> str:
     known = [figure for figure in FIGURES[1:] if any(row[figure] is not None for row in figures[REGIONS[0]].values())]
     for region in REGIONS:
         spread, first = figures["spread"][region], next(iter(figures[region]))
-        tables.append(markdown([region, "problems x seeds", "PSNR", f"to {first}", *(TITLES[k] for k in known),
-                                "seconds"], [
-            [row, f"{r['problems']} x {r['seeds']}", f"{r['psnr']:.2f}",
-             "" if row == first else _compared(r["to_first"], spread),
-             *(None if r[figure] is None else f"{r[figure]:.3f}" for figure in known), f"{r['seconds']:.0f}"]
-             for row, r in figures[region].items()]))
+        tables.append(
+            markdown(
+                [region, "problems x seeds", "PSNR", f"to {first}", *(TITLES[k] for k in known), "seconds"],
+                [
+                    [
+                        row,
+                        f"{r['problems']} x {r['seeds']}",
+                        f"{r['psnr']:.2f}",
+                        "" if row == first else _compared(r["to_first"], spread),
+                        *(None if r[figure] is None else f"{r[figure]:.3f}" for figure in known),
+                        f"{r['seconds']:.0f}",
+                    ]
+                    for row, r in figures[region].items()
+                ],
+            )
+        )
     return "\n\n".join(tables)
 
 

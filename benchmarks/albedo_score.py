@@ -57,9 +57,14 @@ def read_truth(folder: Path) -> list[AlbedoTruth]:
     frames = []
     for path in sorted((folder / "albedo").glob("*.png")):
         shadow = folder / "shadow" / path.name
-        frames.append(AlbedoTruth(int(path.stem), images.read_srgb(path),
-                                  images.read_mask(folder / "face" / path.name) > 0.5,
-                                  images.read_mask(shadow) > 0.5 if shadow.exists() else None))
+        frames.append(
+            AlbedoTruth(
+                int(path.stem),
+                images.read_srgb(path),
+                images.read_mask(folder / "face" / path.name) > 0.5,
+                images.read_mask(shadow) > 0.5 if shadow.exists() else None,
+            )
+        )
     if not frames:
         raise Problem(f"{folder} holds no true albedo.", "Name a folder with albedo/NNNN.png and face/NNNN.png.")
     return frames
@@ -95,14 +100,19 @@ def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, t
     -------
     The figures, and "frames_not_registered".
     """
-    albedo = averaged(images.read_srgb(
-        texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists())))
+    albedo = averaged(
+        images.read_srgb(
+            texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists())
+        )
+    )
     seen, missing = looks(capture, truth)
     if pictures:
         for look in seen:
             mask = (look.true.face & look.hit)[..., None]
-            images.write_srgb(pictures / f"{look.true.frame:04d}.jpg",
-                              np.hstack([look.true.albedo * mask, look.picture(albedo) * mask]))
+            images.write_srgb(
+                pictures / f"{look.true.frame:04d}.jpg",
+                np.hstack([look.true.albedo * mask, look.picture(albedo) * mask]),
+            )
     return {"frames_not_registered": missing, **score_map(albedo, seen)}
 
 
@@ -129,8 +139,9 @@ def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
         hit = face >= 0
         seen.append(HeadInView(true, hit, raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])))
     if not seen:
-        raise Problem("None of the frames with a known albedo was registered.",
-                      "Look at the cameras stage in the report.")
+        raise Problem(
+            "None of the frames with a known albedo was registered.", "Look at the cameras stage in the report."
+        )
     return seen, missing
 
 
@@ -158,8 +169,10 @@ def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
     box = face_box(mask)
     predicted, mask = predicted[box], mask[box]
     true = AlbedoTruth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box])
-    figures = {"raw": differences(predicted, true.albedo, mask),
-               "gain": differences(with_gain(predicted, true.albedo, mask), true.albedo, mask)}
+    figures = {
+        "raw": differences(predicted, true.albedo, mask),
+        "gain": differences(with_gain(predicted, true.albedo, mask), true.albedo, mask),
+    }
     log_true, log = log_green(true.albedo), log_green(predicted)
     figures["detail"] = detail(log, log_true, mask)
     figures["shadow_step"] = shadow_step(log - log_true, mask, true.shadow) if true.shadow is not None else math.nan
@@ -168,8 +181,10 @@ def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
 
 def mean_scores(results: list[dict]) -> dict:
     """The mean over frames of what `compare` gives."""
-    figures = {kind: {name: float(np.mean([r[kind][name] for r in results])) for name in results[0][kind]}
-               for kind in ("raw", "gain")}
+    figures = {
+        kind: {name: float(np.mean([r[kind][name] for r in results])) for name in results[0][kind]}
+        for kind in ("raw", "gain")
+    }
     for name in ("detail", "shadow_step"):
         values = [r[name] for r in results if not math.isnan(r[name])]
         figures[name] = float(np.mean(values)) if values else None
@@ -179,25 +194,45 @@ def mean_scores(results: list[dict]) -> dict:
 def rows(scores: dict[str, dict]) -> dict[str, dict]:
     """Row -> PSNR in dB as it is and after the gain, SSIM, FLIP, detail and shadow step, of what `score_capture` and
     `score_floors` give."""
-    return {name: {"psnr": score["raw"]["psnr"], "psnr_after_gain": score["gain"]["psnr"], "ssim": score["raw"]["ssim"],
-                   "flip": score["raw"]["flip"],
-                   "detail": score["detail"], "shadow_step": score["shadow_step"]} for name, score in scores.items()}
+    return {
+        name: {
+            "psnr": score["raw"]["psnr"],
+            "psnr_after_gain": score["gain"]["psnr"],
+            "ssim": score["raw"]["ssim"],
+            "flip": score["raw"]["flip"],
+            "detail": score["detail"],
+            "shadow_step": score["shadow_step"],
+        }
+        for name, score in scores.items()
+    }
 
 
 def table(figures: dict) -> str:
     """Markdown of figures["rows"], as `rows` gives them."""
-    return markdown(["taken for albedo", "PSNR", "after one gain", "SSIM", "FLIP", "detail", "shadow step"], [
-        [LABELS.get(name, name), f"{r['psnr']:.2f} dB", f"{r['psnr_after_gain']:.2f} dB", f"{r['ssim']:.3f}",
-         f"{r['flip']:.3f}", f"{r['detail']:.2f}",
-         None if r["shadow_step"] is None else f"{r['shadow_step']:.2f}"] for name, r in figures["rows"].items()])
+    return markdown(
+        ["taken for albedo", "PSNR", "after one gain", "SSIM", "FLIP", "detail", "shadow step"],
+        [
+            [
+                LABELS.get(name, name),
+                f"{r['psnr']:.2f} dB",
+                f"{r['psnr_after_gain']:.2f} dB",
+                f"{r['ssim']:.3f}",
+                f"{r['flip']:.3f}",
+                f"{r['detail']:.2f}",
+                None if r["shadow_step"] is None else f"{r['shadow_step']:.2f}",
+            ]
+            for name, r in figures["rows"].items()
+        ],
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
-    parser.add_argument("--texture", type=Path,
-                        help="score this picture in the head's UVs instead of the solved albedo")
+    parser.add_argument(
+        "--texture", type=Path, help="score this picture in the head's UVs instead of the solved albedo"
+    )
     parser.add_argument("--pictures", type=Path, help="folder for truth and result side by side")
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/scan_albedo.json")
     arguments = parser.parse_args()
@@ -206,8 +241,12 @@ def main() -> None:
     print(json.dumps(scores, indent=1))
     if arguments.json:
         ours = scores["WildCap"]
-        write_record(arguments.json, "albedo_score", "python -m benchmarks.albedo_score CAPTURE TRUTH",
-                     {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)})
+        write_record(
+            arguments.json,
+            "albedo_score",
+            "python -m benchmarks.albedo_score CAPTURE TRUTH",
+            {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)},
+        )
 
 
 if __name__ == "__main__":

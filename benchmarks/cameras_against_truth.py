@@ -23,8 +23,17 @@ from core.contract.frame_records import read_frames
 from core.geometry.views import View, read_views
 
 BLENDER_TO_COLMAP = np.diag([1.0, -1.0, -1.0])
-FACE = np.array([[0, 0, 0], [0, -0.03, -0.04], [0.06, 0.03, -0.03], [-0.06, 0.03, -0.03], [0.03, 0, 0.03],
-                 [-0.03, 0, 0.03], [0, -0.01, -0.09]])
+FACE = np.array(
+    [
+        [0, 0, 0],
+        [0, -0.03, -0.04],
+        [0.06, 0.03, -0.03],
+        [-0.06, 0.03, -0.03],
+        [0.03, 0, 0.03],
+        [-0.03, 0, 0.03],
+        [0, -0.01, -0.09],
+    ]
+)
 """Points about a face [N, 3], metres in the head's world: between the eyes, nose, sides, forehead, chin."""
 
 
@@ -38,18 +47,24 @@ def compare(capture: Capture, truth: Path) -> dict:
     target = _looked_at(true_centres, -matrices[:, :3, 2])
     distance = np.linalg.norm(true_centres - target, axis=1).mean()
     errors = np.linalg.norm(scale * centres @ rotation.T + translation - true_centres, axis=1) / distance
-    cosines = [(np.trace(m[:3, :3] @ BLENDER_TO_COLMAP @ v.rotation @ rotation.T) - 1) / 2
-               for v, m in zip(views, matrices, strict=True)]
+    cosines = [
+        (np.trace(m[:3, :3] @ BLENDER_TO_COLMAP @ v.rotation @ rotation.T) - 1) / 2
+        for v, m in zip(views, matrices, strict=True)
+    ]
     turned = [np.degrees(np.arccos(np.clip(cosine, -1, 1))) for cosine in cosines]
     off = place_truth(capture, truth)[1]
     up = rotation @ [0, 0, 1]
     forward = rotation @ [0, -1, 0]
     return {
-        "frames": len(true), "registered": len(views), "centre_error_median_percent": 100 * np.median(errors),
+        "frames": len(true),
+        "registered": len(views),
+        "centre_error_median_percent": 100 * np.median(errors),
         "centre_error_max_percent": 100 * errors.max(),
         "rotation_error_median_deg": np.median(turned),
         "focal_px": views[0].camera.mean_focal_length() * record["width"] / views[0].width,
-        "true_focal_px": record["focal_px"], "true_units_per_metre": scale, "face_off_px_mean": off.mean(),
+        "true_focal_px": record["focal_px"],
+        "true_units_per_metre": scale,
+        "face_off_px_mean": off.mean(),
         "face_off_px_max": off.max(),
         "up_tilt_deg": np.degrees(np.arccos(np.clip(up[2], -1, 1))),
         "facing_off_deg": np.degrees(np.arctan2(forward[0], -forward[1])),
@@ -60,10 +75,13 @@ def place_truth(capture: Capture, truth: Path) -> tuple[tuple[float, np.ndarray,
     """scale, rotation [3, 3], translation [3] that take the truth's world, metres, to the capture's so that points of
     the face lie where they were filmed, and by how many pixels they miss that in each frame [V]."""
     record = json.loads((truth / "cameras.json").read_text(encoding="utf-8"))
-    views, matrices = _paired(capture,
-                              {camera["frame"]: np.array(camera["matrix_world"]) for camera in record["cameras"]})
-    local = np.einsum("vij,vnj->vni", matrices[:, :3, :3].transpose(0, 2, 1),
-                      FACE - matrices[:, None, :3, 3]) @ BLENDER_TO_COLMAP
+    views, matrices = _paired(
+        capture, {camera["frame"]: np.array(camera["matrix_world"]) for camera in record["cameras"]}
+    )
+    local = (
+        np.einsum("vij,vnj->vni", matrices[:, :3, :3].transpose(0, 2, 1), FACE - matrices[:, None, :3, 3])
+        @ BLENDER_TO_COLMAP
+    )
     aims = record["focal_px"] * local[..., :2] / local[..., 2:] + np.array([record["width"], record["height"]]) / 2
     aims = aims * (np.array([view.width for view in views]) / record["width"])[:, None, None]
     scale, rotation, translation = similarity(matrices[:, :3, 3], np.array([view.centre for view in views]))

@@ -72,16 +72,21 @@ def run_closeups(module: str, description: str, shots: Shots, resolution: int, s
     from .gallery import write_small
     from .people import PEOPLE
 
-    captures = [prepare(asked.folder, person.name, person.seed) for person in PEOPLE
-                if person.name in (asked.only or [person.name])]
+    captures = [
+        prepare(asked.folder, person.name, person.seed)
+        for person in PEOPLE
+        if person.name in (asked.only or [person.name])
+    ]
     rows = []
     # each in a process of its own: what EEVEE has compiled for one head, it does not give back
     for capture in captures:
         words = [str(capture), str(asked.resolution), str(asked.samples)]
-        subprocess.run([sys.executable, "-m", "benchmarks.closeups", f"benchmarks.{module}", *words], cwd=ROOT,
-                       check=True)
-        rows.append(np.concatenate([images.read_srgb(capture / "renders" / f"{name}.png")
-                                    for name in shots(capture.stem)], 1))
+        subprocess.run(
+            [sys.executable, "-m", "benchmarks.closeups", f"benchmarks.{module}", *words], cwd=ROOT, check=True
+        )
+        rows.append(
+            np.concatenate([images.read_srgb(capture / "renders" / f"{name}.png") for name in shots(capture.stem)], 1)
+        )
     write_small(asked.out, np.concatenate(rows))
 
 
@@ -108,8 +113,11 @@ def prepare(folder: Path, name: str, seed: int) -> Path:
         images.write_linear(capture.maps / "diffuse_albedo.exr", skin.diffuse)
         images.write_linear(capture.maps / "shading.exr", np.ones_like(skin.diffuse))
         images.write_data(capture.maps / "confidence.png", 0.9 * template.mask("face", len(skin.diffuse)))
-        upscale.run(capture, from_json({"upscale": {"size": 2048, "method": "lanczos", "whole_head": False}}),
-                    Reporter("upscale"))
+        upscale.run(
+            capture,
+            from_json({"upscale": {"size": 2048, "method": "lanczos", "whole_head": False}}),
+            Reporter("upscale"),
+        )
     return capture.root
 
 

@@ -84,18 +84,24 @@ def main() -> None:
         subjects["scan"] = tuple(path.resolve() for path in asked.scan)
     found = {}
     with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
-        running = {pool.submit(compare_methods, *paths, folder / "comparison" / name, asked.size): name
-                   for name, paths in subjects.items()}
+        running = {
+            pool.submit(compare_methods, *paths, folder / "comparison" / name, asked.size): name
+            for name, paths in subjects.items()
+        }
         for future in as_completed(running):
             found[running[future]] = future.result()
             print(f"{running[future]} compared", flush=True)
     found = {"size": asked.size, "subjects": {name: found[name] for name in subjects}}
-    found |= {"people": means([rows for name, rows in found["subjects"].items()
-                               if name != "scan"])} if set(found["subjects"]) - {"scan"} else {}
+    found |= (
+        {"people": means([rows for name, rows in found["subjects"].items() if name != "scan"])}
+        if set(found["subjects"]) - {"scan"}
+        else {}
+    )
     found |= {"scan": means([found["subjects"]["scan"]])} if "scan" in subjects else {}
     if asked.json:
-        figures.write_record(asked.json, "comparison", "python -m benchmarks.comparison FOLDER --scan CAPTURE TRUTH",
-                             found)
+        figures.write_record(
+            asked.json, "comparison", "python -m benchmarks.comparison FOLDER --scan CAPTURE TRUTH", found
+        )
     print(f"{table(found)}\n\n{paired_table(found['subjects'])}")
 
 
@@ -116,9 +122,13 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
     torch.set_num_threads(1)
     found: dict[str, dict] = {given: {} for given in INPUTS}
     for given in INPUTS:
-        settings = from_json({"solve": {"skin_tone": skin_tone(truth), "size": size},
-                              "delight": {"delighter": "none"} if given == "raw" else {}},
-                             preset("standard"))
+        settings = from_json(
+            {
+                "solve": {"skin_tone": skin_tone(truth), "size": size},
+                "delight": {"delighter": "none"} if given == "raw" else {},
+            },
+            preset("standard"),
+        )
         capture = Capture(source) if given == "delit" else _raw(Capture(source), work / "raw.wildcap", settings)
         seen = None
         for method in METHODS:
@@ -145,8 +155,9 @@ def find_row_folder(work: Path, input_name: str, method: str, seed: int = 0) -> 
     return work / f"{input_name}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
 
 
-def solve_by_method(capture: Capture, settings: Settings, method: str,
-                    seed: int) -> tuple[np.ndarray, np.ndarray, float]:
+def solve_by_method(
+    capture: Capture, settings: Settings, method: str, seed: int
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Solves a capture by one method.
 
     Parameters
@@ -168,9 +179,14 @@ def solve_by_method(capture: Capture, settings: Settings, method: str,
     prior = _prior()
     cell = evidence.cell_side(settings.solve.grid_cells)
     tone = read_given_tone(settings.solve.skin_tone)
-    start = initial.start_solve(prior, evidence, tone, cell, recipe_of(settings, prior),
-                                callbacks=initial.Callbacks(
-                                    lambda marks: confirm_marks(capture, head, marks, evidence.size)))
+    start = initial.start_solve(
+        prior,
+        evidence,
+        tone,
+        cell,
+        recipe_of(settings, prior),
+        callbacks=initial.Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size)),
+    )
     fit, recipe = {}, start.recipe
     if method in LIGHTS:
         start, recipe, move = LIGHTS[method](start, recipe)
@@ -190,8 +206,9 @@ def _by_hand(capture: Capture, evidence: Evidence, settings: Settings, method: s
     texture = np.maximum(images.resize(images.read_linear(capture.texture), size, size), 0)
     shading = np.ones_like(texture)
     if method != "texture":
-        blurred, share = (cv2.GaussianBlur(a, (0, 0), BLUR * len(texture))
-                          for a in (texture * weight, np.repeat(weight, 3, 2)))
+        blurred, share = (
+            cv2.GaussianBlur(a, (0, 0), BLUR * len(texture)) for a in (texture * weight, np.repeat(weight, 3, 2))
+        )
         shading = np.maximum(blurred / np.maximum(share, 1e-3), 1e-3)
     skin = weight * evidence.skin.numpy()[..., None]
     tone = np.array(read_given_tone(settings.solve.skin_tone).linear, np.float32)
@@ -213,8 +230,18 @@ def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
     copy = Capture(folder)
     if not copy.shadow_mask_auto.is_file():
         shutil.rmtree(folder, ignore_errors=True)
-        later = shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "delivery", "delit", "lock",
-                                       "shadow_mask*", "mask_history", "texture*")
+        later = shutil.ignore_patterns(
+            "maps*",
+            "preview",
+            "checkpoints",
+            "renders",
+            "delivery",
+            "delit",
+            "lock",
+            "shadow_mask*",
+            "mask_history",
+            "texture*",
+        )
         shutil.copytree(source.root, folder, ignore=later)
         run_stages(copy, settings, "delight", "texture", "shadow_mask")
     return copy

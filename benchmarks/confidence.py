@@ -42,9 +42,13 @@ COMMAND = "python -m benchmarks.confidence FOLDER --json docs/figures/confidence
 DEVIATIONS = "WHOLE_FACE", "VARIED", "UNLIKE_SKIN", "WEAKLY_LIT"
 SHIPPED, LEFT_OUT, BLURRED = "as shipped", "left out", "the error itself, blurred"
 BLUR_TEXELS = 15.0
-COLUMNS = {"gained": Column("nats gained", 3), "coverage": Column("within one sigma", 3, 0),
-           "coverage_absolute": Column("within one sigma, as it is", 3, 0), "spearman": Column("Spearman", 2),
-           "half": Column("error of the surer half", 2, -1)}
+COLUMNS = {
+    "gained": Column("nats gained", 3),
+    "coverage": Column("within one sigma", 3, 0),
+    "coverage_absolute": Column("within one sigma, as it is", 3, 0),
+    "spearman": Column("Spearman", 2),
+    "half": Column("error of the surer half", 2, -1),
+}
 FEW = 4000
 """Texels of a capture that the fit takes: neighbours know nothing new."""
 
@@ -65,8 +69,11 @@ def main() -> int:
     add_captures(parser)
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
-    captures = {filmed.name: read_errors(filmed) for filmed in captures_asked(parser, asked)
-                if filmed.answer(SOLVED) is not None}
+    captures = {
+        filmed.name: read_errors(filmed)
+        for filmed in captures_asked(parser, asked)
+        if filmed.answer(SOLVED) is not None
+    }
     record = measure(captures)
     print("\n\n".join(body for _, body in sections(record)))
     if asked.json:
@@ -83,16 +90,20 @@ def read_errors(filmed: Filmed) -> Errors:
     blurred = np.sqrt(cv2.GaussianBlur(error**2, (0, 0), BLUR_TEXELS) / np.maximum(near, 1e-3))
     evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
     print(f"{filmed.name}: read", file=sys.stderr, flush=True)
-    return Errors(filmed.person, error[where], confidence.variances(evidence, solved)[where],
-                  np.maximum(blurred[where], 1e-3))
+    return Errors(
+        filmed.person, error[where], confidence.variances(evidence, solved)[where], np.maximum(blurred[where], 1e-3)
+    )
 
 
 def measure(captures: dict[str, Errors]) -> dict:
     """The table's scores, the captures' rows, and the deviations that all of them make most likely."""
     shipped = np.array([getattr(confidence, name) for name in DEVIATIONS])
     people = sorted({each.person for each in captures.values()})
-    others = {person: fit_deviations(each for each in captures.values() if each.person != person)
-              for person in people} if len(people) > 1 else {}
+    others = (
+        {person: fit_deviations(each for each in captures.values() if each.person != person) for person in people}
+        if len(people) > 1
+        else {}
+    )
     scores: Scores = {}
     rows: dict[str, dict[str, list[dict]]] = {}
     by_capture = {}
@@ -106,12 +117,19 @@ def measure(captures: dict[str, Errors]) -> dict:
             if method == SHIPPED:
                 by_capture[name] = judged
     for method, of_people in rows.items():
-        scores[method] = {person: {measure: float(np.mean([row[measure] for row in found])) for measure in COLUMNS}
-                          for person, found in of_people.items()}
+        scores[method] = {
+            person: {measure: float(np.mean([row[measure] for row in found])) for measure in COLUMNS}
+            for person, found in of_people.items()
+        }
     fitted = fit_deviations(captures.values())
-    return {**to_record(summarise(scores, COLUMNS), scores), "captures": by_capture,
-            "deviations": {name: {"shipped": value, "most likely": round(float(found), 4)}
-                           for name, value, found in zip(DEVIATIONS, shipped, fitted, strict=True)}}
+    return {
+        **to_record(summarise(scores, COLUMNS), scores),
+        "captures": by_capture,
+        "deviations": {
+            name: {"shipped": value, "most likely": round(float(found), 4)}
+            for name, value, found in zip(DEVIATIONS, shipped, fitted, strict=True)
+        },
+    }
 
 
 def fit_deviations(captures: Iterable[Errors]) -> np.ndarray:
@@ -125,8 +143,10 @@ def fit_deviations(captures: Iterable[Errors]) -> np.ndarray:
 
     def unlikely(log: np.ndarray) -> float:
         weights = np.exp(2 * np.concatenate([[0], log]))
-        each = [(np.log(np.mean(squared / (parts @ weights))) + np.mean(np.log(parts @ weights))) / 2
-                for squared, parts in chosen]
+        each = [
+            (np.log(np.mean(squared / (parts @ weights))) + np.mean(np.log(parts @ weights))) / 2
+            for squared, parts in chosen
+        ]
         return float(np.mean(each))
 
     found = minimize(unlikely, np.zeros(3), method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-7}).x
@@ -141,9 +161,14 @@ def judge(error: np.ndarray, sigma: np.ndarray) -> dict[str, float]:
     sigma over that of the other."""
     found = calibrate(error, sigma * np.sqrt(np.mean((error / sigma) ** 2)))
     size, order = np.abs(error), np.argsort(sigma, kind="stable")
-    sure, rest = order[:len(order) // 2], order[len(order) // 2:]
-    return {"gained": found.gained, "coverage": found.coverage, "coverage_absolute": float(np.mean(size <= sigma)),
-            "spearman": float(spearmanr(sigma, size)[0]), "half": float(size[sure].mean() / size[rest].mean())}
+    sure, rest = order[: len(order) // 2], order[len(order) // 2 :]
+    return {
+        "gained": found.gained,
+        "coverage": found.coverage,
+        "coverage_absolute": float(np.mean(size <= sigma)),
+        "spearman": float(spearmanr(sigma, size)[0]),
+        "half": float(size[sure].mean() / size[rest].mean()),
+    }
 
 
 def sections(record: dict) -> Sections:
@@ -161,15 +186,29 @@ def sections(record: dict) -> Sections:
         to know for more.
         """)
     names = ["", *(f"`{name}`" for name in record["deviations"])]
-    rows = [[which, *(f"{values[which]:.3f}" for values in record["deviations"].values())]
-            for which in ("shipped", "most likely")]
-    return [("", words), ("All people", format_table(found, COLUMNS, "sigma")),
-            ("Capture by capture, as shipped", figures.markdown(
+    rows = [
+        [which, *(f"{values[which]:.3f}" for values in record["deviations"].values())]
+        for which in ("shipped", "most likely")
+    ]
+    return [
+        ("", words),
+        ("All people", format_table(found, COLUMNS, "sigma")),
+        (
+            "Capture by capture, as shipped",
+            figures.markdown(
                 ["capture", *(column.label for column in COLUMNS.values())],
-                [[name, *(f"{row[key]:.{column.digits}f}" for key, column in COLUMNS.items())]
-                 for name, row in record["captures"].items()])),
-            ("The deviations", "In natural log (`core/solve/confidence.py`), and what all these captures make most "
-                               "likely.\n\n" + figures.markdown(names, rows))]
+                [
+                    [name, *(f"{row[key]:.{column.digits}f}" for key, column in COLUMNS.items())]
+                    for name, row in record["captures"].items()
+                ],
+            ),
+        ),
+        (
+            "The deviations",
+            "In natural log (`core/solve/confidence.py`), and what all these captures make most "
+            "likely.\n\n" + figures.markdown(names, rows),
+        ),
+    ]
 
 
 if __name__ == "__main__":

@@ -45,11 +45,22 @@ from .people import PEOPLE, skin_tone
 from .texture import looks_of, score
 
 COMMAND = "python -m benchmarks.controlled FOLDER"
-GAP = {"wild_texture": "in the wild, texture", "wild": "in the wild, solved", "flash_texture": "flash, texture",
-       "flash": "flash, solved", "limit": "true frames, texture"}
+GAP = {
+    "wild_texture": "in the wild, texture",
+    "wild": "in the wild, solved",
+    "flash_texture": "flash, texture",
+    "flash": "flash, solved",
+    "limit": "true frames, texture",
+}
 STUDIO = {"studio_texture": "studio, texture", "studio": "studio, solved"}
-COLUMNS = {"psnr": ("PSNR", 2), "psnr_after_gain": ("after one gain", 2), "ssim_after_gain": ("SSIM", 3),
-           "flip_after_gain": ("FLIP", 3), "detail": ("detail", 2), "mole_contrast": ("mole contrast", 2)}
+COLUMNS = {
+    "psnr": ("PSNR", 2),
+    "psnr_after_gain": ("after one gain", 2),
+    "ssim_after_gain": ("SSIM", 3),
+    "flip_after_gain": ("FLIP", 3),
+    "detail": ("detail", 2),
+    "mole_contrast": ("mole contrast", 2),
+}
 
 
 def main() -> int:
@@ -57,8 +68,9 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--pictures", type=Path,
-                        help="folder for NAME.jpg: frontal cut of the maps wild, flash, studio, and the truth")
+    parser.add_argument(
+        "--pictures", type=Path, help="folder for NAME.jpg: frontal cut of the maps wild, flash, studio, and the truth"
+    )
     asked = parser.parse_args()
     folder = asked.folder.resolve()
     if not folder.is_dir():
@@ -68,8 +80,11 @@ def main() -> int:
         parser.error(f"{folder} holds no capture of benchmarks/people.py.")
     for name in found if asked.pictures else ():
         images.write_srgb(asked.pictures / f"{name}.jpg", side_by_side(folder, name))
-    known = (figures.read_record(asked.json.stem, asked.json.parent)["figures"]["people"]
-             if asked.json and asked.json.exists() else {})
+    known = (
+        figures.read_record(asked.json.stem, asked.json.parent)["figures"]["people"]
+        if asked.json and asked.json.exists()
+        else {}
+    )
     everyone = figures.merged(known, found)
     people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
     summary = {"people": people, "mean": means(people)}
@@ -85,25 +100,37 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
     if not (truth / "skin_tone.txt").is_file():
         return {}
     settings = from_json({"solve": {"skin_tone": skin_tone(truth)}}, preset("standard"))
-    sets = {"wild": Capture(kept / "limit.wildcap"), "flash": Capture(kept / "flash.wildcap"),
-            "studio": Capture(kept / "studio.wildcap")}
+    sets = {
+        "wild": Capture(kept / "limit.wildcap"),
+        "flash": Capture(kept / "flash.wildcap"),
+        "studio": Capture(kept / "studio.wildcap"),
+    }
     makers: dict[str, tuple[str, Callable[[], tuple[np.ndarray, dict]]]] = {
         "wild_texture": ("solved", lambda: (as_albedo(wild, settings), {})),
         "wild": ("solved", lambda: (images.read_srgb(wild.maps / "diffuse_albedo.png"), {})),
-        "flash_texture": ("flash",
-                          lambda: (as_albedo(flash(_set(folder, name, "flash"), sets["flash"], settings), settings),
-                                   {})),
-        "flash": ("flash",
-                  lambda: under_even_light(flash(_set(folder, name, "flash"), sets["flash"], settings), settings)),
-        "studio_texture": ("studio",
-                           lambda: (as_albedo(studio(_set(folder, name, "studio"), sets["studio"], settings), settings),
-                                    {})),
-        "studio": ("studio",
-                   lambda: by_the_stage(studio(_set(folder, name, "studio"), sets["studio"], settings), settings)),
+        "flash_texture": (
+            "flash",
+            lambda: (as_albedo(flash(_set(folder, name, "flash"), sets["flash"], settings), settings), {}),
+        ),
+        "flash": (
+            "flash",
+            lambda: under_even_light(flash(_set(folder, name, "flash"), sets["flash"], settings), settings),
+        ),
+        "studio_texture": (
+            "studio",
+            lambda: (as_albedo(studio(_set(folder, name, "studio"), sets["studio"], settings), settings), {}),
+        ),
+        "studio": (
+            "studio",
+            lambda: by_the_stage(studio(_set(folder, name, "studio"), sets["studio"], settings), settings),
+        ),
         "limit": ("wild", lambda: (as_albedo(use_true_frames(wild, truth, sets["wild"], settings), settings), {})),
     }
-    there = {"wild": True, "solved": (wild.maps / "diffuse_albedo.png").is_file(),
-             **{place: (folder / f"{name}_{place}" / "skin_tone.txt").is_file() for place in ("flash", "studio")}}
+    there = {
+        "wild": True,
+        "solved": (wild.maps / "diffuse_albedo.png").is_file(),
+        **{place: (folder / f"{name}_{place}" / "skin_tone.txt").is_file() for place in ("flash", "studio")},
+    }
     for place in (place for place, is_there in there.items() if not is_there):
         print(f"{name}: {place} is not there and is left out.", file=sys.stderr, flush=True)
     rows = {}
@@ -123,10 +150,12 @@ def side_by_side(folder: Path, name: str, size: int = 512) -> np.ndarray:
     """The front of the face in the maps wild, flash, studio and the true one, sRGB; those that are missing are left
     out."""
     kept = folder / "controlled" / name
-    paths = [*(kept / f"{row}.png" for row in ("wild", "flash", "studio")),
-             folder / name / "maps" / "diffuse_albedo.png"]
+    paths = [
+        *(kept / f"{row}.png" for row in ("wild", "flash", "studio")),
+        folder / name / "maps" / "diffuse_albedo.png",
+    ]
     rows, columns = (np.flatnonzero(template.mask("face", size).max(axis) > 0.5) for axis in (1, 0))
-    box = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1]
+    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     return np.hstack([images.resize(images.read_srgb(path), size, size)[box] for path in paths if path.is_file()])
 
 
@@ -135,9 +164,15 @@ def means(rows_of_people: dict[str, dict]) -> dict[str, dict]:
     out = {}
     for table_rows in (GAP, STUDIO):
         people = whole(rows_of_people, table_rows)
-        out |= {row: {figure: round(float(np.mean([rows[row][figure] for rows in people])), 4)
-                      for figure in people[0][row]
-                      if all(rows[row].get(figure) is not None for rows in people)} for row in table_rows if people}
+        out |= {
+            row: {
+                figure: round(float(np.mean([rows[row][figure] for rows in people])), 4)
+                for figure in people[0][row]
+                if all(rows[row].get(figure) is not None for rows in people)
+            }
+            for row in table_rows
+            if people
+        }
     return out
 
 
@@ -152,24 +187,69 @@ def table(record: dict) -> str:
     parts = []
     for rows in (GAP, STUDIO):
         head = [f"mean of {len(whole(record['people'], rows))} people", *(label for label, _ in COLUMNS.values())]
-        parts.append((head, [[label, *(figures.number(mean[row].get(figure), digits)
-                                       for figure, (_, digits) in COLUMNS.items())]
-                             for row, label in rows.items() if row in mean]))
+        parts.append(
+            (
+                head,
+                [
+                    [label, *(figures.number(mean[row].get(figure), digits) for figure, (_, digits) in COLUMNS.items())]
+                    for row, label in rows.items()
+                    if row in mean
+                ],
+            )
+        )
     three = ("wild", "flash", "limit")
-    head = ["dB after one gain", "in the wild", "flash", "true frames", "gap to flash", "moles, in the wild",
-            "moles, flash", "moles, true frames"]
-    parts.append((head, [[name.replace("_", " "), *(figures.number(rows[row]["psnr_after_gain"], 2) for row in three),
-                          f"{rows['flash']['psnr_after_gain'] - rows['wild']['psnr_after_gain']:+.2f}",
-                          *(figures.number(rows[row].get("mole_contrast"), 2) for row in three)]
-                         for name, rows in everyone.items() if {*three} <= {*rows}]))
-    head = ["dB after one gain", "texture", "solved", "the solve adds", "detail, texture", "detail, solved",
-            "proposed mask, % of the face", "seconds"]
-    parts.append((head, [[name.replace("_", " "), *(figures.number(rows[row]["psnr_after_gain"], 2) for row in STUDIO),
-                          f"{rows['studio']['psnr_after_gain'] - rows['studio_texture']['psnr_after_gain']:+.2f}",
-                          *(figures.number(rows[row]["detail"], 2) for row in STUDIO),
-                          figures.number(rows["studio"]["proposed_mask_percent"], 2),
-                          figures.number(rows["studio"]["seconds"], 0)] for name, rows in everyone.items()
-                         if {*STUDIO} <= {*rows}]))
+    head = [
+        "dB after one gain",
+        "in the wild",
+        "flash",
+        "true frames",
+        "gap to flash",
+        "moles, in the wild",
+        "moles, flash",
+        "moles, true frames",
+    ]
+    parts.append(
+        (
+            head,
+            [
+                [
+                    name.replace("_", " "),
+                    *(figures.number(rows[row]["psnr_after_gain"], 2) for row in three),
+                    f"{rows['flash']['psnr_after_gain'] - rows['wild']['psnr_after_gain']:+.2f}",
+                    *(figures.number(rows[row].get("mole_contrast"), 2) for row in three),
+                ]
+                for name, rows in everyone.items()
+                if {*three} <= {*rows}
+            ],
+        )
+    )
+    head = [
+        "dB after one gain",
+        "texture",
+        "solved",
+        "the solve adds",
+        "detail, texture",
+        "detail, solved",
+        "proposed mask, % of the face",
+        "seconds",
+    ]
+    parts.append(
+        (
+            head,
+            [
+                [
+                    name.replace("_", " "),
+                    *(figures.number(rows[row]["psnr_after_gain"], 2) for row in STUDIO),
+                    f"{rows['studio']['psnr_after_gain'] - rows['studio_texture']['psnr_after_gain']:+.2f}",
+                    *(figures.number(rows[row]["detail"], 2) for row in STUDIO),
+                    figures.number(rows["studio"]["proposed_mask_percent"], 2),
+                    figures.number(rows["studio"]["seconds"], 0),
+                ]
+                for name, rows in everyone.items()
+                if {*STUDIO} <= {*rows}
+            ],
+        )
+    )
     return "\n\n".join(figures.markdown(head, lines) for head, lines in parts if lines)
 
 
@@ -178,8 +258,10 @@ def _set(folder: Path, name: str, place: str) -> Capture:
     scored."""
     capture = Capture(folder / f"{name}_{place}.wildcap")
     if capture.head.read_bytes() != (folder / f"{name}.wildcap" / "head.obj").read_bytes():
-        raise Problem(f"{capture.root} has another head than {name}.wildcap.",
-                      "Make both by the same version of benchmarks/people.py.")
+        raise Problem(
+            f"{capture.root} has another head than {name}.wildcap.",
+            "Make both by the same version of benchmarks/people.py.",
+        )
     return capture
 
 

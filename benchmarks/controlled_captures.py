@@ -51,8 +51,13 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     began, prior = time.monotonic(), _prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
-    start = initial.start_solve(prior, evidence, read_given_tone(settings.solve.skin_tone),
-                                evidence.cell_side(settings.solve.grid_cells), recipe)
+    start = initial.start_solve(
+        prior,
+        evidence,
+        read_given_tone(settings.solve.skin_tone),
+        evidence.cell_side(settings.solve.grid_cells),
+        recipe,
+    )
     sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(settings.seed))
     state = sampler.sample(start.observations, start.state)
     diffuse = maps.finish_maps(state, evidence, start).diffuse

@@ -57,20 +57,31 @@ QUICK = 4  # every n-th picture
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.delight", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, default=SHARED / "faceolat",
-                        help="photographs with their albedo, laid out like faceolat")
-    parser.add_argument("--sets", nargs="+", default=SETS,
-                        help=f"of {', '.join(SETS)}, or folders with capture.mp4, albedo and face")
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.delight", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--data", type=Path, default=SHARED / "faceolat", help="photographs with their albedo, laid out like faceolat"
+    )
+    parser.add_argument(
+        "--sets", nargs="+", default=SETS, help=f"of {', '.join(SETS)}, or folders with capture.mp4, albedo and face"
+    )
     parser.add_argument("--rows", nargs="+", help="only rows whose name begins with one of these")
-    parser.add_argument("--capture", action="append", default=[], metavar="NAME=FOLDER",
-                        help="a registered capture of that set")
-    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_delight",
-                        help="where captures are made and kept")
+    parser.add_argument(
+        "--capture", action="append", default=[], metavar="NAME=FOLDER", help="a registered capture of that set"
+    )
+    parser.add_argument(
+        "--work",
+        type=Path,
+        default=Path(tempfile.gettempdir()) / "wildcap_delight",
+        help="where captures are made and kept",
+    )
     parser.add_argument("--opendelight", default="", help="the authors' checkpoint")
-    parser.add_argument("--weights", type=Path,
-                        help="weights of our network, with their card beside them, instead of those that are shipped")
+    parser.add_argument(
+        "--weights",
+        type=Path,
+        help="weights of our network, with their card beside them, instead of those that are shipped",
+    )
     parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
     parser.add_argument("--json", type=Path, help="where the results go; what it holds of other sets and rows stays")
@@ -84,30 +95,48 @@ def main() -> None:
     if options.weights:
         importlib.import_module("core.delight.network").WEIGHTS = options.weights
     captures = dict(pair.split("=", 1) for pair in options.capture)
-    results = (figures.read_record(options.json.stem, options.json.parent)["figures"] if options.json
-               and options.json.is_file() else {})
+    results = (
+        figures.read_record(options.json.stem, options.json.parent)["figures"]
+        if options.json and options.json.is_file()
+        else {}
+    )
     for name in options.sets:
         title = Path(name).name
         with tempfile.TemporaryDirectory() as folder:
             try:
-                found = measure_rows(_set(name, options, captures, Path(folder)), settings, not options.quick,
-                                     options.rows, options.picture)
+                found = measure_rows(
+                    _set(name, options, captures, Path(folder)),
+                    settings,
+                    not options.quick,
+                    options.rows,
+                    options.picture,
+                )
             except Problem as problem:
                 found = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
         results[title] = {**results.get(title, {}), **found}
         if options.json:
             figures.write_record(options.json, "delight", "python -m benchmarks.delight [--data DIR]", results)
     print(table(results))
-    if any(row.startswith("network") and "figures" in found for rows_ in results.values()
-           for row, found in rows_.items()):
-        print("", "Where the network is no better than no delighting or the delighter shading:",
-              *(shortfalls(results) or ["nowhere."]), sep="\n")
+    if any(
+        row.startswith("network") and "figures" in found for rows_ in results.values() for row, found in rows_.items()
+    ):
+        print(
+            "",
+            "Where the network is no better than no delighting or the delighter shading:",
+            *(shortfalls(results) or ["nowhere."]),
+            sep="\n",
+        )
     if options.json is None:
         print(json.dumps(results, indent=1))
 
 
-def measure_rows(chosen: Photographs, settings: Settings, features: bool = True, only: list[str] | None = None,
-                 picture: Path | None = None) -> dict[str, dict]:
+def measure_rows(
+    chosen: Photographs,
+    settings: Settings,
+    features: bool = True,
+    only: list[str] | None = None,
+    picture: Path | None = None,
+) -> dict[str, dict]:
     """Scores each row's answers to a set of photographs. One that a delighter refuses counts as it is.
 
     Parameters
@@ -147,23 +176,36 @@ def measure_rows(chosen: Photographs, settings: Settings, features: bool = True,
         except Problem as problem:
             results[row] = {"not_run": f"{problem.problem} {problem.remedy}"}
             continue
-        results[row] = {"pictures": len(scores), "refused": len(refused), "figures": mean_of(scores),
-                        "seconds_per_picture": round(seconds / len(scores), 2),
-                        "groups": {group: {"pictures": len(found), "figures": mean_of(found)}
-                                   for group, found in groups.items()}}
+        results[row] = {
+            "pictures": len(scores),
+            "refused": len(refused),
+            "figures": mean_of(scores),
+            "seconds_per_picture": round(seconds / len(scores), 2),
+            "groups": {group: {"pictures": len(found), "figures": mean_of(found)} for group, found in groups.items()},
+        }
         shown.append([_shown(delit[p.name], p) for p in spread])
     print(file=sys.stderr)
     if picture:
-        write_small(picture, sheet([[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p), *delit]
-                                    for p, *delit in zip(spread, *shown, strict=True)]))
+        write_small(
+            picture,
+            sheet(
+                [
+                    [square(p.srgb, p.truth.face), _shown(p.truth.albedo, p), *delit]
+                    for p, *delit in zip(spread, *shown, strict=True)
+                ]
+            ),
+        )
     return results
 
 
 def rows(chosen: Photographs, settings: Settings) -> list[str]:
     """What there is to compare on a set."""
     on_captures = [name for name in delight.DELIGHTERS if name not in BROUGHT] if chosen.capture else []
-    single = [f"{name}, one photograph" for name in delight.PHOTOGRAPHERS if name != "none"
-              and (name != "opendelight" or settings.delight.checkpoint)]
+    single = [
+        f"{name}, one photograph"
+        for name in delight.PHOTOGRAPHERS
+        if name != "none" and (name != "opendelight" or settings.delight.checkpoint)
+    ]
     return ["none", FLAT, *on_captures, *single]
 
 
@@ -171,9 +213,12 @@ def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[t
     """Each photograph of a set with what a row takes for its albedo, sRGB [H, W, 3], or why it does not serve it."""
     if row in ("none", FLAT):
         for photograph in chosen.photographs:
-            yield (photograph,
-                   photograph.srgb if row == "none"
-                   else np.broadcast_to(flat_tone(photograph.truth), photograph.srgb.shape))
+            yield (
+                photograph,
+                photograph.srgb
+                if row == "none"
+                else np.broadcast_to(flat_tone(photograph.truth), photograph.srgb.shape),
+            )
     elif row.endswith(", one photograph"):
         for photograph in chosen.photographs:
             try:
@@ -187,9 +232,12 @@ def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[t
         for delit in delight.DELIGHTERS[row](chosen.capture, settings, Reporter("delight")):
             if (photograph := by_frame.get(delit.view.name)) is not None:
                 height, width = photograph.srgb.shape[:2]
-                yield (photograph,
-                       delit.image if delit.image.shape[:2] == (height, width)
-                       else images.resize(delit.image, width, height))
+                yield (
+                    photograph,
+                    delit.image
+                    if delit.image.shape[:2] == (height, width)
+                    else images.resize(delit.image, width, height),
+                )
 
 
 def _set(name: str, options: argparse.Namespace, captures: dict[str, str], work: Path) -> Photographs:
@@ -206,8 +254,9 @@ def _set(name: str, options: argparse.Namespace, captures: dict[str, str], work:
 def _shown(srgb: np.ndarray, photograph: Photograph) -> np.ndarray:
     """A delit picture as it is compared: after the gain per channel, the skin alone."""
     true = photograph.truth
-    return square(np.where(true.face[..., None], with_gain(np.asarray(srgb, np.float32), true.albedo, true.face), 0),
-                  true.face)
+    return square(
+        np.where(true.face[..., None], with_gain(np.asarray(srgb, np.float32), true.albedo, true.face), 0), true.face
+    )
 
 
 if __name__ == "__main__":

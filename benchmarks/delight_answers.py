@@ -40,16 +40,24 @@ from .eye_captures import EYES
 from .measures.references import TRUE
 from .state_captures import SIZE, Filmed, find
 
-COMMAND = ("python -m benchmarks.delight_answers FOLDER --sample .demo/sample.wildcap --eyes FOLDER "
-           "--json docs/figures/delight_answers.json")
+COMMAND = (
+    "python -m benchmarks.delight_answers FOLDER --sample .demo/sample.wildcap --eyes FOLDER "
+    "--json docs/figures/delight_answers.json"
+)
 SHARES, DOUBTS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0), (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
 SAMPLE = figures.ROOT / "core" / "synthetic" / "sample"
 GRID = tuple(Weighing(share, doubt) for share, doubt in product(SHARES, DOUBTS))
 BARE = 0.5  # share of bare skin in a cell from which it counts, as in second_opinion.weigh_in
 DARKEST = 2e-3
 HAIRED = 0.3  # density of hair from which a map of skin is no truth of what is seen there
-ROWS = {"filmed": "doing nothing", "alone": "each frame alone", "frames": "evened out", "fitted": "the fitted light",
-        "with_fitted": "evened out and fitted light", "together": "put together"}
+ROWS = {
+    "filmed": "doing nothing",
+    "alone": "each frame alone",
+    "frames": "evened out",
+    "fitted": "the fitted light",
+    "with_fitted": "evened out and fitted light",
+    "together": "put together",
+}
 """What is told apart, and its heading."""
 ANSWERS = ("true", "alone", "frames", "fitted", "together")
 
@@ -85,9 +93,11 @@ def main() -> int:
     work = asked.folder.resolve() / "answers"
     judged, known = {}, known_captures(asked)
     if len({person for _, person, _, _ in known}) < 2:
-        parser.error(f"The captures in {asked.folder} that have a texture and a known albedo show fewer than two "
-                     "people, and each person is judged by what the others choose. `python -m benchmarks.state FOLDER "
-                     "--run` makes textures; --sample and --eyes add people.")
+        parser.error(
+            f"The captures in {asked.folder} that have a texture and a known albedo show fewer than two "
+            "people, and each person is judged by what the others choose. `python -m benchmarks.state FOLDER "
+            "--run` makes textures; --sample and --eyes add people."
+        )
     for name, person, capture, truth in known:
         kept = work / f"{name}.npz"
         if not kept.is_file():
@@ -98,8 +108,9 @@ def main() -> int:
     rows, chosen = score(judged)
     print(table(rows), "", choices(chosen), sep="\n")
     if asked.json:
-        figures.write_record(asked.json, "delight_answers", COMMAND,
-                             {"rows": rows, "chosen": chosen, "over_people": over_people(rows)})
+        figures.write_record(
+            asked.json, "delight_answers", COMMAND, {"rows": rows, "chosen": chosen, "over_people": over_people(rows)}
+        )
     return 0
 
 
@@ -107,15 +118,26 @@ def known_captures(asked: argparse.Namespace) -> list[tuple[str, str, Capture, C
     """Name, person, capture, and what reads its true albedo, linear [S, S, 3], with where it is known, bool [SIZE,
     SIZE], both in the head's UVs."""
     folder = asked.folder.resolve()
-    filmed = [each for each in find(folder, (asked.truths or folder).resolve(), folder / "state")
-              if each.name.startswith(tuple(asked.only))]
+    filmed = [
+        each
+        for each in find(folder, (asked.truths or folder).resolve(), folder / "state")
+        if each.name.startswith(tuple(asked.only))
+    ]
     if asked.sample:
         filmed.append(Filmed("sample", "sample", Capture(asked.sample.resolve()), SAMPLE, folder / "state"))
-    captures = [(each.name, each.person, each.capture, lambda each=each: (each.answer(TRUE), each.where))
-                for each in filmed]
+    captures = [
+        (each.name, each.person, each.capture, lambda each=each: (each.answer(TRUE), each.where)) for each in filmed
+    ]
     if asked.eyes:
-        captures += [(str(seed), str(seed), Capture(asked.eyes.resolve() / f"{seed}.wildcap"),
-                      lambda seed=seed: _bare_truth(seed, asked.facekit)) for seed in EYES]
+        captures += [
+            (
+                str(seed),
+                str(seed),
+                Capture(asked.eyes.resolve() / f"{seed}.wildcap"),
+                lambda seed=seed: _bare_truth(seed, asked.facekit),
+            )
+            for seed in EYES
+        ]
     return captures
 
 
@@ -147,8 +169,9 @@ def keep_answers(path: Path, capture: Capture, albedo: np.ndarray, known: np.nda
     maps = np.concatenate([albedo, known[..., None]], -1).astype(np.float32)
     mesh, cells = answers.head.mesh, {key: [] for key in ANSWERS}
     evened = even_out(answers.head, answers.views, answers.looks)
-    for look, even, fitted, final, skin in zip(answers.looks, evened, answers.fitted, put_together(answers),
-                                               answers.skins, strict=True):
+    for look, even, fitted, final, skin in zip(
+        answers.looks, evened, answers.fitted, put_together(answers), answers.skins, strict=True
+    ):
         uv = interpolate(mesh.uvs, mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
         seen = sample(maps, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * SIZE).reshape(*look.face.shape, 4)
         where = (look.face >= 0) & (skin > BARE) & (seen[..., 3] > 0.99)
@@ -171,18 +194,25 @@ def weighed(light: np.ndarray, answer: np.ndarray, weighing: Weighing) -> np.nda
 
 def score(judged: dict[str, Judged]) -> tuple[dict, dict]:
     """The errors of each capture by ROWS, and what `choose` says of the answer that is weighed in."""
-    rows = {name: {"person": each.person, "filmed": each.error(0 * each.true),
-                   **{key: each.error(getattr(each, key)) for key in ANSWERS if key != "true"},
-                   "with_fitted": each.error(weighed(each.frames, each.fitted, FITTED))}
-            for name, each in judged.items()}
+    rows = {
+        name: {
+            "person": each.person,
+            "filmed": each.error(0 * each.true),
+            **{key: each.error(getattr(each, key)) for key in ANSWERS if key != "true"},
+            "with_fitted": each.error(weighed(each.frames, each.fitted, FITTED)),
+        }
+        for name, each in judged.items()
+    }
     return rows, {"fitted": choose(judged)}
 
 
 def choose(judged: dict[str, Judged]) -> dict:
     """Which Weighing of GRID is best for the fitted light beside the frames' own answers, over people, and with each
     person left out of the choice. People count alike, by ratios: their mean is the geometric one."""
-    errors = {weighing: {name: each.error(weighed(each.frames, each.fitted, weighing))
-                         for name, each in judged.items()} for weighing in {*GRID, FITTED}}
+    errors = {
+        weighing: {name: each.error(weighed(each.frames, each.fitted, weighing)) for name, each in judged.items()}
+        for weighing in {*GRID, FITTED}
+    }
     persons = sorted({each.person for each in judged.values()})
 
     def of_person(weighing: Weighing, person: str) -> float:
@@ -196,38 +226,65 @@ def choose(judged: dict[str, Judged]) -> dict:
 
     over_all, none = best(persons), Weighing(0.0, DOUBTS[0])
     left_out = [of_person(best([other for other in persons if other != person]), person) for person in persons]
-    return {"share": over_all.share, "doubt": over_all.doubt,
-            **{key: mean([of_person(weighing, person) for person in persons])
-               for key, weighing in (("best", over_all), ("shipped", FITTED), ("without", none))},
-            "left_out": mean(left_out),
-            "people_better": sum(out < of_person(none, person) for out, person in zip(left_out, persons, strict=True)),
-            "people": len(persons)}
+    return {
+        "share": over_all.share,
+        "doubt": over_all.doubt,
+        **{
+            key: mean([of_person(weighing, person) for person in persons])
+            for key, weighing in (("best", over_all), ("shipped", FITTED), ("without", none))
+        },
+        "left_out": mean(left_out),
+        "people_better": sum(out < of_person(none, person) for out, person in zip(left_out, persons, strict=True)),
+        "people": len(persons),
+    }
 
 
 def over_people(rows: dict[str, dict]) -> dict[str, float]:
     """The geometric mean over people of each error of ROWS; a person's is the mean of its captures."""
     persons = dict.fromkeys(row["person"] for row in rows.values())
-    of_person = {key: [np.mean([row[key] for row in rows.values() if row["person"] == person]) for person in persons]
-                 for key in ROWS}
+    of_person = {
+        key: [np.mean([row[key] for row in rows.values() if row["person"] == person]) for person in persons]
+        for key in ROWS
+    }
     return {key: float(np.exp(np.mean(np.log(errors)))) for key, errors in of_person.items()}
 
 
 def table(rows: dict[str, dict]) -> str:
     """The errors in Markdown, and their geometric mean over people."""
     means = over_people(rows)
-    return figures.markdown(["capture", *ROWS.values()],
-                            [*([name, *(f"{row[key]:.3f}" for key in ROWS)] for name, row in rows.items()),
-                             ["**over people**", *(f"{means[key]:.3f}" for key in ROWS)]])
+    return figures.markdown(
+        ["capture", *ROWS.values()],
+        [
+            *([name, *(f"{row[key]:.3f}" for key in ROWS)] for name, row in rows.items()),
+            ["**over people**", *(f"{means[key]:.3f}" for key in ROWS)],
+        ],
+    )
 
 
 def choices(chosen: dict[str, dict]) -> str:
     """What was chosen, in Markdown."""
     return figures.markdown(
-        ["answer", "best share", "best doubt", "without it", "as shipped", "best", "chosen by the others",
-         "people who gain"],
-        [[ROWS[name], f"{row['share']:.1f}", f"{row['doubt']:.2f}",
-          *(f"{row[key]:.4f}" for key in ("without", "shipped", "best", "left_out")),
-          f"{row['people_better']} of {row['people']}"] for name, row in chosen.items()])
+        [
+            "answer",
+            "best share",
+            "best doubt",
+            "without it",
+            "as shipped",
+            "best",
+            "chosen by the others",
+            "people who gain",
+        ],
+        [
+            [
+                ROWS[name],
+                f"{row['share']:.1f}",
+                f"{row['doubt']:.2f}",
+                *(f"{row[key]:.4f}" for key in ("without", "shipped", "best", "left_out")),
+                f"{row['people_better']} of {row['people']}",
+            ]
+            for name, row in chosen.items()
+        ],
+    )
 
 
 if __name__ == "__main__":

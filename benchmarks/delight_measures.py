@@ -32,8 +32,9 @@ TONES = (("very light", 55), ("light", 41), ("intermediate", 28), ("tan", 10), (
 and Bernerd 2013)."""
 
 
-def score_picture(predicted: np.ndarray, photograph: np.ndarray, true: AlbedoTruth,
-                  features: bool = True) -> dict[str, float]:
+def score_picture(
+    predicted: np.ndarray, photograph: np.ndarray, true: AlbedoTruth, features: bool = True
+) -> dict[str, float]:
     """Scores one delit picture over the facial skin of its truth.
 
     Parameters
@@ -55,10 +56,15 @@ def score_picture(predicted: np.ndarray, photograph: np.ndarray, true: AlbedoTru
     log, log_true = log_green(predicted), log_green(albedo)
     step = math.nan
     if true.shadow is not None:
-        step = shadow_step(log - log_true, mask & stepping(log_green(photograph) - log_true, mask, true.shadow[box]),
-                           true.shadow[box])
-    return {**found, "features": float(distance[mask].mean()) if distance is not None else math.nan,
-            "detail": detail(log, log_true, mask), "shadow_step": step}
+        step = shadow_step(
+            log - log_true, mask & stepping(log_green(photograph) - log_true, mask, true.shadow[box]), true.shadow[box]
+        )
+    return {
+        **found,
+        "features": float(distance[mask].mean()) if distance is not None else math.nan,
+        "detail": detail(log, log_true, mask),
+        "shadow_step": step,
+    }
 
 
 def stepping(log_shading: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> np.ndarray:
@@ -86,8 +92,10 @@ def tone_group(srgb: np.ndarray) -> str:
 
 def mean_of(scores: list[dict[str, float]]) -> dict[str, float | None]:
     """The mean of each figure over the pictures that have it."""
-    return {name: float(np.mean(known)) if (known := [s[name] for s in scores if not math.isnan(s[name])]) else None
-            for name in FIGURES}
+    return {
+        name: float(np.mean(known)) if (known := [s[name] for s in scores if not math.isnan(s[name])]) else None
+        for name in FIGURES
+    }
 
 
 def table(results: dict[str, dict]) -> str:
@@ -95,13 +103,23 @@ def table(results: dict[str, dict]) -> str:
     or skin tone) of several."""
     lines = []
     for name, rows in results.items():
-        lines += [_line(name, row, found) if "figures" in found
-                  else [name, row, None, found["not_run"], *[""] * (len(FIGURES) - 1)] for row, found in rows.items()]
+        lines += [
+            _line(name, row, found)
+            if "figures" in found
+            else [name, row, None, found["not_run"], *[""] * (len(FIGURES) - 1)]
+            for row, found in rows.items()
+        ]
         groups = list(dict.fromkeys(group for found in rows.values() for group in found.get("groups", {})))
-        lines += [_line(f"{name}: {group}", row, found["groups"][group])
-                  for group in groups if len(groups) > 1 for row, found in rows.items() if "figures" in found]
-    return markdown(["set", "delighter", "pictures", "PSNR", "SSIM", "FLIP", "features", "detail", "shadow step"],
-                    lines)
+        lines += [
+            _line(f"{name}: {group}", row, found["groups"][group])
+            for group in groups
+            if len(groups) > 1
+            for row, found in rows.items()
+            if "figures" in found
+        ]
+    return markdown(
+        ["set", "delighter", "pictures", "PSNR", "SSIM", "FLIP", "features", "detail", "shadow step"], lines
+    )
 
 
 def shortfalls(results: dict[str, dict], ours: str = "network") -> list[str]:
@@ -109,16 +127,21 @@ def shortfalls(results: dict[str, dict], ours: str = "network") -> list[str]:
     it; detail is not asked for."""
     found = []
     for name, rows in results.items():
-        done = {row: {"": result["figures"], **{group: part["figures"] for group, part in result["groups"].items()}}
-                for row, result in rows.items() if "figures" in result}
+        done = {
+            row: {"": result["figures"], **{group: part["figures"] for group, part in result["groups"].items()}}
+            for row, result in rows.items()
+            if "figures" in result
+        }
         for row in (row for row in done if row.startswith(ours)):
             for rival in (rival for rival in RIVALS if rival in done):
                 for group, figures in done[row].items():
-                    found += [f"{name}{group and ': ' + group}: {figure} {mine:.3f} of {row}, {theirs:.3f} of {rival}"
-                              for figure in FIGURES
-                              if figure != "detail"
-                              and None not in (mine := figures[figure], theirs := done[rival][group][figure])
-                              and not (mine > theirs if figure in HIGHER_IS_BETTER else abs(mine) < abs(theirs))]
+                    found += [
+                        f"{name}{group and ': ' + group}: {figure} {mine:.3f} of {row}, {theirs:.3f} of {rival}"
+                        for figure in FIGURES
+                        if figure != "detail"
+                        and None not in (mine := figures[figure], theirs := done[rival][group][figure])
+                        and not (mine > theirs if figure in HIGHER_IS_BETTER else abs(mine) < abs(theirs))
+                    ]
     return found
 
 
@@ -128,16 +151,24 @@ def square(srgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
     half = round(0.55 * max(rows[-1] - rows[0], columns[-1] - columns[0]))
     # of the padded picture, where the square begins
     top, left = (rows[0] + rows[-1]) // 2, (columns[0] + columns[-1]) // 2
-    return np.pad(srgb, ((half, half), (half, half), (0, 0)))[top:top + 2 * half, left:left + 2 * half]
+    return np.pad(srgb, ((half, half), (half, half), (0, 0)))[top : top + 2 * half, left : left + 2 * half]
 
 
 def sheet(photographs: list[list[np.ndarray]], side: int = 192) -> np.ndarray:
     """A row of square pictures for each photograph; sRGB [H, W, 3]."""
-    return np.vstack([np.hstack([images.resize(np.asarray(picture, np.float32), side, side) for picture in row])
-                      for row in photographs])
+    return np.vstack(
+        [
+            np.hstack([images.resize(np.asarray(picture, np.float32), side, side) for picture in row])
+            for row in photographs
+        ]
+    )
 
 
 def _line(name: str, row: str, found: dict) -> list:
     digits, figures = {"psnr": 2, "detail": 2, "shadow_step": 2}, found["figures"]
-    return [name, row, found["pictures"], *(None if figures[f] is None else f"{figures[f]:.{digits.get(f, 3)}f}"
-                                            for f in FIGURES)]
+    return [
+        name,
+        row,
+        found["pictures"],
+        *(None if figures[f] is None else f"{figures[f]:.{digits.get(f, 3)}f}" for f in FIGURES),
+    ]

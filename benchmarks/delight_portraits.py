@@ -54,8 +54,9 @@ def subjects_by_tone(count: int) -> dict[str, list[int]]:
     seed = FIRST_SEED
     while min(map(len, seeds.values())) < count:
         p = sample_parameters(seed)
-        skin = pigment.reflectance(np.float32([p.melanin]), np.float32([p.blood]), p.oxygen, p.scattering, p.slope,
-                                   p.chroma)
+        skin = pigment.reflectance(
+            np.float32([p.melanin]), np.float32([p.blood]), p.oxygen, p.scattering, p.slope, p.chroma
+        )
         angle = float(pigment.typology_angle(skin)[0])
         seeds[next(name for name, above in TONES if angle > above)].append(seed)
         seed += 1
@@ -69,10 +70,14 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
         stage, sight = portrait_parts(seed, SIZE)
         made = relight_sight(sight, stage, np.random.default_rng([seed, 41, light]))
         with replacing(path) as temporary:
-            np.savez_compressed(temporary,
-                                **{name: np.round(255 * np.clip(p, 0, 1)).astype(np.uint8) if name == "srgb"
-                                   else np.float16(p)
-                                   for name in PICTURES for p in [getattr(made, name)]})
+            np.savez_compressed(
+                temporary,
+                **{
+                    name: np.round(255 * np.clip(p, 0, 1)).astype(np.uint8) if name == "srgb" else np.float16(p)
+                    for name in PICTURES
+                    for p in [getattr(made, name)]
+                },
+            )
     stored = np.load(path)
     srgb, albedo, skin, shadow = (stored[name].astype(np.float32) for name in PICTURES)
     truth = AlbedoTruth(0, images.linear_to_srgb(albedo), skin > 0.5, shadow > 0.5)

@@ -53,14 +53,20 @@ def light_stage(folder: Path, every: int = 1) -> Photographs:
         name = f"{camera.parent.name}_{camera.name}"
         albedo, mask = (folder / kind / f"{name}.png" for kind in ("align_diffuse", "align_mask_face"))
         if not (albedo.is_file() and mask.is_file()):
-            raise Problem(f"{folder} lacks align_diffuse/{name}.png or align_mask_face/{name}.png.",
-                          "Add it, or leave that camera out.")
+            raise Problem(
+                f"{folder} lacks align_diffuse/{name}.png or align_mask_face/{name}.png.",
+                "Add it, or leave that camera out.",
+            )
         truth = AlbedoTruth(0, images.read_srgb(albedo), images.read_mask(mask) > 0.5, None)
-        found += [Photograph(f"{name}/{path.stem}", images.read_srgb(path), truth, camera.parent.name)
-                  for path in sorted(camera.glob("*.png"))[::every]]
+        found += [
+            Photograph(f"{name}/{path.stem}", images.read_srgb(path), truth, camera.parent.name)
+            for path in sorted(camera.glob("*.png"))[::every]
+        ]
     if not found:
-        raise Problem(f"{folder} holds no photographs with a known albedo.",
-                      "It needs align_image/PERSON/CAM/NNN.png, align_diffuse and align_mask_face.")
+        raise Problem(
+            f"{folder} holds no photographs with a known albedo.",
+            "It needs align_image/PERSON/CAM/NNN.png, align_diffuse and align_mask_face.",
+        )
     return Photographs(found)
 
 
@@ -87,8 +93,10 @@ def select_true_frames(truth: Path, capture: Capture, work: Path, every: int = 1
     registered = {view.name: view for view in read_views(copy)}
     having = [frame for frame in listed.records if frame.video_frame in known and frame.name in registered]
     if not having:
-        raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.",
-                      "Check that the two belong together.")
+        raise Problem(
+            f"No registered frame of {capture.root} has a true albedo in {truth}.",
+            "Check that the two belong together.",
+        )
     # the light is fitted to all, also where only some are scored
     chosen = tuple(replace(frame, selected=frame in having) for frame in listed.records)
     write_frames(copy.frames, replace(listed, records=chosen))
@@ -107,8 +115,16 @@ def registered(truth: Path, work: Path) -> Capture:
     next time."""
     capture = Capture(work / f"{truth.name}.wildcap")
     if not capture.head.is_file():
-        command = [sys.executable, "-m", "core", "run", str(truth / "capture.mp4"), str(capture.root), "--until",
-                   "registration"]
+        command = [
+            sys.executable,
+            "-m",
+            "core",
+            "run",
+            str(truth / "capture.mp4"),
+            str(capture.root),
+            "--until",
+            "registration",
+        ]
         if subprocess.run(command, stdout=sys.stderr, check=False).returncode != 0:
             raise Problem(f"{truth / 'capture.mp4'} could not be registered.", f"Look at {capture.report}.")
     return capture

@@ -36,13 +36,29 @@ def main() -> int:
     capture = Capture(arguments.folder.resolve() / "sample.wildcap")
     started = time.monotonic()
     tone = skin_tone(SAMPLE)
-    code = subprocess.call([sys.executable, "-m", "core", "run", str(SAMPLE / "capture.mp4"), str(capture.root),
-                            "--quality", arguments.quality, "--skin-tone", tone], cwd=figures.ROOT)
+    code = subprocess.call(
+        [
+            sys.executable,
+            "-m",
+            "core",
+            "run",
+            str(SAMPLE / "capture.mp4"),
+            str(capture.root),
+            "--quality",
+            arguments.quality,
+            "--skin-tone",
+            tone,
+        ],
+        cwd=figures.ROOT,
+    )
     if code:
         return code
     print("Rendering the head under three lights with Cycles ...", flush=True)
-    code = subprocess.call([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *LIGHTS],
-                           cwd=figures.ROOT, stdout=subprocess.DEVNULL)
+    code = subprocess.call(
+        [sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *LIGHTS],
+        cwd=figures.ROOT,
+        stdout=subprocess.DEVNULL,
+    )
     if code:  # Cycles fills standard output with its progress; what went wrong is on standard error
         return code
     rows = {"WildCap": albedo_score.score_capture(capture, SAMPLE), **albedo_score.score_floors(SAMPLE)}
@@ -54,8 +70,12 @@ def main() -> int:
     print(f"\nFinished after {(time.monotonic() - started) / 60:.1f} minutes.\nThe report: {capture.report}")
     if arguments.json:
         size = sum(path.stat().st_size for path in capture.root.rglob("*") if path.is_file())
-        figures.write_record(arguments.json, "demo", "make demo",
-                             {"views": rows["WildCap"]["views"], "rows": scores, "capture_gb": size / 1e9})
+        figures.write_record(
+            arguments.json,
+            "demo",
+            "make demo",
+            {"views": rows["WildCap"]["views"], "rows": scores, "capture_gb": size / 1e9},
+        )
     beaten = all(rows["WildCap"]["raw"]["psnr"] > rows[name]["raw"]["psnr"] for name in ("raw video", "flat true tone"))
     if not beaten:
         print("The result does not beat both floors.", file=sys.stderr)

@@ -59,9 +59,10 @@ def cast_face_rays(caster: raster.RayCaster, view: View, true: AlbedoTruth, marg
     """
     height, width = true.face.shape
     rows, columns = (np.flatnonzero(true.face.any(axis)) for axis in (1, 0))
-    box = tuple(slice(max(side[0] - margin, 0), min(side[-1] + margin, end))
-                for side, end in ((rows, height), (columns, width)))
-    y, x = np.mgrid[RAYS * box[0].start:RAYS * box[0].stop, RAYS * box[1].start:RAYS * box[1].stop]
+    box = tuple(
+        slice(max(side[0] - margin, 0), min(side[-1] + margin, end)) for side, end in ((rows, height), (columns, width))
+    )
+    y, x = np.mgrid[RAYS * box[0].start : RAYS * box[0].stop, RAYS * box[1].start : RAYS * box[1].stop]
     pixels = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) / RAYS * [view.width / width, view.height / height]
     face, bary, _ = caster.first_hits(np.repeat(view.centre[None], len(pixels), 0), view.rays(pixels))
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
@@ -69,14 +70,18 @@ def cast_face_rays(caster: raster.RayCaster, view: View, true: AlbedoTruth, marg
     hit = (face >= 0).reshape(x.shape)
     covers = np.maximum.reduce([template.mask(name, 512) for name in ("brows", "lips", "eyes", "nostrils")])
     bare = _shrunk(raster.sample(covers, at.reshape(-1, 2) * 512).reshape(x.shape) * hit) < 0.1
-    return FaceRays(AlbedoTruth(true.frame, true.albedo[box], true.face[box],
-                                None if true.shadow is None else true.shadow[box]), at, hit, bare)
+    return FaceRays(
+        AlbedoTruth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box]),
+        at,
+        hit,
+        bare,
+    )
 
 
 def centre_rays(rays: FaceRays, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The map sRGB [S, S, 3] by one ray per pixel, as albedo_score renders it: sRGB [h, w, 3] and the pixels that
     hit."""
-    at, hit = (x[RAYS // 2::RAYS, RAYS // 2::RAYS] for x in (rays.at, rays.hit))
+    at, hit = (x[RAYS // 2 :: RAYS, RAYS // 2 :: RAYS] for x in (rays.at, rays.hit))
     return raster.sample(texture, at.reshape(-1, 2) * len(texture)).reshape(*hit.shape, 3) * hit[..., None], hit
 
 
@@ -99,9 +104,12 @@ def marks(rays: FaceRays, texture: np.ndarray) -> dict | None:
     logs = [np.where(known, log, log[known].mean()).astype(np.float32) for log in logs]
     (pores, true_pores), (spots, true_spots) = ([_band(log, *sigmas) for log in logs] for sigmas in (PORE_PX, MOLE_PX))
     slopes = [_slope(spots, true_spots, y, x) for y, x in moles(true_spots, inner)]
-    return {"mole_contrast": float(np.mean(slopes)) if slopes else None, "moles": len(slopes),
-            "pore_contrast": float(pores[inner].std() / true_pores[inner].std()),
-            "pore_correlation": float(np.corrcoef(pores[inner], true_pores[inner])[0, 1])}
+    return {
+        "mole_contrast": float(np.mean(slopes)) if slopes else None,
+        "moles": len(slopes),
+        "pore_contrast": float(pores[inner].std() / true_pores[inner].std()),
+        "pore_correlation": float(np.corrcoef(pores[inner], true_pores[inner])[0, 1]),
+    }
 
 
 def moles(band: np.ndarray, inner: np.ndarray) -> list[tuple[int, int]]:
@@ -109,7 +117,7 @@ def moles(band: np.ndarray, inner: np.ndarray) -> list[tuple[int, int]]:
     lowest = (band <= cv2.erode(band, np.ones((7, 7)))) & inner & (band < -MOLE_DEPTH)
     smooth = cv2.GaussianBlur(band, (0, 0), 1)
     xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((2, 0), (0, 2), (1, 1)))
-    spread = np.sqrt((xx - yy) ** 2 / 4 + xy ** 2)
+    spread = np.sqrt((xx - yy) ** 2 / 4 + xy**2)
     mean = (xx + yy) / 2
     # the Hessian's eigenvalues are alike: no wrinkle, no hair
     round_ones = lowest & (mean - spread > 0.4 * (mean + spread))
@@ -136,5 +144,5 @@ def _band(log: np.ndarray, fine: float, coarse: float) -> np.ndarray:
 
 
 def _slope(rendered: np.ndarray, true: np.ndarray, y: int, x: int, reach: int = 5) -> float:
-    a, b = (band[y - reach:y + reach + 1, x - reach:x + reach + 1] for band in (rendered, true))
+    a, b = (band[y - reach : y + reach + 1, x - reach : x + reach + 1] for band in (rendered, true))
     return float((a * b).sum() / (b * b).sum())

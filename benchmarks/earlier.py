@@ -47,16 +47,24 @@ def main() -> int:
         parser.error(f"{checkout} holds no code of 0.1.0: that has core/capture.py.")
     folder = arguments.folder.resolve()
     truths = (arguments.truths or folder).resolve()
-    asked = [capture for capture in map(Capture, sorted(folder.glob("*.wildcap")))
-             if capture.root.stem.startswith(tuple(arguments.only)) and capture.head.is_file()
-             and (truths / capture.root.stem / "albedo").is_dir()]
+    asked = [
+        capture
+        for capture in map(Capture, sorted(folder.glob("*.wildcap")))
+        if capture.root.stem.startswith(tuple(arguments.only))
+        and capture.head.is_file()
+        and (truths / capture.root.stem / "albedo").is_dir()
+    ]
     if not asked:
         parser.error(f"{folder} holds no capture with a head and a truth.")
     failed = 0
     for capture in asked:
         name, copy = capture.root.stem, copy_inputs(capture, out / capture.root.name)
-        ended = subprocess.run([sys.executable, "-c", SOLVE, str(copy.root), str(truths / name)], cwd=checkout,
-                               env={**os.environ, "PYTHONPATH": str(checkout)}, check=False)
+        ended = subprocess.run(
+            [sys.executable, "-c", SOLVE, str(copy.root), str(truths / name)],
+            cwd=checkout,
+            env={**os.environ, "PYTHONPATH": str(checkout)},
+            check=False,
+        )
         failed += ended.returncode != 0
         print(f"{name}: {'not solved' if ended.returncode else 'solved'}", flush=True)
     return 1 if failed else 0

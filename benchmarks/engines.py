@@ -20,8 +20,11 @@ from . import figures
 
 FOUND = figures.ROOT / "dist" / "gui" / "engines.json"
 COMMAND = "python -m benchmarks.engines"
-SHOWN = {"surface": "no subsurface", "random_walk_skin": "WildCap Skin",
-         "random_walk": "the same, Random Walk, as in 0.1.0"}
+SHOWN = {
+    "surface": "no subsurface",
+    "random_walk_skin": "WildCap Skin",
+    "random_walk": "the same, Random Walk, as in 0.1.0",
+}
 
 
 def main() -> None:
@@ -39,10 +42,13 @@ def main() -> None:
 
 def table(ratios_of_lights: dict) -> str:
     """Rows: lights. Columns: EEVEE over Cycles in red, green and blue, linear."""
-    return figures.markdown(["light", *SHOWN.values()],
-                            [[light.replace("_", " "),
-                              *(", ".join(f"{ratio:.3f}" for ratio in ratios[what].values()) for what in SHOWN)]
-                             for light, ratios in ratios_of_lights.items()])
+    return figures.markdown(
+        ["light", *SHOWN.values()],
+        [
+            [light.replace("_", " "), *(", ".join(f"{ratio:.3f}" for ratio in ratios[what].values()) for what in SHOWN)]
+            for light, ratios in ratios_of_lights.items()
+        ],
+    )
 
 
 if __name__ == "__main__":

@@ -21,8 +21,14 @@ import numpy as np
 from . import figures
 from .render_capture import extension
 
-TONES = {"very light": (0.58, 0.40, 0.33), "light": (0.48, 0.31, 0.24), "intermediate": (0.38, 0.23, 0.16),
-         "tan": (0.29, 0.165, 0.105), "brown": (0.17, 0.085, 0.052), "dark": (0.075, 0.042, 0.029)}
+TONES = {
+    "very light": (0.58, 0.40, 0.33),
+    "light": (0.48, 0.31, 0.24),
+    "intermediate": (0.38, 0.23, 0.16),
+    "tan": (0.29, 0.165, 0.105),
+    "brown": (0.17, 0.085, 0.052),
+    "dark": (0.075, 0.042, 0.029),
+}
 """Linear albedo of skin of the six groups of ITA, rounded (benchmarks/skin_tone.py has the groups)."""
 WAYS = ("random walk", "random walk (skin)", "WildCap Skin")
 WORDS = """Red, green and blue light from the middle of a sphere as large as a head over its albedo, in Cycles, under
@@ -41,11 +47,17 @@ def main() -> int:
     parser.add_argument("--json", type=Path, metavar="OUT.json")
     arguments = parser.parse_args()
     with extension():
-        found = {way: {tone: dict(zip(("red", "green", "blue"), given_back(way, albedo), strict=True))
-                       for tone, albedo in TONES.items()} for way in WAYS}
+        found = {
+            way: {
+                tone: dict(zip(("red", "green", "blue"), given_back(way, albedo), strict=True))
+                for tone, albedo in TONES.items()
+            }
+            for way in WAYS
+        }
     if arguments.json:
-        figures.write_record(arguments.json, "even_light", f"python -m benchmarks.even_light --json {arguments.json}",
-                             found)
+        figures.write_record(
+            arguments.json, "even_light", f"python -m benchmarks.even_light --json {arguments.json}", found
+        )
     print(table(found))
     return 0
 

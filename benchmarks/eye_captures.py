@@ -29,8 +29,14 @@ from core.synthetic.people.figure import make_figure
 from .people_lights import KINDS
 from .shadow_captures import registered, write_views
 
-EYES = {910007: "noon sun behind leaves", 910009: "window bars", 910012: "mixed lamps", 910014: "hazy sun",
-        910020: "overcast", 910021: "noon sun behind leaves"}
+EYES = {
+    910007: "noon sun behind leaves",
+    910009: "window bars",
+    910012: "mixed lamps",
+    910014: "hazy sun",
+    910020: "overcast",
+    910021: "noon sun behind leaves",
+}
 """Seeds, reserved from all training, and their lights: chosen for their tones, beards and irises before anything was
 measured on them."""
 FRAMES, SAMPLES, SCALE = 10, 4, 5 / 6
@@ -66,9 +72,11 @@ def photograph_person(folder: Path, seed: int, kind: str, facekit: Path | None) 
     filmed.render(work, figure, KINDS[kind](seed), scene.Shot(cameras, range(FRAMES), SAMPLES, SCALE, None, True))
     frames = [images.read_linear(work / f"{k:05d}.exr").astype(np.float32) for k in range(FRAMES)]
     gain = TO / np.percentile(np.concatenate([frame.max(-1).ravel() for frame in frames]), WHITE)
-    write_views(capture, [sample.view_of(matrix, SCALE) for matrix in cameras],
-                [phone.develop(frame, taken, gain, np.random.default_rng([seed, 72, k]))
-                 for k, frame in enumerate(frames)])
+    write_views(
+        capture,
+        [sample.view_of(matrix, SCALE) for matrix in cameras],
+        [phone.develop(frame, taken, gain, np.random.default_rng([seed, 72, k])) for k, frame in enumerate(frames)],
+    )
     truth = capture.root / "truth"
     truth.mkdir(exist_ok=True)
     meshes.write_obj(truth / "head.obj", figure.head)

@@ -20,8 +20,14 @@ FACES = {
     "open": {"opened": 1.0, **EYE},
     "half": {"opened": 0.5, **EYE},
     "aside": {"opened": 1.0, "units": {"eyeLookOutLeft": 1.0, "eyeLookInRight": 1.0}, **EYE},
-    "mouth": {"opened": 1.0, "units": {"jawOpen": 0.6, "mouthUpperUpLeft": 0.5, "mouthUpperUpRight": 0.5},
-              "at": "mouth", "above_m": -0.008, "way": (0.15, -1.0, 0.0), "lens_mm": 190.0},
+    "mouth": {
+        "opened": 1.0,
+        "units": {"jawOpen": 0.6, "mouthUpperUpLeft": 0.5, "mouthUpperUpRight": 0.5},
+        "at": "mouth",
+        "above_m": -0.008,
+        "way": (0.15, -1.0, 0.0),
+        "lens_mm": 190.0,
+    },
 }
 
 
@@ -29,8 +35,10 @@ def shots(name: str) -> dict[str, CloseUp]:
     """Picture -> what it shows."""
     number = [person.name for person in PEOPLE].index(name)
     light, iris = LIGHTS[number % len(LIGHTS)], IRISES[number]
-    return {face: CloseUp(light, engine=ENGINES[(number + place) % 2], close_up=True, iris=iris, **told)
-            for place, (face, told) in enumerate(FACES.items())}
+    return {
+        face: CloseUp(light, engine=ENGINES[(number + place) % 2], close_up=True, iris=iris, **told)
+        for place, (face, told) in enumerate(FACES.items())
+    }
 
 
 if __name__ == "__main__":

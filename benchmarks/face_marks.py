@@ -73,11 +73,20 @@ def misses(head: meshes.Mesh, views: dict[str, View], marks: dict) -> dict[str, 
 
 def summary(errors_of_views: dict[str, dict[str, float]], names: Collection[str] | None = None) -> dict:
     """Over the views `names` (None: all): points, median, 90th percentile [% of the face's width], share under 3 %."""
-    values = np.array([value for name, points in errors_of_views.items() if names is None or name in names
-                       for value in points.values()])
-    return {"points": len(values), "median_percent": round(float(np.median(values)), 2),
-            "p90_percent": round(float(np.percentile(values, 90)), 2),
-            "under_3_percent": round(100 * float((values < 3).mean()), 1)}
+    values = np.array(
+        [
+            value
+            for name, points in errors_of_views.items()
+            if names is None or name in names
+            for value in points.values()
+        ]
+    )
+    return {
+        "points": len(values),
+        "median_percent": round(float(np.median(values)), 2),
+        "p90_percent": round(float(np.percentile(values, 90)), 2),
+        "under_3_percent": round(100 * float((values < 3).mean()), 1),
+    }
 
 
 def by_photograph(capture: Capture) -> dict[str, View]:
@@ -99,8 +108,9 @@ def fitted_to(capture: Capture, names: Collection[str], folder: Path) -> meshes.
             kept = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=number, keypoints=keypoints)
             model.add_image_with_trivial_frame(kept, pose_of(image))
     for point in whole.points3D.values():
-        seen = [pycolmap.TrackElement(e.image_id, e.point2D_idx) for e in point.track.elements
-                if e.image_id in model.images]
+        seen = [
+            pycolmap.TrackElement(e.image_id, e.point2D_idx) for e in point.track.elements if e.image_id in model.images
+        ]
         if len(seen) > 1:
             model.add_point3D(point.xyz, pycolmap.Track(seen), point.color)
     part.cameras.mkdir()
@@ -114,13 +124,17 @@ def held_out(capture: Capture, marks: dict) -> dict:
     """The figures of heads fitted to some photographs and judged in the others."""
     views, rows = by_photograph(capture), {}
     order = [name for name in marks["views"] if name in views]
-    sides = [name for name in order
-             if abs(np.degrees(np.arctan2(views[name].centre[0], -views[name].centre[1]))) > PROFILE_DEG]
+    sides = [
+        name
+        for name in order
+        if abs(np.degrees(np.arctan2(views[name].centre[0], -views[name].centre[1]))) > PROFILE_DEG
+    ]
     plans = {"first three": order[3:]} | {f"without {name}": [name] for name in sides}
     for title, judged in plans.items():
         with tempfile.TemporaryDirectory() as folder:
-            head = fitted_to(capture, [views[name].name for name in order if name not in judged],
-                             Path(folder) / "part.wildcap")
+            head = fitted_to(
+                capture, [views[name].name for name in order if name not in judged], Path(folder) / "part.wildcap"
+            )
         rows[title] = summary(misses(head, views, marks), judged)
     return rows
 
@@ -135,9 +149,11 @@ def main() -> None:
     capture, marks = Capture(args.capture), json.loads(args.marks.read_text(encoding="utf-8"))
     found = misses(meshes.read_obj(capture.head), by_photograph(capture), marks)
     figures = {"all": summary(found), "views": {name: summary(found, [name]) for name in found}}
-    figures["points"] = {point: round(float(np.median([seen[point] for seen in found.values() if point in seen])), 2)
-                         for point in marks["points"]
-                         if any(point in seen for seen in found.values())}
+    figures["points"] = {
+        point: round(float(np.median([seen[point] for seen in found.values() if point in seen])), 2)
+        for point in marks["points"]
+        if any(point in seen for seen in found.values())
+    }
     if args.held_out:
         figures["held_out"] = held_out(capture, marks)
     print(json.dumps(figures, indent=1))

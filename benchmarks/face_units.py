@@ -17,8 +17,14 @@ import numpy as np
 from .closeups import CloseUp, shoot_closeup
 from .render_capture import extension
 
-FACE = {"light": "overcast", "at": "mouth", "above_m": 0.053, "away_m": 1.0, "lens_mm": 172.0,
-        "way": (-0.16, -1.0, 0.05)}
+FACE = {
+    "light": "overcast",
+    "at": "mouth",
+    "above_m": 0.053,
+    "away_m": 1.0,
+    "lens_mm": 172.0,
+    "way": (-0.16, -1.0, 0.05),
+}
 SHOTS = {
     "rest": CloseUp(**FACE),
     "open": CloseUp(opened=1.0, **FACE),

@@ -44,8 +44,17 @@ FACES_PER_NODE = 100
 """Faces for each node that is killed; one at least."""
 AWAY_S = 45.0
 """How long a node stays away: longer than the term of a lease, so that the other one has to take over what it held."""
-EMPTY = {"seed": 0, "captures": 0, "serial": {}, "wall_s": 0.0, "processor_s": 0.0, "busy_s": 0.0, "kills": [],
-         "sessions": 0, "running": False}
+EMPTY = {
+    "seed": 0,
+    "captures": 0,
+    "serial": {},
+    "wall_s": 0.0,
+    "processor_s": 0.0,
+    "busy_s": 0.0,
+    "kills": [],
+    "sessions": 0,
+    "running": False,
+}
 
 
 def main() -> int:
@@ -71,11 +80,16 @@ class FarmTrial:
 
     def __init__(self, folder: Path, captures: int, seed: int):
         self.folder, self.captures, self.path = folder, captures, folder / "trial.json"
-        self.state = (json.loads(self.path.read_text(encoding="utf-8")) if self.path.is_file()
-                      else {**EMPTY, "seed": seed, "captures": captures})
+        self.state = (
+            json.loads(self.path.read_text(encoding="utf-8"))
+            if self.path.is_file()
+            else {**EMPTY, "seed": seed, "captures": captures}
+        )
         if (self.state["captures"], self.state["seed"]) != (captures, seed):
-            raise Problem(f"{folder} holds a trial of {self.state['captures']} captures with the seed "
-                          f"{self.state['seed']}.", "Name another folder.")
+            raise Problem(
+                f"{folder} holds a trial of {self.state['captures']} captures with the seed {self.state['seed']}.",
+                "Name another folder.",
+            )
         if self.state["running"]:  # it was killed itself, and everything with it
             self.note(None, None, "the benchmark")
 
@@ -89,8 +103,11 @@ class FarmTrial:
         farm_batch.lay_out(self.folder, self.captures)
         self._run_serial()
         one = self._serial_s()
-        print(f"One after the other {one:.0f} s a capture; {self.captures} on two nodes take "
-              f"{self.captures * one / 120:.0f} min at best.", flush=True)
+        print(
+            f"One after the other {one:.0f} s a capture; {self.captures} on two nodes take "
+            f"{self.captures * one / 120:.0f} min at best.",
+            flush=True,
+        )
         if self._left():
             self._run_farm()
         found = self._judge()
@@ -98,8 +115,11 @@ class FarmTrial:
             print(f"{name}: {value}")
         if record is not None:
             figures.write_record(record, "farm", f"python -m benchmarks.farm FOLDER --captures {self.captures}", found)
-        return (0 if found["finished"] == self.captures
-                and not (found["unequal"] or found["twice"] or found["unexplained"]) else 1)
+        return (
+            0
+            if found["finished"] == self.captures and not (found["unequal"] or found["twice"] or found["unexplained"])
+            else 1
+        )
 
     def _run_serial(self) -> None:
         """Each kind once, one after the other on one processor, as each node has one."""
@@ -109,19 +129,33 @@ class FarmTrial:
             shutil.rmtree(self.folder / "serial" / f"{name}.wildcap", ignore_errors=True)
             began, counted = time.monotonic(), farm_nodes.counted_s() or 0.0
             environment = {key: value for key, value in os.environ.items() if key not in farm_nodes.THREAD_VARIABLES}
-            command = [*farm_nodes.on_core(farm_nodes.cores()[0]), *farm_batch.core(), "run",
-                       str(self.folder / "serial"), name]
-            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                                  cwd=farm_batch.code(self.folder), env=environment,
-                                  preexec_fn=farm_nodes.join_account) as process:
+            command = [
+                *farm_nodes.on_core(farm_nodes.cores()[0]),
+                *farm_batch.core(),
+                "run",
+                str(self.folder / "serial"),
+                name,
+            ]
+            with subprocess.Popen(
+                command,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                cwd=farm_batch.code(self.folder),
+                env=environment,
+                preexec_fn=farm_nodes.join_account,
+            ) as process:
                 while process.poll() is None:
                     farm_nodes.keep_pace()
                     time.sleep(0.1)
                 if process.returncode:
-                    raise Problem(f"The capture {name} did not end well: {process.stdout.read().strip()}",
-                                  "Look into its logs.")
-            self.state["serial"][name] = {"wall_s": time.monotonic() - began,
-                                          "processor_s": (farm_nodes.counted_s() or 0.0) - counted}
+                    raise Problem(
+                        f"The capture {name} did not end well: {process.stdout.read().strip()}", "Look into its logs."
+                    )
+            self.state["serial"][name] = {
+                "wall_s": time.monotonic() - began,
+                "processor_s": (farm_nodes.counted_s() or 0.0) - counted,
+            }
             self.save()
             print(f"{name}: {self.state['serial'][name]['wall_s']:.0f} s", flush=True)
 
@@ -151,12 +185,30 @@ class FarmTrial:
         chance = random.Random(f"{self.state['seed']}.{self.state['sessions']}")
         tasks, moments, back = 0, [], {}
         next_kill, done = chance.uniform(0.2, 1.0) * EVERY_TASKS, self.captures - self._left()
-        turns = [self.captures * (turn + chance.uniform(0.2, 0.6)) / self._nodes_to_kill()
-                 for turn in range(self._nodes_to_kill())]
-        driver = [*nodes[HEAD].enter(farm_batch.code(self.folder)), *farm_batch.core(), "run",
-                  str(self.folder / "farm"), "--on", "ray", "--address", f"{ADDRESSES[HEAD]}:{PORT}", "--cores", "1"]
-        with subprocess.Popen(driver, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                              env=nodes[HEAD].environment, start_new_session=True) as process:
+        turns = [
+            self.captures * (turn + chance.uniform(0.2, 0.6)) / self._nodes_to_kill()
+            for turn in range(self._nodes_to_kill())
+        ]
+        driver = [
+            *nodes[HEAD].enter(farm_batch.code(self.folder)),
+            *farm_batch.core(),
+            "run",
+            str(self.folder / "farm"),
+            "--on",
+            "ray",
+            "--address",
+            f"{ADDRESSES[HEAD]}:{PORT}",
+            "--cores",
+            "1",
+        ]
+        with subprocess.Popen(
+            driver,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=nodes[HEAD].environment,
+            start_new_session=True,
+        ) as process:
             try:
                 lines: queue.Queue = queue.Queue()
                 threading.Thread(target=lambda: [lines.put(line) for line in process.stdout], daemon=True).start()
@@ -210,8 +262,9 @@ class FarmTrial:
         return max(1, self.captures // FACES_PER_NODE)
 
     def _kill_process(self, nodes: dict[str, Node], chance: random.Random) -> None:
-        tasks = sorted((node.host, *task) for node in nodes.values() if node.process is not None
-                       for task in node.tasks())
+        tasks = sorted(
+            (node.host, *task) for node in nodes.values() if node.process is not None for task in node.tasks()
+        )
         if tasks:
             host, here, pid, name = chance.choice(tasks)
             try:
@@ -230,16 +283,29 @@ class FarmTrial:
         ours = sum(what in ("the benchmark", "Ctrl-C") for what in kills)
         account = farm_batch.judge_account(farm_batch.read_account(self.folder), state["kills"])
         serial = self._serial_s() * self.captures
-        others = ((state["busy_s"] - state["processor_s"]) / state["wall_s"] if state["processor_s"] and state["wall_s"]
-                  else None)
-        return {"captures": self.captures, "kinds": farm_batch.KINDS, "finished": self.captures - self._left(),
-                "files": farm_batch.count_files(self.folder),
-                "unequal": len(unequal), **account, "processes_killed": len(kills) - nodes - ours,
-                "nodes_killed": nodes, "sessions": state["sessions"],
-                "wall_s": state["wall_s"], "serial_s": serial, "ideal_s": serial / len(WORKING),
-                "over_ideal": state["wall_s"] / (serial / len(WORKING)),
-                "processor_s": state["processor_s"],
-                "serial_processor_s": self._serial_s("processor_s") * self.captures, "others_cores": others}
+        others = (
+            (state["busy_s"] - state["processor_s"]) / state["wall_s"]
+            if state["processor_s"] and state["wall_s"]
+            else None
+        )
+        return {
+            "captures": self.captures,
+            "kinds": farm_batch.KINDS,
+            "finished": self.captures - self._left(),
+            "files": farm_batch.count_files(self.folder),
+            "unequal": len(unequal),
+            **account,
+            "processes_killed": len(kills) - nodes - ours,
+            "nodes_killed": nodes,
+            "sessions": state["sessions"],
+            "wall_s": state["wall_s"],
+            "serial_s": serial,
+            "ideal_s": serial / len(WORKING),
+            "over_ideal": state["wall_s"] / (serial / len(WORKING)),
+            "processor_s": state["processor_s"],
+            "serial_processor_s": self._serial_s("processor_s") * self.captures,
+            "others_cores": others,
+        }
 
 
 if __name__ == "__main__":

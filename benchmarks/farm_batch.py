@@ -30,9 +30,12 @@ FRAMES = 12
 KINDS = 4
 """How many different captures there are: each is another cut of the sample video with another seed."""
 SETTINGS = {
-    "device": "cpu", "frames": {"max_frames": FRAMES, "long_side": 320, "views": 3},
-    "scan": {"pairs": 3, "voxel_mm": 5.0}, "registration": {"iterations": 2},
-    "delight": {"delighter": "shading"}, "texture": {"size": 256},
+    "device": "cpu",
+    "frames": {"max_frames": FRAMES, "long_side": 320, "views": 3},
+    "scan": {"pairs": 3, "voxel_mm": 5.0},
+    "registration": {"iterations": 2},
+    "delight": {"delighter": "shading"},
+    "texture": {"size": 256},
     "solve": {"size": 128, "steps": 4, "guidance": "proximal", "grid_cells": 4},
     "upscale": {"size": 1024, "method": "lanczos", "frames_detail": False},
     "transfer": {"size": 256, "scan_size": 256, "scan_detail_mm": 10.0},
@@ -68,11 +71,16 @@ def lay_out(folder: Path, count: int) -> None:
         with replacing(films / f"{kind}.json") as temporary:
             temporary.write_text(json.dumps({**SETTINGS, "seed": kind}), encoding="utf-8")
     for batch, names in (("serial", twin_names()), ("farm", face_names(count))):
-        rows = [f"{film(folder, number % KINDS).name},{name},{number % KINDS}.json"
-                for number, name in enumerate(names)]
+        rows = [
+            f"{film(folder, number % KINDS).name},{name},{number % KINDS}.json" for number, name in enumerate(names)
+        ]
         (films / f"{batch}.csv").write_text("\n".join(["video,name,settings", *rows]) + "\n", encoding="utf-8")
-        subprocess.run([*core(), "plan", str(films / f"{batch}.csv"), str(folder / batch)], check=True,
-                       stdout=subprocess.DEVNULL, cwd=code(folder))
+        subprocess.run(
+            [*core(), "plan", str(films / f"{batch}.csv"), str(folder / batch)],
+            check=True,
+            stdout=subprocess.DEVNULL,
+            cwd=code(folder),
+        )
 
 
 def code(folder: Path) -> Path:
@@ -118,14 +126,18 @@ def unequal(folder: Path, count: int) -> list[str]:
         if twin not in twins:
             twins[twin] = _written(folder / "serial" / f"{twin}.wildcap")
         made = _written(folder / "farm" / f"{name}.wildcap")
-        found += [f"{name}/{file}" for file in sorted(made.keys() | twins[twin].keys())
-                  if made.get(file) != twins[twin].get(file)]
+        found += [
+            f"{name}/{file}"
+            for file in sorted(made.keys() | twins[twin].keys())
+            if made.get(file) != twins[twin].get(file)
+        ]
     return found
 
 
 def _written(root: Path) -> dict[str, str]:
-    return {name: content for stage in stages.STAGES
-            for name, content in same_maps.written(Capture(root), stage).items()}
+    return {
+        name: content for stage in stages.STAGES for name, content in same_maps.written(Capture(root), stage).items()
+    }
 
 
 def count_files(folder: Path) -> int:
@@ -162,8 +174,14 @@ def judge_account(account: list[Begun], kills: list[dict]) -> dict:
     broken = [each for each in account if each.finished is None]
 
     def explained(each: Begun) -> bool:
-        return any(kill["at"] >= each.at and kill["host"] in (None, each.host) and kill["pid"] in (None, each.pid)
-                   for kill in kills)
+        return any(
+            kill["at"] >= each.at and kill["host"] in (None, each.host) and kill["pid"] in (None, each.pid)
+            for kill in kills
+        )
 
-    return {"stages": sum(done.values()), "twice": sum(count - 1 for count in done.values()),
-            "interrupted": len(broken), "unexplained": sum(not explained(each) for each in broken)}
+    return {
+        "stages": sum(done.values()),
+        "twice": sum(count - 1 for count in done.values()),
+        "interrupted": len(broken),
+        "unexplained": sum(not explained(each) for each in broken),
+    }

@@ -58,16 +58,26 @@ class Assumptions:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path,
-                        help="keep the model's figures here; measurements that are there are used again")
+    parser.add_argument(
+        "--json", type=Path, help="keep the model's figures here; measurements that are there are used again"
+    )
     parser.add_argument("--page", type=Path, help="write the page")
     parser.add_argument("--capture", type=Path, help="weigh this finished capture")
-    parser.add_argument("--starts", metavar="N", type=int, default=0,
-                        help="measure how long a task's processes take to start, N times each")
+    parser.add_argument(
+        "--starts",
+        metavar="N",
+        type=int,
+        default=0,
+        help="measure how long a task's processes take to start, N times each",
+    )
     for field in fields(Assumptions):
         kind = type(field.default)
-        parser.add_argument(f"--{field.name.replace('_', '-')}", type=kind, default=field.default,
-                            help=f"{SAID[field.name]} ({field.default:g})")
+        parser.add_argument(
+            f"--{field.name.replace('_', '-')}",
+            type=kind,
+            default=field.default,
+            help=f"{SAID[field.name]} ({field.default:g})",
+        )
     options = parser.parse_args()
     try:
         published = (figures.PUBLISHED / "farm_model.json").is_file()
@@ -75,8 +85,10 @@ def main() -> int:
         disk = weigh(Capture(options.capture)) if options.capture else known.get("disk_mb")
         starts = time_starts(options.starts) if options.starts else known.get("starts")
         if not disk or not starts:
-            raise Problem("Neither the disk of a face nor the start of a task was measured yet.",
-                          "Add --capture CAPTURE and --starts 5.")
+            raise Problem(
+                "Neither the disk of a face nor the start of a task was measured yet.",
+                "Add --capture CAPTURE and --starts 5.",
+            )
         given = Assumptions(**{field.name: getattr(options, field.name) for field in fields(Assumptions)})
         found = figures.plain(model_farm(figures.read_record("costs")["figures"], disk, starts, given))
     except Problem as problem:
@@ -99,8 +111,9 @@ def weigh(capture: Capture) -> dict[str, float]:
     names = dict.fromkeys(name for stage in stages.STAGES for name in stage.writes)
     missing = [name for name in names if not (capture.root / name).exists()]
     if missing:
-        raise Problem(f"{capture.root} is not a finished capture: {missing[0]} is missing.",
-                      "Run the chain to its end first.")
+        raise Problem(
+            f"{capture.root} is not a finished capture: {missing[0]} is missing.", "Run the chain to its end first."
+        )
     found = {entry: _megabytes(capture.root / entry) for entry in entries(names)}
     return {**found, "all else": round(_megabytes(capture.root) - sum(found.values()), 3)}
 
@@ -120,8 +133,9 @@ def time_starts(count: int) -> dict[str, dict[str, float]]:
     found = {}
     for name, words in STARTS.items():
         ran = [run_alone(words).checked() for _ in range(count)]
-        found[name] = {key: round(statistics.median(getattr(each, key) for each in ran), 2)
-                       for key in ("seconds", "processor_s")}
+        found[name] = {
+            key: round(statistics.median(getattr(each, key) for each in ran), 2) for key in ("seconds", "processor_s")
+        }
     return found
 
 
@@ -142,8 +156,10 @@ def model_farm(costs: dict, disk: dict[str, float], starts: dict, assumptions: A
     """
     row, cores = costs.get("standard", {}), costs["machine"]["cores"]
     if any("seconds" not in row.get(stage, {}) for stage in stages.NAMES):
-        raise Problem("docs/figures/costs.json has no whole row 'standard'.",
-                      "Run `python -m benchmarks.costs chain WORK --json docs/figures/costs.json`.")
+        raise Problem(
+            "docs/figures/costs.json has no whole row 'standard'.",
+            "Run `python -m benchmarks.costs chain WORK --json docs/figures/costs.json`.",
+        )
     tasks = {group.name: _task(group, row, disk, assumptions.film_mb) for group in GROUPS}
     seconds, traffic = (sum(task[key] for task in tasks.values()) for key in ("seconds", "traffic_mb"))
     solve, faces, hour = tasks[GATE]["seconds"], assumptions.faces, 3600.0
@@ -175,24 +191,40 @@ def model_farm(costs: dict, disk: dict[str, float], starts: dict, assumptions: A
         "peak_gb": max(task["peak_gb"] for task in tasks.values()),
         "gb_a_core": max(task["peak_gb"] for task in tasks.values()) / cores,
     }
-    return {"cores": cores, "processor": costs["machine"]["processor"], "networks": costs["machine"]["networks"],
-            "frames": _frames(costs, row), "stages": {
-        stage: row[stage]["seconds"] for stage in stages.NAMES}, "tasks": tasks, "seconds": seconds,
-            "traffic_mb": traffic, "gb": kept, "gb_slim": slim,
-        "totals": totals, "limits": limits, "starts": starts, "disk_mb": disk, "assumed": asdict(assumptions)}
+    return {
+        "cores": cores,
+        "processor": costs["machine"]["processor"],
+        "networks": costs["machine"]["networks"],
+        "frames": _frames(costs, row),
+        "stages": {stage: row[stage]["seconds"] for stage in stages.NAMES},
+        "tasks": tasks,
+        "seconds": seconds,
+        "traffic_mb": traffic,
+        "gb": kept,
+        "gb_slim": slim,
+        "totals": totals,
+        "limits": limits,
+        "starts": starts,
+        "disk_mb": disk,
+        "assumed": asdict(assumptions),
+    }
 
 
 def _task(group, row: dict, disk: dict[str, float], film_mb: float) -> dict[str, float]:
     """Cost of one task of a face. It reads what its own stages and all before them read, once: what is there already is
     compared with what it was made from."""
-    upto = stages.STAGES[:stages.NAMES.index(group.last) + 1]
+    upto = stages.STAGES[: stages.NAMES.index(group.last) + 1]
     written = entries(name for stage in group.stages for name in stage.writes)
     read = set(entries(name for stage in upto for name in (*stage.reads, *stage.optional_reads))) - set(written)
     reads, writes = sum(disk.get(name, 0.0) for name in read) + film_mb, sum(disk[name] for name in written)
-    return {"seconds": sum(row[stage.name]["seconds"] for stage in group.stages),
-            "processor_s": sum(row[stage.name]["processor_s"] for stage in group.stages),
-            "peak_gb": max(row[stage.name]["peak_mb"] for stage in group.stages) / 1000, "read_mb": reads,
-            "write_mb": writes, "traffic_mb": reads + writes}
+    return {
+        "seconds": sum(row[stage.name]["seconds"] for stage in group.stages),
+        "processor_s": sum(row[stage.name]["processor_s"] for stage in group.stages),
+        "peak_gb": max(row[stage.name]["peak_mb"] for stage in group.stages) / 1000,
+        "read_mb": reads,
+        "write_mb": writes,
+        "traffic_mb": reads + writes,
+    }
 
 
 def _frames(costs: dict, row: dict) -> dict[str, dict]:
@@ -203,8 +235,9 @@ def _frames(costs: dict, row: dict) -> dict[str, dict]:
         count = re.fullmatch(r"frames-(\d+)", name)
         if count and all("seconds" in cost.get(stage, {}) for stage in ("frames", "cameras", "scan")):
             mixed = {**row, **cost}
-            found[count[1]] = {key: sum(mixed[stage][key] for stage in stages.NAMES)
-                               for key in ("seconds", "processor_s")}
+            found[count[1]] = {
+                key: sum(mixed[stage][key] for stage in stages.NAMES) for key in ("seconds", "processor_s")
+            }
     return dict(sorted(found.items(), key=lambda each: int(each[0])))
 
 

@@ -41,10 +41,17 @@ STARTED = b"Ray runtime started"
 def refuse_elsewhere() -> None:
     """Raises Problem where no such machines can be made."""
     if not sys.platform.startswith("linux") or os.getuid() != 0:
-        raise Problem("The nodes of this benchmark are namespaces, which take Linux and root.",
-                      "Run it as root on Linux, as in a container with all rights.")
-    for program, package in (("ip", "iproute2"), ("unshare", "util-linux"), ("nsenter", "util-linux"),
-                             ("mount", "mount"), ("taskset", "util-linux")):
+        raise Problem(
+            "The nodes of this benchmark are namespaces, which take Linux and root.",
+            "Run it as root on Linux, as in a container with all rights.",
+        )
+    for program, package in (
+        ("ip", "iproute2"),
+        ("unshare", "util-linux"),
+        ("nsenter", "util-linux"),
+        ("mount", "mount"),
+        ("taskset", "util-linux"),
+    ):
         if shutil.which(program) is None:
             raise Problem(f"There is no program {program} here.", f"Install it: apt-get install {package}.")
 
@@ -66,17 +73,45 @@ class Node:
 
     def start(self) -> None:
         """Raises Problem where it does not begin."""
-        common = [str(Path(sys.executable).with_name("ray")), "start", f"--node-ip-address={ADDRESSES[self.name]}",
-                  "--block", "--disable-usage-stats", f"--object-store-memory={STORE}"]
-        own = (["--head", f"--port={PORT}", "--num-cpus=0", "--include-dashboard=false"] if self.name == HEAD
-               else [f"--address={ADDRESSES[HEAD]}:{PORT}", "--num-cpus=1", f"--memory={MEMORY}"])
+        common = [
+            str(Path(sys.executable).with_name("ray")),
+            "start",
+            f"--node-ip-address={ADDRESSES[self.name]}",
+            "--block",
+            "--disable-usage-stats",
+            f"--object-store-memory={STORE}",
+        ]
+        own = (
+            ["--head", f"--port={PORT}", "--num-cpus=0", "--include-dashboard=false"]
+            if self.name == HEAD
+            else [f"--address={ADDRESSES[HEAD]}:{PORT}", "--num-cpus=1", f"--memory={MEMORY}"]
+        )
         script = f"hostname {self.host} && mkdir -p /tmp/ray && mount -t tmpfs tmpfs /tmp/ray && exec \"$@\""
-        command = ["ip", "netns", "exec", PREFIX + self.name, "unshare", "--uts", "--pid", "--mount", "--fork",
-                   "--kill-child", "--mount-proc", "sh", "-c", script, "sh", *on_core(self.core), *common, *own]
+        command = [
+            "ip",
+            "netns",
+            "exec",
+            PREFIX + self.name,
+            "unshare",
+            "--uts",
+            "--pid",
+            "--mount",
+            "--fork",
+            "--kill-child",
+            "--mount-proc",
+            "sh",
+            "-c",
+            script,
+            "sh",
+            *on_core(self.core),
+            *common,
+            *own,
+        ]
         path = self.folder / f"{self.name}.log"
         with open(path, "wb") as log:
-            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                                            env=self.environment, preexec_fn=join_account)
+            self.process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=self.environment, preexec_fn=join_account
+            )
         deadline = time.monotonic() + START_S
         while STARTED not in path.read_bytes():
             if self.process.poll() is not None or time.monotonic() > deadline:
@@ -94,8 +129,16 @@ class Node:
 
     def enter(self, folder: Path) -> list[str]:
         """Words before a command that has it run on this node, in a folder."""
-        return ["nsenter", f"--target={self._first()}", "--mount", "--uts", "--net", "--pid", f"--wd={folder}",
-                *on_core(self.core)]
+        return [
+            "nsenter",
+            f"--target={self._first()}",
+            "--mount",
+            "--uts",
+            "--net",
+            "--pid",
+            f"--wd={folder}",
+            *on_core(self.core),
+        ]
 
     def tasks(self) -> list[tuple[int, int, str]]:
         """The processes of Ray's that work on a task: number here, number on the node, and the task's name."""
@@ -104,8 +147,9 @@ class Node:
             with contextlib.suppress(OSError, ValueError, IndexError):
                 words = (folder / "cmdline").read_bytes().partition(b"\0")[0].decode()
                 if words.startswith("ray::") and "." in words and os.readlink(folder / "ns" / "pid") == self.space:
-                    inside = next(line for line in (folder / "status").read_text().splitlines()
-                                  if line.startswith("NSpid:")).split()[-1]
+                    inside = next(
+                        line for line in (folder / "status").read_text().splitlines() if line.startswith("NSpid:")
+                    ).split()[-1]
                     found.append((int(folder.name), int(inside), words.removeprefix("ray::")))
         return found
 
@@ -138,11 +182,18 @@ def farm(folder: Path):
     if not token.is_file():
         token.write_text(secrets.token_hex(32))
         token.chmod(0o600)
-    environment = {**os.environ, "RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN_PATH": str(token),
-                   "RAY_USAGE_STATS_ENABLED": "0", "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {
+        **os.environ,
+        "RAY_AUTH_MODE": "token",
+        "RAY_AUTH_TOKEN_PATH": str(token),
+        "RAY_USAGE_STATS_ENABLED": "0",
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
     environment = {name: value for name, value in environment.items() if name not in (*THREAD_VARIABLES, "RAY_ADDRESS")}
-    nodes = {name: Node(name, folder, core, environment=environment)
-             for name, core in zip((HEAD, *WORKING), (None, *cores()), strict=True)}
+    nodes = {
+        name: Node(name, folder, core, environment=environment)
+        for name, core in zip((HEAD, *WORKING), (None, *cores()), strict=True)
+    }
     try:
         _lay_cables()
         for node in nodes.values():
@@ -192,8 +243,10 @@ def clear() -> None:
 def _ip(*words: str) -> None:
     done = subprocess.run(["ip", *words], capture_output=True, text=True)
     if done.returncode:
-        raise Problem(f"`ip {' '.join(words)}` says: {done.stderr.strip()}",
-                      "Run the benchmark where namespaces may be made, as in a container with all rights.")
+        raise Problem(
+            f"`ip {' '.join(words)}` says: {done.stderr.strip()}",
+            "Run the benchmark where namespaces may be made, as in a container with all rights.",
+        )
 
 
 def keep_pace() -> None:

@@ -79,15 +79,19 @@ def read_record(name: str, folder: Path = PUBLISHED) -> dict:
     if isinstance(record, dict):
         record = {"date": None, "machine": None, **record}
     if not isinstance(record, dict) or set(record) != KEYS or not isinstance(record["figures"], dict):
-        raise Problem(f"{path} is not a benchmark's record.",
-                      'It holds "benchmark", "command", "commit" and "figures"; benchmarks/figures.py writes it.')
+        raise Problem(
+            f"{path} is not a benchmark's record.",
+            'It holds "benchmark", "command", "commit" and "figures"; benchmarks/figures.py writes it.',
+        )
     return record
 
 
 def markdown(head: list[str], rows: list[list]) -> str:
     """A Markdown table, without a newline at its end; None is a dash."""
-    return "\n".join("| " + " | ".join("-" if cell is None else str(cell) for cell in row) + " |"
-                     for row in (head, ["---"] * len(head), *rows))
+    return "\n".join(
+        "| " + " | ".join("-" if cell is None else str(cell) for cell in row) + " |"
+        for row in (head, ["---"] * len(head), *rows)
+    )
 
 
 def number(value: float | None, digits: int, unit: str = "") -> str | None:
@@ -97,9 +101,13 @@ def number(value: float | None, digits: int, unit: str = "") -> str | None:
 
 def merged(base: dict, update: dict) -> dict:
     """Nested figures: `update` over `base`."""
-    return {**base,
-            **{key: merged(base[key], value) if isinstance(value, dict) and isinstance(base.get(key), dict) else value
-               for key, value in update.items()}}
+    return {
+        **base,
+        **{
+            key: merged(base[key], value) if isinstance(value, dict) and isinstance(base.get(key), dict) else value
+            for key, value in update.items()
+        },
+    }
 
 
 def plain(figures, name: str = "figures"):
@@ -119,8 +127,9 @@ def plain(figures, name: str = "figures"):
 def commit() -> str | None:
     """HEAD's short hash; None where this is no checkout or git is not installed."""
     try:
-        found = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True,
-                               check=True)
+        found = subprocess.run(
+            ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
+        )
     except (OSError, subprocess.CalledProcessError):
         return None
     return found.stdout.strip()

@@ -72,8 +72,9 @@ def write_delit(capture: Capture, folder: Path) -> Highlight:
     brightest = np.concatenate([picture[frame.hit].max(1) for picture, frame in zip(pictures, frames, strict=True)])
     gain = BRIGHT[1] / np.percentile(brightest, BRIGHT[0])
     for frame, picture in zip(frames, pictures, strict=True):
-        images.write_srgb(folder / Path(frame.view.name).with_suffix(".png").name,
-                          images.linear_to_srgb(picture * gain), bits=16)
+        images.write_srgb(
+            folder / Path(frame.view.name).with_suffix(".png").name, images.linear_to_srgb(picture * gain), bits=16
+        )
     return found
 
 
@@ -122,10 +123,12 @@ def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
 def _observed(frame: Lit, surface: Unfolded) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What a frame shows of each texel: its unshaded colour [S, S, 3], n.l [S, S], and how far that counts [S, S]."""
     seen = observe(frame.view, hold(frame.unshaded), surface, 1.0)
-    burnt = cv2.dilate((images.linear_to_srgb(frame.linear).max(-1) > BURNT).astype(np.uint8),
-                       np.ones((5, 5))).astype(np.float32)
-    weight = seen.quality * (cv2.remap(burnt, seen.pixels[..., 0] - 0.5, seen.pixels[..., 1] - 0.5, cv2.INTER_LINEAR)
-                             == 0)
+    burnt = cv2.dilate((images.linear_to_srgb(frame.linear).max(-1) > BURNT).astype(np.uint8), np.ones((5, 5))).astype(
+        np.float32
+    )
+    weight = seen.quality * (
+        cv2.remap(burnt, seen.pixels[..., 0] - 0.5, seen.pixels[..., 1] - 0.5, cv2.INTER_LINEAR) == 0
+    )
     towards = frame.view.centre - surface.points
     cosine = np.zeros(surface.covered.shape, np.float32)
     cosine[surface.covered] = np.clip((towards * surface.normals).sum(1) / np.linalg.norm(towards, axis=1), 0, 1)
@@ -140,8 +143,9 @@ def _fit(samples: list[tuple], roughness: float) -> tuple[np.ndarray, float]:
     mean_lobe = sum(w * f for w, f in zip(weights, lobes, strict=True)) / total
     mean = sum(w * colour for w, (colour, *_) in zip(weights, samples, strict=True)) / total
     spread = sum(w * (f - mean_lobe) ** 2 for w, f in zip(weights, lobes, strict=True))
-    together = sum(w * (f - mean_lobe) * (colour - mean)
-                   for w, f, (colour, *_) in zip(weights, lobes, samples, strict=True))
+    together = sum(
+        w * (f - mean_lobe) * (colour - mean) for w, f, (colour, *_) in zip(weights, lobes, samples, strict=True)
+    )
     squares = sum(float((w * (colour - mean) ** 2).sum()) for w, (colour, *_) in zip(weights, samples, strict=True))
     everywhere = np.maximum(together.sum((0, 1)) / max(float(spread.sum()), 1e-9), 0)
     near_spread, near_together = (cv2.GaussianBlur(a, (0, 0), SMOOTH).reshape(a.shape) for a in (spread, together))

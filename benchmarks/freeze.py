@@ -28,9 +28,18 @@ from core.contract.messages import Problem
 from .figures import ROOT, commit
 
 RECORD = "frozen.json"
-FILES = ("capture.json", "head.obj", "texture.exr", "texture_filmed.png", "texture_confidence.exr",
-         "texture_detail.exr", "shadow_mask_auto.png",
-         "shadow_mask.png", "maps/diffuse_albedo.png", "maps/confidence.png")
+FILES = (
+    "capture.json",
+    "head.obj",
+    "texture.exr",
+    "texture_filmed.png",
+    "texture_confidence.exr",
+    "texture_detail.exr",
+    "shadow_mask_auto.png",
+    "shadow_mask.png",
+    "maps/diffuse_albedo.png",
+    "maps/confidence.png",
+)
 FOLDERS = ("frames", "cameras", "delit")
 STAGES = ("delight", "texture", "shadow_mask", "solve")
 STAGE_KEYS = ("version", "code", "finished", "seed", "settings")
@@ -66,8 +75,11 @@ def freeze(folder: Path, out: Path, only: tuple[str, ...] = ("",)) -> list[str]:
     """
     if out.is_relative_to(ROOT):
         raise Problem(f"{out} lies in the repository.", "Name a folder outside of it.")
-    captures = [path for path in sorted(folder.glob("*.wildcap")) if path.stem.startswith(only)
-                and (path / "texture.exr").is_file()]
+    captures = [
+        path
+        for path in sorted(folder.glob("*.wildcap"))
+        if path.stem.startswith(only) and (path / "texture.exr").is_file()
+    ]
     if not captures:
         raise Problem(f"{folder} holds no capture with a texture.", "Run the chain until texture first.")
     record, changed = read_record(out), []
@@ -83,10 +95,13 @@ def freeze(folder: Path, out: Path, only: tuple[str, ...] = ("",)) -> list[str]:
                 (kept / path).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(source / path, kept / path)
         stages = Capture(source).read()["stages"]
-        record[name] = {"commit": commit(),
-                        "stages": {stage: {key: stages[stage].get(key) for key in STAGE_KEYS} for stage in STAGES
-                                   if stage in stages},
-                        "files": hashes}
+        record[name] = {
+            "commit": commit(),
+            "stages": {
+                stage: {key: stages[stage].get(key) for key in STAGE_KEYS} for stage in STAGES if stage in stages
+            },
+            "files": hashes,
+        }
         write_json(out / RECORD, record)
         print(f"{name}: {len(hashes)} files kept", flush=True)
     return changed
@@ -109,8 +124,12 @@ def differences(out: Path) -> list[str]:
 
 def inputs(root: Path) -> list[str]:
     """The files of a capture that are kept, relative to it."""
-    inside = [path for folder in FOLDERS for path in sorted((root / folder).rglob("*")) if path.is_file()
-              and not path.name.startswith(".")]
+    inside = [
+        path
+        for folder in FOLDERS
+        for path in sorted((root / folder).rglob("*"))
+        if path.is_file() and not path.name.startswith(".")
+    ]
     return [name for name in FILES if (root / name).is_file()] + [path.relative_to(root).as_posix() for path in inside]
 
 

@@ -59,8 +59,7 @@ def captured(capture: Capture) -> list[np.ndarray]:
     mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
     mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
     delit = images.read_srgb(capture.delit / f"{Path(view.name).stem}.png") * cover
-    return [view.read()[box], delit[box], texture,
-            texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0])]
+    return [view.read()[box], delit[box], texture, texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0])]
 
 
 def solved(capture: Capture, truth: Path | None) -> list[np.ndarray]:
@@ -74,20 +73,45 @@ def solved(capture: Capture, truth: Path | None) -> list[np.ndarray]:
     shading = images.linear_to_srgb(shading * (0.6 / max(float(np.percentile(shading, 95)), 1e-6)))
     side = round(CLOSE_UP * len(albedo))
     column, row = np.round(landmark_uv(CHEEK) * len(albedo) - side / 2).astype(int)
-    return [albedo, true, np.repeat(specular[..., :1], 3, 2), normal[..., :3], shading,
-            albedo[row:row + side, column:column + side]]
+    return [
+        albedo,
+        true,
+        np.repeat(specular[..., :1], 3, 2),
+        normal[..., :3],
+        shading,
+        albedo[row : row + side, column : column + side],
+    ]
 
 
 def relit(capture: Capture) -> list[np.ndarray]:
     """The head under LIGHTS, rendered where that is not done: sRGB, square."""
     paths = [capture.renders / f"{Path(light).stem}.exr" for light in LIGHTS]
-    made = max(path.stat().st_mtime for folder in (capture.maps, capture.maps_4k) if folder.is_dir()
-               for path in folder.glob("*.png"))
-    stale = [light for light, path in zip(LIGHTS, paths, strict=True) if not path.is_file()
-             or path.stat().st_mtime < made]
+    made = max(
+        path.stat().st_mtime
+        for folder in (capture.maps, capture.maps_4k)
+        if folder.is_dir()
+        for path in folder.glob("*.png")
+    )
+    stale = [
+        light for light, path in zip(LIGHTS, paths, strict=True) if not path.is_file() or path.stat().st_mtime < made
+    ]
     if stale:
-        subprocess.run([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *stale, "--resolution",
-                        str(RESOLUTION), "--samples", str(SAMPLES)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "benchmarks.render_capture",
+                str(capture.root),
+                *stale,
+                "--resolution",
+                str(RESOLUTION),
+                "--samples",
+                str(SAMPLES),
+            ],
+            cwd=ROOT,
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
     return [images.linear_to_srgb(images.read_linear(path)) for path in paths]
 
 

@@ -52,10 +52,13 @@ class ScannedSubject:
 def subjects(data: Path) -> dict[str, ScannedSubject]:
     """The captures by name; those of `data` that are not there are left out."""
     sample = ROOT / "core" / "synthetic" / "sample"
-    found = {"sample": ScannedSubject(sample / "capture.mp4", sample),
-             "lps_sun": ScannedSubject(data / "lps_sun" / "capture.mp4", data / "lps_sun",
-                                       data / "lee_perry_smith" / "LeePerrySmith.glb"),
-             "bust": ScannedSubject(data / "bust")}
+    found = {
+        "sample": ScannedSubject(sample / "capture.mp4", sample),
+        "lps_sun": ScannedSubject(
+            data / "lps_sun" / "capture.mp4", data / "lps_sun", data / "lee_perry_smith" / "LeePerrySmith.glb"
+        ),
+        "bust": ScannedSubject(data / "bust"),
+    }
     return {name: subject for name, subject in found.items() if subject.source.exists()}
 
 
@@ -78,8 +81,12 @@ def measure_capture(name: str, subject: ScannedSubject, folder: Path, fresh: boo
         shutil.rmtree(capture.root, ignore_errors=True)
     costs, stopped = run_stages(capture, subject.source)
     figures = {"stages": costs, "stopped": stopped}
-    for part, made, compare in (("cameras", capture.cameras, _cameras), ("scan", capture.scan, _surface),
-                                ("head", capture.head, _surface), ("texture", capture.head, _texture)):
+    for part, made, compare in (
+        ("cameras", capture.cameras, _cameras),
+        ("scan", capture.scan, _surface),
+        ("head", capture.head, _surface),
+        ("texture", capture.head, _texture),
+    ):
         if not made.exists():  # "stopped" says why
             continue
         print(f"{name}: {part}", flush=True)
@@ -103,7 +110,7 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
     stages that were fresh are kept."""
     path = capture.root / "costs.json"
     costs = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    for stage in stages.NAMES[:stages.NAMES.index(LAST) + 1]:
+    for stage in stages.NAMES[: stages.NAMES.index(LAST) + 1]:
         if stage in costs and capture.state(stages.by_name(stage), Settings()) == "done":
             continue
         print(f"{capture.root.stem}: stage {stage}", flush=True)
@@ -124,11 +131,19 @@ def _cameras(capture: Capture, subject: ScannedSubject, section: str) -> dict:
 
     frames = len(read_frames(capture).records)
     views = read_views(capture)
-    figures = {"frames": frames, "registered_percent": 100 * len(views) / frames,
-               "reprojection_px": pycolmap.Reconstruction(str(capture.cameras)).compute_mean_reprojection_error()}
-    return {**figures,
-            **({"against_truth": {k: float(v) for k, v in compare(capture, subject.truth).items()}} if subject.truth
-               else {})}
+    figures = {
+        "frames": frames,
+        "registered_percent": 100 * len(views) / frames,
+        "reprojection_px": pycolmap.Reconstruction(str(capture.cameras)).compute_mean_reprojection_error(),
+    }
+    return {
+        **figures,
+        **(
+            {"against_truth": {k: float(v) for k, v in compare(capture, subject.truth).items()}}
+            if subject.truth
+            else {}
+        ),
+    }
 
 
 def _surface(capture: Capture, subject: ScannedSubject, section: str) -> dict:
@@ -137,9 +152,12 @@ def _surface(capture: Capture, subject: ScannedSubject, section: str) -> dict:
     figures = capture.read()["stages"].get({"scan": "scan", "head": "registration"}[section], {}).get("figures", {})
     if subject.truth is None:
         return {"own": figures}
-    return {"own": figures,
-            "against_truth": compare_surface(capture, subject.truth, subject.mesh,
-                                             {"scan": "scan.ply", "head": "head.obj"}[section])}
+    return {
+        "own": figures,
+        "against_truth": compare_surface(
+            capture, subject.truth, subject.mesh, {"scan": "scan.ply", "head": "head.obj"}[section]
+        ),
+    }
 
 
 def _texture(capture: Capture, subject: ScannedSubject, section: str) -> dict:
@@ -152,8 +170,9 @@ def _texture(capture: Capture, subject: ScannedSubject, section: str) -> dict:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--captures", nargs="+", metavar="NAME",
-                        help="of sample, lps_sun, bust; all that are there by default")
+    parser.add_argument(
+        "--captures", nargs="+", metavar="NAME", help="of sample, lps_sun, bust; all that are there by default"
+    )
     parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
     parser.add_argument("--fresh", action="store_true", help="do everything again")
     parser.add_argument("--json", type=Path, help="where the tables' figures go")
@@ -170,13 +189,17 @@ def main() -> None:
         started = time.monotonic()
         figures = measure_capture(name, known[name], folder, options.fresh)
         write_json(result, {**figures, "minutes": round((time.monotonic() - started) / 60, 1)})
-    everything = {name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8")) for name in known
-                  if (folder / f"{name}.json").is_file()}
+    everything = {
+        name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        for name in known
+        if (folder / f"{name}.json").is_file()
+    }
     write_json(folder / "geometry.json", everything)
     if options.json:
         others = read_record(options.json.stem, options.json.parent)["figures"] if options.json.is_file() else {}
-        write_record(options.json, "geometry", "python -m benchmarks.geometry FOLDER",
-                     {**others, **published(everything)})
+        write_record(
+            options.json, "geometry", "python -m benchmarks.geometry FOLDER", {**others, **published(everything)}
+        )
     print(table(everything))
 
 

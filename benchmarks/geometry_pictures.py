@@ -63,8 +63,9 @@ def _shaded(caster: raster.RayCaster, view: View, scale: float) -> np.ndarray:
     """Grey, lit from the camera."""
     face, _, _ = raster.render_view(caster, view, scale)
     cosine = np.abs(meshes.face_normals(caster.mesh) @ view.axis)
-    return np.repeat(np.where(face >= 0, 0.15 + 0.75 * cosine[np.maximum(face, 0)], 0.95)[..., None], 3,
-                     2).astype(np.float32)
+    return np.repeat(np.where(face >= 0, 0.15 + 0.75 * cosine[np.maximum(face, 0)], 0.95)[..., None], 3, 2).astype(
+        np.float32
+    )
 
 
 def _wires(mesh: meshes.Mesh, caster: raster.RayCaster, view: View, frame: np.ndarray, scale: float) -> np.ndarray:

@@ -84,24 +84,31 @@ def counted(captures: list[list[float]]) -> dict:
     """Of captures and of their single pictures: what becomes of them."""
     single = np.array([each for capture in captures for each in capture if np.isfinite(each)])
     ends = [verdict(capture) for capture in captures]
-    return {"captures": len(captures), **{end: ends.count(end) for end in ("refused", "warned", "passed")},
-            "pictures": len(single),
-            "likely_percent": round(100 * float((single > LIKELY_LOG_ODDS).mean()), 1) if len(single) else None,
-            "surest": round(float(single.max()), 1) if len(single) else None}
+    return {
+        "captures": len(captures),
+        **{end: ends.count(end) for end in ("refused", "warned", "passed")},
+        "pictures": len(single),
+        "likely_percent": round(100 * float((single > LIKELY_LOG_ODDS).mean()), 1) if len(single) else None,
+        "surest": round(float(single.max()), 1) if len(single) else None,
+    }
 
 
 def real(data: Path) -> dict[str, list[list[np.ndarray]]]:
     """Captures of real people without glasses by set, each a list of sRGB pictures."""
-    lamps = [images.read_srgb(path) for path in sorted((data / "near_ps_human1").glob("*.png")) if path.stem[0] == "0"
-             or path.stem == "ambient"]
-    return {"photographs": [list(read(data / "photographs", "*.jpg"))],
-            "portraits": [[picture] for picture in read(data / "portraits", "*.png")],
-            "faceolat": [list(read(data / "faceolat" / "align_image" / person, "**/*.png"))
-                         for person in ("049", "071")],
-            "near_ps_human1": [[np.clip(gain * lamp, 0, 1) for lamp in lamps] for gain in (6, 15)],
-            "bust": [list(read(data / "bust", "*.jpg"))],
-            "lps_sun": [filmed(data / "lps_sun" / "capture.mp4")],
-            "scikit-image": [[astronaut().astype(np.float32) / 255]]}
+    lamps = [
+        images.read_srgb(path)
+        for path in sorted((data / "near_ps_human1").glob("*.png"))
+        if path.stem[0] == "0" or path.stem == "ambient"
+    ]
+    return {
+        "photographs": [list(read(data / "photographs", "*.jpg"))],
+        "portraits": [[picture] for picture in read(data / "portraits", "*.png")],
+        "faceolat": [list(read(data / "faceolat" / "align_image" / person, "**/*.png")) for person in ("049", "071")],
+        "near_ps_human1": [[np.clip(gain * lamp, 0, 1) for lamp in lamps] for gain in (6, 15)],
+        "bust": [list(read(data / "bust", "*.jpg"))],
+        "lps_sun": [filmed(data / "lps_sun" / "capture.mp4")],
+        "scikit-image": [[astronaut().astype(np.float32) / 255]],
+    }
 
 
 def read(folder: Path, pattern: str) -> Iterator[np.ndarray]:
@@ -118,11 +125,18 @@ def sheet(judged_pictures: list) -> np.ndarray:
     rows = []
     for picture, sure in judged_pictures:
         tile = cv2.resize(picture, (180, 180), interpolation=cv2.INTER_AREA)
-        cv2.putText(tile, f"{sure:.1f}", (6, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.55,
-                    (1.0, 1.0, 0.2) if sure > LIKELY_LOG_ODDS else (0.4, 1.0, 1.0), 2)
+        cv2.putText(
+            tile,
+            f"{sure:.1f}",
+            (6, 20),
+            cv2.FONT_HERSHEY_SIMPLEX,
+            0.55,
+            (1.0, 1.0, 0.2) if sure > LIKELY_LOG_ODDS else (0.4, 1.0, 1.0),
+            2,
+        )
         rows.append(tile)
     rows += [np.zeros_like(rows[0])] * (-len(rows) % ACROSS)
-    return np.vstack([np.hstack(rows[k:k + ACROSS]) for k in range(0, len(rows), ACROSS)])
+    return np.vstack([np.hstack(rows[k : k + ACROSS]) for k in range(0, len(rows), ACROSS)])
 
 
 def main() -> None:
@@ -133,8 +147,12 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--sheet", type=Path)
     asked = parser.parse_args()
-    record = {"real": {name: counted([[look(picture) for picture in capture] for capture in captures])
-                       for name, captures in real(asked.data).items()}}
+    record = {
+        "real": {
+            name: counted([[look(picture) for picture in capture] for capture in captures])
+            for name, captures in real(asked.data).items()
+        }
+    }
     record["rendered"], shown = rendered(asked.work, asked.hdri)
     print(json.dumps(record, indent=1))
     if asked.json:

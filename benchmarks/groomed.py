@@ -56,28 +56,30 @@ SOWN = {"brows": brows.grow_brows, "beard": beards.grow_beard}
 """The rules by which the people have their hair."""
 WANTED_IOU, WANTED_DEGREES = 0.7, 20
 COMMAND = "python -m benchmarks.groomed FOLDER --sheet docs/pictures/hair.jpg --json docs/figures/groomed.json"
-WORDS = ("Four people whose every hair is known, from nine sides through a phone's pipeline (1,440 x 1,920). No "
-         "other step of the chain lies between: cameras, head and texture are the true ones, and the face parser is "
-         "asked in these pictures. *IoU*: of the pixels that hair covers, by the true and by the grown hairs, seen "
-         "from either side of the front. *Amount*: what both cover of a pixel's surroundings of 3 mm, over what "
-         "either does. *Anew*: either one, for the true hairs sown anew by the same rule, with other roots: no more "
-         "can be known where pictures show no single hairs. *Parser*: of the texels to which the parser gives more "
-         "than half, and those where hair grows, whether a fringe hides them or not. *Off*: the median angle on the "
-         "skin between each true hair and the nearest grown one within 3 mm, from root to tip; *off, usual*: the "
-         "same of hair that lies as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and 20 "
-         "degrees. Nothing but the rules for stubble was chosen on these four. How clear strokes must be to "
-         "outweigh the usual direction was, on seeds 3, 5 and 13, and there the rule that joins the parser's answer "
-         "with the strokes was looked at, too. *mm*: mean length of the hairs.\n\n"
-         "A beard is stubble where its strokes are shorter than 2 mm and no more blue light is missing than stubble "
-         "and the shade of a shaven beard take, the shade as these people's generator paints it; then a hair is as "
-         "long as a stroke (core/upscale/stroke_length.py). That rule was made with these people in view, and on no "
-         "others; so was the one that takes the parser's shares of a beard over what they are in its middle, which "
-         "the stubbled person asked for.\n\n"
-         "Where it falls short: of a beard no length is told, its hairs are 6 mm long on everybody (*Beard Length* "
-         "is the artist's). Stubble hides little of the skin, so its IoU mostly compares where hairs happen to lie "
-         "close together, which sown anew they do elsewhere; its hairs have the brows' colour. Where both brows lie "
-         "behind a fringe, usual ones are grown, in no colour of the person's. Dark brows become a little wider "
-         "than by dark strokes alone.")
+WORDS = (
+    "Four people whose every hair is known, from nine sides through a phone's pipeline (1,440 x 1,920). No "
+    "other step of the chain lies between: cameras, head and texture are the true ones, and the face parser is "
+    "asked in these pictures. *IoU*: of the pixels that hair covers, by the true and by the grown hairs, seen "
+    "from either side of the front. *Amount*: what both cover of a pixel's surroundings of 3 mm, over what "
+    "either does. *Anew*: either one, for the true hairs sown anew by the same rule, with other roots: no more "
+    "can be known where pictures show no single hairs. *Parser*: of the texels to which the parser gives more "
+    "than half, and those where hair grows, whether a fringe hides them or not. *Off*: the median angle on the "
+    "skin between each true hair and the nearest grown one within 3 mm, from root to tip; *off, usual*: the "
+    "same of hair that lies as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and 20 "
+    "degrees. Nothing but the rules for stubble was chosen on these four. How clear strokes must be to "
+    "outweigh the usual direction was, on seeds 3, 5 and 13, and there the rule that joins the parser's answer "
+    "with the strokes was looked at, too. *mm*: mean length of the hairs.\n\n"
+    "A beard is stubble where its strokes are shorter than 2 mm and no more blue light is missing than stubble "
+    "and the shade of a shaven beard take, the shade as these people's generator paints it; then a hair is as "
+    "long as a stroke (core/upscale/stroke_length.py). That rule was made with these people in view, and on no "
+    "others; so was the one that takes the parser's shares of a beard over what they are in its middle, which "
+    "the stubbled person asked for.\n\n"
+    "Where it falls short: of a beard no length is told, its hairs are 6 mm long on everybody (*Beard Length* "
+    "is the artist's). Stubble hides little of the skin, so its IoU mostly compares where hairs happen to lie "
+    "close together, which sown anew they do elsewhere; its hairs have the brows' colour. Where both brows lie "
+    "behind a fringe, usual ones are grown, in no colour of the person's. Dark brows become a little wider "
+    "than by dark strokes alone."
+)
 CHOSEN_ON, TRUSTS, TURNS = (3, 5, 13), (0.03, 0.1, 0.3, 1.0, 3.0), (-40, 0, 40)
 """People on whom the trust in strokes was chosen; degrees by which the usual directions are turned, for nobody's hair
 is all as usual."""
@@ -88,16 +90,26 @@ USUAL_ALONE = 1e6
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="FOLDER", type=Path)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[person.seed for person in LIKENESSES],
-                        help="the four reserved people, where none are named")
-    parser.add_argument("--trust", action="store_true",
-                        help="how far hair is off for how clear strokes must be (seeds 3, 5, 13)")
+    parser.add_argument(
+        "--seeds",
+        type=int,
+        nargs="+",
+        default=[person.seed for person in LIKENESSES],
+        help="the four reserved people, where none are named",
+    )
+    parser.add_argument(
+        "--trust", action="store_true", help="how far hair is off for how clear strokes must be (seeds 3, 5, 13)"
+    )
     parser.add_argument("--sheet", type=Path, help="a picture of true and grown hair")
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/groomed.json")
     options = parser.parse_args()
     if options.trust:
-        print(figures.markdown(["person", "part", *map(str, TRUSTS)],
-                               [row for seed in CHOSEN_ON for row in try_trusts(options.folder, seed)]))
+        print(
+            figures.markdown(
+                ["person", "part", *map(str, TRUSTS)],
+                [row for seed in CHOSEN_ON for row in try_trusts(options.folder, seed)],
+            )
+        )
         return
     rows, pictures = {}, []
     for seed in options.seeds:
@@ -112,11 +124,43 @@ def main() -> None:
 
 def to_table(rows: dict[str, dict]) -> str:
     """Markdown: a line for each part of each person."""
-    lines = [[name, part, row["true_hairs"], row["grown_hairs"], row.get("true_mm"), row.get("grown_mm"), row["iou"],
-              row.get("iou_anew"), row["amount"], row.get("amount_anew"), row["parser_iou"], row.get("degrees"),
-              row.get("usual_degrees")] for name, parts in rows.items() for part, row in parts.items()]
-    return figures.markdown(["person", "part", "true hairs", "grown hairs", "true mm", "grown mm", "IoU", "anew",
-                             "amount", "anew", "parser", "off, degrees", "off, usual"], lines)
+    lines = [
+        [
+            name,
+            part,
+            row["true_hairs"],
+            row["grown_hairs"],
+            row.get("true_mm"),
+            row.get("grown_mm"),
+            row["iou"],
+            row.get("iou_anew"),
+            row["amount"],
+            row.get("amount_anew"),
+            row["parser_iou"],
+            row.get("degrees"),
+            row.get("usual_degrees"),
+        ]
+        for name, parts in rows.items()
+        for part, row in parts.items()
+    ]
+    return figures.markdown(
+        [
+            "person",
+            "part",
+            "true hairs",
+            "grown hairs",
+            "true mm",
+            "grown mm",
+            "IoU",
+            "anew",
+            "amount",
+            "anew",
+            "parser",
+            "off, degrees",
+            "off, usual",
+        ],
+        lines,
+    )
 
 
 def shortfalls(rows: dict[str, dict]) -> str:
@@ -124,12 +168,17 @@ def shortfalls(rows: dict[str, dict]) -> str:
     told = [(f"the {name} person's {part}", row) for name, parts in rows.items() for part, row in parts.items()]
     known = [row for _, row in told if "degrees" in row]
     thin = [f"{what} ({row['iou']:.2f})" for what, row in told if row["iou"] < WANTED_IOU]
-    off = [f"{what} ({row['degrees']:.0f} degrees)" for what, row in told
-           if "degrees" in row and row["degrees"] > WANTED_DEGREES]
+    off = [
+        f"{what} ({row['degrees']:.0f} degrees)"
+        for what, row in told
+        if "degrees" in row and row["degrees"] > WANTED_DEGREES
+    ]
     nearer = sum(row["degrees"] < row["usual_degrees"] for row in known)
-    return (f"Below the IoU that is wanted: {', '.join(thin) or 'nothing'}; farther off: "
-            f"{', '.join(off) or 'nothing'}. Hair that follows the strokes lies nearer to the true one than "
-            f"the usual directions alone in {nearer} of {len(known)} rows.")
+    return (
+        f"Below the IoU that is wanted: {', '.join(thin) or 'nothing'}; farther off: "
+        f"{', '.join(off) or 'nothing'}. Hair that follows the strokes lies nearer to the true one than "
+        f"the usual directions alone in {nearer} of {len(known)} rows."
+    )
 
 
 def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
@@ -138,7 +187,7 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     views, seen = photograph(folder / str(seed), figure)
     surface = lay_out(figure.head, SIZE)
     maps, shown = read_maps(figure, views, seen)
-    found = hair.find(maps, surface, shown.shares[..., :len(GROWTHS)])
+    found = hair.find(maps, surface, shown.shares[..., : len(GROWTHS)])
     cleaned, _ = hair.clean(maps, found, surface, seed)
     grown = grooming.groom(maps, found, cleaned, surface, seed)
     usual = grooming.groom(maps, found, cleaned, surface, seed, trust=USUAL_ALONE)
@@ -148,15 +197,28 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
         if part in true or part in grown:
             judged = [views[k] for k in JUDGED]
             iou, amount = overlaps(figure, judged, true.get(part), grown.get(part))
-            row[part] = {"true_hairs": _count(true.get(part)), "grown_hairs": _count(grown.get(part)), "iou": iou,
-                         "amount": amount, "parser_iou": _told(figure, shown, part)}
+            row[part] = {
+                "true_hairs": _count(true.get(part)),
+                "grown_hairs": _count(grown.get(part)),
+                "iou": iou,
+                "amount": amount,
+                "parser_iou": _told(figure, shown, part),
+            }
             if part in true:
-                row[part] |= dict(zip(("iou_anew", "amount_anew"),
-                                      overlaps(figure, judged, true[part], sow_anew(figure, part)), strict=True))
+                row[part] |= dict(
+                    zip(
+                        ("iou_anew", "amount_anew"),
+                        overlaps(figure, judged, true[part], sow_anew(figure, part)),
+                        strict=True,
+                    )
+                )
             if part in true and part in grown:
-                row[part] |= {"true_mm": _mean_mm(true[part]), "grown_mm": _mean_mm(grown[part]),
-                              "degrees": _off(true[part], grown[part], figure),
-                              "usual_degrees": _off(true[part], usual[part], figure)}
+                row[part] |= {
+                    "true_mm": _mean_mm(true[part]),
+                    "grown_mm": _mean_mm(grown[part]),
+                    "degrees": _off(true[part], grown[part], figure),
+                    "usual_degrees": _off(true[part], usual[part], figure),
+                }
     return row, _picture(figure, views[VIEWS // 2], true, grown)
 
 
@@ -166,7 +228,7 @@ def try_trusts(folder: Path, seed: int) -> list[list]:
     figure = make_figure(seed, SIZE)
     views, seen = photograph(folder / str(seed), figure)
     surface, (maps, shown) = lay_out(figure.head, SIZE), read_maps(figure, views, seen)
-    found = hair.find(maps, surface, shown.shares[..., :len(GROWTHS)])
+    found = hair.find(maps, surface, shown.shares[..., : len(GROWTHS)])
     landmarks, rows = template.landmark_points(surface.mesh), []
     for true in (hairs for hairs in figure.strands if hairs.part in ("brows", "beard")):
         where = (getattr(found, true.part) > grooming.LEAST_COVER_SHARE) & surface.covered
@@ -199,8 +261,10 @@ def _off(true: Strands, grown: Strands, figure: Figure) -> float:
     distance, nearest = cKDTree(grown.points[:, 0]).query(true.points[:, 0])
     close = distance < NEAR_MM / 1000
     normals = vertex_normals(figure.head)[cKDTree(figure.head.vertices).query(true.points[close, 0])[1]]
-    one, other = (hairs.points[index, -1] - hairs.points[index, 0]
-                  for hairs, index in ((true, np.flatnonzero(close)), (grown, nearest[close])))
+    one, other = (
+        hairs.points[index, -1] - hairs.points[index, 0]
+        for hairs, index in ((true, np.flatnonzero(close)), (grown, nearest[close]))
+    )
     return round(_median_angle(one, other, normals), 1)
 
 
@@ -231,15 +295,17 @@ def overlaps(figure: Figure, views: list[View], true: Strands | None, grown: Str
 
 def sow_anew(figure: Figure, part: str) -> Strands:
     """A person's hairs of a part as they would be with other roots."""
-    return SOWN[part](figure.person, ground_of(figure.head), SkinSurface(figure.head),
-                      np.random.default_rng([figure.person.seed, 99]))
+    return SOWN[part](
+        figure.person, ground_of(figure.head), SkinSurface(figure.head), np.random.default_rng([figure.person.seed, 99])
+    )
 
 
 def _told(figure: Figure, parts_shown: PartsShown, part: str) -> float:
     """Intersection over union of the texels to which the parser gives more than half and of those where such hair
     grows, as far as a view shows them."""
-    grows = (images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth
-             else np.zeros((SIZE, SIZE), bool))
+    grows = (
+        images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth else np.zeros((SIZE, SIZE), bool)
+    )
     told, grows = (where[parts_shown.judged] for where in (parts_shown.shares[..., GROWTHS.index(part)] > 0.5, grows))
     return round(float((told & grows).sum() / max((told | grows).sum(), 1)), 3)
 
@@ -264,9 +330,15 @@ def _picture(figure: Figure, view: View, true: dict, grown: dict) -> np.ndarray:
     for hairs in (true, grown):
         chosen = [hairs[part] for part in ("brows", "lashes", "beard") if part in hairs]
         meshes = [figure.opened.skin, *(prisms(h) for h in chosen)]
-        flat = np.concatenate([np.zeros((len(meshes[0].faces), 3)),
-                               *(np.repeat(h.colour, len(m.faces) // len(h.colour), 0)
-                                 for h, m in zip(chosen, meshes[1:], strict=True))])
+        flat = np.concatenate(
+            [
+                np.zeros((len(meshes[0].faces), 3)),
+                *(
+                    np.repeat(h.colour, len(m.faces) // len(h.colour), 0)
+                    for h, m in zip(chosen, meshes[1:], strict=True)
+                ),
+            ]
+        )
         whole = joined(meshes)
         face, bary, _ = raster.render_view(raster.RayCaster(whole), view, OVER)
         hit = face >= 0

@@ -86,4 +86,4 @@ def read_maps(figure: Figure, views: list[View], colours: list[np.ndarray]) -> t
 
 def shrink(image: np.ndarray) -> np.ndarray:
     h, w = image.shape[0] // OVER, image.shape[1] // OVER
-    return image[:h * OVER, :w * OVER].reshape(h, OVER, w, OVER, -1).mean((1, 3))
+    return image[: h * OVER, : w * OVER].reshape(h, OVER, w, OVER, -1).mean((1, 3))

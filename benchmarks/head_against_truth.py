@@ -50,12 +50,15 @@ def compare_surface(capture: Capture, truth: Path, mesh: Path | None, surface: s
 
     points, normals = sample_truth(mesh)
     points, normals = pose.apply(points), normals @ pose.rotation.T
-    ours_mesh = (meshes.read_obj(capture.root / surface) if surface.endswith(".obj")
-                 else meshes.read_ply(capture.root / surface))
+    ours_mesh = (
+        meshes.read_obj(capture.root / surface) if surface.endswith(".obj") else meshes.read_ply(capture.root / surface)
+    )
     hits = _face_points(ours_mesh, shared, frames, truth)
     tree = cKDTree(points)
-    figures = {"camera_centres_mm": _round(1e3 * np.median(np.linalg.norm(pose.apply(theirs) - ours, axis=1))),
-               "points": len(hits)}
+    figures = {
+        "camera_centres_mm": _round(1e3 * np.median(np.linalg.norm(pose.apply(theirs) - ours, axis=1))),
+        "points": len(hits),
+    }
     figures["by_cameras"] = _percentiles(_distances(hits, tree, points, normals))
     figures["after_icp"] = _percentiles(_distances(settle(hits, points, normals), tree, points, normals))
     return figures
@@ -76,8 +79,10 @@ def pose_of_truth(capture: Capture, truth: Path) -> tuple[Similarity, list[View]
     """What brings the world of TRUTH's cameras.json into the capture's, the views that are in both, and their true
     centres [N, 3]."""
     frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
-    cameras = {c["frame"]: np.array(c["matrix_world"])[:3, 3]
-               for c in json.loads((truth / "cameras.json").read_text())["cameras"]}
+    cameras = {
+        c["frame"]: np.array(c["matrix_world"])[:3, 3]
+        for c in json.loads((truth / "cameras.json").read_text())["cameras"]
+    }
     shared = [v for v in read_views(capture) if frames[v.name] in cameras]
     ours, theirs = np.stack([v.centre for v in shared]), np.stack([cameras[frames[v.name]] for v in shared])
     return similarity(theirs, ours, np.ones(len(ours))), shared, theirs
@@ -126,8 +131,10 @@ def _moved(hits, targets, normals, used):
 
 
 def _percentiles(distances: np.ndarray) -> dict:
-    return {f"{name}_mm": _round(1e3 * np.percentile(distances, percent))
-            for name, percent in (("median", 50), ("p90", 90), ("p95", 95))}
+    return {
+        f"{name}_mm": _round(1e3 * np.percentile(distances, percent))
+        for name, percent in (("median", 50), ("p90", 90), ("p95", 95))
+    }
 
 
 def _round(figure: float) -> float:

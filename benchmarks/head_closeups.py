@@ -63,8 +63,10 @@ person's left; from AWAY_M metres on that side, through that lens. The neck from
 processor did not come to an end."""
 FRAMES = 60
 """Of the sample video."""
-COMMAND = ("python -m benchmarks.head_closeups CHECKOUT FOLDER --picture docs/pictures/head_closeups.jpg --frame "
-           "docs/pictures/head_frame.jpg --json docs/figures/head_closeups.json")
+COMMAND = (
+    "python -m benchmarks.head_closeups CHECKOUT FOLDER --picture docs/pictures/head_closeups.jpg --frame "
+    "docs/pictures/head_frame.jpg --json docs/figures/head_closeups.json"
+)
 
 
 def main() -> None:
@@ -84,14 +86,30 @@ def main() -> None:
     for version, checkout in checkouts.items():
         render_closeups(checkout, folder / version, asked.resolution, asked.samples)
     if asked.picture:
-        write_small(asked.picture, np.vstack([
-            np.hstack([images.read_srgb(folder / version / f"{place}_{light}_{engine}.png")[..., :3]
-                       for light in LIGHTS for version in checkouts for engine in ENGINES]) for place in PLACES]))
+        write_small(
+            asked.picture,
+            np.vstack(
+                [
+                    np.hstack(
+                        [
+                            images.read_srgb(folder / version / f"{place}_{light}_{engine}.png")[..., :3]
+                            for light in LIGHTS
+                            for version in checkouts
+                            for engine in ENGINES
+                        ]
+                    )
+                    for place in PLACES
+                ]
+            ),
+        )
     number = front_frame()
     frame, face = read_frame(number), images.read_mask(sample.SAMPLE / "face" / f"{number:04d}.png") > 0.5
     heads = {version: read_head(folder / version / "sample_head.wildcap") for version in (TODAY, EARLIER)}
-    heads = {TRUE: (make_skin(sample_parameters(sample.RESERVED["sample"]), sample.MAPS), None),
-             ON_TRUE: (heads[TODAY][0], None), **heads}
+    heads = {
+        TRUE: (make_skin(sample_parameters(sample.RESERVED["sample"]), sample.MAPS), None),
+        ON_TRUE: (heads[TODAY][0], None),
+        **heads,
+    }
     shown = {name: render_in_scene(folder / "frame" / name, number, *head) for name, head in heads.items()}
     judged = {name: with_gain(picture, frame, face) for name, picture in shown.items()}
     rows = {name: differences(picture, frame, face) for name, picture in judged.items()}
@@ -103,15 +121,17 @@ def main() -> None:
         write_small(asked.frame, np.vstack([np.hstack([picture[box] for picture in row]) for row in (above, below)]))
     seconds = {"seconds": time_picture(folder / TODAY / "sample_head.wildcap")} if asked.seconds else {}
     if asked.json:
-        figures.write_record(asked.json, "head_closeups", COMMAND, {"frame": number, "rows": rows, **seconds},
-                             keep=True)
+        figures.write_record(
+            asked.json, "head_closeups", COMMAND, {"frame": number, "rows": rows, **seconds}, keep=True
+        )
 
 
 def to_table(rows: dict[str, dict]) -> str:
     """Markdown: how far each head lies from the frame."""
-    return figures.markdown(["in the frame's scene", "PSNR", "SSIM", "FLIP"],
-                            [[name, f"{row['psnr']:.2f} dB", f"{row['ssim']:.3f}", f"{row['flip']:.3f}"]
-                             for name, row in rows.items()])
+    return figures.markdown(
+        ["in the frame's scene", "PSNR", "SSIM", "FLIP"],
+        [[name, f"{row['psnr']:.2f} dB", f"{row['ssim']:.3f}", f"{row['flip']:.3f}"] for name, row in rows.items()],
+    )
 
 
 def render_closeups(checkout: Path, folder: Path, resolution: int, samples: int) -> None:
@@ -126,22 +146,55 @@ def render_closeups(checkout: Path, folder: Path, resolution: int, samples: int)
     """
     folder.mkdir(parents=True, exist_ok=True)
     for engine in ENGINES:  # in a process of its own: what EEVEE has compiled, it does not give back
-        write_json(folder / "job.json", {
-            "work": str(folder), "resolution": resolution, "samples": samples,
-            "shots": [{"path": str(folder / f"{place}_{light}_{engine}.png"), "light": light, "engine": engine,
-                       "away_m": AWAY_M, **told, "at": weights_at(told["at"])}
-                      for place, told in PLACES.items() for light in LIGHTS]})
+        write_json(
+            folder / "job.json",
+            {
+                "work": str(folder),
+                "resolution": resolution,
+                "samples": samples,
+                "shots": [
+                    {
+                        "path": str(folder / f"{place}_{light}_{engine}.png"),
+                        "light": light,
+                        "engine": engine,
+                        "away_m": AWAY_M,
+                        **told,
+                        "at": weights_at(told["at"]),
+                    }
+                    for place, told in PLACES.items()
+                    for light in LIGHTS
+                ],
+            },
+        )
         script = Path(__file__).with_name("head_closeups_render.py")
         # -P: the version's own modules, not those beside the script
-        subprocess.run([sys.executable, "-P", str(script), str(folder / "job.json")], cwd=checkout, check=True,
-                       env={**os.environ, "PYTHONPATH": str(checkout)})
+        subprocess.run(
+            [sys.executable, "-P", str(script), str(folder / "job.json")],
+            cwd=checkout,
+            check=True,
+            env={**os.environ, "PYTHONPATH": str(checkout)},
+        )
 
 
 def time_picture(capture: Path) -> float:
     """Seconds that a picture of a capture's head takes in Cycles at 1,024 pixels and 128 samples."""
     start = time.perf_counter()
-    subprocess.run([sys.executable, "-m", "benchmarks.render_capture", str(capture), LIGHTS[0], "--resolution", "1024",
-                    "--samples", "128"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "benchmarks.render_capture",
+            str(capture),
+            LIGHTS[0],
+            "--resolution",
+            "1024",
+            "--samples",
+            "128",
+        ],
+        cwd=ROOT,
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     return round(time.perf_counter() - start, 1)
 
 
@@ -188,8 +241,10 @@ def read_head(capture: Path) -> tuple[Skin, Mesh]:
     diffuse = images.srgb_to_linear(images.read_srgb(capture / "maps" / "diffuse_albedo.png")[..., :3])
     specular, normal = (images.read_data(capture / "maps" / f"{name}.png") for name in ("specular_albedo", "normal"))
     nothing = np.zeros(diffuse.shape[:2], np.float32)
-    return (Skin(diffuse, specular.reshape(*nothing.shape, -1)[..., 0], nothing, 2 * normal[..., :3] - 1, nothing > -1),
-            true.moved(placed))
+    return (
+        Skin(diffuse, specular.reshape(*nothing.shape, -1)[..., 0], nothing, 2 * normal[..., :3] - 1, nothing > -1),
+        true.moved(placed),
+    )
 
 
 def flip_map(picture: np.ndarray, frame: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -200,8 +255,13 @@ def flip_map(picture: np.ndarray, frame: np.ndarray, mask: np.ndarray) -> np.nda
 
 def render_in_scene(work: Path, number: int, skin: Skin, head: Mesh | None) -> np.ndarray:
     """A head in the place of the sample's subject, in the light and from the camera of one frame, sRGB [H, W, 3]."""
-    sample.render_frames(work, sample.RESERVED["sample"], skin,
-                         scene.Shot(scene.camera_path(sample.RESERVED["sample"], FRAMES), [number], 32), head=head)
+    sample.render_frames(
+        work,
+        sample.RESERVED["sample"],
+        skin,
+        scene.Shot(scene.camera_path(sample.RESERVED["sample"], FRAMES), [number], 32),
+        head=head,
+    )
     return images.read_srgb(work / f"{number:05d}.png")[..., :3]
 
 

@@ -56,9 +56,10 @@ def table(recorded: dict) -> str:
     for kind, row in recorded["rows"].items():
         rows.setdefault(STAGES_FILES if kind.startswith("stage ") else kind, Counter()).update(row)
     rows["all"] = Counter(recorded["all"])
-    return markdown(["what was spoiled", "cases", "refused by name", "accepted, with sound results", "faults"],
-                    [[kind, *(row[name] for name in ("cases", "refused", "accepted", "faults"))]
-                     for kind, row in rows.items()])
+    return markdown(
+        ["what was spoiled", "cases", "refused by name", "accepted, with sound results", "faults"],
+        [[kind, *(row[name] for name in ("cases", "refused", "accepted", "faults"))] for kind, row in rows.items()],
+    )
 
 
 def _run(arguments: argparse.Namespace, work: Path) -> int:
@@ -68,7 +69,8 @@ def _run(arguments: argparse.Namespace, work: Path) -> int:
     began = time.monotonic()
     kills_worker.warm_up()
     undisturbed = kills_capture.run_undisturbed(
-        work / "undisturbed", arguments.until, arguments.delighter, tell=lambda text: None)
+        work / "undisturbed", arguments.until, arguments.delighter, tell=lambda text: None
+    )
     stock = hostile_cases.Stock(undisturbed, work / "stock")
     print(f"A capture was made in {time.monotonic() - began:.0f} s.", flush=True)
     kinds = hostile_cases.kinds(undisturbed.names)
@@ -90,23 +92,35 @@ def _run(arguments: argparse.Namespace, work: Path) -> int:
             faulty.append((number, kind, case.said, faults))
             print(f"{number:5} {kind}: {case.said}", *(f"      {fault}" for fault in faults), sep="\n", flush=True)
         if arguments.only is not None:
-            print(f"{kind}: {case.said}\nexit code {ended.code} after {ended.seconds:.1f} s and {ended.peak / 1e9:.2f} "
-                  f"GB\n{ended.output}")
+            print(
+                f"{kind}: {case.said}\nexit code {ended.code} after {ended.seconds:.1f} s and {ended.peak / 1e9:.2f} "
+                f"GB\n{ended.output}"
+            )
         shutil.rmtree(place, ignore_errors=True)
     print(f"\n{'':24}{'cases':>8}{'refused':>9}{'accepted':>10}{'faults':>8}")
     total = sum(rows.values(), Counter())
     for name, row in (*sorted(rows.items()), ("all", total)):
         print(f"{name:24}{row['cases']:8}{row['refused']:9}{row['accepted']:10}{row['faults']:8}")
     for number, *_ in faulty[:20]:
-        print(f"Again: python -m benchmarks.hostile --seed {arguments.seed} --count {arguments.count} --until "
-              f"{arguments.until} "
-              f"--delighter {arguments.delighter} --only {number}")
+        print(
+            f"Again: python -m benchmarks.hostile --seed {arguments.seed} --count {arguments.count} --until "
+            f"{arguments.until} "
+            f"--delighter {arguments.delighter} --only {number}"
+        )
     seconds = time.monotonic() - began
     print(f"{total['cases']} cases in {seconds / 60:.1f} minutes, seed {arguments.seed}.")
     if arguments.json:
-        figures.write_record(arguments.json, "hostile", "python -m benchmarks.hostile --count COUNT --seed SEED",
-                             {"rows": {name: dict(row) for name, row in rows.items()}, "all": dict(total),
-                              "seed": arguments.seed, "minutes": seconds / 60})
+        figures.write_record(
+            arguments.json,
+            "hostile",
+            "python -m benchmarks.hostile --count COUNT --seed SEED",
+            {
+                "rows": {name: dict(row) for name, row in rows.items()},
+                "all": dict(total),
+                "seed": arguments.seed,
+                "minutes": seconds / 60,
+            },
+        )
     return 0 if total["cases"] and not total["faults"] else 1
 
 

@@ -21,9 +21,23 @@ from .kills_worker import in_fork
 
 CHEAP = {"cameras": 6, "scan": 5, "texture": 2, "shadow_mask": 2}
 """Stages that take little time, and how often they are tried for once of the others."""
-NAMES = ("Zoë et moi", "a b'c\"d", "-rf", "%s{0}$HOME`id`", "tab\there", "line\nbreak", ".hidden", "trailing. ", "CON",
-         "x" * 240, "日本語の顔", "📷", "..wildcap",
-         os.fsdecode(b"caf\xe9"), os.fsdecode(b"\xff\xfe"))
+NAMES = (
+    "Zoë et moi",
+    "a b'c\"d",
+    "-rf",
+    "%s{0}$HOME`id`",
+    "tab\there",
+    "line\nbreak",
+    ".hidden",
+    "trailing. ",
+    "CON",
+    "x" * 240,
+    "日本語の顔",
+    "📷",
+    "..wildcap",
+    os.fsdecode(b"caf\xe9"),
+    os.fsdecode(b"\xff\xfe"),
+)
 
 
 @dataclass
@@ -80,9 +94,16 @@ class Stock:
 def kinds(names: tuple[str, ...]) -> dict[str, Kind]:
     """All that can be tried on a capture in which these stages were run."""
     found = {f"stage {name}": Kind(_of_stage(stages.by_name(name)), CHEAP.get(name, 1)) for name in names[1:]}
-    found |= {"books": Kind(_book, 8), "video": Kind(_video), "photographs": Kind(_photographs), "mask": Kind(_mask, 6),
-              "landmarks": Kind(_landmarks),
-              "settings": Kind(_settings), "cameras": Kind(_cameras), "names": Kind(_names)}
+    found |= {
+        "books": Kind(_book, 8),
+        "video": Kind(_video),
+        "photographs": Kind(_photographs),
+        "mask": Kind(_mask, 6),
+        "landmarks": Kind(_landmarks),
+        "settings": Kind(_settings),
+        "cameras": Kind(_cameras),
+        "names": Kind(_names),
+    }
     if "registration" in names:
         found["own mesh"] = Kind(_own_mesh, 1)
     if "delight" in names:
@@ -114,18 +135,30 @@ def _spoil(case: Case, path: Path, rng: random.Random) -> None:
     # picture libraries start threads, which no process that forks may have
     way, said = in_fork(lambda: list(mutate(path, rng)))
     case.spoiled, case.said = path, f"{path.relative_to(case.place)}: {way}, {said}"
-    case.named = ((path.name, path.parent.name)
-                  if path.parent.name in ("cameras", "model", "frames", "delit", "photographs") else (path.name,))
+    case.named = (
+        (path.name, path.parent.name)
+        if path.parent.name in ("cameras", "model", "frames", "delit", "photographs")
+        else (path.name,)
+    )
 
 
 def _run(case: Case, stage: str, source: str = "-", forced: bool = True, **settings: dict) -> None:
     """A run of one stage of the case's capture, with the settings of the undisturbed run and others."""
     job = json.loads(capture_at(case.place).job.read_text())["settings"] if capture_at(case.place).job.is_file() else {}
     chosen = case.place / "chosen.json"
-    chosen.write_text(json.dumps({**job,
-                                  **{name: {**job.get(name, {}), **values} for name, values in settings.items()}}))
-    case.command = ["run", source, str(capture_at(case.place).root), "--settings", str(chosen), "--until", stage,
-                    *(["--from", stage] if forced else [])]
+    chosen.write_text(
+        json.dumps({**job, **{name: {**job.get(name, {}), **values} for name, values in settings.items()}})
+    )
+    case.command = [
+        "run",
+        source,
+        str(capture_at(case.place).root),
+        "--settings",
+        str(chosen),
+        "--until",
+        stage,
+        *(["--from", stage] if forced else []),
+    ]
     case.outputs = stages.by_name(stage).writes
 
 
@@ -133,10 +166,16 @@ def _of_stage(stage: stages.Stage) -> Callable:
     def make(case: Case, stock: Stock, rng: random.Random) -> None:
         root = capture_at(case.place).root
         names = (*stage.reads, *stage.optional_reads)
-        files = [file for name in names
-                 for file in ([root / name] if (root / name).is_file() else sorted((root / name).glob("*.*")))]
-        ours = [file for file in files if file.name not in ("retouched.psd", "rig.txt")
-                and not file.name.startswith(".") and file.is_file()]
+        files = [
+            file
+            for name in names
+            for file in ([root / name] if (root / name).is_file() else sorted((root / name).glob("*.*")))
+        ]
+        ours = [
+            file
+            for file in files
+            if file.name not in ("retouched.psd", "rig.txt") and not file.name.startswith(".") and file.is_file()
+        ]
         _run(case, stage.name)
         _spoil(case, rng.choice(ours), rng)
         if stage.name == "cameras":
@@ -194,8 +233,19 @@ def _settings(case: Case, stock: Stock, rng: random.Random) -> None:
         _spoil(case, chosen, rng)
         case.named = (chosen.name, "--settings", "frames.", "scan.", "seed")
     else:
-        name = rng.choice(["frames.views", "solve.skin_tone", "delight.delighter", "scan.voxel_mm", "none.such",
-                           "registration.template", "", "seed", "frames"])
+        name = rng.choice(
+            [
+                "frames.views",
+                "solve.skin_tone",
+                "delight.delighter",
+                "scan.voxel_mm",
+                "none.such",
+                "registration.template",
+                "",
+                "seed",
+                "frames",
+            ]
+        )
         value = (
             rng.choice([*map(str, VALUES[3:-1]), "nan", "1e999", "0,0,0", "-5", "on"])
             .encode("utf-8", "replace")
@@ -228,11 +278,24 @@ def _delit(case: Case, stock: Stock, rng: random.Random) -> None:
 
 def _deliver(case: Case, stock: Stock, rng: random.Random) -> None:
     capture = capture_at(case.place)
-    files = [capture.head,
-             *(path for folder in (capture.maps, capture.maps_4k) for path in sorted(folder.glob("*.*"))
-               if path.suffix in (".png", ".exr"))]
-    case.command = ["deliver", str(capture.root), "--to", str(case.place / "out"), "--set=deliver.format=obj",
-                    f"--set=deliver.preset={DELIVERY['preset']}", "--set=deliver.size=1024"]
+    files = [
+        capture.head,
+        *(
+            path
+            for folder in (capture.maps, capture.maps_4k)
+            for path in sorted(folder.glob("*.*"))
+            if path.suffix in (".png", ".exr")
+        ),
+    ]
+    case.command = [
+        "deliver",
+        str(capture.root),
+        "--to",
+        str(case.place / "out"),
+        "--set=deliver.format=obj",
+        f"--set=deliver.preset={DELIVERY['preset']}",
+        "--set=deliver.size=1024",
+    ]
     _spoil(case, rng.choice(files), rng)
 
 

@@ -18,18 +18,62 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
-NUMBERS = ("nan", "-nan", "inf", "-inf", "1e30", "-1e30", "1e-310", "-1", "0", "999999999999", "1e999", "", "x", "1,5",
-           "0x10")
-VALUES = (None, True, [], {}, "", "x", "../../etc/passwd", "..\\secret.jpg", "a\0b", "/tmp/there", -1, 0, 1e308,
-          float("nan"), float("inf"), 10**400, [[]], "\ud800", "<script>alert(1)</script>", "%s%n{0}", "ä" * 5000)
+NUMBERS = (
+    "nan",
+    "-nan",
+    "inf",
+    "-inf",
+    "1e30",
+    "-1e30",
+    "1e-310",
+    "-1",
+    "0",
+    "999999999999",
+    "1e999",
+    "",
+    "x",
+    "1,5",
+    "0x10",
+)
+VALUES = (
+    None,
+    True,
+    [],
+    {},
+    "",
+    "x",
+    "../../etc/passwd",
+    "..\\secret.jpg",
+    "a\0b",
+    "/tmp/there",
+    -1,
+    0,
+    1e308,
+    float("nan"),
+    float("inf"),
+    10**400,
+    [[]],
+    "\ud800",
+    "<script>alert(1)</script>",
+    "%s%n{0}",
+    "ä" * 5000,
+)
 """What stands in a JSON file in the place of a sound value."""
 COUNTS = (2**60, 2**63, 2**31 - 1, 2**32 - 1, 0, 1)
 
 
 def truncate(path: Path, rng: random.Random) -> str:
     content = path.read_bytes()
-    kept = rng.choice([0, 1, 8, rng.randrange(len(content) + 1), max(0, len(content) - 1),
-                       max(0, len(content) - rng.randrange(1, 64))])
+    kept = rng.choice(
+        [
+            0,
+            1,
+            8,
+            rng.randrange(len(content) + 1),
+            max(0, len(content) - 1),
+            max(0, len(content) - rng.randrange(1, 64)),
+        ]
+    )
     _put(path, content[:kept])
     return f"cut to {kept} of {len(content)} bytes"
 
@@ -49,18 +93,24 @@ def overwrite(path: Path, rng: random.Random) -> str:
     start, size = rng.randrange(max(1, len(content))), rng.choice([4, 8, 512, 4096])
     what = rng.choice(["zeros", "ones", "noise"])
     spoilt = {"zeros": bytes(size), "ones": b"\xff" * size, "noise": rng.randbytes(size)}[what]
-    content[start:start + size] = spoilt[:max(0, len(content) - start)]
+    content[start : start + size] = spoilt[: max(0, len(content) - start)]
     _put(path, bytes(content))
     return f"{what} of {size} bytes at {start}"
 
 
 def replace_whole(path: Path, rng: random.Random) -> str:
     what = rng.choice(["noise", "text", "a page", "zeros", "a picture", "a pickle"])
-    _put(path,
-         {"noise": rng.randbytes(rng.randrange(1, 5000)), "text": b"Dear diary,\nno face today.\n" * 20,
-          "a page": b"<!doctype html><html>404</html>",
-          "zeros": bytes(4096), "a picture": make_png(4, 4, rng.randbytes(4 * 13)),
-          "a pickle": b"\x80\x04cos\nsystem\n(S'true'\ntR."}[what])
+    _put(
+        path,
+        {
+            "noise": rng.randbytes(rng.randrange(1, 5000)),
+            "text": b"Dear diary,\nno face today.\n" * 20,
+            "a page": b"<!doctype html><html>404</html>",
+            "zeros": bytes(4096),
+            "a picture": make_png(4, 4, rng.randbytes(4 * 13)),
+            "a pickle": b"\x80\x04cos\nsystem\n(S'true'\ntR.",
+        }[what],
+    )
     return f"replaced by {what}"
 
 
@@ -98,12 +148,20 @@ def forge_png(path: Path, rng: random.Random) -> str:
 
 def forge_exr(path: Path, rng: random.Random) -> str:
     content = bytearray(path.read_bytes())
-    box = rng.choice([(0, 0, 59999, 59999), (0, 0, 2**31 - 1, 2**31 - 1), (-2**31, -2**31, 2**31 - 1, 2**31 - 1),
-                      (0, 0, -1, -1), (5, 5, 0, 0), (0, 0, 0, 0)])
+    box = rng.choice(
+        [
+            (0, 0, 59999, 59999),
+            (0, 0, 2**31 - 1, 2**31 - 1),
+            (-(2**31), -(2**31), 2**31 - 1, 2**31 - 1),
+            (0, 0, -1, -1),
+            (5, 5, 0, 0),
+            (0, 0, 0, 0),
+        ]
+    )
     for field in (b"dataWindow\0box2i\0", b"displayWindow\0box2i\0"):
         at = content.find(field)
         if at >= 0:
-            content[at + len(field) + 4:at + len(field) + 20] = struct.pack("<4i", *box)
+            content[at + len(field) + 4 : at + len(field) + 20] = struct.pack("<4i", *box)
     _put(path, bytes(content))
     return f"an EXR of {box}"
 
@@ -114,8 +172,9 @@ def spoil_pixels(path: Path, rng: random.Random) -> str:
     import OpenImageIO as oiio
 
     size = rng.choice([None, None, (1, 1), (7, 300), (33, 33)])
-    channels = rng.choice([1, 2, 3, 4, 7] if path.suffix == ".exr" else [1, 3] if path.suffix == ".jpg"
-                          else [1, 2, 3, 4])
+    channels = rng.choice(
+        [1, 2, 3, 4, 7] if path.suffix == ".exr" else [1, 3] if path.suffix == ".jpg" else [1, 2, 3, 4]
+    )
     old = oiio.ImageInput.open(str(path))
     if old is None:  # a file of the user's that is no picture
         return replace_whole(path, rng)
@@ -156,10 +215,12 @@ def spoil_json(path: Path, rng: random.Random) -> str:
         said = f"{way} {'removed' if how == 'key' else f'is now {box[key]!r:.40}'}"
     else:
         value = rng.choice(VALUES)
-        text, said = {"whole": (_dump(value), f"the whole is {value!r:.40}"),
-                      "deep": ("[" * 100_000, "nested 100,000 deep"),
-                      "cut": (_dump(told)[:rng.randrange(1, 200)], "cut off"),
-                      "bytes": ("\ufeff" + _dump(told), "with a byte order mark")}[how]
+        text, said = {
+            "whole": (_dump(value), f"the whole is {value!r:.40}"),
+            "deep": ("[" * 100_000, "nested 100,000 deep"),
+            "cut": (_dump(told)[: rng.randrange(1, 200)], "cut off"),
+            "bytes": ("\ufeff" + _dump(told), "with a byte order mark"),
+        }[how]
     _put(path, text.encode("utf-8", "surrogatepass"))
     return said
 
@@ -172,7 +233,7 @@ def spoil_lines(path: Path, rng: random.Random) -> str:
     if not found:
         return flip(path, rng)
     at, new = rng.choice(found), rng.choice(NUMBERS)
-    _put(path, (text[:at.start()] + new + text[at.end():]).encode("latin-1"))
+    _put(path, (text[: at.start()] + new + text[at.end() :]).encode("latin-1"))
     return f"{at.group()} is now {new!r}"
 
 
@@ -181,20 +242,38 @@ def spoil_counts(path: Path, rng: random.Random) -> str:
     content = bytearray(path.read_bytes())
     at = rng.choice([0, 8, 16, 24, rng.randrange(max(1, len(content) - 8))])
     value = rng.choice([*COUNTS, None])
-    content[at:at + 8] = (struct.pack("<d", rng.choice([float("nan"), float("inf"), 1e300])) if value is None
-                          else struct.pack("<Q", value))
+    content[at : at + 8] = (
+        struct.pack("<d", rng.choice([float("nan"), float("inf"), 1e300]))
+        if value is None
+        else struct.pack("<Q", value)
+    )
     _put(path, bytes(content))
     return f"{'no finite number' if value is None else value} at {at}"
 
 
 ANY: tuple[Callable[[Path, random.Random], str], ...] = (
-    truncate, truncate, flip, overwrite, replace_whole, append, other_kind, remove)
-SPECIAL = {".png": (forge_png, spoil_pixels, spoil_pixels), ".exr": (forge_exr, spoil_pixels, spoil_pixels),
-           ".jpg": (spoil_pixels, forge_png),
-           ".json": (spoil_json,) * 8, ".obj": (spoil_lines,) * 5, ".ply": (spoil_lines, spoil_counts),
-           ".bin": (spoil_counts,) * 5,
-           ".jsonl": (spoil_lines,), ".xml": (spoil_lines,) * 4, ".csv": (spoil_lines,) * 4,
-           ".safetensors": (spoil_counts,) * 2}
+    truncate,
+    truncate,
+    flip,
+    overwrite,
+    replace_whole,
+    append,
+    other_kind,
+    remove,
+)
+SPECIAL = {
+    ".png": (forge_png, spoil_pixels, spoil_pixels),
+    ".exr": (forge_exr, spoil_pixels, spoil_pixels),
+    ".jpg": (spoil_pixels, forge_png),
+    ".json": (spoil_json,) * 8,
+    ".obj": (spoil_lines,) * 5,
+    ".ply": (spoil_lines, spoil_counts),
+    ".bin": (spoil_counts,) * 5,
+    ".jsonl": (spoil_lines,),
+    ".xml": (spoil_lines,) * 4,
+    ".csv": (spoil_lines,) * 4,
+    ".safetensors": (spoil_counts,) * 2,
+}
 
 
 def mutate(path: Path, rng: random.Random) -> tuple[str, str]:
@@ -215,10 +294,11 @@ def make_png(width: int, height: int, rows: bytes, depth: int = 8, colour: int =
     colour : PNG's colour type; 2 is RGB
     compressed : whether `rows` already are
     """
+
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    header = struct.pack(">IIBBBBB", width & 0xffffffff, height & 0xffffffff, depth, colour, 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width & 0xFFFFFFFF, height & 0xFFFFFFFF, depth, colour, 0, 0, 0)
     data = rows if compressed else zlib.compress(rows)
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
 

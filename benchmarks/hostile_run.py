@@ -78,8 +78,14 @@ def run(case: Case) -> Ended:
     output, errors = (path.read_text(encoding="utf-8", errors="replace") for path in told)
     for path in told:
         path.unlink()
-    return Ended(os.waitstatus_to_exitcode(status), output + errors, errors, time.monotonic() - began,
-                 used.ru_maxrss * 1024, hung)
+    return Ended(
+        os.waitstatus_to_exitcode(status),
+        output + errors,
+        errors,
+        time.monotonic() - began,
+        used.ru_maxrss * 1024,
+        hung,
+    )
 
 
 def _command(words: list[str]) -> int:
@@ -104,9 +110,11 @@ def judge(case: Case, ended: Ended) -> list[str]:
     if ended.hung:
         faults.append(f"it did not end within {LIMIT_S:.0f} s")
     elif ended.code not in (0, 2):
-        faults.append(f"it ended with "
-                      f"{signal.Signals(-ended.code).name if ended.code < 0 else f'exit code {ended.code}'}: "
-                      f"{ended.errors[-300:]}")
+        faults.append(
+            f"it ended with "
+            f"{signal.Signals(-ended.code).name if ended.code < 0 else f'exit code {ended.code}'}: "
+            f"{ended.errors[-300:]}"
+        )
     if "Traceback" in ended.output:
         faults.append(f"a traceback was shown: {ended.output[-300:]}")
     if "An error inside WildCap" in ended.output:
@@ -125,8 +133,9 @@ def _refusal(case: Case, ended: Ended) -> list[str]:
     if len(lines) < 2 or not all(line.rstrip().endswith((".", ")")) for line in lines[-2:]):
         return [f"the refusal is no problem and remedy: {ended.errors[-300:]!r}"]
     text = " ".join(lines[-2:])
-    return ([] if any(name in text for name in case.named)
-            else [f"the refusal does not name {case.named[0]}: {text[:400]}"])
+    return (
+        [] if any(name in text for name in case.named) else [f"the refusal does not name {case.named[0]}: {text[:400]}"]
+    )
 
 
 def find_unsound(case: Case) -> list[str]:
@@ -159,12 +168,20 @@ def _unsound(file: Path) -> str:
     if file.suffix in (".png", ".exr", ".jpg"):
         picture = oiio.ImageInput.open(str(file))
         pixels = picture.read_image("float") if picture else None
-        return ("cannot be read" if pixels is None else "" if np.isfinite(pixels).all()
-                else "holds what is no finite number")
+        return (
+            "cannot be read"
+            if pixels is None
+            else ""
+            if np.isfinite(pixels).all()
+            else "holds what is no finite number"
+        )
     if file.suffix == ".obj":
         numbers = re.findall(r"^vt? (.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
-        return ("" if numbers and all(math.isfinite(float(word)) for line in numbers for word in line.split())
-                else "holds what is no finite number")
+        return (
+            ""
+            if numbers and all(math.isfinite(float(word)) for line in numbers for word in line.split())
+            else "holds what is no finite number"
+        )
     if file.suffix == ".json":
         text = file.read_text(encoding="utf-8")
         json.loads(text)

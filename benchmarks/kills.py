@@ -29,14 +29,30 @@ from core.worker.client import THREAD_VARIABLES
 
 from . import kills_disk
 
-WORDS = {"moment": "worker killed at a random moment of a random stage", "write": "the same while it writes",
-         "command": "the same, begun as Blender begins it",
-         "mask": "killed while the add-on saves a mask", "deliver": "killed while it delivers over an older delivery",
-         "full": "disk full at a random byte", "asleep": "worker stopped, replaced, awakened",
-         "at_once": "two workers at once", "colmap": "COLMAP killed, or the worker beside it, or both", "all": "all"}
+WORDS = {
+    "moment": "worker killed at a random moment of a random stage",
+    "write": "the same while it writes",
+    "command": "the same, begun as Blender begins it",
+    "mask": "killed while the add-on saves a mask",
+    "deliver": "killed while it delivers over an older delivery",
+    "full": "disk full at a random byte",
+    "asleep": "worker stopped, replaced, awakened",
+    "at_once": "two workers at once",
+    "colmap": "COLMAP killed, or the worker beside it, or both",
+    "all": "all",
+}
 
-MIX = {"moment": 12, "write": 12, "command": 2, "mask": 6, "deliver": 6, "full": 4, "asleep": 4, "at_once": 2,
-       "colmap": 4}
+MIX = {
+    "moment": 12,
+    "write": 12,
+    "command": 2,
+    "mask": 6,
+    "deliver": 6,
+    "full": 4,
+    "asleep": 4,
+    "at_once": 2,
+    "colmap": 4,
+}
 """Kinds of trial, and how many of each there are in a round."""
 NEEDS = {"deliver": NAMES[-1], "colmap": "cameras"}
 """Stages up to which the chain has to have been run for a kind."""
@@ -73,8 +89,12 @@ def _watch(work: Path) -> tuple[Path, Path]:
     folders = work / "temporary", work / "home"
     for folder in folders:
         folder.mkdir()
-    os.environ |= {"TMPDIR": str(folders[0]), "HOME": str(folders[1]), **dict.fromkeys(THREAD_VARIABLES, "1"),
-                   "BLENDER_USER_RESOURCES": str(work / "blender")}
+    os.environ |= {
+        "TMPDIR": str(folders[0]),
+        "HOME": str(folders[1]),
+        **dict.fromkeys(THREAD_VARIABLES, "1"),
+        "BLENDER_USER_RESOURCES": str(work / "blender"),
+    }
     tempfile.tempdir = None
     return folders
 
@@ -86,25 +106,35 @@ def _run(arguments: argparse.Namespace, work: Path, watched: tuple[Path, Path], 
     kills_worker.warm_up()
     print(f"Undisturbed, {'on a disk of its own in memory' if private else 'on the disk of ' + str(work)}:", flush=True)
     undisturbed = kills_capture.run_undisturbed(work / "undisturbed", arguments.until, arguments.delighter)
-    kinds = {"moment": lambda trial: kills_trials.killed(trial, writing=False),
-             "write": lambda trial: kills_trials.killed(trial, writing=True),
-             "command": kills_trials.command, "mask": kills_others.saving, "deliver": kills_others.delivering,
-             "full": kills_trials.full,
-             "asleep": kills_trials.asleep, "at_once": kills_trials.at_once, "colmap": kills_others.colmap}
+    kinds = {
+        "moment": lambda trial: kills_trials.killed(trial, writing=False),
+        "write": lambda trial: kills_trials.killed(trial, writing=True),
+        "command": kills_trials.command,
+        "mask": kills_others.saving,
+        "deliver": kills_others.delivering,
+        "full": kills_trials.full,
+        "asleep": kills_trials.asleep,
+        "at_once": kills_trials.at_once,
+        "colmap": kills_others.colmap,
+    }
     found: dict[str, list] = {}
     for number, kind in enumerate(_draw(arguments)):
         if arguments.only not in (None, number):
             continue
         place = work / "trials" / str(number)
         place.parent.mkdir(exist_ok=True)
-        trial = kills_trials.KillTrial(number, kind, random.Random(f"{arguments.seed} {number}"), undisturbed, place,
-                                       private)
+        trial = kills_trials.KillTrial(
+            number, kind, random.Random(f"{arguments.seed} {number}"), undisturbed, place, private
+        )
         started = time.monotonic()
         kinds[kind](trial)
         trial.faults += [f"{path.relative_to(work)} lies outside the capture" for path in _outside(watched)]
         found.setdefault(kind, []).append(trial)
-        print(f"{number:4} {kind:8} {'fault' if trial.faults else 'ok':6}{time.monotonic() - started:5.1f} s  "
-              f"{trial.where}", flush=True)
+        print(
+            f"{number:4} {kind:8} {'fault' if trial.faults else 'ok':6}{time.monotonic() - started:5.1f} s  "
+            f"{trial.where}",
+            flush=True,
+        )
         for fault in trial.faults:
             print(f"     {fault}", flush=True)
         kills_disk.unmount(place)
@@ -117,21 +147,23 @@ def table(recorded: dict) -> str:
     """Markdown of figures["rows"]."""
     from .figures import markdown
 
-    return markdown(["what happens", "trials", "times that it struck", "without a fault"],
-                    [[WORDS[kind], row["trials"], row["struck"], row["faultless"]]
-                     for kind, row in recorded["rows"].items()])
+    return markdown(
+        ["what happens", "trials", "times that it struck", "without a fault"],
+        [[WORDS[kind], row["trials"], row["struck"], row["faultless"]] for kind, row in recorded["rows"].items()],
+    )
 
 
 def _draw(arguments: argparse.Namespace) -> list[str]:
     """The kinds of all trials: rounds of the mix, each in an order of its own. The same seed gives the same."""
-    allowed = [kind for kind in arguments.kinds
-               if NAMES.index(NEEDS.get(kind, NAMES[0])) <= NAMES.index(arguments.until)]
+    allowed = [
+        kind for kind in arguments.kinds if NAMES.index(NEEDS.get(kind, NAMES[0])) <= NAMES.index(arguments.until)
+    ]
     rng, drawn = random.Random(arguments.seed), []
     while len(drawn) < arguments.count:
         turn = [kind for kind in allowed for _ in range(MIX[kind])]
         rng.shuffle(turn)
         drawn += turn
-    return drawn[:arguments.count]
+    return drawn[: arguments.count]
 
 
 def _outside(watched: tuple[Path, Path]) -> list[Path]:
@@ -149,20 +181,31 @@ def _outside(watched: tuple[Path, Path]) -> list[Path]:
 def _tell(
     trials_by_kind: dict[str, list], arguments: argparse.Namespace, figures, private: bool, seconds: float
 ) -> int:
-    rows = {kind: {"trials": len(trials), "struck": sum(trial.struck for trial in trials),
-                   "faultless": sum(not trial.faults for trial in trials)}
-            for kind, trials in sorted(trials_by_kind.items(), key=lambda item: list(MIX).index(item[0]))}
+    rows = {
+        kind: {
+            "trials": len(trials),
+            "struck": sum(trial.struck for trial in trials),
+            "faultless": sum(not trial.faults for trial in trials),
+        }
+        for kind, trials in sorted(trials_by_kind.items(), key=lambda item: list(MIX).index(item[0]))
+    }
     rows["all"] = {name: sum(row[name] for row in rows.values()) for name in ("trials", "struck", "faultless")}
     print(f"\n{'':10}{'trials':>8}{'struck':>8}{'faultless':>11}")
     for kind, row in rows.items():
         print(f"{kind:10}{row['trials']:8}{row['struck']:8}{row['faultless']:11}")
     for trial in (trial for trials in trials_by_kind.values() for trial in trials if trial.faults):
-        print(f"Again: python -m benchmarks.kills --count {arguments.count} --seed {arguments.seed} --only "
-              f"{trial.number}  # {trial.kind}: {trial.faults[0]}")
+        print(
+            f"Again: python -m benchmarks.kills --count {arguments.count} --seed {arguments.seed} --only "
+            f"{trial.number}  # {trial.kind}: {trial.faults[0]}"
+        )
     print(f"\n{rows['all']['trials']} trials in {seconds / 60:.1f} minutes.")
     if arguments.json:
-        figures.write_record(arguments.json, "kills", "python -m benchmarks.kills --count COUNT --seed SEED",
-                             {"rows": rows, "seed": arguments.seed, "minutes": seconds / 60, "own_disks": private})
+        figures.write_record(
+            arguments.json,
+            "kills",
+            "python -m benchmarks.kills --count COUNT --seed SEED",
+            {"rows": rows, "seed": arguments.seed, "minutes": seconds / 60, "own_disks": private},
+        )
     return 0 if rows["all"]["trials"] and rows["all"]["faultless"] == rows["all"]["trials"] else 1
 
 

@@ -28,28 +28,56 @@ from .kills_worker import Forked, Moment, fork_worker, in_fork
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE = ROOT / "core" / "synthetic" / "sample"
 SETTINGS = {
-    "frames": {"max_frames": 8, "long_side": 320, "views": 3}, "cameras": {"import_from": str(SAMPLE / "cameras.json")},
-    "scan": {"pairs": 4, "voxel_mm": 5.0}, "registration": {"iterations": 3}, "texture": {"size": 256},
+    "frames": {"max_frames": 8, "long_side": 320, "views": 3},
+    "cameras": {"import_from": str(SAMPLE / "cameras.json")},
+    "scan": {"pairs": 4, "voxel_mm": 5.0},
+    "registration": {"iterations": 3},
+    "texture": {"size": 256},
     "solve": {"size": 128, "steps": 4, "guidance": "proximal", "grid_cells": 4, "checkpoint_every": 1},
-    "upscale": {"size": 1024, "method": "lanczos"}, "transfer": {"scan_size": 256, "scan_detail_mm": 10.0},
+    "upscale": {"size": 1024, "method": "lanczos"},
+    "transfer": {"scan_size": 256, "scan_detail_mm": 10.0},
 }
 """As little work as every stage takes."""
-OTHER = {"frames": {"long_side": 352}, "cameras": {"interpupillary_mm": 64.0}, "scan": {"voxel_mm": 4.0},
-         "registration": {"iterations": 4},
-         "delight": {"delighter": "shading"}, "texture": {"size": 288}, "shadow_mask": {"sensitivity": 0.8},
-         "solve": {"steps": 5}, "upscale": {"hair": False}, "transfer": {"scan_size": 288}}
+OTHER = {
+    "frames": {"long_side": 352},
+    "cameras": {"interpupillary_mm": 64.0},
+    "scan": {"voxel_mm": 4.0},
+    "registration": {"iterations": 4},
+    "delight": {"delighter": "shading"},
+    "texture": {"size": 288},
+    "shadow_mask": {"sensitivity": 0.8},
+    "solve": {"steps": 5},
+    "upscale": {"hair": False},
+    "transfer": {"scan_size": 288},
+}
 """What a stage was run with before, where it is run again."""
 DELIVERY = {"preset": "blender", "format": "obj", "whole": True, "size": "1024"}
 EARLIER = {**DELIVERY, "hair": False, "roughness": 60}
 """The delivery that is there already."""
-STRANGERS = {name: f"This is {name}, and not WildCap's.\n".encode() for name in (
-    "shopping.txt", ".mine.tmp", "notes/list.txt", "frames/retouched.psd", "frames/.mine.1.tmp.jpg", "cameras/rig.txt",
-    "delit/look/a.txt", "maps/painted.psd",
-    "maps_4k/painted.psd", "delivery/notes.txt", "report/notes.txt", "mask_history/notes.txt", "preview/notes.txt",
-    "logs/mine.txt")}
+STRANGERS = {
+    name: f"This is {name}, and not WildCap's.\n".encode()
+    for name in (
+        "shopping.txt",
+        ".mine.tmp",
+        "notes/list.txt",
+        "frames/retouched.psd",
+        "frames/.mine.1.tmp.jpg",
+        "cameras/rig.txt",
+        "delit/look/a.txt",
+        "maps/painted.psd",
+        "maps_4k/painted.psd",
+        "delivery/notes.txt",
+        "report/notes.txt",
+        "mask_history/notes.txt",
+        "preview/notes.txt",
+        "logs/mine.txt",
+    )
+}
 """Files of the user's in the capture: name -> content."""
-GUESTS = {name: f"This is {name}, and no delivery's.\n".encode()
-          for name in ("render.txt", "textures/painted.psd", ".look/shader.ma")}
+GUESTS = {
+    name: f"This is {name}, and no delivery's.\n".encode()
+    for name in ("render.txt", "textures/painted.psd", ".look/shader.ma")
+}
 """The same in a folder of a delivery."""
 BESIDE = "anna.txt"
 
@@ -85,8 +113,12 @@ class Undisturbed:
     def job(self, stage: str, resumed: bool = False, **changed: dict) -> dict:
         """The job that runs a stage whatever there is, or the one that goes on up to it from what there is; `changed`
         lies over the settings."""
-        return {"source": SAMPLE / "capture.mp4" if stage == stages.NAMES[0] else "",
-                "first": None if resumed else stage, "last": stage, "settings": {**self.settings, **changed}}
+        return {
+            "source": SAMPLE / "capture.mp4" if stage == stages.NAMES[0] else "",
+            "first": None if resumed else stage,
+            "last": stage,
+            "settings": {**self.settings, **changed},
+        }
 
     def delivered(self) -> Path:
         """The finished place with a delivery in the capture and one beside it, and files of the user's in both."""
@@ -122,8 +154,9 @@ class Undisturbed:
                 self.known.setdefault(path.relative_to(capture.root).as_posix(), set()).add(read_hash(path))
 
 
-def run_undisturbed(folder: Path, until: str = stages.NAMES[-1], delighter: str = "network",
-                    tell: Callable[[str], None] = print) -> Undisturbed:
+def run_undisturbed(
+    folder: Path, until: str = stages.NAMES[-1], delighter: str = "network", tell: Callable[[str], None] = print
+) -> Undisturbed:
     """Runs the chain up to a stage, and keeps the place before each and at the end.
 
     Parameters
@@ -138,7 +171,7 @@ def run_undisturbed(folder: Path, until: str = stages.NAMES[-1], delighter: str 
     AssertionError
         Where a stage does not end well; and the machine's own errors.
     """
-    names = stages.NAMES[:stages.NAMES.index(until) + 1]
+    names = stages.NAMES[: stages.NAMES.index(until) + 1]
     found = Undisturbed(folder, {**SETTINGS, "delight": {"delighter": delighter}}, names)
     place = folder / "end"
     _plant(place)
@@ -156,8 +189,9 @@ def capture_at(place: Path) -> Capture:
     return Capture(place / "face.wildcap")
 
 
-def start_job(place: Path, moment: Moment | None = None, *, log_name: str = "told", limits: dict | None = None,
-              **job) -> Forked:
+def start_job(
+    place: Path, moment: Moment | None = None, *, log_name: str = "told", limits: dict | None = None, **job
+) -> Forked:
     """Writes a job and starts a worker at it.
 
     Parameters
@@ -168,8 +202,9 @@ def start_job(place: Path, moment: Moment | None = None, *, log_name: str = "tol
     limits : `term_s` and `most_bytes` of `fork_worker`
     job : as `write_job` has it
     """
-    return fork_worker(write_job(capture_at(place), **job), place.with_name(f"{place.name}.{log_name}"), moment,
-                       **(limits or {}))
+    return fork_worker(
+        write_job(capture_at(place), **job), place.with_name(f"{place.name}.{log_name}"), moment, **(limits or {})
+    )
 
 
 def run(place: Path, **job) -> Forked:
@@ -195,8 +230,9 @@ def _plant(place: Path) -> None:
     for name, content in STRANGERS.items():
         (capture.root / name).parent.mkdir(parents=True, exist_ok=True)
         (capture.root / name).write_bytes(content)
-    in_fork(lambda: [_paint(path, shift) for path, shift in ((capture.shadow_mask, 0), (capture.protect_mask, 9))]
-            and None)
+    in_fork(
+        lambda: [_paint(path, shift) for path, shift in ((capture.shadow_mask, 0), (capture.protect_mask, 9))] and None
+    )
 
 
 def _paint(path: Path, shift: int) -> None:

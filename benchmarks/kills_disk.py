@@ -28,8 +28,11 @@ def go_private() -> bool:
     try:
         _call("unshare", NEW_MOUNTS if user == 0 else NEW_MOUNTS | NEW_USER)
         if user:
-            for name, text in (("setgroups", "deny"), ("uid_map", f"{user} {user} 1"),
-                               ("gid_map", f"{group} {group} 1")):
+            for name, text in (
+                ("setgroups", "deny"),
+                ("uid_map", f"{user} {user} 1"),
+                ("gid_map", f"{group} {group} 1"),
+            ):
                 Path(f"/proc/self/{name}").write_text(text, encoding="ascii")
         _call("mount", b"none", b"/", None, PRIVATE, None)
     except OSError:

@@ -59,8 +59,14 @@ def judge_kill(
     return found
 
 
-def judge_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mapping[str, Collection[bytes]] | None = None,
-                 unlike: Collection[str] = (), within: Collection[str] = ()) -> list[str]:
+def judge_resume(
+    place: Path,
+    undisturbed: Undisturbed,
+    last: str,
+    masks: Mapping[str, Collection[bytes]] | None = None,
+    unlike: Collection[str] = (),
+    within: Collection[str] = (),
+) -> list[str]:
     """Finds the faults of a place in which the run that goes on has ended: every stage has the undisturbed run's bytes,
     all of the user's is in its place, and nothing else is left.
 
@@ -74,12 +80,15 @@ def judge_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mappin
     """
     capture, expected = capture_at(place), undisturbed.end
     found = judge_kill(place, undisturbed.known, masks, within) + find_lost(place) + _left(place)
-    for stage in stages.STAGES[:stages.NAMES.index(last) + 1]:
+    for stage in stages.STAGES[: stages.NAMES.index(last) + 1]:
         if stage.name in unlike:
             continue
         ours, theirs = written(capture, stage), written(expected, stage)
-        found += [f"{name} is not as in the undisturbed run" for name in sorted(ours.keys() | theirs.keys())
-                  if ours.get(name) != theirs.get(name)]
+        found += [
+            f"{name} is not as in the undisturbed run"
+            for name in sorted(ours.keys() | theirs.keys())
+            if ours.get(name) != theirs.get(name)
+        ]
         if stage.name not in capture.read()["stages"]:
             found.append(f"the stage {stage.name} is not on record")
     return found
@@ -87,8 +96,9 @@ def judge_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mappin
 
 def tree(folder: Path) -> dict[str, str]:
     """Every file below a folder: name -> content hash."""
-    return {path.relative_to(folder).as_posix(): read_hash(path) for path in sorted(folder.rglob("*"))
-            if path.is_file()}
+    return {
+        path.relative_to(folder).as_posix(): read_hash(path) for path in sorted(folder.rglob("*")) if path.is_file()
+    }
 
 
 def find_lost(place: Path, aside: bool = False) -> list[str]:
@@ -109,14 +119,21 @@ def _left(place: Path) -> list[str]:
     """What should have gone with the run: temporary files, locks, processes, what was kept aside though nobody had
     changed it, and files elsewhere."""
     capture = capture_at(place)
-    found = [f"{path.relative_to(place)} is left" for path in sorted(place.rglob(".*"))
-             if path.relative_to(capture.root.parent).as_posix()
-             not in {f"{capture.root.name}/{name}" for name in STRANGERS} and ".look" not in path.parts]
+    found = [
+        f"{path.relative_to(place)} is left"
+        for path in sorted(place.rglob(".*"))
+        if path.relative_to(capture.root.parent).as_posix() not in {f"{capture.root.name}/{name}" for name in STRANGERS}
+        and ".look" not in path.parts
+    ]
     found += [f"{path.name} is left" for path in capture.root.glob("lock*")]
-    found += [f"{name} was kept aside, and nobody had changed it"
-              for name in sorted(ownership.kept_files(capture.root))]
-    found += [f"{path.name} lies beside the capture" for path in sorted(place.iterdir())
-              if path.name not in (BESIDE, capture.root.name, "out")]
+    found += [
+        f"{name} was kept aside, and nobody had changed it" for name in sorted(ownership.kept_files(capture.root))
+    ]
+    found += [
+        f"{path.name} lies beside the capture"
+        for path in sorted(place.iterdir())
+        if path.name not in (BESIDE, capture.root.name, "out")
+    ]
     found += [f"process {pid} still runs there" for pid in running_at(place)]
     try:
         capture.check_free()
@@ -128,8 +145,9 @@ def _left(place: Path) -> list[str]:
 def _named(root: Path) -> list[tuple[Path, str]]:
     """The files under final names: no part of those begins with a dot."""
     files = ((path, path.relative_to(root)) for path in sorted(root.rglob("*")) if path.is_file())
-    return [(path, inside.as_posix()) for path, inside in files
-            if not any(part.startswith(".") for part in inside.parts)]
+    return [
+        (path, inside.as_posix()) for path, inside in files if not any(part.startswith(".") for part in inside.parts)
+    ]
 
 
 def _read(path: Path) -> str:

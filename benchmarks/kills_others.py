@@ -36,18 +36,24 @@ def saving(trial: KillTrial) -> None:
     """The add-on is killed while it saves a mask several times, in half of the trials while a worker is at the capture:
     the mask is the old one or one of the new, and the old one is in the history where it was replaced."""
     # no mask is an input of theirs
-    early = [name for name in trial.undisturbed.names
-             if stages.NAMES.index(name) <= stages.NAMES.index(stages.MASK_STAGE)]
+    early = [
+        name for name in trial.undisturbed.names if stages.NAMES.index(name) <= stages.NAMES.index(stages.MASK_STAGE)
+    ]
     stage, which, busy = trial.rng.choice(early), trial.rng.choice(list(MASKS)), trial.rng.random() < 0.5
     trial.undisturbed.copy(trial.undisturbed.folder / "end", trial.place)
     capture, name = capture_at(trial.place), MASKS[which]
     old, painted = (capture.root / name).read_bytes(), trial.place.with_name(f"{trial.place.name}.painted")
-    moment = Moment(write=trial.rng.randint(1, SAVE_CHANGES),
-                    late_s=trial.rng.choice((0.0, trial.rng.uniform(0, 0.01))))
+    moment = Moment(
+        write=trial.rng.randint(1, SAVE_CHANGES), late_s=trial.rng.choice((0.0, trial.rng.uniform(0, 0.01)))
+    )
     trial.where = f"{which.lower()} mask, {moment}{f', while {stage} is run' if busy else ''}"
     seed = trial.rng.randrange(2**31)
-    addon = Forked(lambda: _save_masks(capture.root, which, seed, painted), trial.place,
-                   trial.place.with_name(f"{trial.place.name}.addon"), moment)
+    addon = Forked(
+        lambda: _save_masks(capture.root, which, seed, painted),
+        trial.place,
+        trial.place.with_name(f"{trial.place.name}.addon"),
+        moment,
+    )
     worker = None
     if busy:
         wait_until(lambda: painted.is_dir() or addon.ended(), 60)
@@ -76,8 +82,10 @@ def _save_masks(root: Path, mask_kind: str, seed: int, painted: Path) -> None:
     spec = spec_from_file_location("wildcap", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)])
     sys.modules["wildcap"] = module_from_spec(spec)
     spec.loader.exec_module(sys.modules["wildcap"])
-    keeping, mask_image, contract = (importlib.import_module(f"wildcap.{name}") for name in (
-        "wildcap_addon.paint.keeping", "wildcap_addon.paint.mask_image", "core.contract.capture"))
+    keeping, mask_image, contract = (
+        importlib.import_module(f"wildcap.{name}")
+        for name in ("wildcap_addon.paint.keeping", "wildcap_addon.paint.mask_image", "core.contract.capture")
+    )
     rng = np.random.default_rng(seed)
     masks = [rng.random((SIDE, SIDE), np.float32) for _ in range(SAVES)]
     half = painted.with_suffix(".half")
@@ -96,8 +104,9 @@ def delivering(trial: KillTrial) -> None:
     base = trial.undisturbed.delivered()
     trial.undisturbed.copy(base, trial.place)
     beside, writing = trial.rng.random() < 0.5, trial.rng.random() < 0.7
-    target, earlier, new = (delivery_folders(place)[beside]
-                            for place in (trial.place, base, base.with_name("delivered_again")))
+    target, earlier, new = (
+        delivery_folders(place)[beside] for place in (trial.place, base, base.with_name("delivered_again"))
+    )
     job, known = trial.undisturbed.delivery_job(trial.place, target), (_delivery(earlier), _delivery(new))
     trial.where = "beside the capture" if beside else "in the capture"
     for _ in range(1 + (trial.rng.random() < 0.3)):
@@ -119,8 +128,11 @@ def delivering(trial: KillTrial) -> None:
 
 def _gone(*folders: Path) -> list[str]:
     """The user's files that lie, as they were, in none of these folders of a delivery."""
-    return [f"the user's {name} in the delivery is gone" for name, content in GUESTS.items()
-            if not any((folder / name).is_file() and (folder / name).read_bytes() == content for folder in folders)]
+    return [
+        f"the user's {name} in the delivery is gone"
+        for name, content in GUESTS.items()
+        if not any((folder / name).is_file() and (folder / name).read_bytes() == content for folder in folders)
+    ]
 
 
 def _delivery(target: Path) -> dict[str, str]:

@@ -86,8 +86,10 @@ class KillTrial:
         self.faults += kills_judge.judge_resume(self.place, self.undisturbed, stage, masks, unlike, unlike_folders)
 
     def judge_kill(self, masks: dict | None = None, within: tuple = ()) -> None:
-        self.faults += [f"after the kill: {fault}"
-                        for fault in kills_judge.judge_kill(self.place, self.undisturbed.known, masks, within)]
+        self.faults += [
+            f"after the kill: {fault}"
+            for fault in kills_judge.judge_kill(self.place, self.undisturbed.known, masks, within)
+        ]
 
 
 def killed(trial: KillTrial, writing: bool) -> None:
@@ -108,8 +110,9 @@ def command(trial: KillTrial) -> None:
     trial.begin(stage)
     capture, after = capture_at(trial.place), trial.rng.uniform(0, 4 + trial.undisturbed.seconds[stage])
     trial.where += f", after {after:.3f} s"
-    worker = Worker(Path(sys.executable), ROOT, write_job(capture, **trial.undisturbed.job(stage)),
-                    capture.logs / "worker.log")
+    worker = Worker(
+        Path(sys.executable), ROOT, write_job(capture, **trial.undisturbed.job(stage)), capture.logs / "worker.log"
+    )
     worker.start()
     deadline = time.monotonic() + after
     while worker.running and time.monotonic() < deadline:
@@ -174,8 +177,9 @@ def asleep(trial: KillTrial) -> None:
         return
     trial.struck += 1
     capture = capture_at(trial.place)
-    second = fork_worker(capture.job, trial.place.with_name(f"{trial.place.name}.second"), Moment(write=10**9),
-                         term_s=SHORT_TERM_S)
+    second = fork_worker(
+        capture.job, trial.place.with_name(f"{trial.place.name}.second"), Moment(write=10**9), term_s=SHORT_TERM_S
+    )
     if meanwhile:
         wait_until(lambda: second.pid == _holder(capture.lock) or second.ended())
         time.sleep(trial.rng.uniform(0, trial.undisturbed.seconds[stage]))
@@ -187,8 +191,10 @@ def asleep(trial: KillTrial) -> None:
     if not meanwhile:
         first.send(signal.SIGCONT)
     awake = first.wait()
-    changed = {name for name, digest in kills_judge.tree(capture.root).items()
-               if before.get(name) != digest} - {"written.jsonl", f"logs/{stage}.log"}
+    changed = {name for name, digest in kills_judge.tree(capture.root).items() if before.get(name) != digest} - {
+        "written.jsonl",
+        f"logs/{stage}.log",
+    }
     if changed:
         trial.fault(f"the first worker changed {', '.join(sorted(changed))} after it had been replaced")
     if not isinstance(awake, Failed | Done) or isinstance(awake, Failed) and "nother worker" not in awake.problem:

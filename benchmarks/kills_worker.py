@@ -151,8 +151,9 @@ class Forked:
         return hook
 
 
-def fork_worker(job: Path, log: Path, moment: Moment | None = None, *, term_s: float = lease.TERM_S,
-                most_bytes: int | None = None) -> Forked:
+def fork_worker(
+    job: Path, log: Path, moment: Moment | None = None, *, term_s: float = lease.TERM_S, most_bytes: int | None = None
+) -> Forked:
     """Forks a worker at a job file.
 
     Parameters
@@ -163,6 +164,7 @@ def fork_worker(job: Path, log: Path, moment: Moment | None = None, *, term_s: f
     term_s : of its lease, in seconds
     most_bytes : of a single file that it writes; None: any
     """
+
     def work() -> None:
         main = importlib.import_module("core.worker.__main__")
         main.NICE_VALUE = 0  # beside it nobody paints
@@ -230,7 +232,7 @@ def _changes(event: str, arguments: tuple, root: str) -> bool:
         return name.startswith(root) and (bool(flags & (os.O_WRONLY | os.O_RDWR)) or ".tmp" in name)
     if event not in CHANGES:
         return False
-    paths = [os.fsdecode(path) for path in arguments[:CHANGES[event]] if isinstance(path, str | bytes | os.PathLike)]
+    paths = [os.fsdecode(path) for path in arguments[: CHANGES[event]] if isinstance(path, str | bytes | os.PathLike)]
     # shutil.rmtree names what it removes by an open folder
     return any(path.startswith(root) or not os.path.isabs(path) for path in paths)
 

@@ -53,8 +53,10 @@ class RegionShader:
         """Shading by what the regions add [3, H, W]."""
         chroma = functional.interpolate(lights.chroma[None], self.basis.shape[1:], mode="bilinear", align_corners=False)
         share = chroma[0].softmax(0)
-        return sum(weight * torch.einsum("ck,khw->chw", gamma, self.basis)
-                   for weight, gamma in zip(share, lights.grid, strict=True))
+        return sum(
+            weight * torch.einsum("ck,khw->chw", gamma, self.basis)
+            for weight, gamma in zip(share, lights.grid, strict=True)
+        )
 
     def total(self, lights: Lights) -> torch.Tensor:
         """Shading [3, H, W]."""
@@ -76,8 +78,9 @@ def light_by_regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
     -------
     The start, the recipe, and what moves the lights.
     """
-    observations = {factor: replace(o, shader=RegionShader(o.shader.normal))
-                    for factor, o in start.observations.items()}
+    observations = {
+        factor: replace(o, shader=RegionShader(o.shader.normal)) for factor, o in start.observations.items()
+    }
     lights = RegionLights(start.state.lights.glob.clone(), torch.zeros(count, 3, 9), _clusters(start, count, seed))
     return _under(start, observations, lights), recipe, partial(update_lights, loss=_region_loss)
 
@@ -96,8 +99,10 @@ def _clusters(start: Start, count: int, seed: int) -> torch.Tensor:
     o = start.observations[1]
     rendered = albedo(start.reference) * o.shader.main(start.state.lights)
     ratio = (o.texture.clamp_min(1e-3) / rendered.clamp_min(1e-3)).log().mean(0).clamp(-2, 2)
-    ratio, weight = (functional.interpolate(a[None, None], (CELLS, CELLS), mode="area")[0, 0].numpy()
-                     for a in (ratio * o.weight, o.weight))
+    ratio, weight = (
+        functional.interpolate(a[None, None], (CELLS, CELLS), mode="area")[0, 0].numpy()
+        for a in (ratio * o.weight, o.weight)
+    )
     row, column = (np.mgrid[:CELLS, :CELLS] + 0.5) / CELLS
     features = np.stack([3 * row, 3 * column, ratio / np.maximum(weight, 0.05)], -1)[weight > 0.5]
     centres, _ = kmeans2(features, count, seed=seed, minit="++")
@@ -134,18 +139,23 @@ class EnvironmentShader:
 
 def light_by_environment(start: Start, recipe: Recipe):
     """`start` under one environment cubemap, even at first, the recipe, and what moves it."""
-    observations = {factor: replace(o, shader=EnvironmentShader(o.shader.normal))
-                    for factor, o in start.observations.items()}
+    observations = {
+        factor: replace(o, shader=EnvironmentShader(o.shader.normal)) for factor, o in start.observations.items()
+    }
     o = start.observations[1]
     shade = (o.texture * o.weight).sum((1, 2)) / (albedo(start.reference) * o.weight).sum((1, 2)).clamp_min(1e-6)
     lights = EnvironmentLights(shade.log().repeat(6 * FACE**2, 1), torch.zeros(1), torch.zeros(1))
     phases = tuple(("main", *when) for _, *when in recipe.phases)
-    return (_under(start, observations, lights), replace(recipe, rate=RATE, phases=phases),
-            partial(update_lights, loss=_environment_loss))
+    return (
+        _under(start, observations, lights),
+        replace(recipe, rate=RATE, phases=phases),
+        partial(update_lights, loss=_environment_loss),
+    )
 
 
-def _environment_loss(lights: EnvironmentLights, denoised: torch.Tensor, o: Observation,
-                      recipe: Recipe) -> torch.Tensor:
+def _environment_loss(
+    lights: EnvironmentLights, denoised: torch.Tensor, o: Observation, recipe: Recipe
+) -> torch.Tensor:
     """L_pho, and smoothness of the cubemap's logarithm."""
     one, other = o.shader.neighbours.T
     rough = ((lights.glob[one] - lights.glob[other]) ** 2).mean()
@@ -161,8 +171,10 @@ def cubemap() -> tuple[np.ndarray, torch.Tensor, torch.Tensor]:
     across = (np.arange(FACE) + 0.5) / FACE * 2 - 1
     u, v = (a.ravel() for a in np.meshgrid(across, across))
     one = np.ones_like(u)
-    corners = [np.stack(face, -1)
-               for face in ((one, v, -u), (-one, v, u), (u, one, -v), (u, -one, v), (u, v, one), (-u, v, -one))]
+    corners = [
+        np.stack(face, -1)
+        for face in ((one, v, -u), (-one, v, u), (u, one, -v), (u, -one, v), (u, v, one), (-u, v, -one))
+    ]
     points = np.concatenate(corners)
     solid = np.linalg.norm(points, axis=1) ** -3  # solid angle of a texel, but for a constant
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)

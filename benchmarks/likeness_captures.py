@@ -35,8 +35,9 @@ SCALE, SAMPLES = 5 / 6, 4  # of 720 x 960; rays per pixel before denoising
 PACE = 6
 
 
-def film_person(folder: Path, name: str, figure: Figure, light: scene.SceneLight, description: str, frames: int,
-                room: bool) -> Capture:
+def film_person(
+    folder: Path, name: str, figure: Figure, light: scene.SceneLight, description: str, frames: int, room: bool
+) -> Capture:
     """Films a person, if the files are not there, and prints the minutes.
 
     Parameters
@@ -67,16 +68,21 @@ def film_person(folder: Path, name: str, figure: Figure, light: scene.SceneLight
     flows = _flows(figure, cameras, poses)
     sample.write_video(target / "capture.mp4", _developed(work, frames, faces, flows, taken, seed), taken.crf)
     if not room:
-        write_views(capture, views, _developed(work, frames, faces, flows, taken, seed),
-                    min(Settings().frames.views, frames))
+        write_views(
+            capture, views, _developed(work, frames, faces, flows, taken, seed), min(Settings().frames.views, frames)
+        )
         meshes.write_obj(capture.head, registered(figure.head, seed))
     total = sum(albedo[face].sum(0, dtype=np.float64) for albedo, face in faces.values())
     count = sum(int(face.sum()) for _, face in faces.values())
     with replacing(target / "skin_tone.txt") as temporary:
-        temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n",
-                             encoding="ascii")
-    print(f"{name}: {(rendered - began) / 60:.1f} min of rendering ({(_spent() - spent) / 60:.1f} of a core), "
-          f"{(time.monotonic() - rendered) / 60:.1f} min of truth and video", flush=True)
+        temporary.write_text(
+            ",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n", encoding="ascii"
+        )
+    print(
+        f"{name}: {(rendered - began) / 60:.1f} min of rendering ({(_spent() - spent) / 60:.1f} of a core), "
+        f"{(time.monotonic() - rendered) / 60:.1f} min of truth and video",
+        flush=True,
+    )
     return capture
 
 
@@ -86,8 +92,9 @@ def _spent() -> float:
     return times.children_user + times.children_system
 
 
-def _write_truth(target: Path, figure: Figure, light: scene.SceneLight, views: list,
-                 poses: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+def _write_truth(
+    target: Path, figure: Figure, light: scene.SceneLight, views: list, poses: np.ndarray
+) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """albedo/ (as it is seen), bare/ (below hair and clothes), face/, shadow/, normal/ and parts/PART/ of TRUTHS
     frames; the albedo and the bare skin of the face of each, by frame: what a light meter and the skin's tone ask
     for."""
@@ -96,11 +103,18 @@ def _write_truth(target: Path, figure: Figure, light: scene.SceneLight, views: l
     for frame in np.unique(np.linspace(1, len(views) - 2, TRUTHS).round().astype(int)).tolist():
         sun = poses[frame, :3, :3].T @ light.sun.direction if light.sun else None
         found, name = truth.trace_truth(seen, views[frame], sun, pose=poses[frame]), f"{frame:04d}.png"
-        for folder in ("albedo", "bare", "face", "normal", *(["shadow"] if light.sun else []),
-                       *(f"parts/{part}" for part in PARTS)):
+        for folder in (
+            "albedo",
+            "bare",
+            "face",
+            "normal",
+            *(["shadow"] if light.sun else []),
+            *(f"parts/{part}" for part in PARTS),
+        ):
             (target / folder).mkdir(parents=True, exist_ok=True)
-        images.write_srgb(target / "albedo" / name,
-                          np.concatenate([images.linear_to_srgb(found.seen), found.alpha[..., None]], -1))
+        images.write_srgb(
+            target / "albedo" / name, np.concatenate([images.linear_to_srgb(found.seen), found.alpha[..., None]], -1)
+        )
         images.write_srgb(target / "bare" / name, images.linear_to_srgb(found.bare))
         images.write_data(target / "face" / name, found.face.astype(np.float32))
         images.write_data(target / "normal" / name, found.normal / 2 + 0.5)
@@ -112,8 +126,15 @@ def _write_truth(target: Path, figure: Figure, light: scene.SceneLight, views: l
     return faces
 
 
-def _write_record(target: Path, figure: Figure, light: scene.SceneLight, description: str, inside: np.ndarray,
-                  poses: np.ndarray, camera: phone.Phone) -> None:
+def _write_record(
+    target: Path,
+    figure: Figure,
+    light: scene.SceneLight,
+    description: str,
+    inside: np.ndarray,
+    poses: np.ndarray,
+    camera: phone.Phone,
+) -> None:
     """head.obj (closed lids), opened.obj, strands, the true maps and maps/part_*.png, cameras.json, and light.json with
     sky.exr."""
     meshes.write_obj(target / "head.obj", figure.head)
@@ -124,21 +145,34 @@ def _write_record(target: Path, figure: Figure, light: scene.SceneLight, descrip
         images.write_data(target / "maps" / f"part_{part}.png", where)
     for growth in figure.strands:
         with replacing(target / f"strands_{growth.part}.npz") as temporary, open(temporary, "wb") as file:
-            np.savez_compressed(file, points=growth.points.astype(np.float32), radius=growth.radius,
-                                colour=growth.colour)
+            np.savez_compressed(
+                file, points=growth.points.astype(np.float32), radius=growth.radius, colour=growth.colour
+            )
     sky = light.sky
     if isinstance(sky, np.ndarray):
         images.write_linear(target / "sky.exr", sky)
         sky = "sky.exr"
     sun = asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None
-    write_json(target / "light.json",
-               {"sky": sky, "sun": sun, "lamps": [asdict(lamp) for lamp in light.lamps],
-                "blockers": bool(light.blockers)})
-    write_json(target / "cameras.json", {
-        "name": target.name, "light": description, "focal_px": scene.FOCAL * SCALE, "width": round(scene.WIDTH * SCALE),
-        "height": round(scene.HEIGHT * SCALE), "person": asdict(figure.person), "phone": asdict(camera),
-        "cameras": [{"frame": k, "matrix_world": inside[k].tolist(), "head_pose": poses[k].tolist()}
-                    for k in range(len(inside))]})
+    write_json(
+        target / "light.json",
+        {"sky": sky, "sun": sun, "lamps": [asdict(lamp) for lamp in light.lamps], "blockers": bool(light.blockers)},
+    )
+    write_json(
+        target / "cameras.json",
+        {
+            "name": target.name,
+            "light": description,
+            "focal_px": scene.FOCAL * SCALE,
+            "width": round(scene.WIDTH * SCALE),
+            "height": round(scene.HEIGHT * SCALE),
+            "person": asdict(figure.person),
+            "phone": asdict(camera),
+            "cameras": [
+                {"frame": k, "matrix_world": inside[k].tolist(), "head_pose": poses[k].tolist()}
+                for k in range(len(inside))
+            ],
+        },
+    )
 
 
 def uv_parts(figure: Figure) -> dict[str, np.ndarray]:
@@ -162,12 +196,14 @@ def _flows(figure: Figure, cameras: np.ndarray, poses: np.ndarray) -> list[np.nd
     return flows
 
 
-def _developed(work: Path, count: int, faces: dict, flows: list[np.ndarray], camera: phone.Phone,
-               seed: int) -> Iterator[np.ndarray]:
+def _developed(
+    work: Path, count: int, faces: dict, flows: list[np.ndarray], camera: phone.Phone, seed: int
+) -> Iterator[np.ndarray]:
     """The frames as the phone shows them, sRGB [H, W, 3]."""
     gain = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}, faces)
     for frame in range(count):
         linear = images.read_linear(work / f"{frame:05d}.exr").astype(np.float32)
-        moved = motion.motion_blur(motion.rolling_shutter(linear, flows[frame], camera.readout), flows[frame],
-                                   camera.shutter)
+        moved = motion.motion_blur(
+            motion.rolling_shutter(linear, flows[frame], camera.readout), flows[frame], camera.shutter
+        )
         yield phone.develop(moved, camera, gain, np.random.default_rng([seed, 72, frame]))

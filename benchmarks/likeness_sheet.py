@@ -19,12 +19,16 @@ SIDE, SAMPLES, SCALE = 290, 12, 0.5
 SUN = np.array([0.55, -0.70, 0.46])
 SKY = (0.50, 0.54, 0.60)
 SHOTS = (  # azimuth, height in degrees, distance and the point looked at in metres, factor on the focal length, bare
-    (4.0, 2.0, 0.75, (0.0, 0.02, -0.03), 1.55, False), (40.0, 6.0, 0.75, (0.0, 0.03, -0.03), 1.55, False),
-    (14.0, 0.0, 0.55, (0.030, -0.015, 0.006), 4.5, False), (22.0, 3.0, 0.75, (0.0, 0.02, -0.03), 1.55, True))
+    (4.0, 2.0, 0.75, (0.0, 0.02, -0.03), 1.55, False),
+    (40.0, 6.0, 0.75, (0.0, 0.03, -0.03), 1.55, False),
+    (14.0, 0.0, 0.55, (0.030, -0.015, 0.006), 4.5, False),
+    (22.0, 3.0, 0.75, (0.0, 0.02, -0.03), 1.55, True),
+)
 
 
-def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = None,
-                beside: Path | None = None) -> None:
+def write_sheet(
+    out: Path, seeds: list[int], work: Path, facekit: Path | None = None, beside: Path | None = None
+) -> None:
     """Draws one row a person.
 
     Parameters
@@ -41,7 +45,7 @@ def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = 
         rows.append(np.concatenate(_shots(make_figure(seed, facekit=facekit), work / str(seed)), 1))
         print(f"{seed}: {(time.monotonic() - began) / 60:.1f} min", flush=True)
     if beside:
-        paths = sorted(path for path in beside.iterdir() if path.suffix in (".png", ".jpg"))[:len(SHOTS)]
+        paths = sorted(path for path in beside.iterdir() if path.suffix in (".png", ".jpg"))[: len(SHOTS)]
         rows.append(np.concatenate([_square(images.read_srgb(path)) for path in paths], 1))
     images.write_srgb(out, np.concatenate(rows), quality=82)
 
@@ -62,4 +66,4 @@ def _square(picture: np.ndarray) -> np.ndarray:
     """The middle of a picture [H, W, 3] as one of SIDE x SIDE."""
     side = min(picture.shape[:2])
     top, left = (picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2
-    return images.resize(picture[top:top + side, left:left + side, :3], SIDE, SIDE)
+    return images.resize(picture[top : top + side, left : left + side, :3], SIDE, SIDE)

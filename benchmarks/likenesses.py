@@ -69,8 +69,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     everybody = [person.name for person in (*LIKENESSES, *people.PEOPLE)]
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--only", nargs="+", choices=everybody + [person.name for person in HELD_BACK],
-                        default=everybody)
+    parser.add_argument(
+        "--only", nargs="+", choices=everybody + [person.name for person in HELD_BACK], default=everybody
+    )
     parser.add_argument("--lights", nargs="+", choices=("own", *LIGHTS), default=("own", *LIGHTS))
     parser.add_argument("--facekit", type=Path)
     parser.add_argument("--sheet", type=Path, help="render a contact sheet of the four people instead")
@@ -101,8 +102,15 @@ def film_likeness(person: Likeness, folder: Path, lights: list[str], facekit: Pa
     if "own" in lights:
         film_person(folder, person.name, figure, KINDS[person.light](person.seed), person.light, OWN_FRAMES, room=True)
     for light in (light for light in LIGHTS if light in lights):
-        film_person(folder, f"{person.name}_{light}", figure, FURTHER[LIGHTS[light]](person.seed), LIGHTS[light],
-                    FURTHER_FRAMES, room=False)
+        film_person(
+            folder,
+            f"{person.name}_{light}",
+            figure,
+            FURTHER[LIGHTS[light]](person.seed),
+            LIGHTS[light],
+            FURTHER_FRAMES,
+            room=False,
+        )
 
 
 def photograph_again(person: people.FilmedPerson, folder: Path, light: str) -> None:

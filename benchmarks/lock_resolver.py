@@ -75,20 +75,41 @@ def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
     where one is not to be had."""
     with tempfile.TemporaryDirectory(prefix="wildcap_lock_") as folder:
         report = Path(folder) / "report.json"
-        command = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--quiet", "--dry-run",
-                   "--ignore-installed", "--no-deps",
-                   "--target", folder, "--report", report, *wheels.tags(name), *more, *packages]
+        command = [
+            sys.executable,
+            "-m",
+            "pip",
+            "install",
+            "--disable-pip-version-check",
+            "--quiet",
+            "--dry-run",
+            "--ignore-installed",
+            "--no-deps",
+            "--target",
+            folder,
+            "--report",
+            report,
+            *wheels.tags(name),
+            *more,
+            *packages,
+        ]
         ended = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         if ended.returncode:
             errors = [line for line in ended.stderr.splitlines() if line.startswith("ERROR")]
-            raise Problem(f"{name}: {' '.join(errors) or ended.stderr[-300:]}",
-                          "Choose versions that have wheels for it in requirements/worker.txt.")
+            raise Problem(
+                f"{name}: {' '.join(errors) or ended.stderr[-300:]}",
+                "Choose versions that have wheels for it in requirements/worker.txt.",
+            )
         chosen = {}
         for entry in json.loads(report.read_text(encoding="utf-8"))["install"]:
             about, source = entry["metadata"], entry["download_info"]
-            wheel = Wheel(locks.normal(about["name"]), about["version"], source["url"],
-                          source.get("archive_info", {}).get("hashes", {}).get("sha256", ""),
-                          tuple(about.get("requires_dist", ())))
+            wheel = Wheel(
+                locks.normal(about["name"]),
+                about["version"],
+                source["url"],
+                source.get("archive_info", {}).get("hashes", {}).get("sha256", ""),
+                tuple(about.get("requires_dist", ())),
+            )
             chosen[wheel.name] = wheel
     return chosen
 
@@ -96,14 +117,25 @@ def ask(name: str, packages: list[str], *more: str) -> dict[str, Wheel]:
 def environment_of(name: str) -> dict[str, str]:
     """What a requirement's conditions are judged by (PEP 508)."""
     platform, _, python = name.rpartition("-")
-    system, short, machine, kind = {"win_amd64": ("Windows", "win32", "AMD64", "nt"),
-                                    "macosx_arm64": ("Darwin", "darwin", "arm64", "posix"),
-                                    "manylinux_x86_64": ("Linux", "linux", "x86_64", "posix")}[platform]
-    return {"platform_system": system, "sys_platform": short, "platform_machine": machine, "os_name": kind,
-            "python_version": python,
-            "python_full_version": f"{python}.0", "implementation_name": "cpython",
-            "platform_python_implementation": "CPython",
-            "implementation_version": f"{python}.0", "platform_release": "", "platform_version": "", "extra": ""}
+    system, short, machine, kind = {
+        "win_amd64": ("Windows", "win32", "AMD64", "nt"),
+        "macosx_arm64": ("Darwin", "darwin", "arm64", "posix"),
+        "manylinux_x86_64": ("Linux", "linux", "x86_64", "posix"),
+    }[platform]
+    return {
+        "platform_system": system,
+        "sys_platform": short,
+        "platform_machine": machine,
+        "os_name": kind,
+        "python_version": python,
+        "python_full_version": f"{python}.0",
+        "implementation_name": "cpython",
+        "platform_python_implementation": "CPython",
+        "implementation_version": f"{python}.0",
+        "platform_release": "",
+        "platform_version": "",
+        "extra": "",
+    }
 
 
 def wheel_files(url: str) -> tuple[int, list[tuple[str, int]]]:
@@ -114,8 +146,10 @@ def wheel_files(url: str) -> tuple[int, list[tuple[str, int]]]:
         *_, size, offset, _ = END.unpack(tail)
         return total, _listed(_part(url, offset, size)[0])
     except (OSError, ValueError, struct.error) as error:
-        raise Problem(f"{urllib.parse.urlsplit(url).hostname or url} did not answer ({error}).",
-                      "Check the network connection, and try again.") from error
+        raise Problem(
+            f"{urllib.parse.urlsplit(url).hostname or url} did not answer ({error}).",
+            "Check the network connection, and try again.",
+        ) from error
 
 
 def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
@@ -138,9 +172,9 @@ def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
 def _listed(directory: bytes) -> list[tuple[str, int]]:
     """Name and bytes unpacked of the files in a zip file's central directory (PKWARE APPNOTE 4.3.12)."""
     files, at = [], 0
-    while directory[at:at + 4] == b"PK\1\2":
+    while directory[at : at + 4] == b"PK\1\2":
         size, name_length, *more = struct.unpack_from("<L3H", directory, at + 24)
-        name = directory[at + 46:at + 46 + name_length].decode("utf-8", "replace")
+        name = directory[at + 46 : at + 46 + name_length].decode("utf-8", "replace")
         files += [(name, size)] * (not name.endswith("/"))  # which a folder's does
         at += 46 + name_length + sum(more)
     return files

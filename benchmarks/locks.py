@@ -27,8 +27,10 @@ from .lock_resolver import Wheel
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 HEAD = "# {name}: written by `python -m benchmarks.locks`, out of worker.txt.\n"
-NOT_VERIFIED = ("# not verified: the index that has this build was not reached when this was written, so its hash is "
-                "not known,\n# and its size is taken to be that of the package index's build for Linux.\n")
+NOT_VERIFIED = (
+    "# not verified: the index that has this build was not reached when this was written, so its hash is "
+    "not known,\n# and its size is taken to be that of the package index's build for Linux.\n"
+)
 PIP = "26.3"
 TEMPORARY = ".0123456789012345"
 """What Python appends to a compiled file's name while it writes it: a dot and a number of 15 digits or so."""
@@ -38,8 +40,10 @@ COMPILED = 1.25
 
 def write(name: str) -> None:
     """Writes one lock and what lies beside it. Raises Problem where a package is not to be had."""
-    direct = [line.partition("#")[0].strip()
-              for line in (REQUIREMENTS / "worker.txt").read_text(encoding="utf-8").splitlines()]
+    direct = [
+        line.partition("#")[0].strip()
+        for line in (REQUIREMENTS / "worker.txt").read_text(encoding="utf-8").splitlines()
+    ]
     wheels = lock_resolver.resolve(name, [line for line in direct if line])
     torch = wheels["torch"]
     public = torch.version.partition("+")[0]
@@ -58,8 +62,9 @@ def _packages(name: str, wheels: dict[str, Wheel], torch: str = "") -> list[str]
     """The longest path of all, then the packages, with their sizes; `torch` is the hash of a build of PyTorch that is
     taken as well."""
     files = {other: lock_resolver.wheel_files(wheel.url) for other, wheel in wheels.items()}
-    longest = max((path for _, listed in files.values() for file, _ in listed for path in installed_paths(file, name)),
-                  key=len)
+    longest = max(
+        (path for _, listed in files.values() for file, _ in listed for path in installed_paths(file, name)), key=len
+    )
     lines = [f"# longest path: {len(longest)} characters below the environment's folder: {longest}\n"]
     for other, wheel in sorted(wheels.items()):
         hashes = {wheel.sha256, torch} - {""} if other == "torch" else {wheel.sha256}
@@ -82,17 +87,22 @@ def _size(name: str, version: str, download: int, disk: int) -> str:
 
 def _write_pip(name: str) -> None:
     wheel = lock_resolver.ask(name, [f"pip=={PIP}"])["pip"]
-    _write("pip.txt",
-           ["# pip, for a Python that brings none: a wheel of pure Python, for every platform.\n",
-            _line("pip", wheel.version, wheel.sha256)])
+    _write(
+        "pip.txt",
+        [
+            "# pip, for a Python that brings none: a wheel of pure Python, for every platform.\n",
+            _line("pip", wheel.version, wheel.sha256),
+        ],
+    )
 
 
 def installed_paths(file: str, name: str) -> list[str]:
     """Where a file of a wheel comes to lie below the environment's folder, the compiled one of a module and its
     temporary name among them."""
     platform, _, python = name.rpartition("-")
-    inside, scripts = (("Lib/site-packages", "Scripts") if platform == "win_amd64"
-                       else (f"lib/python{python}/site-packages", "bin"))
+    inside, scripts = (
+        ("Lib/site-packages", "Scripts") if platform == "win_amd64" else (f"lib/python{python}/site-packages", "bin")
+    )
     path = PurePosixPath(file)
     if path.parts[0].endswith(".data"):  # PEP 427: PACKAGE.data/purelib/... and the like
         inside = {"purelib": inside, "platlib": inside}.get(path.parts[1], scripts)
@@ -109,9 +119,11 @@ def _write_build(name: str, compute: str, version: str, local: Wheel, wheels: di
     if build:
         lines = _own_build(name, f"{version}+{build}", build, local, compute)
     elif compute == "cuda" and system == "linux":
-        libraries = {other: wheel
-                     for other, wheel in lock_resolver.resolve(name, [f"torch==={version}"], cuda=True).items()
-                     if other not in wheels}
+        libraries = {
+            other: wheel
+            for other, wheel in lock_resolver.resolve(name, [f"torch==={version}"], cuda=True).items()
+            if other not in wheels
+        }
         lines = _packages(name, libraries)
     else:
         return

@@ -55,8 +55,9 @@ def main() -> None:
     options.add_argument("folder", type=Path)
     options.add_argument("--frames", type=int, nargs="+", default=COUNTS, metavar="N")
     options.add_argument("--again", action="store_true", help="measure rows anew that the record has")
-    options.add_argument("--plain-times", type=float, default=4,
-                         help="how many times as long plain pycolmap may take; 0: it is left out")
+    options.add_argument(
+        "--plain-times", type=float, default=4, help="how many times as long plain pycolmap may take; 0: it is left out"
+    )
     options.add_argument("--json", type=Path)
     asked = options.parse_args()
     folder = asked.folder.resolve()
@@ -66,8 +67,12 @@ def main() -> None:
         if asked.again or str(count) not in known.get("frames", {}):
             found = {"frames": {**known.get("frames", {}), str(count): row(folder, count, asked.plain_times)}}
             found["frames"] = dict(sorted(found["frames"].items(), key=lambda item: int(item[0])))
-            figures.write_record(path, "long_films", "python -m benchmarks.long_films FOLDER",
-                                 {**found, "growth": growth(found["frames"])})
+            figures.write_record(
+                path,
+                "long_films",
+                "python -m benchmarks.long_films FOLDER",
+                {**found, "growth": growth(found["frames"])},
+            )
     print(table(figures.read_record(path.stem, path.parent)["figures"]))
 
 
@@ -82,15 +87,28 @@ def film(folder: Path, count: int) -> Path:
     if not all((work / f"{number:05d}.exr").is_file() for number in numbers):
         from core.synthetic.people.figure import make_figure
 
-        filmed.render(work, make_figure(SEED), KINDS[LIGHT](SEED), scene.Shot(cameras, numbers, SAMPLES),
-                      module="benchmarks.long_films_render")
+        filmed.render(
+            work,
+            make_figure(SEED),
+            KINDS[LIGHT](SEED),
+            scene.Shot(cameras, numbers, SAMPLES),
+            module="benchmarks.long_films_render",
+        )
     out.mkdir(exist_ok=True)
-    write_json(out / "cameras.json",
-               {"name": "film", "light": LIGHT, "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
-                "cameras": [{"frame": k, "matrix_world": cameras[number].tolist()}
-                            for k, number in enumerate(numbers)]})
-    sample.write_video(out / "film.mp4", _developed(work, numbers, raster.RayCaster(person_mesh(SEED)), cameras, taken),
-                       taken.crf)
+    write_json(
+        out / "cameras.json",
+        {
+            "name": "film",
+            "light": LIGHT,
+            "focal_px": scene.FOCAL,
+            "width": scene.WIDTH,
+            "height": scene.HEIGHT,
+            "cameras": [{"frame": k, "matrix_world": cameras[number].tolist()} for k, number in enumerate(numbers)],
+        },
+    )
+    sample.write_video(
+        out / "film.mp4", _developed(work, numbers, raster.RayCaster(person_mesh(SEED)), cameras, taken), taken.crf
+    )
     return out
 
 
@@ -100,8 +118,9 @@ def chosen_frames(count: int) -> list[int]:
     return whole[np.linspace(0, len(whole) - 1, count).round().astype(int)].tolist()
 
 
-def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: np.ndarray,
-               camera: phone.Phone) -> Iterator[np.ndarray]:
+def _developed(
+    work: Path, numbers: list[int], head: raster.RayCaster, cameras: np.ndarray, camera: phone.Phone
+) -> Iterator[np.ndarray]:
     """The frames as the phone shows them, sRGB [H, W, 3]. Its rows are read at once: a rolling shutter has no one true
     camera."""
     views, still = [sample.view_of(matrix) for matrix in cameras], np.tile(np.eye(4), (3, 1, 1))
@@ -131,21 +150,28 @@ def row(folder: Path, count: int, plain_times: float) -> dict:
     print(count, ours, flush=True)
     found = {"ours": ours, "plain": None, "times": None, "processor_times": None}
     if plain_times and "problem" not in ours:
-        plain = found["plain"] = measure_plain(capture, Capture(folder / f"{count}_plain.wildcap"), truth, count,
-                                               plain_times * ours["seconds"])
+        plain = found["plain"] = measure_plain(
+            capture, Capture(folder / f"{count}_plain.wildcap"), truth, count, plain_times * ours["seconds"]
+        )
         if "over_s" not in plain:
-            found |= {"times": plain["seconds"] / ours["seconds"],
-                      "processor_times": plain["processor_s"] / ours["processor_s"]}
+            found |= {
+                "times": plain["seconds"] / ours["seconds"],
+                "processor_times": plain["processor_s"] / ours["processor_s"],
+            }
         print(count, plain, flush=True)
     return found
 
 
 def _against_truth(capture: Capture, truth: Path, frames: int) -> dict:
     found = compare(capture, truth)
-    return {"frames": frames, "registered": found["registered"],
-            "centre_median_percent": found["centre_error_median_percent"],
-            "centre_max_percent": found["centre_error_max_percent"], "rotation_deg": found["rotation_error_median_deg"],
-            "focal_px": found["focal_px"]}
+    return {
+        "frames": frames,
+        "registered": found["registered"],
+        "centre_median_percent": found["centre_error_median_percent"],
+        "centre_max_percent": found["centre_error_max_percent"],
+        "rotation_deg": found["rotation_error_median_deg"],
+        "focal_px": found["focal_px"],
+    }
 
 
 def measure_plain(capture: Capture, beside: Capture, truth: Path, count: int, limit_s: float) -> dict:
@@ -173,8 +199,11 @@ def measure_plain(capture: Capture, beside: Capture, truth: Path, count: int, li
     if ran.code is None:
         return {"over_s": round(limit_s)}
     cost = {"seconds": round(ran.seconds, 1), "processor_s": round(ran.processor_s, 1)}
-    return ({**cost, **_against_truth(beside, truth, count)} if ran.code == 0
-            else {**cost, "frames": count, "registered": 0})
+    return (
+        {**cost, **_against_truth(beside, truth, count)}
+        if ran.code == 0
+        else {**cost, "frames": count, "registered": 0}
+    )
 
 
 def plain() -> None:
@@ -198,9 +227,17 @@ def growth(rows: dict) -> float | None:
 
 def table(record: dict) -> str:
     """The record's table."""
-    head = ["frames", "cameras: seconds (of processor)", "registered",
-            "centre error, median and most, % of the distance", "rotation, degrees", "found by",
-            "plain pycolmap: seconds (of processor)", "its registered, centre error", "times as long (of processor)"]
+    head = [
+        "frames",
+        "cameras: seconds (of processor)",
+        "registered",
+        "centre error, median and most, % of the distance",
+        "rotation, degrees",
+        "found by",
+        "plain pycolmap: seconds (of processor)",
+        "its registered, centre error",
+        "times as long (of processor)",
+    ]
     return figures.markdown(head, [[count, *_cells(of)] for count, of in record["frames"].items()])
 
 
@@ -208,16 +245,24 @@ def _cells(of: dict) -> list:
     ours, plain = of["ours"], of["plain"]
     if "problem" in ours:
         return [ours["problem"], *[None] * 7]
-    own = [f"{ours['seconds']:.0f} ({ours['processor_s']:.0f})", ours["registered"],
-           f"{ours['centre_median_percent']:.3f}, {ours['centre_max_percent']:.2f}",
-           f"{ours['rotation_deg']:.3f}", ours["found_by"]]
+    own = [
+        f"{ours['seconds']:.0f} ({ours['processor_s']:.0f})",
+        ours["registered"],
+        f"{ours['centre_median_percent']:.3f}, {ours['centre_max_percent']:.2f}",
+        f"{ours['rotation_deg']:.3f}",
+        ours["found_by"],
+    ]
     if plain is None:
         return [*own, None, None, None]
     if "over_s" in plain:
         return [*own, f"over {plain['over_s']:.0f}", None, None]
     error = f", {plain['centre_median_percent']:.3f} %" if "centre_median_percent" in plain else ""
-    return [*own, f"{plain['seconds']:.0f} ({plain['processor_s']:.0f})", f"{plain['registered']}{error}",
-            f"{of['times']:.1f} ({of['processor_times']:.1f})"]
+    return [
+        *own,
+        f"{plain['seconds']:.0f} ({plain['processor_s']:.0f})",
+        f"{plain['registered']}{error}",
+        f"{of['times']:.1f} ({of['processor_times']:.1f})",
+    ]
 
 
 if __name__ == "__main__":

@@ -46,11 +46,15 @@ def main() -> None:
         light = tree.nodes.new("ShaderNodeAttribute")
         light.attribute_name = "light"
         _emit(tree, _product(tree, _colour(tree), light.outputs["Color"]))
-    for material in {thing.data.materials[0] for thing in scene.objects if thing.type in ('MESH', 'CURVES')
-                     and thing.name not in parts}:
+    for material in {
+        thing.data.materials[0]
+        for thing in scene.objects
+        if thing.type in ('MESH', 'CURVES') and thing.name not in parts
+    }:
         shine(material, job["sun"]["direction"], np.median(lights["skin"], axis=0).tolist())
-    for thing in [thing for thing in scene.objects if thing.type == 'LIGHT' or thing.type == 'MESH'
-                  and not thing.visible_camera]:
+    for thing in [
+        thing for thing in scene.objects if thing.type == 'LIGHT' or thing.type == 'MESH' and not thing.visible_camera
+    ]:
         bpy.data.objects.remove(thing)
     scene.cycles.use_denoising, scene.cycles.max_bounces = False, 0
     scene.render.image_settings.color_depth, scene.render.image_settings.exr_codec = '16', 'ZIPS'
@@ -72,8 +76,9 @@ def traced(objects: dict[str, bpy.types.Object], sun: dict, sky: np.ndarray) -> 
         light += free[:, None] * sky[row, column] / RAYS
     middle = np.array(sun["direction"])
     for _ in range(SUN_RAYS):
-        towards = _unit(middle + np.tan(sun["angle"] / 2) * np.sqrt(rng.random())
-                        * _unit(np.cross(middle, rng.normal(size=3))))
+        towards = _unit(
+            middle + np.tan(sun["angle"] / 2) * np.sqrt(rng.random()) * _unit(np.cross(middle, rng.normal(size=3)))
+        )
         free = ~caster.blocked(start, np.repeat(towards[None], len(points), 0))
         light += (
             (free * np.clip(normals @ towards, 0, 1))[:, None]
@@ -121,8 +126,13 @@ def _colour(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
     return node.outputs[0]
 
 
-def _vector(tree: bpy.types.NodeTree, operation: str, first: bpy.types.NodeSocket, second: Sequence[float] = (0, 0, 0),
-            output: int = 0) -> bpy.types.NodeSocket:
+def _vector(
+    tree: bpy.types.NodeTree,
+    operation: str,
+    first: bpy.types.NodeSocket,
+    second: Sequence[float] = (0, 0, 0),
+    output: int = 0,
+) -> bpy.types.NodeSocket:
     node = tree.nodes.new("ShaderNodeVectorMath")
     node.operation = operation
     tree.links.new(first, node.inputs[0])

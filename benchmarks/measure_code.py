@@ -33,8 +33,9 @@ def main() -> None:
     asked = parser.parse_args()
     found = look([path for top in (*PRODUCT, "benchmarks") for path in sorted((figures.ROOT / top).rglob("*.py"))])
     if asked.list:
-        print("\n".join(f"{kind}: {name}" for kind, names in found.items() if kind != "product lines"
-                        for name in names))
+        print(
+            "\n".join(f"{kind}: {name}" for kind, names in found.items() if kind != "product lines" for name in names)
+        )
     counts = {kind: names if isinstance(names, int) else len(names) for kind, names in found.items()}
     print(figures.markdown(["what", "how many"], [[kind, count] for kind, count in counts.items()]))
     if asked.json:
@@ -56,10 +57,13 @@ def look(paths: list[Path], root: Path = figures.ROOT) -> dict[str, list[str] | 
         wide += [f"{place}:{number}" for number, line in enumerate(text.splitlines(), 1) if len(line) > COLUMNS]
         if place.startswith(PRODUCT) and not place.startswith(BESIDE):
             lines += count_lines(text, tree)
-    return {f"functions over {LINES} lines": long, f"functions over {PARAMETERS} parameters": many,
-            f"lines over {COLUMNS} columns": wide,
-            "class names of two meanings": [name for name, count in classes.items() if count > 1],
-            "product lines": lines}
+    return {
+        f"functions over {LINES} lines": long,
+        f"functions over {PARAMETERS} parameters": many,
+        f"lines over {COLUMNS} columns": wide,
+        "class names of two meanings": [name for name, count in classes.items() if count > 1],
+        "product lines": lines,
+    }
 
 
 def count_parameters(node: ast.FunctionDef) -> int:
@@ -77,8 +81,12 @@ def count_lines(text: str, tree: ast.Module) -> int:
             if constant and isinstance(each.value.value, str):
                 docs |= set(range(each.lineno, each.end_lineno + 1))
     skipped = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
-    code = {line for token in tokenize.generate_tokens(io.StringIO(text).readline) if token.type not in skipped
-            for line in range(token.start[0], token.end[0] + 1)}
+    code = {
+        line
+        for token in tokenize.generate_tokens(io.StringIO(text).readline)
+        if token.type not in skipped
+        for line in range(token.start[0], token.end[0] + 1)
+    }
     return len(code - docs)
 
 

@@ -42,8 +42,17 @@ from .eye_captures import EYES
 from .figures import markdown, write_record
 from .likenesses import HELD_BACK, LIKENESSES
 
-COLUMNS = ("rim, mm", "rim's worst, mm", "centre, mm", "radius, mm", "gaze, degrees", "iris radius, mm",
-           "iris, delta E", "openness", "true openness")
+COLUMNS = (
+    "rim, mm",
+    "rim's worst, mm",
+    "centre, mm",
+    "radius, mm",
+    "gaze, degrees",
+    "iris radius, mm",
+    "iris, delta E",
+    "openness",
+    "true openness",
+)
 ALONE = ", by the head alone"
 SKIN_TEXELS = 512
 QUIET = Reporter("registration", emit=lambda message: None)
@@ -52,8 +61,12 @@ QUIET = Reporter("registration", emit=lambda message: None)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--only", nargs="*", choices=[person.name for person in (*LIKENESSES, *HELD_BACK)],
-                        default=[person.name for person in LIKENESSES])
+    parser.add_argument(
+        "--only",
+        nargs="*",
+        choices=[person.name for person in (*LIKENESSES, *HELD_BACK)],
+        default=[person.name for person in LIKENESSES],
+    )
     parser.add_argument("--eyes", type=Path, help="captures of benchmarks/eye_captures.py")
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
@@ -65,12 +78,19 @@ def main() -> None:
             continue
         for side, row in zip(SIDES, compare(capture, truth) if capture.eyes.is_file() else missed(truth), strict=False):
             rows[f"{name}, {side}"] = row
-    print(markdown(["eye", *COLUMNS],
-                   [[name, *(None if row[column] is None else f"{row[column]:.2f}" for column in COLUMNS)]
-                    for name, row in rows.items()]))
+    print(
+        markdown(
+            ["eye", *COLUMNS],
+            [
+                [name, *(None if row[column] is None else f"{row[column]:.2f}" for column in COLUMNS)]
+                for name, row in rows.items()
+            ],
+        )
+    )
     if asked.json:
-        write_record(asked.json, "open_eyes", "python -m benchmarks.open_eyes FOLDER --eyes FOLDER", {"rows": rows},
-                     keep=True)
+        write_record(
+            asked.json, "open_eyes", "python -m benchmarks.open_eyes FOLDER --eyes FOLDER", {"rows": rows}, keep=True
+        )
 
 
 def compare(capture: Capture, truth: Path) -> list[dict]:
@@ -83,8 +103,10 @@ def compare(capture: Capture, truth: Path) -> list[dict]:
     rows = []
     for side, ball in enumerate(true.balls):
         off = None if colours is None else apart(np.array(colours[side]), true_iris(person, ball.radius))
-        rows.append(compare_eye(found[side], opened, true, side, (scale, turn, shift))
-                    | {"iris, delta E": _plain(off), "true openness": _plain(person["openness"])})
+        rows.append(
+            compare_eye(found[side], opened, true, side, (scale, turn, shift))
+            | {"iris, delta E": _plain(off), "true openness": _plain(person["openness"])}
+        )
     return rows
 
 
@@ -111,11 +133,14 @@ def fit_alone(folder: Path) -> dict[str, dict]:
             fitted = eyeballs.fit(head, told, seen.opening)
             colours = None if name else irises_over_own_skin(views, fitted, seed)
             for side, eye in enumerate(fitted.records()):
-                off = None if colours is None else apart(np.array(colours[side]),
-                                                         true_iris(person, true.balls[side].radius))
-                rows[f"{seed}, {SIDES[side]}{name}"] = (
-                    compare_eye(eye, fitted.opened.skin.vertices, true, side, still)
-                    | {"iris, delta E": _plain(off), "true openness": _plain(person["openness"])})
+                off = (
+                    None
+                    if colours is None
+                    else apart(np.array(colours[side]), true_iris(person, true.balls[side].radius))
+                )
+                rows[f"{seed}, {SIDES[side]}{name}"] = compare_eye(
+                    eye, fitted.opened.skin.vertices, true, side, still
+                ) | {"iris, delta E": _plain(off), "true openness": _plain(person["openness"])}
     return rows
 
 
@@ -142,14 +167,23 @@ def compare_eye(eye: Eyeball, opened: np.ndarray, true: lids.OpenHead, side: int
     """
     scale, turn, shift = pose
     ball = true.balls[side]
-    rims = [_off(opened[rim], _curve(true, side, lid) @ (scale * turn).T + shift)
-            for lid, rim in enumerate(true.rims[side])]
+    rims = [
+        _off(opened[rim], _curve(true, side, lid) @ (scale * turn).T + shift) for lid, rim in enumerate(true.rims[side])
+    ]
     centre = scale * turn @ ball.centre + shift
     gaze = np.degrees(np.arccos(np.clip(turn @ ball.gaze @ np.array(eye.gaze), -1, 1)))
     iris = 1e3 * eye.iris_radius / scale - eyes.IRIS_MM if eye.iris_radius else None
-    told = (1e3 * np.mean([off.mean() for off in rims]), 1e3 * max(off.max() for off in rims),
-            1e3 * np.linalg.norm(centre - eye.centre), 1e3 * (eye.radius - scale * ball.radius), gaze, iris, None,
-            eye.openness, None)
+    told = (
+        1e3 * np.mean([off.mean() for off in rims]),
+        1e3 * max(off.max() for off in rims),
+        1e3 * np.linalg.norm(centre - eye.centre),
+        1e3 * (eye.radius - scale * ball.radius),
+        gaze,
+        iris,
+        None,
+        eye.openness,
+        None,
+    )
     return dict(zip(COLUMNS, map(_plain, told), strict=True))
 
 
@@ -173,8 +207,9 @@ def _curve(opened: lids.OpenHead, side: int, lid: int) -> np.ndarray:
     """The true edge of a lid from corner to corner [N, 3], finely."""
     outer, inner = lids.corners()[side]
     points = opened.skin.vertices[[inner, *opened.rims[side][lid], outer]]
-    return np.concatenate([a + (b - a) * np.linspace(0, 1, 20)[:, None]
-                           for a, b in zip(points, points[1:], strict=False)])
+    return np.concatenate(
+        [a + (b - a) * np.linspace(0, 1, 20)[:, None] for a, b in zip(points, points[1:], strict=False)]
+    )
 
 
 def _off(points: np.ndarray, curve: np.ndarray) -> np.ndarray:

@@ -67,8 +67,16 @@ def reflow(block: str) -> str:
     if block.startswith(("|", "!", "#", "<", " ")):
         return block
     items = re.split(r"\n(?=- )", block)
-    return "\n".join(textwrap.fill(" ".join(item.split()), WIDTH, subsequent_indent="  " * item.startswith("- "),
-                                   break_long_words=False, break_on_hyphens=False) for item in items)
+    return "\n".join(
+        textwrap.fill(
+            " ".join(item.split()),
+            WIDTH,
+            subsequent_indent="  " * item.startswith("- "),
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for item in items
+    )
 
 
 def replace_text(path: Path, text: str) -> None:

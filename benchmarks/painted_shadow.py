@@ -41,8 +41,10 @@ def main() -> None:
     y, x = np.mgrid[:1024, :1024].astype(np.float32)
     distance = np.hypot(x - CENTRE[0], y - CENTRE[1])
     disc = (distance < RADIUS).astype(np.float32)
-    inside, around = (images.resize(part.astype(np.float32), size, size) > 0.99
-                      for part in (distance < RADIUS - 10, np.abs(distance - RADIUS - 20) < 10))
+    inside, around = (
+        images.resize(part.astype(np.float32), size, size) > 0.99
+        for part in (distance < RADIUS - 10, np.abs(distance - RADIUS - 20) < 10)
+    )
     print("| light in the shadow | mask | left of the shadow in the albedo |\n| --- | --- | --- |")
     for added in (False, True):
         steps = {}

@@ -62,8 +62,9 @@ def blotches(sight: Sight, rng: np.random.Generator) -> np.ndarray:
     total = np.zeros((sight.size, sight.size, 3), np.float32)
     for scale in SCALES:
         for channels, deviation in ((1, DEVIATION), (3, 0.1 * DEVIATION)):
-            noise = cv2.GaussianBlur(rng.standard_normal((sight.size, sight.size, channels)).astype(np.float32), (0, 0),
-                                     scale * sight.size)
+            noise = cv2.GaussianBlur(
+                rng.standard_normal((sight.size, sight.size, channels)).astype(np.float32), (0, 0), scale * sight.size
+            )
             total += deviation * (noise / noise.std()).reshape(sight.size, sight.size, channels)
     return np.exp(total.reshape(-1, 3)[sight.pixel])
 

@@ -43,8 +43,22 @@ VIEWS, SIZE, TEXELS = 8, 400, 1024
 SPARSE = 4.0
 HAIRS = ("brows", "beard", "hair")
 ENDINGS = (".png", ".jpg", ".jpeg")
-COLOURS = np.array([[255, 190, 150], [230, 0, 80], [120, 60, 0], [255, 150, 0], [70, 70, 230], [255, 255, 255],
-                    [0, 160, 80], [0, 0, 0]], np.float32) / 255
+COLOURS = (
+    np.array(
+        [
+            [255, 190, 150],
+            [230, 0, 80],
+            [120, 60, 0],
+            [255, 150, 0],
+            [70, 70, 230],
+            [255, 255, 255],
+            [0, 160, 80],
+            [0, 0, 0],
+        ],
+        np.float32,
+    )
+    / 255
+)
 """Of the parts in a sheet."""
 
 
@@ -76,8 +90,13 @@ def main() -> None:
         lines.append([name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in shares)])
     print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"], lines))
     if asked.json:
-        write_record(asked.json, "parts", "python -m benchmarks.parts" + (" --frames FOLDER" if asked.frames else ""),
-                     {"rows": rows}, keep=True)
+        write_record(
+            asked.json,
+            "parts",
+            "python -m benchmarks.parts" + (" --frames FOLDER" if asked.frames else ""),
+            {"rows": rows},
+            keep=True,
+        )
 
 
 def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -100,8 +119,9 @@ def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
             yield frame.astype(np.float32) / 255, shares / shares.sum(-1, keepdims=True)
 
 
-def _crops(pictures: Iterator[tuple[np.ndarray, np.ndarray]],
-           network: ParseNet) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _crops(
+    pictures: Iterator[tuple[np.ndarray, np.ndarray]], network: ParseNet
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Of each picture in which a face is found: the true parts, the network's, and where the crop shows the picture;
     [SIDE, SIDE] each."""
     for srgb, shares in pictures:
@@ -125,11 +145,16 @@ def row(crops: list[tuple[np.ndarray, np.ndarray, np.ndarray]], pictures: int) -
     both = np.diag(counted)
     either = counted.sum(0) + counted.sum(1) - both
     skin, hair = PARTS.index("skin"), PARTS.index("hair")
-    return {"pictures": pictures, "found": len(crops),
-            "iou": {name: float(both[k] / either[k]) if counted[k].sum() > 20 * len(crops) else None
-                    for k, name in enumerate(PARTS)},
-            "hair_as_skin": _share(counted[hair, skin], counted[hair].sum()),
-            "skin_as_hair": _share(counted[skin, hair], counted[skin].sum())}
+    return {
+        "pictures": pictures,
+        "found": len(crops),
+        "iou": {
+            name: float(both[k] / either[k]) if counted[k].sum() > 20 * len(crops) else None
+            for k, name in enumerate(PARTS)
+        },
+        "hair_as_skin": _share(counted[hair, skin], counted[hair].sum()),
+        "skin_as_hair": _share(counted[skin, hair], counted[skin].sum()),
+    }
 
 
 def _share(count: int, total: int) -> float | None:
@@ -147,8 +172,12 @@ def write_sheet(out: Path, pictures: list[Path], network: ParseNet, brighter: fl
     brighter : factor on the pictures' sRGB values
     """
     rows = []
-    for path in [path for each in pictures for path in (sorted(each.iterdir()) if each.is_dir() else [each])
-                 if path.suffix.lower() in ENDINGS]:
+    for path in [
+        path
+        for each in pictures
+        for path in (sorted(each.iterdir()) if each.is_dir() else [each])
+        if path.suffix.lower() in ENDINGS
+    ]:
         srgb = np.clip(images.read_srgb(path)[..., :3] * brighter, 0, 1)
         face = faces.detect(srgb)
         if face is None:

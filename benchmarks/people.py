@@ -99,17 +99,29 @@ def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
     skin = make_skin(sample_parameters(person.seed), sample.MAPS)
     light, cameras = _set(person, place)
     work = folder / "rendered" / name
-    sample.render_frames(work, person.seed, skin,
-                         scene.Shot(cameras, list(range(len(cameras))), SAMPLES, SCALE, room=False), light=light,
-                         suffix=".exr")
+    sample.render_frames(
+        work,
+        person.seed,
+        skin,
+        scene.Shot(cameras, list(range(len(cameras))), SAMPLES, SCALE, room=False),
+        light=light,
+        suffix=".exr",
+    )
     head = subject_mesh(person.seed)
     meshes.write_obj(truth / "head.obj", head)
     if place == "wild":
         write_maps(truth / "maps", skin)
-    write_json(truth / "cameras.json",
-               {"name": name, "light": person.light if place == "wild" else place, "focal_px": scene.FOCAL * SCALE,
-                "width": round(scene.WIDTH * SCALE), "height": round(scene.HEIGHT * SCALE),
-                "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
+    write_json(
+        truth / "cameras.json",
+        {
+            "name": name,
+            "light": person.light if place == "wild" else place,
+            "focal_px": scene.FOCAL * SCALE,
+            "width": round(scene.WIDTH * SCALE),
+            "height": round(scene.HEIGHT * SCALE),
+            "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)],
+        },
+    )
     faces, total, count = {}, np.zeros(3), 0
     opaque = meshes.joined([head, light.blockers]) if light.blockers else head
     for frame in np.unique(np.linspace(1, len(cameras) - 2, TRUTHS).round().astype(int)).tolist():
@@ -119,13 +131,15 @@ def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
         _write_truth(truth, frame, albedo, alpha, face, shadow if light.sun else None)
         total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
     views = [sample.view_of(matrix, SCALE) for matrix in cameras]
-    write_views(capture, views, _developed(work, len(cameras), faces, person.seed),
-                min(Settings().frames.views, len(views)))
+    write_views(
+        capture, views, _developed(work, len(cameras), faces, person.seed), min(Settings().frames.views, len(views))
+    )
     sample.write_video(truth / "capture.mp4", _developed(work, len(cameras), faces, person.seed))
     meshes.write_obj(capture.head, registered(head, person.seed))
     with replacing(truth / "skin_tone.txt") as temporary:
-        temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n",
-                             encoding="ascii")
+        temporary.write_text(
+            ",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n", encoding="ascii"
+        )
     return capture
 
 
@@ -166,7 +180,7 @@ def solve_person(capture: Capture, truth: Path, until: str, quality: str) -> Non
     values = {"solve": {"skin_tone": skin_tone(truth)}}
     names, settings = [stage.name for stage in STAGES], from_json(values, preset(quality))
     begin = "delight" if capture.head.is_file() else "scan"
-    asked = STAGES[names.index(begin):names.index(until) + 1]
+    asked = STAGES[names.index(begin) : names.index(until) + 1]
     stale = [stage.name for stage in asked if capture.state(stage, settings) != "done"]
     if not stale:
         return
@@ -181,8 +195,9 @@ def skin_tone(truth: Path) -> str:
     return (truth / "skin_tone.txt").read_text(encoding="ascii").split("#")[0].replace(" ", "").strip()
 
 
-def _write_truth(truth: Path, frame: int, albedo: np.ndarray, alpha: np.ndarray, face: np.ndarray,
-                 shadow: np.ndarray | None) -> None:
+def _write_truth(
+    truth: Path, frame: int, albedo: np.ndarray, alpha: np.ndarray, face: np.ndarray, shadow: np.ndarray | None
+) -> None:
     name = f"{frame:04d}.png"
     for folder in ("albedo", "face", *(["shadow"] if shadow is not None else [])):
         (truth / folder).mkdir(parents=True, exist_ok=True)
@@ -192,8 +207,9 @@ def _write_truth(truth: Path, frame: int, albedo: np.ndarray, alpha: np.ndarray,
         images.write_data(truth / "shadow" / name, shadow.astype(np.float32))
 
 
-def _developed(work: Path, count: int, faces: dict[int, tuple[np.ndarray, np.ndarray]],
-               seed: int) -> Iterator[np.ndarray]:
+def _developed(
+    work: Path, count: int, faces: dict[int, tuple[np.ndarray, np.ndarray]], seed: int
+) -> Iterator[np.ndarray]:
     """The rendered frames as a phone would show them, sRGB [H, W, 3]; `faces`: per frame with truth its albedo [H, W,
     3] and facial skin [H, W]."""
     gain = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}, faces)
@@ -201,8 +217,9 @@ def _developed(work: Path, count: int, faces: dict[int, tuple[np.ndarray, np.nda
         rng = np.random.default_rng([seed, 51, frame])
         linear = cv2.GaussianBlur(images.read_linear(work / f"{frame:05d}.exr") * gain, (0, 0), BLUR_PX)
         srgb = images.linear_to_srgb(linear)
-        yield np.clip(srgb + rng.normal(0, NOISE, srgb.shape) * np.sqrt(np.clip(srgb, 0.05, 1) / 0.5), 0,
-                      1).astype(np.float32)
+        yield np.clip(srgb + rng.normal(0, NOISE, srgb.shape) * np.sqrt(np.clip(srgb, 0.05, 1) / 0.5), 0, 1).astype(
+            np.float32
+        )
 
 
 def exposure(frames: dict[int, np.ndarray], faces: dict[int, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

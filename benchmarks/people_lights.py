@@ -40,28 +40,41 @@ def window_bars(seed: int) -> SceneLight:
 def mixed_lamps(seed: int) -> SceneLight:
     """An evening at home: a warm bulb on one side, a cool screen on the other, a ceiling lamp."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
-    return SceneLight(panorama((0.030, 0.024, 0.018), (0.03, 0.024, 0.018), (0.018, 0.012, 0.008)), lamps=(
-        AreaLamp((0.75 * side, -0.65, 0.30), 0.12, 7.0, (1.0, 0.62, 0.30)),
-        AreaLamp((-0.55 * side, -0.85, -0.10), 0.30, 13.0, (0.55, 0.78, 1.0)),
-        AreaLamp((0.10 * side, -0.35, 1.25), 0.35, 9.0, (1.0, 0.80, 0.58))))
+    return SceneLight(
+        panorama((0.030, 0.024, 0.018), (0.03, 0.024, 0.018), (0.018, 0.012, 0.008)),
+        lamps=(
+            AreaLamp((0.75 * side, -0.65, 0.30), 0.12, 7.0, (1.0, 0.62, 0.30)),
+            AreaLamp((-0.55 * side, -0.85, -0.10), 0.30, 13.0, (0.55, 0.78, 1.0)),
+            AreaLamp((0.10 * side, -0.35, 1.25), 0.35, 9.0, (1.0, 0.80, 0.58)),
+        ),
+    )
 
 
 def haze(seed: int) -> SceneLight:
     """A sun behind thin cloud, soft and from the side: the head's own shadow and no other."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
-    return SceneLight(panorama((0.55, 0.62, 0.75), (0.75, 0.72, 0.68), (0.16, 0.14, 0.11)),
-                      Sun(_towards(58 * side, 36), 4.0, 0.09, (1.0, 0.95, 0.87)))
+    return SceneLight(
+        panorama((0.55, 0.62, 0.75), (0.75, 0.72, 0.68), (0.16, 0.14, 0.11)),
+        Sun(_towards(58 * side, 36), 4.0, 0.09, (1.0, 0.95, 0.87)),
+    )
 
 
 def lamp_below(seed: int) -> SceneLight:
     """A lamp on a table below the face, in a dim room: shading upside down, shadows that rise from nose and lips."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
-    return SceneLight(panorama((0.035, 0.034, 0.033), (0.04, 0.038, 0.035), (0.06, 0.045, 0.03)), lamps=(
-        AreaLamp((0.16 * side, -0.50, -0.48), 0.10, 8.0, (1.0, 0.74, 0.46)),))
+    return SceneLight(
+        panorama((0.035, 0.034, 0.033), (0.04, 0.038, 0.035), (0.06, 0.045, 0.03)),
+        lamps=(AreaLamp((0.16 * side, -0.50, -0.48), 0.10, 8.0, (1.0, 0.74, 0.46)),),
+    )
 
 
-KINDS = {"noon sun behind leaves": noon, "overcast": overcast, "window bars": window_bars, "mixed lamps": mixed_lamps,
-         "hazy sun": haze}
+KINDS = {
+    "noon sun behind leaves": noon,
+    "overcast": overcast,
+    "window bars": window_bars,
+    "mixed lamps": mixed_lamps,
+    "hazy sun": haze,
+}
 FURTHER = {"overcast": overcast, "lamp from below": lamp_below}
 """The lights in which every person is photographed again (benchmarks/likenesses.py)."""
 
@@ -73,8 +86,9 @@ def panorama(zenith, horizon, ground) -> np.ndarray:
     return np.where(height > 0, sky, np.asarray(ground)).astype(np.float32)
 
 
-def make_bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024,
-              reach: float = 0.25) -> Mesh:
+def make_bars(
+    direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024, reach: float = 0.25
+) -> Mesh:
     """A window's upright and level bars between the head and the light, in a plane across it.
 
     Parameters
@@ -92,8 +106,10 @@ def make_bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.08
     for along, across, step in ((up, side, 1.0), (side, up, 1.6)):  # panes are higher than they are wide
         for place in places * step:
             first = len(vertices)
-            vertices += [direction * distance + along * a * 2 * reach + across * (place + b * width / 2)
-                         for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            vertices += [
+                direction * distance + along * a * 2 * reach + across * (place + b * width / 2)
+                for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+            ]
             faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
     return Mesh(np.array(vertices), np.array(faces))
 
@@ -110,8 +126,9 @@ def _directions() -> np.ndarray:
     quarter to the right -Y."""
     polar = (np.arange(HEIGHT) + 0.5)[:, None] / HEIGHT * np.pi
     azimuth = -((np.arange(2 * HEIGHT) + 0.5)[None] / (2 * HEIGHT) - 0.5) * 2 * np.pi
-    return np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth),
-                     np.cos(polar) * np.ones_like(azimuth)], -1)
+    return np.stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) * np.ones_like(azimuth)], -1
+    )
 
 
 def _towards(azimuth_deg: float, height_deg: float) -> np.ndarray:

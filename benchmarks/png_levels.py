@@ -23,9 +23,13 @@ from core.imaging import images
 
 from . import figures
 
-PICTURES = {"albedo": ("maps_4k/diffuse_albedo.png", 16), "normals": ("maps_4k/normal.png", 16),
-            "specular": ("maps_4k/specular_albedo.png", 16),
-            "confidence": ("maps_4k/confidence.png", 8), "delit frame": ("delit", 16)}
+PICTURES = {
+    "albedo": ("maps_4k/diffuse_albedo.png", 16),
+    "normals": ("maps_4k/normal.png", 16),
+    "specular": ("maps_4k/specular_albedo.png", 16),
+    "confidence": ("maps_4k/confidence.png", 8),
+    "delit frame": ("delit", 16),
+}
 LEVELS = (1, 3)
 FILTERS = {"none": 0x08, "up": 0x20, "paeth": 0x80, "chosen": None}
 """libpng's flags."""
@@ -38,8 +42,10 @@ def main() -> None:
     options = parser.parse_args()
     shm = Path("/dev/shm")
     with tempfile.TemporaryDirectory(dir=shm if shm.is_dir() else None) as folder:
-        found = {name: measured(options.capture / path, bits, Path(folder) / "a.png")
-                 for name, (path, bits) in PICTURES.items()}
+        found = {
+            name: measured(options.capture / path, bits, Path(folder) / "a.png")
+            for name, (path, bits) in PICTURES.items()
+        }
     print(table(found))
     if options.json:
         figures.write_record(options.json, "png_levels", "python -m benchmarks.png_levels CAPTURE", found)
@@ -50,8 +56,11 @@ def measured(path: Path, bits: int, into: Path) -> dict:
     if path.is_dir():
         path = min(path.glob("*.png"))
     pixels = np.ascontiguousarray(images.read_data(path))
-    costs = {f"{name} {level}": measure_encoding(pixels, bits, into, level, flag) for name, flag in FILTERS.items()
-             for level in LEVELS}
+    costs = {
+        f"{name} {level}": measure_encoding(pixels, bits, into, level, flag)
+        for name, flag in FILTERS.items()
+        for level in LEVELS
+    }
     return {"raw_mb": round(pixels.size * bits / 8e6, 1), **costs}
 
 

@@ -40,8 +40,10 @@ from core.training.skins import SCALES, carried_names, carried_skins, synthetic_
 
 from .figures import write_record
 
-COMMAND = ("python -m benchmarks.prior_figures samples OUT.png --work DIR --skins FOLDER; "
-           "python -m benchmarks.prior_figures response")
+COMMAND = (
+    "python -m benchmarks.prior_figures samples OUT.png --work DIR --skins FOLDER; "
+    "python -m benchmarks.prior_figures response"
+)
 PATCH = 64
 COARSE = SCALES[-1]
 NAMES = "sampled", "expected", "draft", "draft, not restored", "mean face", "another subject"
@@ -65,9 +67,11 @@ def main() -> None:
     response.set_defaults(command=measure_response)
     for command in (samples, response):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
-        command.add_argument("--json", type=Path,
-                             help="where the figures go, such as docs/figures/prior.json; those of the other command "
-                                  "stay")
+        command.add_argument(
+            "--json",
+            type=Path,
+            help="where the figures go, such as docs/figures/prior.json; those of the other command stay",
+        )
     options = parser.parse_args()
     options.command(options)
 
@@ -90,8 +94,11 @@ def show_samples(options: argparse.Namespace) -> None:
     for (row, column), sampled, skin_tone in zip(corner, albedo, tone, strict=True):
         window = slice(row, row + PATCH), slice(column, column + PATCH)
         mirrored = slice(row, row + PATCH), slice(side - column - PATCH, side - column)
-        known = [((m[(slice(3), *w)].float() + 1) / 2 / t[:, None, None]).flip([2] if w is mirrored else [])
-                 for m, t in zip(skins.maps[COARSE], skins.tones, strict=True) for w in (window, mirrored)]
+        known = [
+            ((m[(slice(3), *w)].float() + 1) / 2 / t[:, None, None]).flip([2] if w is mirrored else [])
+            for m, t in zip(skins.maps[COARSE], skins.tones, strict=True)
+            for w in (window, mirrored)
+        ]
         known = torch.stack(known)
         distance = (known - sampled / skin_tone[:, None, None]).pow(2).mean((1, 2, 3)).sqrt()
         nearest = int(distance.argmin())
@@ -100,16 +107,22 @@ def show_samples(options: argparse.Namespace) -> None:
         pairs.append(torch.cat([sampled, known[nearest] * skin_tone[:, None, None]], 2))
     sheet = torch.stack(pairs).clamp(0, 1).permute(0, 2, 3, 1).numpy()
     columns = 4
-    sheet = np.vstack([np.hstack(sheet[i:i + columns]) for i in range(0, len(sheet) - columns + 1, columns)])
+    sheet = np.vstack([np.hstack(sheet[i : i + columns]) for i in range(0, len(sheet) - columns + 1, columns)])
     images.write_srgb(options.out, images.linear_to_srgb(images.resize(sheet, 2 * sheet.shape[1], 2 * sheet.shape[0])))
-    print(f"{options.count} samples; distance to the nearest training patch over that patch's own distance to its "
-          "nearest: "
-          f"median {np.median(ratios):.2f}, least {min(ratios):.2f}. Left of each pair the sample, right the training "
-          "patch.")
+    print(
+        f"{options.count} samples; distance to the nearest training patch over that patch's own distance to its "
+        "nearest: "
+        f"median {np.median(ratios):.2f}, least {min(ratios):.2f}. Left of each pair the sample, right the training "
+        "patch."
+    )
     if options.json:
-        write_record(options.json, "prior_figures", COMMAND,
-                     {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}},
-                     keep=True)
+        write_record(
+            options.json,
+            "prior_figures",
+            COMMAND,
+            {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}},
+            keep=True,
+        )
 
 
 def card_of(weights: Path) -> dict:
@@ -160,19 +173,40 @@ def measure_response(options: argparse.Namespace) -> None:
         draft = sample_given_diffuse(conditioned, truth, options.steps, "proximal")
         again = restore_maps(conditioned, draft[None], coords, 0)[0]
         rows.append([errors(maps, truth, face) for maps in (solved, expected, again, draft, mean, other)])
-        print(f"{seed}: "
-              + "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}"
-                          for name, (angle, gloss) in zip(NAMES, rows[-1], strict=True)), flush=True)
+        print(
+            f"{seed}: "
+            + "; ".join(
+                f"{name} {angle:.2f} deg, {gloss:.4f}" for name, (angle, gloss) in zip(NAMES, rows[-1], strict=True)
+            ),
+            flush=True,
+        )
     means = np.mean(rows, 0)
     if options.json:
-        write_record(options.json, "prior_figures", COMMAND, keep=True, figures={"response": {name: {
-            f"{what}_of_{whose}": means[k][part] / means[of][part] for of, whose in ((-2, "mean_face"), (-1, "another"))
-            for part, what in enumerate(("normals", "specular"))} for k, name in enumerate(NAMES[:-2])}})
+        write_record(
+            options.json,
+            "prior_figures",
+            COMMAND,
+            keep=True,
+            figures={
+                "response": {
+                    name: {
+                        f"{what}_of_{whose}": means[k][part] / means[of][part]
+                        for of, whose in ((-2, "mean_face"), (-1, "another"))
+                        for part, what in enumerate(("normals", "specular"))
+                    }
+                    for k, name in enumerate(NAMES[:-2])
+                }
+            },
+        )
     for k, name in enumerate(NAMES[:-2]):
-        print(f"{name}: "
-              + ", ".join(f"normals {means[k][0] / means[j][0]:.2f} and specular {means[k][1] / means[j][1]:.2f} of "
-                          f"{NAMES[j]}'s error"
-                          for j in (-2, -1)))
+        print(
+            f"{name}: "
+            + ", ".join(
+                f"normals {means[k][0] / means[j][0]:.2f} and specular {means[k][1] / means[j][1]:.2f} of "
+                f"{NAMES[j]}'s error"
+                for j in (-2, -1)
+            )
+        )
 
 
 def reflectance(seed: int, size: int) -> torch.Tensor:
@@ -188,8 +222,9 @@ def of_subject(prior: Prior, truth: torch.Tensor) -> ConditionedPrior:
     return prior.of_tone(SkinTone.from_linear(((truth[:3] + 1) / 2 * skin).sum((1, 2)) / skin.sum(), GIVEN))
 
 
-def sample_given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: int,
-                         guidance: str = "dps") -> torch.Tensor:
+def sample_given_diffuse(
+    prior: ConditionedPrior, truth: torch.Tensor, steps: int, guidance: str = "dps"
+) -> torch.Tensor:
     """The map that the solver samples under even light where the texture is the true albedo.
 
     Parameters
@@ -213,8 +248,9 @@ def sample_given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: in
         normal[2] = 1
         coords = make_coordinates(side, slice(0, side), slice(0, side))
         one = torch.ones(side, side)
-        found[factor] = Observation(texture, one, one, coords, Shader(normal, 0 * one, (1, 1)), (0 * one).bool(),
-                                    1024 / side)
+        found[factor] = Observation(
+            texture, one, one, coords, Shader(normal, 0 * one, (1, 1)), (0 * one).bool(), 1024 / side
+        )
     recipe = replace(OURS, steps=steps, phases=(), guidance=guidance)
     coords = make_coordinates(size, slice(0, size), slice(0, size))
     lights = Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 1, 1), torch.ones(3))

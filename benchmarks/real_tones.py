@@ -34,8 +34,18 @@ from core.solve.tone import TONE_SIDE_TEXELS, estimate_skin_tone
 from .figures import ROOT, write_record
 
 SAMPLE = ROOT / "core" / "synthetic" / "sample"
-LONDON = {"025": "black", "042": "black", "043": "black", "005": "east Asian", "030": "east Asian",
-          "008": "west Asian", "038": "west Asian", "001": "white", "003": "white", "004": "white"}
+LONDON = {
+    "025": "black",
+    "042": "black",
+    "043": "black",
+    "005": "east Asian",
+    "030": "east Asian",
+    "008": "west Asian",
+    "038": "west Asian",
+    "001": "white",
+    "003": "white",
+    "004": "white",
+}
 """The first people of each group in london_info.csv, women and men; the group as they named it themselves."""
 GROUNDS = {"white": 1.0, "black": 0.02}  # sRGB
 OLAT = {"049": "Cam06", "071": "Cam07"}
@@ -58,8 +68,23 @@ def main() -> None:
         capture = Capture(asked.folder / f"{name}.wildcap")
         if not capture.shadow_mask_auto.is_file():
             source = asked.folder / "sources" / name
-            subprocess.run([sys.executable, "-m", "core", "run", str(prepare(source)), str(capture.root), "--until",
-                            "shadow_mask", "--quality", "draft"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+            subprocess.run(
+                [
+                    sys.executable,
+                    "-m",
+                    "core",
+                    "run",
+                    str(prepare(source)),
+                    str(capture.root),
+                    "--until",
+                    "shadow_mask",
+                    "--quality",
+                    "draft",
+                ],
+                cwd=ROOT,
+                check=True,
+                stdout=subprocess.DEVNULL,
+            )
         figures[name] = {asked.row: estimate(capture)}
         print(name, *figures[name][asked.row].values(), flush=True)
     if asked.json:
@@ -87,7 +112,8 @@ def cases(data: Path) -> dict[str, Callable[[Path], Path]]:
         found[f"london_{person}"] = lambda to, p=picture: _copied([p], to)
         for ground, level in GROUNDS.items():
             found[f"london_{person}_{ground}"] = lambda to, p=picture, v=level: _copied(
-                [p], to, lambda srgb: _cut_out(srgb, v))
+                [p], to, lambda srgb: _cut_out(srgb, v)
+            )
     return found
 
 
@@ -107,8 +133,9 @@ def _copied(pictures: list[Path], to: Path, change: Callable[[np.ndarray], np.nd
 def _cut_out(srgb: np.ndarray, ground: float) -> np.ndarray:
     """An sRGB picture [H, W, 3] whose ground behind the person is of one grey, mixed as light is."""
     person = faces.segment_person(srgb)[..., None]
-    return images.linear_to_srgb(person * images.srgb_to_linear(srgb)
-                                 + (1 - person) * images.srgb_to_linear(np.full(3, ground, np.float32)))
+    return images.linear_to_srgb(
+        person * images.srgb_to_linear(srgb) + (1 - person) * images.srgb_to_linear(np.full(3, ground, np.float32))
+    )
 
 
 def estimate(capture: Capture) -> dict:
@@ -116,8 +143,12 @@ def estimate(capture: Capture) -> dict:
     head = read_filmed_head(capture)
     evidence = read_evidence(capture, head, TONE_SIDE_TEXELS)
     tone = estimate_skin_tone(capture, head, Settings(), evidence, Reporter("real_tones"))
-    return {"srgb": ",".join(f"{v:.2f}" for v in tone.srgb), "lightness": to_lab(np.array(tone.linear))[0],
-            "deviation": tone.deviation, "group": tone.group}
+    return {
+        "srgb": ",".join(f"{v:.2f}" for v in tone.srgb),
+        "lightness": to_lab(np.array(tone.linear))[0],
+        "deviation": tone.deviation,
+        "group": tone.group,
+    }
 
 
 if __name__ == "__main__":

@@ -28,8 +28,14 @@ from .render_capture import extension
 ADDON = "bl_ext.user_default.wildcap.wildcap_addon"
 SHOWN = (("blender", "glb"), ("blender", "usd"), ("unreal", "fbx"), ("character_creator", "obj"))
 COMMAND = "python -m benchmarks.reimported --picture docs/pictures/reimported.jpg --json docs/figures/reimported.json"
-DELIVERED = (("blender", "glb"), ("blender", "gltf"), ("blender", "usd"), ("unreal", "fbx"), ("unity_hdrp", "fbx"),
-             ("character_creator", "obj"))
+DELIVERED = (
+    ("blender", "glb"),
+    ("blender", "gltf"),
+    ("blender", "usd"),
+    ("unreal", "fbx"),
+    ("unity_hdrp", "fbx"),
+    ("character_creator", "obj"),
+)
 LIGHT = "three_point"
 
 
@@ -55,8 +61,10 @@ def main() -> None:
     asked = parser.parse_args()
     with extension(), tempfile.TemporaryDirectory() as work:
         original, flat, returned = compare_deliveries(Path(work), DELIVERED, asked.resolution, asked.samples)
-    record = {f"{preset}_{kind}": {name: round(value, 3) for name, value in vars(back).items() if name != "picture"}
-              for (preset, kind), back in returned.items()}
+    record = {
+        f"{preset}_{kind}": {name: round(value, 3) for name, value in vars(back).items() if name != "picture"}
+        for (preset, kind), back in returned.items()
+    }
     print(table(figures.Figures.of(record)))
     if asked.picture:
         from .gallery import write_small
@@ -70,12 +78,26 @@ def table(record: figures.Figures) -> str:
     """Rows: deliveries."""
     return figures.markdown(
         ["preset and format", "PSNR, dB", "without scattering, dB", "points, mm", "shape keys", "maps"],
-        [[name.replace("_", " "), f"{back.psnr_db:.1f}", f"{back.flat_psnr_db:.1f}", f"{back.off_mm:.3f}",
-          str(back.shape_keys), str(back.maps)] for name, back in record.items()])
+        [
+            [
+                name.replace("_", " "),
+                f"{back.psnr_db:.1f}",
+                f"{back.flat_psnr_db:.1f}",
+                f"{back.off_mm:.3f}",
+                str(back.shape_keys),
+                str(back.maps),
+            ]
+            for name, back in record.items()
+        ],
+    )
 
 
-def compare_deliveries(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int, samples: int,
-                       ) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], Returned]]:
+def compare_deliveries(
+    work: Path,
+    deliveries: tuple[tuple[str, str], ...],
+    resolution: int,
+    samples: int,
+) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], Returned]]:
     """Delivers the sample head, imports each delivery, and renders it like the original. The extension is enabled.
 
     Parameters
@@ -108,8 +130,9 @@ def compare_deliveries(work: Path, deliveries: tuple[tuple[str, str], ...], reso
         for thing in back:
             scene.collection.objects.link(thing)
         shown, _ = render(scene, work / f"{preset}_{kind}.png")
-        returned[preset, kind] = Returned(psnr(shown, original, covered), psnr(shown, flat, covered),
-                                          1000 * off(head, back), *counted(back), shown)
+        returned[preset, kind] = Returned(
+            psnr(shown, original, covered), psnr(shown, flat, covered), 1000 * off(head, back), *counted(back), shown
+        )
         for thing in back:
             bpy.data.objects.remove(thing)
     return original, flat, returned
@@ -125,11 +148,15 @@ def deliver(item, preset: str, kind: str) -> Path:
     from core.worker.runner import run_job
 
     operators, waiting, captures, properties = (
-        import_module(f"{ADDON}.{name}") for name in ("deliver.operators", "deliver.waiting", "captures", "properties"))
+        import_module(f"{ADDON}.{name}") for name in ("deliver.operators", "deliver.waiting", "captures", "properties")
+    )
     item.deliver.preset, item.deliver.format = preset, kind
     capture = Capture(Path(captures.root(item)))
-    settings = {**properties.job_settings(item)["deliver"],
-                "roughness": operators.roughness(captures.head(bpy.context, item)), "whole": False}
+    settings = {
+        **properties.job_settings(item)["deliver"],
+        "roughness": operators.roughness(captures.head(bpy.context, item)),
+        "whole": False,
+    }
     plan = operators.planned(bpy.context)
     ended = run_job(write_job(capture, tool="deliver", settings={"deliver": settings}))
     if not isinstance(ended, Done):
@@ -146,11 +173,13 @@ def bring_back(folder: Path) -> list:
 
     path = next(path for path in folder.iterdir() if path.suffix in (".glb", ".gltf", ".usdc", ".fbx", ".obj"))
     before = set(bpy.data.objects)
-    {".glb": lambda: bpy.ops.import_scene.gltf(filepath=str(path)),
-     ".gltf": lambda: bpy.ops.import_scene.gltf(filepath=str(path)),
-     ".usdc": lambda: bpy.ops.wm.usd_import(filepath=str(path)),
-     ".fbx": lambda: bpy.ops.import_scene.fbx(filepath=str(path)),
-     ".obj": lambda: bpy.ops.wm.obj_import(filepath=str(path), global_scale=0.01)}[path.suffix]()
+    {
+        ".glb": lambda: bpy.ops.import_scene.gltf(filepath=str(path)),
+        ".gltf": lambda: bpy.ops.import_scene.gltf(filepath=str(path)),
+        ".usdc": lambda: bpy.ops.wm.usd_import(filepath=str(path)),
+        ".fbx": lambda: bpy.ops.import_scene.fbx(filepath=str(path)),
+        ".obj": lambda: bpy.ops.wm.obj_import(filepath=str(path), global_scale=0.01),
+    }[path.suffix]()
     made = set(bpy.data.objects) - before
     bpy.context.view_layer.update()
     meshes = [thing for thing in made if thing.type == 'MESH']
@@ -166,8 +195,13 @@ def bring_back(folder: Path) -> list:
 
 def as_the_hint_says(meshes: list) -> None:
     """Switches what MTL cannot say to be no colour: every picture but the albedo."""
-    for node in (node for thing in meshes for slot in thing.material_slots for node in slot.material.node_tree.nodes
-                 if node.type == 'TEX_IMAGE'):
+    for node in (
+        node
+        for thing in meshes
+        for slot in thing.material_slots
+        for node in slot.material.node_tree.nodes
+        if node.type == 'TEX_IMAGE'
+    ):
         if "Base Color" not in {link.to_socket.name for link in node.outputs["Color"].links}:
             node.image.colorspace_settings.name = "Non-Color"
 
@@ -186,8 +220,12 @@ def render(scene, path: Path) -> tuple[np.ndarray, np.ndarray]:
 @contextmanager
 def without_scattering(head) -> Iterator[None]:
     """The head's skin without light that spreads under it."""
-    nodes = [node for slot in head.material_slots for node in slot.material.node_tree.nodes if node.type == 'GROUP'
-             and "Subsurface" in node.inputs]
+    nodes = [
+        node
+        for slot in head.material_slots
+        for node in slot.material.node_tree.nodes
+        if node.type == 'GROUP' and "Subsurface" in node.inputs
+    ]
     before = [node.inputs["Subsurface"].default_value for node in nodes]
     for node in nodes:
         node.inputs["Subsurface"].default_value = 0.0
@@ -220,9 +258,14 @@ def points_of(obj) -> np.ndarray:
 def counted(back: list) -> tuple[int, int]:
     """How many shape keys beside the rest, and how many pictures its materials show."""
     keys = sum(len(thing.data.shape_keys.key_blocks) - 1 for thing in back if thing.data.shape_keys is not None)
-    images = {node.image.name for thing in back for slot in thing.material_slots if slot.material is not None
-              for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE' and node.image is not None
-              and node.image.size[0] > 0}
+    images = {
+        node.image.name
+        for thing in back
+        for slot in thing.material_slots
+        if slot.material is not None
+        for node in slot.material.node_tree.nodes
+        if node.type == 'TEX_IMAGE' and node.image is not None and node.image.size[0] > 0
+    }
     return keys, len(images)
 
 

@@ -50,14 +50,30 @@ from .relit_maps import Worn, face_mask, read_rows, read_worn, worn_by, write_ro
 from .relit_renders import MARGIN
 
 LIGHTS = ("three_point", "window", "sun", "coloured", "city.exr", "interior.exr")
-ROWS = ("raw", "delit", "solved", "plain", "no_relief", "even_gloss", "true_albedo", "true_normal", "true_specular",
-        "floor")
-LABELS = {"raw": "filmed texture as albedo", "delit": "delit texture as albedo", "solved": "**solved**",
-          "plain": "solved albedo, no relief, even gloss",
-          "no_relief": "solved, no relief", "even_gloss": "solved, even gloss",
-          "true_albedo": "solved, with the true albedo", "true_normal": "solved, with the true normals",
-          "true_specular": "solved, with the true specular albedo",
-          "floor": "the truth, other random numbers"}
+ROWS = (
+    "raw",
+    "delit",
+    "solved",
+    "plain",
+    "no_relief",
+    "even_gloss",
+    "true_albedo",
+    "true_normal",
+    "true_specular",
+    "floor",
+)
+LABELS = {
+    "raw": "filmed texture as albedo",
+    "delit": "delit texture as albedo",
+    "solved": "**solved**",
+    "plain": "solved albedo, no relief, even gloss",
+    "no_relief": "solved, no relief",
+    "even_gloss": "solved, even gloss",
+    "true_albedo": "solved, with the true albedo",
+    "true_normal": "solved, with the true normals",
+    "true_specular": "solved, with the true specular albedo",
+    "floor": "the truth, other random numbers",
+}
 SHOWN = ("truth", "solved", "delit", "raw")
 RESOLUTION, SAMPLES = 320, 16
 MIDDLE = 0.18
@@ -70,8 +86,9 @@ def main() -> int:
     parser.add_argument("--sample", type=Path)
     parser.add_argument("--people", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
-    parser.add_argument("--picture", type=Path,
-                        help="a JPEG of the first subject under all lights: truth, solved, delit, raw")
+    parser.add_argument(
+        "--picture", type=Path, help="a JPEG of the first subject under all lights: truth, solved, delit, raw"
+    )
     parser.add_argument("--json", type=Path, help="where the table's figures go, such as docs/figures/relit.json")
     parser.add_argument("--lights", nargs="+", default=LIGHTS)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
@@ -84,14 +101,21 @@ def main() -> int:
         write_json(work / f"{name}.json", results[name])
         print(f"{name}: {shortfall(mean_over_lights(results[name])) or 'as asked'}", file=sys.stderr)
     if arguments.picture and results:
-        images.write_srgb(arguments.picture,
-                          side_by_side([images.read_srgb(work / next(iter(results)) / f"{Path(light).stem}.png")
-                                        for light in arguments.lights]), quality=86)
+        images.write_srgb(
+            arguments.picture,
+            side_by_side(
+                [images.read_srgb(work / next(iter(results)) / f"{Path(light).stem}.png") for light in arguments.lights]
+            ),
+            quality=86,
+        )
     means = {name: mean_over_lights(found) for name, found in results.items()}
     print(table(means))
     if arguments.json:
-        source = ("--sample .demo/sample.wildcap" if arguments.sample
-                  else f"--people FOLDER --rows {' '.join(arguments.rows)}")
+        source = (
+            "--sample .demo/sample.wildcap"
+            if arguments.sample
+            else f"--people FOLDER --rows {' '.join(arguments.rows)}"
+        )
         figures.write_record(arguments.json, "relit", f"python -m benchmarks.relit WORK {source}", with_mean(means))
     return 0
 
@@ -144,9 +168,13 @@ def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names:
     capture, truth = subject.capture, subject.maps
     renders, mask = work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)
-    pictures = [renders / name
-                for name in (*(f"{row}_{Path(light).stem}.exr" for row in ("truth", *row_names) for light in lights),
-                             "face.exr")]
+    pictures = [
+        renders / name
+        for name in (
+            *(f"{row}_{Path(light).stem}.exr" for row in ("truth", *row_names) for light in lights),
+            "face.exr",
+        )
+    ]
     old = [picture for picture in pictures if not is_newer(picture, capture, truth)]
     if not old:
         return
@@ -160,18 +188,31 @@ def render_rows(subject: RelitSubject, work: Path, lights: list[str], row_names:
         folder = work / f"{name}.wildcap"
         write_row(folder, capture, worn)
         rows.append({"name": name, "capture": str(folder), "seed": int(name == "floor")})
-    write_json(work / "job.json",
-               {"rows": rows, "lights": list(lights), "out": str(renders), "mask": str(mask), "resolution": RESOLUTION,
-                "samples": SAMPLES})
-    subprocess.run([sys.executable, "-m", "benchmarks.relit_renders", str(work / "job.json")], cwd=figures.ROOT,
-                   check=True, stdout=subprocess.DEVNULL)
+    write_json(
+        work / "job.json",
+        {
+            "rows": rows,
+            "lights": list(lights),
+            "out": str(renders),
+            "mask": str(mask),
+            "resolution": RESOLUTION,
+            "samples": SAMPLES,
+        },
+    )
+    subprocess.run(
+        [sys.executable, "-m", "benchmarks.relit_renders", str(work / "job.json")],
+        cwd=figures.ROOT,
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
 
 
 def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
     """Whether a render is there and was made after all that it shows: the capture's maps, its textures and head, and
     the true maps."""
-    shown = [path for folder in (capture.maps, capture.maps_4k, truth) if folder.is_dir()
-             for path in folder.glob("*.png")]
+    shown = [
+        path for folder in (capture.maps, capture.maps_4k, truth) if folder.is_dir() for path in folder.glob("*.png")
+    ]
     shown += [path for path in (capture.head, capture.texture, capture.texture_filmed) if path.is_file()]
     return picture.is_file() and picture.stat().st_mtime >= max((path.stat().st_mtime for path in shown), default=0.0)
 
@@ -181,12 +222,14 @@ def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, di
     face = images.read_data(work / "renders" / "face.exr")[..., 0] > 0.5
     box, seen, found = face_box(face), rendered(face), {}
     for light in lights:
-        linear = {row: images.read_linear(work / "renders" / f"{row}_{Path(light).stem}.exr")
-                  for row in ("truth", *rows)}
+        linear = {
+            row: images.read_linear(work / "renders" / f"{row}_{Path(light).stem}.exr") for row in ("truth", *rows)
+        }
         gain = exposure(linear["truth"], face)
         shown = {row: images.linear_to_srgb(picture * gain) for row, picture in linear.items()}
-        images.write_srgb(work / f"{Path(light).stem}.png",
-                          np.hstack([shown[row][seen] for row in SHOWN if row in shown]))
+        images.write_srgb(
+            work / f"{Path(light).stem}.png", np.hstack([shown[row][seen] for row in SHOWN if row in shown])
+        )
         found[light] = {row: differences(shown[row][box], shown["truth"][box], face[box]) for row in rows}
     return found
 
@@ -200,8 +243,10 @@ def exposure(truth: np.ndarray, face: np.ndarray) -> float:
 def rendered(face: np.ndarray) -> tuple[slice, slice]:
     """Rows and columns of the rectangle about the face, bool [H, W], that is rendered (benchmarks/relit_renders.py)."""
     margin = int(MARGIN * len(face)) - 1
-    return tuple(slice(max(side[0] - margin, 0), side[-1] + margin)
-                 for side in (np.flatnonzero(face.any(axis)) for axis in (1, 0)))
+    return tuple(
+        slice(max(side[0] - margin, 0), side[-1] + margin)
+        for side in (np.flatnonzero(face.any(axis)) for axis in (1, 0))
+    )
 
 
 def side_by_side(pictures: list[np.ndarray]) -> np.ndarray:
@@ -226,8 +271,11 @@ def mean_over_lights(figures_by_light: dict[str, dict[str, dict]]) -> dict[str, 
 def shortfall(rows: dict[str, dict[str, float]]) -> str:
     """What is missing to what is asked for, in words; empty where nothing is."""
     gains = {row: rows["solved"]["psnr"] - rows[row]["psnr"] for row in ("raw", "delit")}
-    return ", ".join(f"{gains[row]:+.2f} dB over {row} where {asked:.1f} is asked for"
-                     for row, asked in (("raw", OVER_RAW), ("delit", OVER_DELIT)) if gains[row] < asked)
+    return ", ".join(
+        f"{gains[row]:+.2f} dB over {row} where {asked:.1f} is asked for"
+        for row, asked in (("raw", OVER_RAW), ("delit", OVER_DELIT))
+        if gains[row] < asked
+    )
 
 
 def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict[str, dict[str, float]]]:
@@ -236,20 +284,27 @@ def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict
     if len(people) < 2:
         return dict(results)
     common = [row for row in ROWS if all(row in found for found in people)]
-    return {**results,
-            "mean": mean_over_lights({str(k): {row: found[row] for row in common} for k, found in enumerate(people)})}
+    return {
+        **results,
+        "mean": mean_over_lights({str(k): {row: found[row] for row in common} for k, found in enumerate(people)}),
+    }
 
 
 def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
     """Markdown: a line per row, and for each subject PSNR, SSIM and FLIP; last the mean over the people of
     benchmarks/people.py."""
     columns, people = with_mean(results), sum(person.name in results for person in PEOPLE)
-    return figures.markdown(["row",
-                             *(f"mean of {people}" if name == "mean" else name.replace("_", " ") for name in columns)],
-                            [
-        [LABELS[row],
-         *(f"{c[row]['psnr']:.2f} dB, {c[row]['ssim']:.3f}, {c[row]['flip']:.3f}" for c in columns.values())]
-        for row in ROWS if all(row in column for column in columns.values())])
+    return figures.markdown(
+        ["row", *(f"mean of {people}" if name == "mean" else name.replace("_", " ") for name in columns)],
+        [
+            [
+                LABELS[row],
+                *(f"{c[row]['psnr']:.2f} dB, {c[row]['ssim']:.3f}, {c[row]['flip']:.3f}" for c in columns.values()),
+            ]
+            for row in ROWS
+            if all(row in column for column in columns.values())
+        ],
+    )
 
 
 if __name__ == "__main__":

@@ -84,9 +84,11 @@ def toned(texture: np.ndarray, tone: np.ndarray, skin: np.ndarray) -> np.ndarray
 def read_worn(folder: Path, size: int = SIZE) -> Worn:
     """A folder of maps, averaged to `size`."""
     normal = _sized(images.read_data(folder / "normal.png")[..., :3] * 2 - 1, size)
-    return Worn(_sized(images.read_linear(folder / "diffuse_albedo.png"), size),
-                normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
-                _sized(images.read_mask(folder / "specular_albedo.png"), size))
+    return Worn(
+        _sized(images.read_linear(folder / "diffuse_albedo.png"), size),
+        normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
+        _sized(images.read_mask(folder / "specular_albedo.png"), size),
+    )
 
 
 def worn_by(capture: Capture, true: Worn, subject: Mesh) -> Worn:

@@ -42,8 +42,9 @@ def main() -> None:
             thing = head.bring_in(bpy.context, item)
             material.assemble(bpy.context, item)
             if not (out / "face.exr").exists():
-                _render_mask(thing, picture.set_up_scene(thing, left[0], job["resolution"], 16), job["mask"],
-                             out / "face.exr")
+                _render_mask(
+                    thing, picture.set_up_scene(thing, left[0], job["resolution"], 16), job["mask"], out / "face.exr"
+                )
             for light in left:
                 source = Hdri(worlds / light) if light.endswith(".exr") else light
                 scene = picture.set_up_scene(thing, source, job["resolution"], job["samples"])
@@ -87,8 +88,9 @@ def _render_mask(obj, scene, mask: str, path: Path) -> None:
         material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
-    image, emission, output = (nodes.new(kind)
-                               for kind in ("ShaderNodeTexImage", "ShaderNodeEmission", "ShaderNodeOutputMaterial"))
+    image, emission, output = (
+        nodes.new(kind) for kind in ("ShaderNodeTexImage", "ShaderNodeEmission", "ShaderNodeOutputMaterial")
+    )
     image.image = bpy.data.images.load(mask)
     image.image.colorspace_settings.name = "Non-Color"
     links.new(image.outputs["Color"], emission.inputs["Color"])

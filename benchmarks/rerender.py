@@ -61,12 +61,17 @@ def main() -> None:
     people = {}
     for name in asked.only:
         views = delit_views(Capture(asked.folder / f"{name}.wildcap"))
-        people[name] = {row: score(rendering(asked.folder / "comparison" / name, row), views)
-                        for row in (*ROWS, CEILING)}
+        people[name] = {
+            row: score(rendering(asked.folder / "comparison" / name, row), views) for row in (*ROWS, CEILING)
+        }
         print(name, json.dumps(people[name]), flush=True)
-    found = {"people": people,
-             "mean": {row: {figure: float(np.mean([rows[row][figure] for rows in people.values()])) for figure in cells}
-                      for row, cells in next(iter(people.values())).items()}}
+    found = {
+        "people": people,
+        "mean": {
+            row: {figure: float(np.mean([rows[row][figure] for rows in people.values()])) for figure in cells}
+            for row, cells in next(iter(people.values())).items()
+        },
+    }
     if asked.json:
         figures.write_record(asked.json, "rerender", "python -m benchmarks.rerender FOLDER", found)
     print(table(found))
@@ -114,8 +119,12 @@ def score(rendered: np.ndarray, views: list[DelitFrame]) -> dict[str, float]:
         picture, mask = view.picture[box], mask[box]
         seen = with_gain(seen, picture, mask)
         distance = feature_distance(seen * mask[..., None], picture * mask[..., None])
-        found.append({**differences(seen, picture, mask),
-                      **({} if distance is None else {"features": float(distance[mask].mean())})})
+        found.append(
+            {
+                **differences(seen, picture, mask),
+                **({} if distance is None else {"features": float(distance[mask].mean())}),
+            }
+        )
     return {figure: round(float(np.mean([one[figure] for one in found])), 4) for figure in found[0]}
 
 
@@ -125,11 +134,16 @@ def table(record: dict) -> str:
     lines = []
     for row, cells in record["mean"].items():
         paper = PAPER.get(row if row in PAPER else row.rsplit(" ", 1)[0])
-        lines.append([f"**{row}**" if row == OURS else row,
-                      *(FORMATS[figure].format(cells[figure]) for figure in known),
-                      "{:.2f} dB, {:.4f}".format(*paper) if paper else None])
-    return figures.markdown(["mean of the people", *(TITLES[figure] for figure in known),
-                             "the paper's, on its own captures"], lines)
+        lines.append(
+            [
+                f"**{row}**" if row == OURS else row,
+                *(FORMATS[figure].format(cells[figure]) for figure in known),
+                "{:.2f} dB, {:.4f}".format(*paper) if paper else None,
+            ]
+        )
+    return figures.markdown(
+        ["mean of the people", *(TITLES[figure] for figure in known), "the paper's, on its own captures"], lines
+    )
 
 
 if __name__ == "__main__":

@@ -33,11 +33,16 @@ def main() -> int:
     for stage in stages.STAGES:
         before, after = (written(capture, stage) for capture in (one, other))
         names = before.keys() | after.keys()
-        unlike = sorted(name for name in names if before.get(name) != after.get(name)
-                        and not same_pixels(one.root / name, other.root / name))
+        unlike = sorted(
+            name
+            for name in names
+            if before.get(name) != after.get(name) and not same_pixels(one.root / name, other.root / name)
+        )
         compared, different = compared + len(names), different + len(unlike)
-        print(f"{stage.label:12} {len(names) - len(unlike):4} files are the same"
-              + (f", {len(unlike)} are not: {', '.join(unlike[:4])}" if unlike else ""))
+        print(
+            f"{stage.label:12} {len(names) - len(unlike):4} files are the same"
+            + (f", {len(unlike)} are not: {', '.join(unlike[:4])}" if unlike else "")
+        )
     print(f"{compared - different} of {compared} files are the same.")
     return 1 if different or not compared else 0
 
@@ -56,8 +61,13 @@ def written(capture: Capture, stage: stages.Stage) -> dict[str, str]:
     found = {}
     for name in stage.writes:
         told = hash_tree(capture.root / name)
-        found |= {f"{name}{inside}": content
-                  for inside, content in told.items()} if isinstance(told, dict) else {name: told} if told else {}
+        found |= (
+            {f"{name}{inside}": content for inside, content in told.items()}
+            if isinstance(told, dict)
+            else {name: told}
+            if told
+            else {}
+        )
     return found
 
 

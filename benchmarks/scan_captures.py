@@ -38,13 +38,24 @@ from .people_lights import FURTHER, KINDS
 from .shadow_captures import write_views
 
 FRAMES, SCALE, SAMPLES, SEED = 24, 5 / 6, 6, 930001
-LIGHTS = {"leaves": "noon sun behind leaves", "overcast": "overcast", "window": "window bars", "lamps": "mixed lamps",
-          "below": "lamp from below"}
+LIGHTS = {
+    "leaves": "noon sun behind leaves",
+    "overcast": "overcast",
+    "window": "window bars",
+    "lamps": "mixed lamps",
+    "below": "lamp from below",
+}
 METRES = 0.0553  # one unit of the scan, with the pupils 63 mm apart
 # between the pupils, metres in the axes of lps_sun/cameras.json: where the people's origin is
 MIDDLE = np.array([-0.007, -0.086, 0.094])
-NEEDED = ("lee_perry_smith/LeePerrySmith.glb", "lee_perry_smith/Map-COL.jpg", "lee_perry_smith/Map-SPEC.jpg",
-          "lee_perry_smith/Infinite-Level_02_Tangent_SmoothUV.jpg", "lps_sun/cameras.json", "lps_sun/face")
+NEEDED = (
+    "lee_perry_smith/LeePerrySmith.glb",
+    "lee_perry_smith/Map-COL.jpg",
+    "lee_perry_smith/Map-SPEC.jpg",
+    "lee_perry_smith/Infinite-Level_02_Tangent_SmoothUV.jpg",
+    "lps_sun/cameras.json",
+    "lps_sun/face",
+)
 
 
 def main() -> None:
@@ -55,8 +66,10 @@ def main() -> None:
     asked = parser.parse_args()
     missing = [name for name in NEEDED if not (asked.data / name).exists()]
     if missing:
-        raise SystemExit(f"{asked.data} holds no head scan: {', '.join(missing)} is missing. Name the folder that has "
-                         "lee_perry_smith and lps_sun.")
+        raise SystemExit(
+            f"{asked.data} holds no head scan: {', '.join(missing)} is missing. Name the folder that has "
+            "lee_perry_smith and lps_sun."
+        )
     for light in asked.lights:
         photograph(asked.data, asked.folder.resolve(), light)
 
@@ -72,21 +85,40 @@ def photograph(data: Path, folder: Path, name: str) -> Capture:
     work, cameras = folder / "rendered" / name, scene.camera_path(SEED, FRAMES)
     relief = 2 * images.read_data(data / NEEDED[3])[..., :3] - 1
     gloss = images.read_data(data / NEEDED[2])
-    skin = filmed.write_skin(work, head, albedo, gloss[..., 0] if gloss.ndim == 3 else gloss,
-                             relief / np.linalg.norm(relief, axis=-1, keepdims=True))
-    filmed.render_parts(work, SEED, {"skin": skin}, [], light,
-                        scene.Shot(cameras, range(FRAMES), SAMPLES, SCALE, room=False))
+    skin = filmed.write_skin(
+        work,
+        head,
+        albedo,
+        gloss[..., 0] if gloss.ndim == 3 else gloss,
+        relief / np.linalg.norm(relief, axis=-1, keepdims=True),
+    )
+    filmed.render_parts(
+        work, SEED, {"skin": skin}, [], light, scene.Shot(cameras, range(FRAMES), SAMPLES, SCALE, room=False)
+    )
     views = [sample.view_of(matrix, SCALE) for matrix in cameras]
     caster, facial = raster.RayCaster(head), face_of(data, head)
     opaque = raster.RayCaster(joined([head, light.blockers])) if light.blockers else caster
     faces = {}
     for frame in np.unique(np.linspace(1, FRAMES - 2, TRUTHS).round().astype(int)).tolist():
-        faces[frame] = _write_truth(target, frame, views[frame],
-                                    LitScan(caster, opaque, albedo, facial, light.sun.direction if light.sun else None))
+        faces[frame] = _write_truth(
+            target,
+            frame,
+            views[frame],
+            LitScan(caster, opaque, albedo, facial, light.sun.direction if light.sun else None),
+        )
     write_obj(target / "head.obj", head)  # by it the five are known to be one person
     placed = [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]
-    write_json(target / "cameras.json", {"name": name, "light": LIGHTS[name], "focal_px": scene.FOCAL * SCALE,
-                                         "width": views[0].width, "height": views[0].height, "cameras": placed})
+    write_json(
+        target / "cameras.json",
+        {
+            "name": name,
+            "light": LIGHTS[name],
+            "focal_px": scene.FOCAL * SCALE,
+            "width": views[0].width,
+            "height": views[0].height,
+            "cameras": placed,
+        },
+    )
     write_views(capture, views, _developed(work, faces), min(Settings().frames.views, FRAMES))
     total = sum(true[face].sum(0, dtype=np.float64) for true, face in faces.values())
     tone = total / sum(int(face.sum()) for _, face in faces.values())
@@ -152,8 +184,9 @@ def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int 
         normals = raster.interpolate(vertex_normals(head), head.faces, face, bary)[hit]
         towards_sun = np.repeat(sun[None], len(points), 0)
         dark[hit] = (normals @ sun <= 0) | scan.opaque.blocked(points + 5e-4 * normals, towards_sun)
-    cover, colour, skin, dark = (images.resize(values, view.width, view.height)
-                                 for values in (hit.astype(np.float32), colour, skin, dark))
+    cover, colour, skin, dark = (
+        images.resize(values, view.width, view.height) for values in (hit.astype(np.float32), colour, skin, dark)
+    )
     colour, face, name = colour / np.maximum(cover, 1e-6)[..., None], (skin > 0.5) & (cover > 0.99), f"{frame:04d}.png"
     for folder in ("albedo", "face", *(["shadow"] if sun is not None else [])):
         (target / folder).mkdir(parents=True, exist_ok=True)
@@ -169,8 +202,12 @@ def _developed(work: Path, faces: dict[int, tuple[np.ndarray, np.ndarray]]) -> I
     filmed = {frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}
     gain, taken = exposure(filmed, faces), phone.sample_phone(SEED)
     for frame in range(FRAMES):
-        yield phone.develop(images.read_linear(work / f"{frame:05d}.exr").astype(np.float32), taken, gain,
-                            np.random.default_rng([SEED, 72, frame]))
+        yield phone.develop(
+            images.read_linear(work / f"{frame:05d}.exr").astype(np.float32),
+            taken,
+            gain,
+            np.random.default_rng([SEED, 72, frame]),
+        )
 
 
 if __name__ == "__main__":

@@ -33,12 +33,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("count", type=int, nargs="?", default=SEEDS, help="of seeds")
     count = parser.parse_args().count
-    scores = {name: [score(seed, dtype) for seed in range(1, 1 + count)]
-              for name, dtype in PRECISIONS.items()}
+    scores = {name: [score(seed, dtype) for seed in range(1, 1 + count)] for name, dtype in PRECISIONS.items()}
     every = np.concatenate(list(scores.values()))
-    write_json(EXPECTED_FILE,
-               {"mean_db": round(float(every.mean()), 3), "deviation_db": round(float(every.std(ddof=1)), 3),
-                "scores_db": scores})
+    write_json(
+        EXPECTED_FILE,
+        {
+            "mean_db": round(float(every.mean()), 3),
+            "deviation_db": round(float(every.std(ddof=1)), 3),
+            "scores_db": scores,
+        },
+    )
 
 
 def score(seed: int, dtype: torch.dtype) -> float:

@@ -65,8 +65,11 @@ def lifted_truth(capture: Capture, truth: Path, size: int = SIZE) -> np.ndarray:
     size]."""
     frames = read_frames(capture).by_name
     pictures = {int(path.stem): path for path in (truth / "shadow").glob("*.png")}
-    views = [(view, pictures[frames[view.name].video_frame]) for view in read_views(capture)
-             if frames[view.name].video_frame in pictures]
+    views = [
+        (view, pictures[frames[view.name].video_frame])
+        for view in read_views(capture)
+        if frames[view.name].video_frame in pictures
+    ]
     masks = ((view, images.read_mask(path)) for view, path in views)
     return lift_shadows(read_head(capture).unfold(size), len(views), masks, Reporter("shadow_mask")) > 0.5
 
@@ -86,8 +89,9 @@ def _lit(mesh: Mesh, seed: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
     return shading, shadow
 
 
-def _shadow(mesh: Mesh, size: int, light: SkyAndSun, kind: str,
-            seeds: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _shadow(
+    mesh: Mesh, size: int, light: SkyAndSun, kind: str, seeds: tuple
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Shading [S, S, 3], where the sun does not reach bool [S, S], and the share of the light that whatever stands in
     the sun's way takes [S, S]."""
     shading, blocked, normal = bake(mesh, size, light, kind, np.random.default_rng(seeds))
@@ -99,20 +103,24 @@ def _shadow(mesh: Mesh, size: int, light: SkyAndSun, kind: str,
 def registered(mesh: Mesh, seed: int) -> Mesh:
     """The true head as a fit leaves it: off by OFF_M along its normals, smoothly over OFF_MM."""
     off = noise(1000 * mesh.vertices, OFF_MM, np.random.default_rng([seed, 33]), smooth=True)
-    return mesh.moved(mesh.vertices + meshes.vertex_normals(mesh)
-                      * (OFF_M * off / max(float(off.std()), 1e-6))[:, None])
+    return mesh.moved(
+        mesh.vertices + meshes.vertex_normals(mesh) * (OFF_M * off / max(float(off.std()), 1e-6))[:, None]
+    )
 
 
 def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.random.Generator) -> None:
     """frames/ with frames.json, and cameras/, of a lit texture, linear [S, S, 3]."""
     caster = raster.RayCaster(mesh)
-    views = [place_camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE)
-             for i, azimuth in enumerate(AZIMUTHS)]
+    views = [
+        place_camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE)
+        for i, azimuth in enumerate(AZIMUTHS)
+    ]
     write_views(capture, views, (render_picture(caster, view, texture, rng) for view in views))
 
 
-def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray],
-                selected: int | None = None) -> None:
+def write_views(
+    capture: Capture, views: list[View], pictures: Iterable[np.ndarray], selected: int | None = None
+) -> None:
     """Writes frames/ with frames.json, and cameras/: pictures with the known cameras that took them.
 
     Parameters
@@ -140,8 +148,9 @@ def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarr
     model.write_binary(str(capture.cameras))
 
 
-def render_picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator,
-                   rays: int = 2) -> np.ndarray:
+def render_picture(
+    caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator, rays: int = 2
+) -> np.ndarray:
     """A picture of a head before a dim, uneven background.
 
     Parameters
@@ -161,7 +170,8 @@ def render_picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rn
     at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)
     colour = raster.sample(texture, at).reshape(*face.shape, 3) * (face >= 0)[..., None]
     head, cover = (images.resize(a.astype(np.float32), view.width, view.height) for a in (colour, face >= 0))
-    wall = cv2.resize(rng.uniform(0.02, 0.3, (9, 7, 3)).astype(np.float32), (view.width, view.height),
-                      interpolation=cv2.INTER_CUBIC)
+    wall = cv2.resize(
+        rng.uniform(0.02, 0.3, (9, 7, 3)).astype(np.float32), (view.width, view.height), interpolation=cv2.INTER_CUBIC
+    )
     seen = images.linear_to_srgb(cv2.GaussianBlur(head + (1 - cover)[..., None] * wall, (0, 0), 0.6))
     return np.clip(seen + rng.normal(0, NOISE, seen.shape), 0, 1).astype(np.float32)

@@ -37,23 +37,34 @@ COLUMNS = ("true", "masked", "IoU", "precision", "recall", "border F", "CPU seco
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.shadow_mask", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.shadow_mask",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--seeds", type=int, nargs="*", default=HELD_OUT)
     parser.add_argument("--capture", type=Path, nargs=2, action="append", default=[], metavar=("CAPTURE", "TRUTH"))
     parser.add_argument("--delighters", nargs="+", default=["shading", "none"])
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_shadow_masks")
-    parser.add_argument("--pictures", action="store_true",
-                        help="leave the filmed texture, the true mask and the proposal side by side in the work folder")
-    parser.add_argument("--json", type=Path,
-                        help="where the figures go, such as docs/figures/shadow_mask.json; those of other rows stay")
+    parser.add_argument(
+        "--pictures",
+        action="store_true",
+        help="leave the filmed texture, the true mask and the proposal side by side in the work folder",
+    )
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="where the figures go, such as docs/figures/shadow_mask.json; those of other rows stay",
+    )
     asked = parser.parse_args()
     found: dict[str, dict] = {}
     print("| capture | delighter | " + " | ".join(COLUMNS) + " |\n| --- | --- |" + " --- |" * len(COLUMNS))
     for delighter in asked.delighters:
         names = [f"synthetic {seed}, {KINDS[seed % len(KINDS)]}" for seed in asked.seeds]
-        rows = [_row(*_synthetic(seed, delighter, asked.work), name, delighter, asked)
-                for seed, name in zip(asked.seeds, names, strict=True)]
+        rows = [
+            _row(*_synthetic(seed, delighter, asked.work), name, delighter, asked)
+            for seed, name in zip(asked.seeds, names, strict=True)
+        ]
         found |= {f"{name}, {delighter}": _figures(name, delighter, row) for name, row in zip(names, rows, strict=True)}
         if len(rows) > 1:
             _print("mean of the synthetic", delighter, np.mean(rows, 0))
@@ -70,10 +81,12 @@ def scores(proposed: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[
     F-score of the border at NEAR texels of a 1024 map, of masks bool [S, S] over texels bool [S, S]."""
     both = (proposed & true)[judged].sum()
     reach = NEAR * len(proposed) / 1024
-    borders = [_border(mask) & cv2.erode(judged.astype(np.uint8), np.ones((5, 5))).astype(bool)
-               for mask in (proposed, true)]
-    hits = [float((_distance(other) <= reach)[own].mean()) if own.any() else 0.0
-            for own, other in (borders, borders[::-1])]
+    borders = [
+        _border(mask) & cv2.erode(judged.astype(np.uint8), np.ones((5, 5))).astype(bool) for mask in (proposed, true)
+    ]
+    hits = [
+        float((_distance(other) <= reach)[own].mean()) if own.any() else 0.0 for own, other in (borders, borders[::-1])
+    ]
     return (
         float(true[judged].mean()),
         float(proposed[judged].mean()),
@@ -104,13 +117,18 @@ def _row(
 
 
 def _figures(name: str, delighter: str, scores: tuple[float, ...]) -> dict:
-    return {"capture": name, "delighter": delighter,
-            **{column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, scores, strict=True)}}
+    return {
+        "capture": name,
+        "delighter": delighter,
+        **{column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, scores, strict=True)},
+    }
 
 
 def _print(name: str, delighter: str, scores) -> None:
-    print(f"| {name} | {delighter} | " + " | ".join(f"{v:.2f}" for v in scores[:-1]) + f" | {scores[-1]:.1f} |",
-          flush=True)
+    print(
+        f"| {name} | {delighter} | " + " | ".join(f"{v:.2f}" for v in scores[:-1]) + f" | {scores[-1]:.1f} |",
+        flush=True,
+    )
 
 
 def _synthetic(seed: int, delighter: str, work: Path) -> tuple[Capture, np.ndarray]:
@@ -122,8 +140,9 @@ def _filmed(source: Path, truth: Path, work: Path) -> tuple[Capture, np.ndarray]
     """A copy of the capture up to its texture."""
     copy = Capture(work / f"{source.stem}_copy.wildcap")
     shutil.rmtree(copy.root, ignore_errors=True)
-    shutil.copytree(source, copy.root,
-                    ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "renders", "lock"))
+    shutil.copytree(
+        source, copy.root, ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "renders", "lock")
+    )
     return copy, lifted_truth(copy, truth)
 
 

@@ -63,30 +63,51 @@ def measure(filmed: Filmed) -> dict:
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
     tone = read_given_tone(people.skin_tone(filmed.truth))
     begun = initial.start_solve(load(), evidence, tone, evidence.cell_side(Settings().solve.grid_cells), OURS)
-    luminance = {name: np.log(np.maximum(images.resize(np.ascontiguousarray(image, np.float32), REFERENCE_TEXELS,
-                                                       REFERENCE_TEXELS).mean(-1), 1e-3))
-                 for name, image in (("filmed", images.read_linear(capture.texture_filmed)),
-                                     ("delit", images.read_linear(capture.texture)), ("true", filmed.answer(TRUE)))}
+    luminance = {
+        name: np.log(
+            np.maximum(
+                images.resize(np.ascontiguousarray(image, np.float32), REFERENCE_TEXELS, REFERENCE_TEXELS).mean(-1),
+                1e-3,
+            )
+        )
+        for name, image in (
+            ("filmed", images.read_linear(capture.texture_filmed)),
+            ("delit", images.read_linear(capture.texture)),
+            ("true", filmed.answer(TRUE)),
+        )
+    }
     seen = np.log(initial.find_remaining_light(evidence, begun).numpy().clip(0.05, 4)).mean(0)
     weight = (evidence.weight * evidence.trust * evidence.skin).numpy()
-    kinds = {"removed": luminance["filmed"] - luminance["delit"], "seen": seen,
-             "left": luminance["delit"] - luminance["true"]}
+    kinds = {
+        "removed": luminance["filmed"] - luminance["delit"],
+        "seen": seen,
+        "left": luminance["delit"] - luminance["true"],
+    }
     row, steps = {"person": filmed.person}, {}
     for kind, value in kinds.items():
-        steps[kind], sure = border.measure_border_steps(value.astype(np.float32), begun.alpha.numpy(), weight,
-                                                        evidence.texel)
+        steps[kind], sure = border.measure_border_steps(
+            value.astype(np.float32), begun.alpha.numpy(), weight, evidence.texel
+        )
         row |= dict(zip((kind, f"{kind}_spread"), border.mean_and_deviation(steps[kind], sure), strict=True))
     about = {kind: steps[kind] - row[kind] for kind in ("seen", "left")}
-    return row | {"best": float((sure * about["seen"] * about["left"]).sum()
-                                / max((sure * about["seen"] ** 2).sum(), 1e-6))}
+    return row | {
+        "best": float((sure * about["seen"] * about["left"]).sum() / max((sure * about["seen"] ** 2).sum(), 1e-6))
+    }
 
 
 def table(rows: dict[str, dict]) -> str:
     """The rows in Markdown."""
-    return figures.markdown(HEAD, [
-        [name, *(f"{row[kind]:.2f} ± {row[f'{kind}_spread']:.2f}" for kind in ("removed", "seen", "left")),
-         *(None if row[key] is None else f"{row[key]:.2f}" for key in ("left_of_others", "taken", "best"))]
-        for name, row in rows.items()])
+    return figures.markdown(
+        HEAD,
+        [
+            [
+                name,
+                *(f"{row[kind]:.2f} ± {row[f'{kind}_spread']:.2f}" for kind in ("removed", "seen", "left")),
+                *(None if row[key] is None else f"{row[key]:.2f}" for key in ("left_of_others", "taken", "best")),
+            ]
+            for name, row in rows.items()
+        ],
+    )
 
 
 if __name__ == "__main__":

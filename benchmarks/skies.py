@@ -53,12 +53,12 @@ def harmonic_shares(panorama: np.ndarray) -> np.ndarray:
 
 def summarise_skies(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean and standard deviation [9] of environments [N, 9] that may be turned about the vertical by any angle."""
-    mean, square = np.zeros(9), (shares ** 2).mean(0)
+    mean, square = np.zeros(9), (shares**2).mean(0)
     for pair in PAIRS:
         square[list(pair)] = square[list(pair)].mean()
     zonal = [0, 2, 6]
     mean[zonal] = shares[:, zonal].mean(0)
-    return mean, np.sqrt(np.maximum(square - mean ** 2, 0))
+    return mean, np.sqrt(np.maximum(square - mean**2, 0))
 
 
 def count_independent(points: np.ndarray, weights: np.ndarray, reach: float) -> float:

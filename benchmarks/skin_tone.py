@@ -43,8 +43,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--each", type=int, default=6, help="subjects of each group, at least")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("CAPTURE", "TONE"))
-    parser.add_argument("--json", type=Path,
-                        help="where the figures go, such as docs/figures/skin_tone.json; those of other captures stay")
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="where the figures go, such as docs/figures/skin_tone.json; those of other captures stay",
+    )
     asked = parser.parse_args()
     rows: dict[str, list] = {"scene": [], "measured": []}
     subjects = dict.fromkeys((name for _, name in TYPOLOGY_GROUPS), 0)
@@ -59,8 +62,10 @@ def main() -> None:
         for light, scene in enumerate(scenes):
             for phone in range(PHONES):
                 look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
-                for row, tone in (("scene", estimate_from_scene(look.best, SCENE)),
-                                  ("measured", estimate_from_white(look.front, card))):
+                for row, tone in (
+                    ("scene", estimate_from_scene(look.best, SCENE)),
+                    ("measured", estimate_from_white(look.front, card)),
+                ):
                     rows[row].append((name, *errors(tone, scene.tone)))
     print_table(rows, subjects)
     captures = {}
@@ -68,8 +73,13 @@ def main() -> None:
         tone = np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")])
         captures[Path(folder).stem] = of_capture(Capture(folder), tone)
     if asked.json:
-        write_record(asked.json, "skin_tone", "python -m benchmarks.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
-                     {"groups": summary(rows, subjects), "captures": captures}, keep=True)
+        write_record(
+            asked.json,
+            "skin_tone",
+            "python -m benchmarks.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
+            {"groups": summary(rows, subjects), "captures": captures},
+            keep=True,
+        )
 
 
 def expected(seed: int) -> str:
@@ -95,22 +105,30 @@ def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
             chosen = np.array([values for group_name, *values in errors_of_row if name in (group_name, "all")])
             if len(chosen):
                 signed, colour, stated = chosen.T
-                of_group[row] = {"lightness": signed.mean(), "rms": np.sqrt((signed**2).mean()),
-                                 "delta_e": colour.mean(), "stated": stated.mean(),
-                                 "within_two": np.mean(np.abs(signed) <= 2 * stated)}
+                of_group[row] = {
+                    "lightness": signed.mean(),
+                    "rms": np.sqrt((signed**2).mean()),
+                    "delta_e": colour.mean(),
+                    "stated": stated.mean(),
+                    "within_two": np.mean(np.abs(signed) <= 2 * stated),
+                }
         found[name] = of_group
     return found
 
 
 def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
-    print(f"{'row':9} {'group':13} {'subjects':>8} {'L* mean':>8} {'L* rms':>7} {'delta E':>8} {'stated':>7} "
-          f"{'in two':>7}")
+    print(
+        f"{'row':9} {'group':13} {'subjects':>8} {'L* mean':>8} {'L* rms':>7} {'delta E':>8} {'stated':>7} "
+        f"{'in two':>7}"
+    )
     groups = summary(rows, subjects)
     for row in rows:
         for name, of_group in groups.items():
             if of := of_group.get(row):
-                print(f"{row:9} {name:13} {of_group['subjects']:8} {of['lightness']:+8.2f} {of['rms']:7.2f} "
-                      f"{of['delta_e']:8.2f} {of['stated']:7.2f} {of['within_two']:7.2f}")
+                print(
+                    f"{row:9} {name:13} {of_group['subjects']:8} {of['lightness']:+8.2f} {of['rms']:7.2f} "
+                    f"{of['delta_e']:8.2f} {of['stated']:7.2f} {of['within_two']:7.2f}"
+                )
 
 
 def of_capture(capture: Capture, srgb: np.ndarray) -> dict:
@@ -121,8 +139,10 @@ def of_capture(capture: Capture, srgb: np.ndarray) -> dict:
     tone = estimate_skin_tone(capture, head, Settings(), evidence, Reporter("skin_tone"))
     signed, colour, stated = errors(tone, truth)
     lightness = to_lab(truth)[0]
-    print(f"{tone.source:9} {capture.root.name:20} {name_group(truth):13} L* {lightness:.1f} error {signed:+.2f} "
-          f"delta E {colour:.2f} stated {stated:.2f}")
+    print(
+        f"{tone.source:9} {capture.root.name:20} {name_group(truth):13} L* {lightness:.1f} error {signed:+.2f} "
+        f"delta E {colour:.2f} stated {stated:.2f}"
+    )
     return {"lightness": lightness, "scene": {"lightness": signed, "delta_e": colour, "stated": stated}}
 
 

@@ -48,29 +48,37 @@ ALONE, TOGETHER, LESS, MORE = (
     "prior of the scales halved",
     "prior of the scales doubled",
 )
-COLUMNS = {"psnr_uv": Column("PSNR in UV, dB"), "psnr_shared": Column("up to one shared light, dB"),
-           "light_shared": Column("that light, in log", 3, 0),
-           "psnr_alone": Column("up to a light of its own, dB"), "agreement": Column("agreement, dB")}
-WORDS = ("Means over people ± their spread, then differences from the delit texture, person by person, ± the standard "
-         "error of their mean. *Up to one "
-         "shared light*: one grey second-order light, fitted to all captures of a person together, is no error (a "
-         "capture cannot tell it from skin, and a "
-         "scan's own map holds some); what differs between captures is. *Agreement*: PSNR of the difference between "
-         "the captures' albedos. *Split alone* is "
-         "the texture over the global light that the closed form finds, before anything is sampled; *together*, over "
-         "the light that it finds with all "
-         "captures of that person. Rows beside these are solves of the same textures by other code or options "
-         "(`--beside`): *solved before* by commit c93b420, "
-         "whose lights were held back by pulls chosen by hand, *solved together* by `core run - CAPTURE --from solve "
-         "--until solve --with OTHERS`.")
-PARTS = ("![As filmed, delit, mean face, with traits, global light; local light, texture over light, solved, true, "
-         "deviation](../pictures/split.jpg)\n\n"
-         "A lamp from below (`python -m benchmarks.split FOLDER --only stubbled_below --picture "
-         "docs/pictures/split.jpg`). Above: as filmed, delit, the mean face of the tone, that with the traits that "
-         "were found; the light of the whole face that the delighter left. Below: what it left locally, the delit "
-         "texture over the light of the whole face, as solved, the truth; and how large an error is expected, black "
-         "to a deviation of 0.4 in natural log. What stays is mostly the delighter's: noise in the dark, a nose whose "
-         "shadow was brightened too much.")
+COLUMNS = {
+    "psnr_uv": Column("PSNR in UV, dB"),
+    "psnr_shared": Column("up to one shared light, dB"),
+    "light_shared": Column("that light, in log", 3, 0),
+    "psnr_alone": Column("up to a light of its own, dB"),
+    "agreement": Column("agreement, dB"),
+}
+WORDS = (
+    "Means over people ± their spread, then differences from the delit texture, person by person, ± the standard "
+    "error of their mean. *Up to one "
+    "shared light*: one grey second-order light, fitted to all captures of a person together, is no error (a "
+    "capture cannot tell it from skin, and a "
+    "scan's own map holds some); what differs between captures is. *Agreement*: PSNR of the difference between "
+    "the captures' albedos. *Split alone* is "
+    "the texture over the global light that the closed form finds, before anything is sampled; *together*, over "
+    "the light that it finds with all "
+    "captures of that person. Rows beside these are solves of the same textures by other code or options "
+    "(`--beside`): *solved before* by commit c93b420, "
+    "whose lights were held back by pulls chosen by hand, *solved together* by `core run - CAPTURE --from solve "
+    "--until solve --with OTHERS`."
+)
+PARTS = (
+    "![As filmed, delit, mean face, with traits, global light; local light, texture over light, solved, true, "
+    "deviation](../pictures/split.jpg)\n\n"
+    "A lamp from below (`python -m benchmarks.split FOLDER --only stubbled_below --picture "
+    "docs/pictures/split.jpg`). Above: as filmed, delit, the mean face of the tone, that with the traits that "
+    "were found; the light of the whole face that the delighter left. Below: what it left locally, the delit "
+    "texture over the light of the whole face, as solved, the truth; and how large an error is expected, black "
+    "to a deviation of 0.4 in natural log. What stays is mostly the delighter's: noise in the dark, a nose whose "
+    "shadow was brightened too much."
+)
 DOUBTFUL = 0.4
 """Deviation in natural log that is white in the picture."""
 
@@ -78,11 +86,14 @@ DOUBTFUL = 0.4
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_captures(parser)
-    parser.add_argument("--beside", nargs="+", default=[], metavar="NAME=FOLDER",
-                        help="the same captures, solved in another way")
-    parser.add_argument("--picture", type=Path,
-                        help="draw the parts of the first capture instead of measuring; of synthetic people only in "
-                             "the docs")
+    parser.add_argument(
+        "--beside", nargs="+", default=[], metavar="NAME=FOLDER", help="the same captures, solved in another way"
+    )
+    parser.add_argument(
+        "--picture",
+        type=Path,
+        help="draw the parts of the first capture instead of measuring; of synthetic people only in the docs",
+    )
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     captures = captures_asked(parser, asked)
@@ -102,10 +113,13 @@ def sections(record: dict) -> Sections:
     """Heading and Markdown of each part of the page."""
     people, captures = {name for rows in record["people"].values() for name in rows}, record["captures"]
     found = summarise(record["people"], COLUMNS, DELIT)
-    parts = [("", f"{WORDS} {len(captures)} captures of {len(people)} people."), ("The parts", PARTS),
-             ("All people", format_table(found, COLUMNS, "taken for albedo", DELIT)),
-             ("Capture by capture, up to the person's shared light, dB", capture_table(captures)),
-             ("The scales that were found", scale_table(record["scales"]))]
+    parts = [
+        ("", f"{WORDS} {len(captures)} captures of {len(people)} people."),
+        ("The parts", PARTS),
+        ("All people", format_table(found, COLUMNS, "taken for albedo", DELIT)),
+        ("Capture by capture, up to the person's shared light, dB", capture_table(captures)),
+        ("The scales that were found", scale_table(record["scales"])),
+    ]
     return parts
 
 
@@ -171,25 +185,35 @@ def parts_side_by_side(filmed: Filmed) -> np.ndarray:
     truth's tone."""
     shapes = shapes_of(filmed)
     found = split.split_captures([shapes])
-    maps = small({method: answer for method in (NOTHING, DELIT, SOLVED, TRUE)
-                  if (answer := filmed.answer(method)) is not None})
+    maps = small(
+        {method: answer for method in (NOTHING, DELIT, SOLVED, TRUE) if (answer := filmed.answer(method)) is not None}
+    )
     mean = shapes.reference.permute(1, 2, 0).numpy()
-    traits, local = (split.enlarge_field(torch.from_numpy(part), SIZE).exp().permute(1, 2, 0).numpy()
-                     for part in (found.traits, found.local))
+    traits, local = (
+        split.enlarge_field(torch.from_numpy(part), SIZE).exp().permute(1, 2, 0).numpy()
+        for part in (found.traits, found.local)
+    )
     light = found.light(shapes.normal).permute(1, 2, 0).numpy()
     where, tone = filmed.where, maps[TRUE][filmed.where].mean(0)
-    skins = [maps[NOTHING], maps[DELIT], mean, mean * traits, maps[DELIT] / light,
-             maps.get(SOLVED, maps[DELIT] / light), maps[TRUE]]
+    skins = [
+        maps[NOTHING],
+        maps[DELIT],
+        mean,
+        mean * traits,
+        maps[DELIT] / light,
+        maps.get(SOLVED, maps[DELIT] / light),
+        maps[TRUE],
+    ]
     toned = [skin * tone / np.maximum(skin[where].mean(0), 1e-6) for skin in skins]
     lights = [0.35 * part / np.maximum(part[where].mean(0), 1e-6) for part in (light, local)]
     rows, columns = (np.flatnonzero(where.any(axis)) for axis in (1, 0))
-    box = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1]
+    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     shown = [images.linear_to_srgb(np.clip(part, 0, 1))[box] for part in (*toned[:4], *lights, *toned[4:])]
     evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
     sure = confidence.estimate_confidence(evidence, maps.get(SOLVED, maps[DELIT]))[box]
     deviation = confidence.PLAIN_DEVIATION / np.maximum(sure, confidence.PLAIN_DEVIATION / DOUBTFUL)
     shown.append(np.repeat(np.where(sure > 0, deviation / DOUBTFUL, 0)[..., None], 3, 2).astype(np.float32))
-    return np.vstack([np.hstack(shown[first:first + 5]) for first in (0, 5)])
+    return np.vstack([np.hstack(shown[first : first + 5]) for first in (0, 5)])
 
 
 def solved_map(root: Path) -> np.ndarray | None:
@@ -199,16 +223,25 @@ def solved_map(root: Path) -> np.ndarray | None:
 
 def capture_table(by_capture: dict[str, dict[str, float]]) -> str:
     methods = list(dict.fromkeys(method for row in by_capture.values() for method in row if method not in (LESS, MORE)))
-    rows = [[name, *(f"{row[method]:.2f}" if method in row else None for method in methods),
-             f"{row[SOLVED] - row[DELIT]:+.2f}" if SOLVED in row else None] for name, row in by_capture.items()]
+    rows = [
+        [
+            name,
+            *(f"{row[method]:.2f}" if method in row else None for method in methods),
+            f"{row[SOLVED] - row[DELIT]:+.2f}" if SOLVED in row else None,
+        ]
+        for name, row in by_capture.items()
+    ]
     return figures.markdown(["capture", *methods, "solve adds"], rows)
 
 
 def scale_table(scales: dict[str, dict[str, float]]) -> str:
     names = ["traits", "global light", "local light", "noise"]
-    return ("Deviations in natural log along the axis of brightness (times 0.58 in each channel).\n\n"
-            + figures.markdown(["capture", *names],
-                               [[name, *(f"{value:.3f}" for value in row.values())] for name, row in scales.items()]))
+    return (
+        "Deviations in natural log along the axis of brightness (times 0.58 in each channel).\n\n"
+        + figures.markdown(
+            ["capture", *names], [[name, *(f"{value:.3f}" for value in row.values())] for name, row in scales.items()]
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -44,37 +44,52 @@ COMMAND = "python -m benchmarks.state FOLDER"
 SHOWN = "skin", "brows", "lips", "beard"
 """Parts: eyes are objects of their own, and under them lie lids that were completed from around."""
 TABLES = {
-    "In the picture": {"psnr": Column("PSNR, dB"), "ssim": Column("SSIM", 3), "flip": Column("FLIP", 3, -1),
-                       "detail": Column("detail"), "shadow_step": Column("shadow step", 2, 0)},
-    "Along the edges of shadows": {"edge_step": Column("step", 3, 0), "edge_bright": Column("bright line", 4, -1),
-                                   "edge_dark": Column("dark line", 4, -1),
-                                   "overshoot": Column("overshoot", 4, -1),
-                                   "edge_detail_within": Column("detail there"),
-                                   "edge_detail_away": Column("detail elsewhere")},
-    "Up to a light, and across lights": {"psnr_uv": Column("PSNR in UV, dB"),
-                                         "psnr_shared": Column("up to one shared light, dB"),
-                                         "light_shared": Column("that light, in log", 3, 0),
-                                         "psnr_alone": Column("up to a light of its own, dB"),
-                                         "light_alone": Column("that light of its own, in log", 3, 0),
-                                         "agreement": Column("agreement, dB"),
-                                         "light_slope": Column("slope by light", 2, 0)},
-    "Features kept": {"kept_brows": Column("brows", 2, 0), "kept_lips": Column("lips", 2, 0),
-                      "kept_chin": Column("chin", 2, 0), "lost": Column("mean abs(1 - kept)", 2, -1),
-                      "between_lights": Column("between lights", 2, -1)},
-    "Parts apart": {**{f"psnr_{part}": Column(f"{part}, dB") for part in SHOWN},
-                    **{f"bias_{part}": Column(f"{part}, log", 3, 0)
-                       for part in SHOWN}},
+    "In the picture": {
+        "psnr": Column("PSNR, dB"),
+        "ssim": Column("SSIM", 3),
+        "flip": Column("FLIP", 3, -1),
+        "detail": Column("detail"),
+        "shadow_step": Column("shadow step", 2, 0),
+    },
+    "Along the edges of shadows": {
+        "edge_step": Column("step", 3, 0),
+        "edge_bright": Column("bright line", 4, -1),
+        "edge_dark": Column("dark line", 4, -1),
+        "overshoot": Column("overshoot", 4, -1),
+        "edge_detail_within": Column("detail there"),
+        "edge_detail_away": Column("detail elsewhere"),
+    },
+    "Up to a light, and across lights": {
+        "psnr_uv": Column("PSNR in UV, dB"),
+        "psnr_shared": Column("up to one shared light, dB"),
+        "light_shared": Column("that light, in log", 3, 0),
+        "psnr_alone": Column("up to a light of its own, dB"),
+        "light_alone": Column("that light of its own, in log", 3, 0),
+        "agreement": Column("agreement, dB"),
+        "light_slope": Column("slope by light", 2, 0),
+    },
+    "Features kept": {
+        "kept_brows": Column("brows", 2, 0),
+        "kept_lips": Column("lips", 2, 0),
+        "kept_chin": Column("chin", 2, 0),
+        "lost": Column("mean abs(1 - kept)", 2, -1),
+        "between_lights": Column("between lights", 2, -1),
+    },
+    "Parts apart": {
+        **{f"psnr_{part}": Column(f"{part}, dB") for part in SHOWN},
+        **{f"bias_{part}": Column(f"{part}, log", 3, 0) for part in SHOWN},
+    },
 }
 WORDS = {
     "In the picture": "In the frames with a true albedo, on the face with its brows, lips and beard, after one gain "
-                      "per channel: PSNR, SSIM and FLIP; *detail* is the correlation with "
+    "per channel: PSNR, SSIM and FLIP; *detail* is the correlation with "
     "the truth's log green between 1 and 3 px; *shadow step* is log(answer / truth), lit less dark, 4 to 12 px from "
     "the shadow's edge.",
     "Along the edges of shadows": "log(answer / truth) across the edges where the true light steps: the step; the line "
-                                  "at the edge above or below both "
+    "at the edge above or below both "
     "sides, and the sum of both; detail within the band of the edge and elsewhere.",
     "Up to a light, and across lights": "On the map, against the texture of the true frames through the same "
-                                        "registration. *Up to one shared light*: one grey "
+    "registration. *Up to one shared light*: one grey "
     "second-order light (nine numbers) fitted to all captures of a person together is no error; what differs between "
     "captures is. Of a person with one capture it is that capture's own. *That light* is its "
     "standard deviation in natural log. *Agreement*: PSNR of the mean squared difference between the captures' albedos "
@@ -82,19 +97,21 @@ WORDS = {
     "perfectly, the true light tells what the registrations allow. *Slope by light*: how far the answer follows from "
     "one capture to the other what was filmed; 0 is best, and below it too much was taken out.",
     "Features kept": "Share of the truth's contrast that brows, lips and chin keep (1 is all); mean abs(1 - kept) of "
-                     "brows, and of closed eyes, each capture "
+    "brows, and of closed eyes, each capture "
     "apart; the deviation of kept between a person's captures over that of the filmed textures.",
     "Parts apart": "PSNR, and the median of the grey log(answer / truth), in each part of the map after the whole "
-                   "face's gain. True part masks where "
+    "face's gain. True part masks where "
     "the subject has them, else the built-in head's.",
 }
-INTRODUCTION = ("Means over people ± their spread (standard deviation; one person's figure is the mean of its "
-                "captures), then the differences from the delit "
-                "texture, person by person, ± the standard error of their mean: bold where better by more than two of "
-                "those, italic where worse. Doing "
-                "nothing is the texture as filmed, a flat colour its mean, the blur's deviation is 2 % of the face's "
-                "height, and the true light is the "
-                "texture of the true albedo frames.")
+INTRODUCTION = (
+    "Means over people ± their spread (standard deviation; one person's figure is the mean of its "
+    "captures), then the differences from the delit "
+    "texture, person by person, ± the standard error of their mean: bold where better by more than two of "
+    "those, italic where worse. Doing "
+    "nothing is the texture as filmed, a flat colour its mean, the blur's deviation is 2 % of the face's "
+    "height, and the true light is the "
+    "texture of the true albedo frames."
+)
 
 
 def main() -> int:
@@ -102,8 +119,9 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
-    parser.add_argument("--run", action="store_true",
-                        help="run the chain, to the solve, on captures where it is not fresh")
+    parser.add_argument(
+        "--run", action="store_true", help="run the chain, to the solve, on captures where it is not fresh"
+    )
     parser.add_argument("--quality", choices=QUALITIES, default="standard", help="of --run")
     parser.add_argument("--page", type=Path, help="where the page goes, docs/results/state.md")
     parser.add_argument("--json", type=Path, help="where the record goes, docs/figures/state.json")
@@ -116,25 +134,34 @@ def main() -> int:
         for path in sorted(folder.glob("*.wildcap")):
             if path.stem.startswith(tuple(asked.only)) and (truths / path.stem / "skin_tone.txt").is_file():
                 run_chain(Capture(path), truths / path.stem, asked.quality)
-    captures = [filmed for filmed in find(folder, truths, folder / "state")
-                if filmed.name.startswith(tuple(asked.only))]
+    captures = [
+        filmed for filmed in find(folder, truths, folder / "state") if filmed.name.startswith(tuple(asked.only))
+    ]
     if not captures:
-        parser.error(f"{folder} holds no capture with a texture and a truth. benchmarks/people.py makes them; --run "
-                     "takes them through the chain.")
+        parser.error(
+            f"{folder} holds no capture with a texture and a truth. benchmarks/people.py makes them; --run "
+            "takes them through the chain."
+        )
     scores, by_capture = measure(captures)
     code = code_of(captures)
     if asked.json and asked.json.is_file():
-        scores, by_capture = merge_earlier(figures.read_record(asked.json.stem, asked.json.parent)["figures"], scores,
-                                          by_capture, code)
+        scores, by_capture = merge_earlier(
+            figures.read_record(asked.json.stem, asked.json.parent)["figures"], scores, by_capture, code
+        )
     text = sections(scores, by_capture)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
     if asked.page:
         write_page(asked.page, "The state of the albedo", f"{COMMAND} --page docs/results/{asked.page.name}", text)
     if asked.json:
-        found = summarise(scores, {name: column for columns in TABLES.values() for name, column in columns.items()},
-                          DELIT)
-        figures.write_record(asked.json, "state", f"{COMMAND} --json docs/figures/{asked.json.name}",
-                             {**to_record(found, scores), "captures": by_capture, "code": code})
+        found = summarise(
+            scores, {name: column for columns in TABLES.values() for name, column in columns.items()}, DELIT
+        )
+        figures.write_record(
+            asked.json,
+            "state",
+            f"{COMMAND} --json docs/figures/{asked.json.name}",
+            {**to_record(found, scores), "captures": by_capture, "code": code},
+        )
     return 0
 
 
@@ -173,15 +200,19 @@ def code_of(captures: list[Filmed]) -> dict[str, str]:
     """What made the figures: the keys of the stages' code in the captures' records, and the hash of the measures'."""
     stages = [filmed.capture.read()["stages"] for filmed in captures]
     # a stage of 0.1.0 has no key of its code alone, and benchmarks/earlier.py takes one commit of it
-    keys = {name: " ".join(sorted({each[name].get("code", "0.1.0")[:12] for each in stages if name in each}))
-            for name in freeze.STAGES}
+    keys = {
+        name: " ".join(sorted({each[name].get("code", "0.1.0")[:12] for each in stages if name in each}))
+        for name in freeze.STAGES
+    }
     return {**keys, "measures": hash_value(measuring())[:12]}
 
 
 def measuring() -> dict[str, str]:
     """The code that says what a figure is: file -> hash, in which words that only explain do not count."""
-    files = [*sorted(Path(__file__).parent.glob("measures/*.py")),
-             *(Path(module.__file__) for module in (state_scores, state_captures, albedo_score, delight_measures))]
+    files = [
+        *sorted(Path(__file__).parent.glob("measures/*.py")),
+        *(Path(module.__file__) for module in (state_scores, state_captures, albedo_score, delight_measures)),
+    ]
     hashes = {}
     for path in files:
         text: list[str] = []
@@ -190,8 +221,9 @@ def measuring() -> dict[str, str]:
     return hashes
 
 
-def merge_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]],
-                  code: dict[str, str]) -> tuple[Scores, dict]:
+def merge_earlier(
+    record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]], code: dict[str, str]
+) -> tuple[Scores, dict]:
     """What was measured now, over what a record has of other people; the record is left out, and that is said, where
     other code made it.
 
@@ -215,10 +247,12 @@ def merge_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, 
 
 def seen_in_pictures(filmed: Filmed, answers: dict[str, np.ndarray]) -> dict[str, Figures]:
     """`in_pictures` of a capture, kept with what it was made from: the maps, the truth and the measures' own code."""
-    sources = {"inputs": {path.name: hash_file(path) for path in filmed.inputs()},
-               "truth": {name: hash_tree(filmed.truth / name) for name in ("albedo", "face", "shadow")},
-               "methods": list(answers),
-               "code": measuring()}
+    sources = {
+        "inputs": {path.name: hash_file(path) for path in filmed.inputs()},
+        "truth": {name: hash_tree(filmed.truth / name) for name in ("albedo", "face", "shadow")},
+        "methods": list(answers),
+        "code": measuring(),
+    }
     kept = filmed.work / f"{filmed.name}.json"
     if kept.is_file() and (stored := json.loads(kept.read_text(encoding="utf-8")))["sources"] == json.loads(
         json.dumps(sources)
@@ -233,9 +267,11 @@ def side_by_side(filmed: Filmed, maps: dict[str, np.ndarray]) -> np.ndarray:
     """The front of the face of every answer at the truth's tone, sRGB, in the order of METHODS."""
     face = template.mask("face", SIZE) > 0.5
     rows, columns = (np.flatnonzero(face.any(axis)) for axis in (1, 0))
-    box, tone = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1], maps["true light"][filmed.where].mean(0)
-    shown = [images.linear_to_srgb(np.clip(answer * tone / np.maximum(answer[filmed.where].mean(0), 1e-6), 0, 1))[box]
-             for answer in maps.values()]
+    box, tone = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], maps["true light"][filmed.where].mean(0)
+    shown = [
+        images.linear_to_srgb(np.clip(answer * tone / np.maximum(answer[filmed.where].mean(0), 1e-6), 0, 1))[box]
+        for answer in maps.values()
+    ]
     return np.hstack(shown)
 
 
@@ -247,23 +283,40 @@ def sections(scores: Scores, by_capture: dict[str, dict[str, Figures]]) -> list[
         found = summarise(scores, columns, DELIT)
         if found:
             parts.append((title, f"{WORDS[title]}\n\n{format_table(found, columns, 'taken for albedo', DELIT)}"))
-    return [*parts,
-            ("Capture by capture",
-             "PSNR in dB in the picture after one gain, and on the map up to the person's shared light; what the solve "
-             "adds to "
-                                           "the delit texture.\n\n" + by_capture_table(by_capture))]
+    return [
+        *parts,
+        (
+            "Capture by capture",
+            "PSNR in dB in the picture after one gain, and on the map up to the person's shared light; what the solve "
+            "adds to "
+            "the delit texture.\n\n" + by_capture_table(by_capture),
+        ),
+    ]
 
 
 def by_capture_table(by_capture: dict[str, dict[str, Figures]]) -> str:
     """Markdown: a line per capture."""
-    head = ["capture", *(f"{method}" for method in METHODS), "solve adds",
-            *(f"{method}, shared light" for method in (DELIT, SOLVED)), "solve adds"]
+    head = [
+        "capture",
+        *(f"{method}" for method in METHODS),
+        "solve adds",
+        *(f"{method}, shared light" for method in (DELIT, SOLVED)),
+        "solve adds",
+    ]
     lines = []
     for name, rows in sorted(by_capture.items()):
-        psnr, shared = ({method: row.get(measure) for method, row in rows.items()}
-                        for measure in ("psnr", "psnr_shared"))
-        lines.append([name, *(_text(psnr.get(method)) for method in METHODS), _gain(psnr),
-                      *(_text(shared.get(method)) for method in (DELIT, SOLVED)), _gain(shared)])
+        psnr, shared = (
+            {method: row.get(measure) for method, row in rows.items()} for measure in ("psnr", "psnr_shared")
+        )
+        lines.append(
+            [
+                name,
+                *(_text(psnr.get(method)) for method in METHODS),
+                _gain(psnr),
+                *(_text(shared.get(method)) for method in (DELIT, SOLVED)),
+                _gain(shared),
+            ]
+        )
     return figures.markdown(head, lines)
 
 

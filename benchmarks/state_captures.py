@@ -66,7 +66,8 @@ class Filmed:
         copy = Capture(self.work / f"{self.name}.wildcap")
         same = ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
         changed = copy.texture_confidence.is_file() and any(
-            hash_file(copy.root / name) != hash_file(self.capture.root / name) for name in same)
+            hash_file(copy.root / name) != hash_file(self.capture.root / name) for name in same
+        )
         if changed:
             copy.texture_confidence.unlink()
         return use_true_frames(self.capture, self.truth, copy, Settings())
@@ -74,10 +75,19 @@ class Filmed:
     def inputs(self) -> list[Path]:
         """The files that the figures of this capture depend on, but for the truth's pictures."""
         capture = self.capture
-        return [path
-                for path in (capture.head, capture.texture_filmed, capture.texture, capture.texture_confidence,
-                             capture.maps / "diffuse_albedo.png", self.truth / "cameras.json", self.truth / "head.obj")
-                if path.is_file()]
+        return [
+            path
+            for path in (
+                capture.head,
+                capture.texture_filmed,
+                capture.texture,
+                capture.texture_confidence,
+                capture.maps / "diffuse_albedo.png",
+                self.truth / "cameras.json",
+                self.truth / "head.obj",
+            )
+            if path.is_file()
+        ]
 
     @cached_property
     def truth_map(self) -> np.ndarray:
@@ -89,8 +99,10 @@ class Filmed:
         """bool [SIZE, SIZE]: texels of the face that the capture and its true frames saw well. Of a person's own eyes
         and their lashes there are none: the true frames have them painted on the lids, where an answer has lids that
         were completed from around."""
-        seen = [images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE) > SEEN
-                for capture in (self.capture, self.true_capture)]
+        seen = [
+            images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE) > SEEN
+            for capture in (self.capture, self.true_capture)
+        ]
         face = (template.mask("face", SIZE) > 0.5) & seen[0] & seen[1]
         eyes = self.own_parts().get("eyes")
         if eyes is None:
@@ -129,8 +141,10 @@ class Filmed:
     def own_parts(self) -> dict[str, np.ndarray]:
         """Part -> bool [SIZE, SIZE]: the truth's own masks; none where the head's eyes are closed and it has no
         hair."""
-        return {path.stem.removeprefix("part_"): _dense(images.read_mask(path))
-                for path in sorted((self.truth / "maps").glob("part_*.png"))}
+        return {
+            path.stem.removeprefix("part_"): _dense(images.read_mask(path))
+            for path in sorted((self.truth / "maps").glob("part_*.png"))
+        }
 
 
 def _dense(mask: np.ndarray) -> np.ndarray:
@@ -146,8 +160,11 @@ def find(folder: Path, truths: Path, work: Path) -> list[Filmed]:
     for truth in sorted(path.parent for path in truths.glob("*/albedo") if path.is_dir()):
         first.setdefault(_true_head(truth), truth.name)
     pairs = [(path.stem, Capture(path), truths / path.stem) for path in sorted(folder.glob("*.wildcap"))]
-    pairs = [(name, capture, truth) for name, capture, truth in pairs if capture.texture.is_file()
-             and (truth / "albedo").is_dir()]
+    pairs = [
+        (name, capture, truth)
+        for name, capture, truth in pairs
+        if capture.texture.is_file() and (truth / "albedo").is_dir()
+    ]
     return [Filmed(name, first[_true_head(truth)], capture, truth, work) for name, capture, truth in pairs]
 
 
@@ -161,8 +178,11 @@ def add_captures(parser: argparse.ArgumentParser) -> None:
 def captures_asked(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> list[Filmed]:
     """The captures that these arguments name; ends with an error where there are none."""
     folder = arguments.folder.resolve()
-    found = [filmed for filmed in find(folder, (arguments.truths or folder).resolve(), folder / "state")
-             if filmed.name.startswith(tuple(arguments.only))]
+    found = [
+        filmed
+        for filmed in find(folder, (arguments.truths or folder).resolve(), folder / "state")
+        if filmed.name.startswith(tuple(arguments.only))
+    ]
     if not found:
         parser.error(f"{folder} holds no capture with a texture and a truth.")
     return found

@@ -43,17 +43,23 @@ def in_pictures(answers: dict[str, np.ndarray], looks: list[HeadInView]) -> dict
         true, mask = look.true.albedo[box], mask[box]
         shadow = None if look.true.shadow is None else look.true.shadow[box]
         log_true = log_green(true)
-        steps = (None if shadow is None
-                 else stepping(log_green(_seen(look, answers[NOTHING])[box]) - log_true, mask, shadow))
+        steps = (
+            None if shadow is None else stepping(log_green(_seen(look, answers[NOTHING])[box]) - log_true, mask, shadow)
+        )
         for method, answer in answers.items():
             picture = _seen(look, answer)[box]
             log = log_green(picture)
-            figures: Figures = {**differences(with_gain(picture, true, mask), true, mask),
-                                "detail": detail(log, log_true, mask)}
+            figures: Figures = {
+                **differences(with_gain(picture, true, mask), true, mask),
+                "detail": detail(log, log_true, mask),
+            }
             if shadow is not None:
                 edge = score_edges(log, log_true, shadow, mask, height, steps)
-                figures |= {"shadow_step": shadow_step(log - log_true, mask, shadow), "overshoot": edge.overshoot,
-                            **{f"edge_{name}": value for name, value in vars(edge).items()}}
+                figures |= {
+                    "shadow_step": shadow_step(log - log_true, mask, shadow),
+                    "overshoot": edge.overshoot,
+                    **{f"edge_{name}": value for name, value in vars(edge).items()},
+                }
             found[method].append(figures)
     return {method: mean_of(frames) for method, frames in found.items()}
 
@@ -68,8 +74,11 @@ def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
     found = {}
     for method, answer in maps.items():
         alone = fit_light([log_ratio(answer[where], truth[where])], [normals])
-        figures: Figures = {"psnr_uv": psnr_after_gain(answer[where], truth[where]), "light_alone": alone.deviation,
-                            "psnr_alone": psnr_after_gain(without_light(answer[where], normals, alone), truth[where])}
+        figures: Figures = {
+            "psnr_uv": psnr_after_gain(answer[where], truth[where]),
+            "light_alone": alone.deviation,
+            "psnr_alone": psnr_after_gain(without_light(answer[where], normals, alone), truth[where]),
+        }
         kept = contrast_kept(contrasts(images.linear_to_srgb(answer), points, where), true_contrasts)
         figures |= {f"kept_{name}": value for name, value in kept.items()}
         for name, part in score_parts(answer[where], truth[where], parts).items():
@@ -78,8 +87,9 @@ def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
     return found
 
 
-def of_person(captures: list[Filmed],
-              maps: list[dict[str, np.ndarray]]) -> tuple[dict[str, Figures], dict[str, Figures]]:
+def of_person(
+    captures: list[Filmed], maps: list[dict[str, np.ndarray]]
+) -> tuple[dict[str, Figures], dict[str, Figures]]:
     """Method -> what only the captures of one person together tell: PSNR up to their shared light, that light,
     agreement, how features vary between lights, and the slope by light; and method -> capture -> PSNR up to the shared
     light. A method counts the captures that have its answer; what needs two captures is None with one."""
@@ -87,21 +97,31 @@ def of_person(captures: list[Filmed],
     for method in dict.fromkeys(name for answers in maps for name in answers):
         chosen = [i for i, each in enumerate(maps) if method in each]
         places = [captures[i].where for i in chosen]
-        answers, truths = ([maps[i][name][where] for i, where in zip(chosen, places, strict=True)]
-                           for name in (method, TRUE))
+        answers, truths = (
+            [maps[i][name][where] for i, where in zip(chosen, places, strict=True)] for name in (method, TRUE)
+        )
         normals = [captures[i].normals[where] for i, where in zip(chosen, places, strict=True)]
         shared = fit_light([log_ratio(a, t) for a, t in zip(answers, truths, strict=True)], normals)
-        each_alone[method] = {captures[i].name: psnr_after_gain(without_light(a, n, shared), t)
-                              for i, a, n, t in zip(chosen, answers, normals, truths, strict=True)}
-        figures: Figures = {"light_shared": shared.deviation, "captures": len(chosen),
-                            "psnr_shared": _mean(list(each_alone[method].values()))}
+        each_alone[method] = {
+            captures[i].name: psnr_after_gain(without_light(a, n, shared), t)
+            for i, a, n, t in zip(chosen, answers, normals, truths, strict=True)
+        }
+        figures: Figures = {
+            "light_shared": shared.deviation,
+            "captures": len(chosen),
+            "psnr_shared": _mean(list(each_alone[method].values())),
+        }
         everywhere = np.logical_and.reduce(places)
         if len(chosen) > 1 and everywhere.any():
             tone = np.mean([maps[i][TRUE][everywhere].mean(0) for i in chosen], axis=0)
-            slopes = [slope((maps[i][method], maps[j][method]), (maps[i][NOTHING], maps[j][NOTHING]), everywhere)
-                      for i, j in combinations(chosen, 2)]
-            figures |= {"agreement": agreement([maps[i][method][everywhere] for i in chosen], tone),
-                        "light_slope": _mean(slopes)}
+            slopes = [
+                slope((maps[i][method], maps[j][method]), (maps[i][NOTHING], maps[j][NOTHING]), everywhere)
+                for i, j in combinations(chosen, 2)
+            ]
+            figures |= {
+                "agreement": agreement([maps[i][method][everywhere] for i in chosen], tone),
+                "light_slope": _mean(slopes),
+            }
         figures |= joint(*([_kept(captures[i], maps[i], name) for i in chosen] for name in (method, NOTHING)))
         found[method] = figures
     return found, each_alone
@@ -109,20 +129,24 @@ def of_person(captures: list[Filmed],
 
 def mean_of(rows: list[Figures]) -> Figures:
     """The mean of each figure over the rows that have it; None where none does."""
-    return {name: _mean([row.get(name) for row in rows])
-            for name in dict.fromkeys(name for row in rows for name in row)}
+    return {
+        name: _mean([row.get(name) for row in rows]) for name in dict.fromkeys(name for row in rows for name in row)
+    }
 
 
 def small(answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Maps at SIZE."""
-    return {method: images.resize(np.ascontiguousarray(answer, np.float32), SIZE, SIZE)
-            for method, answer in answers.items()}
+    return {
+        method: images.resize(np.ascontiguousarray(answer, np.float32), SIZE, SIZE)
+        for method, answer in answers.items()
+    }
 
 
 def _kept(filmed: Filmed, maps: dict[str, np.ndarray], method: str) -> Figures:
     points = landmarks_in_uv()
-    return contrast_kept(*(contrasts(images.linear_to_srgb(maps[name]), points, filmed.where)
-                           for name in (method, TRUE)))
+    return contrast_kept(
+        *(contrasts(images.linear_to_srgb(maps[name]), points, filmed.where) for name in (method, TRUE))
+    )
 
 
 def _seen(look: HeadInView, answer: np.ndarray) -> np.ndarray:

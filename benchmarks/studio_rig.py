@@ -54,8 +54,10 @@ def photograph(views: list, folder: Path, seed: int) -> None:
     """folder/photos/cam_NN.png and folder/rig.json."""
     cameras = []
     for i, view in enumerate(views):
-        images.write_srgb(folder / "photos" / f"cam_{i:02d}.png",
-                          painted_head.photograph(view, wall=False, even=True, seed=seed, texels=2048))
+        images.write_srgb(
+            folder / "photos" / f"cam_{i:02d}.png",
+            painted_head.photograph(view, wall=False, even=True, seed=seed, texels=2048),
+        )
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = view.rotation.T @ np.diag([1, -1, -1]), view.centre
         cameras.append({"name": f"cam_{i:02d}", "matrix_world": matrix.tolist()})
@@ -69,16 +71,20 @@ def judge(capture: Capture, views: list, seed: int) -> dict:
     from scipy.spatial import cKDTree
 
     found = read_views(capture)
-    scale, rotation, shift = similarity(np.array([view.centre for view in found]),
-                                        np.array([view.centre for view in views]))
+    scale, rotation, shift = similarity(
+        np.array([view.centre for view in found]), np.array([view.centre for view in views])
+    )
     true = painted_head.person(seed, 2048)[0].mesh
     head = scale * meshes.read_obj(capture.head).vertices @ rotation.T + shift
     x, y, z = true.vertices.T
     face = (y < 0.0) & (np.abs(x) < 0.06) & (z > -0.12) & (z < 0.05)
     off = 1000 * cKDTree(head).query(true.vertices[face])[0]
-    return {"metres_per_metre": round(scale, 4), "face_to_nearest_vertex_median_mm": round(float(np.median(off)), 2),
-            "face_to_nearest_vertex_p90_mm": round(float(np.percentile(off, 90)), 2),
-            "mask_percent_of_texture": round(100 * float(images.read_mask(capture.shadow_mask_auto).mean()), 3)}
+    return {
+        "metres_per_metre": round(scale, 4),
+        "face_to_nearest_vertex_median_mm": round(float(np.median(off)), 2),
+        "face_to_nearest_vertex_p90_mm": round(float(np.percentile(off, 90)), 2),
+        "mask_percent_of_texture": round(100 * float(images.read_mask(capture.shadow_mask_auto).mean()), 3),
+    }
 
 
 if __name__ == "__main__":

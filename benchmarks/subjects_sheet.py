@@ -35,8 +35,9 @@ def main() -> None:
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as work:
         pictures = [portrait(seed, Path(work) / str(seed)) for seed in SUBJECTS]
-    write_small(asked.out, np.vstack([np.hstack(pictures[row:row + COLUMNS])
-                                      for row in range(0, len(pictures), COLUMNS)]))
+    write_small(
+        asked.out, np.vstack([np.hstack(pictures[row : row + COLUMNS]) for row in range(0, len(pictures), COLUMNS)])
+    )
 
 
 def portrait(seed: int, work: Path) -> np.ndarray:
@@ -45,7 +46,7 @@ def portrait(seed: int, work: Path) -> np.ndarray:
     render_frames(work, seed, make_skin(sample_parameters(seed), MAPS), shot, leaves=False)
     picture = images.read_srgb(work / "00000.png")[..., :3]
     top = (len(picture) - SIDE) // 2
-    return picture[top:top + SIDE]
+    return picture[top : top + SIDE]
 
 
 if __name__ == "__main__":

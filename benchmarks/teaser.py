@@ -32,11 +32,17 @@ def main() -> None:
     mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
     mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
     albedo = capture.maps_4k if capture.maps_4k.is_dir() else capture.maps
-    above = [images.read_srgb(views[len(views) // 2].path), texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0]),
-             images.read_srgb(albedo / "diffuse_albedo.png")]
+    above = [
+        images.read_srgb(views[len(views) // 2].path),
+        texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0]),
+        images.read_srgb(albedo / "diffuse_albedo.png"),
+    ]
     below = [images.read_srgb(capture.renders / f"{light}.png") for light in LIGHTS]
-    images.write_srgb(arguments.target, np.vstack([np.hstack([_square(picture) for picture in row])
-                                                   for row in (above, below)]), quality=88)
+    images.write_srgb(
+        arguments.target,
+        np.vstack([np.hstack([_square(picture) for picture in row]) for row in (above, below)]),
+        quality=88,
+    )
 
 
 def _square(picture: np.ndarray) -> np.ndarray:
@@ -44,7 +50,7 @@ def _square(picture: np.ndarray) -> np.ndarray:
     height, width = picture.shape[:2]
     side = min(height, width)
     top, left = (height - side) // 3, (width - side) // 2
-    return images.resize(picture[top:top + side, left:left + side], SIDE, SIDE)
+    return images.resize(picture[top : top + side, left : left + side], SIDE, SIDE)
 
 
 if __name__ == "__main__":

@@ -47,8 +47,15 @@ ROWS = ("average", "blend", "aligned", "perceptual", "delit")
 STEPS = 150
 
 
-def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: int = STEPS, size: int = 1024,
-                 leave_out: int = 4, pictures: Path | None = None) -> dict:
+def measure_rows(
+    capture: Capture,
+    truth: Path,
+    rows: tuple[str, ...] = ROWS,
+    steps: int = STEPS,
+    size: int = 1024,
+    leave_out: int = 4,
+    pictures: Path | None = None,
+) -> dict:
     """Scores the textures of a capture.
 
     Parameters
@@ -75,8 +82,13 @@ def measure_rows(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, st
     head, report, results = read_head(capture), Reporter("texture"), {}
     looks = looks_of(capture, head.caster, truth)
     if "delit" in rows and any(capture.delit.glob("*.png")):
-        results["delit"] = _row("aligned", *texture.observe_all(capture, head, size, report)[:2], looks, steps,
-                                pictures and pictures / "delit.jpg")
+        results["delit"] = _row(
+            "aligned",
+            *texture.observe_all(capture, head, size, report)[:2],
+            looks,
+            steps,
+            pictures and pictures / "delit.jpg",
+        )
     with tempfile.TemporaryDirectory() as folder:
         copy = begin_at_delight(capture, Path(folder) / "copy.wildcap")
         delighter = from_json({"delight": {"delighter": "folder", "folder": str(truth.absolute() / "albedo")}})
@@ -96,16 +108,22 @@ def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[st
     """Frame name -> what its rays meet, of the registered frames with a true albedo."""
     frames = read_frames(capture).by_name
     known = {true.frame: true for true in read_truth(truth)}
-    found = {view.name: cast_face_rays(caster, view, known[frames[view.name].video_frame])
-             for view in read_views(capture) if frames[view.name].video_frame in known}
+    found = {
+        view.name: cast_face_rays(caster, view, known[frames[view.name].video_frame])
+        for view in read_views(capture)
+        if frames[view.name].video_frame in known
+    }
     if not found:
-        raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.",
-                      "Check that the two belong together.")
+        raise Problem(
+            f"No registered frame of {capture.root} has a true albedo in {truth}.",
+            "Check that the two belong together.",
+        )
     return found
 
 
-def _row(row: str, observations: list, surface, looks: dict[str, FaceRays], steps: int,
-         picture: Path | None = None) -> dict:
+def _row(
+    row: str, observations: list, surface, looks: dict[str, FaceRays], steps: int, picture: Path | None = None
+) -> dict:
     started = time.monotonic()
     map_ = _texture(row, [replace(o) for o in observations], surface, steps)
     seconds = time.monotonic() - started
@@ -135,19 +153,35 @@ def score(map_: np.ndarray, frames: Iterable[FaceRays]) -> dict:
         scores.append(compare(predicted, seen.true, seen.true.face & hit))
         found.append(marks(seen, map_))
     mean = mean_scores(scores)
-    return {**mean["raw"], **{f"{name}_after_gain": value for name, value in mean["gain"].items()},
-            "detail": mean["detail"], "shadow_step": mean["shadow_step"], "frames": len(scores), **mean_of(found)}
+    return {
+        **mean["raw"],
+        **{f"{name}_after_gain": value for name, value in mean["gain"].items()},
+        "detail": mean["detail"],
+        "shadow_step": mean["shadow_step"],
+        "frames": len(scores),
+        **mean_of(found),
+    }
 
 
 def _leave_one_out(observations: list, surface, looks: dict[str, FaceRays], count: int) -> dict:
     """The aligned texture without one view, scored in that view alone; `count` views in turn, evenly spread."""
     names = [o.name for o in observations if o.name in looks]
     chosen = [names[i] for i in np.unique(np.linspace(1, max(len(names) - 2, 1), count).round().astype(int))]
-    frames = {name: score(_texture("aligned", [replace(o) for o in observations if o.name != name], surface, 0),
-                          [looks[name]]) for name in chosen}
+    frames = {
+        name: score(
+            _texture("aligned", [replace(o) for o in observations if o.name != name], surface, 0), [looks[name]]
+        )
+        for name in chosen
+    }
     figures = ("psnr", "ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")
-    return {**{f: float(np.mean(values)) for f in figures
-               if (values := [v[f] for v in frames.values() if v.get(f) is not None])}, "frames": frames}
+    return {
+        **{
+            f: float(np.mean(values))
+            for f in figures
+            if (values := [v[f] for v in frames.values() if v.get(f) is not None])
+        },
+        "frames": frames,
+    }
 
 
 def main() -> None:
@@ -160,8 +194,20 @@ def main() -> None:
     parser.add_argument("--leave-out", type=int, default=4, help="frames that are left out in turn; 0 for none")
     parser.add_argument("--pictures", type=Path, help="folder for the rows' textures")
     options = parser.parse_args()
-    print(json.dumps(measure_rows(Capture(options.capture.resolve()), options.truth, tuple(options.rows), options.steps,
-                                  options.size, options.leave_out, options.pictures), indent=1))
+    print(
+        json.dumps(
+            measure_rows(
+                Capture(options.capture.resolve()),
+                options.truth,
+                tuple(options.rows),
+                options.steps,
+                options.size,
+                options.leave_out,
+                options.pictures,
+            ),
+            indent=1,
+        )
+    )
 
 
 if __name__ == "__main__":

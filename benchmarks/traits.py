@@ -44,8 +44,10 @@ def main() -> int:
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     mean = load().mean_face
-    record = {PAINTED: measure(read_shapes(asked.skins)),
-              UNLIT: measure(read_shapes(asked.skins, lambda skin: unshaded(skin, mean)))}
+    record = {
+        PAINTED: measure(read_shapes(asked.skins)),
+        UNLIT: measure(read_shapes(asked.skins, lambda skin: unshaded(skin, mean))),
+    }
     print("\n\n".join(body for _, body in sections(record)))
     if asked.json:
         figures.write_record(asked.json, "traits", COMMAND, record)
@@ -61,12 +63,20 @@ def measure(found: LargeShapes) -> dict:
     product = found.ratio[:, i] * found.ratio[:, j] / variance
     across = (one[:, 0] * other[:, 0] < 0) & (np.abs(one[:, 0]) > 0.012)
     z = z_scores(found)
-    return {"skins": len(found.ratio), "deviation": round(variance**0.5, 4),
-            "same side": correlation_by_distance(product, 1e3 * np.linalg.norm(one - other, axis=1)),
-            "mirror image": correlation_by_distance(product[:, across], 1e3 * np.linalg.norm(
-                one - other * [-1, 1, 1], axis=1)[across]),
-            "z": {"all": _deviation(z), "least": min(map(_deviation, z)), "most": max(map(_deviation, z)),
-                  "regions": {name: _deviation(z[:, where]) for name, where in regions(found.places).items()}}}
+    return {
+        "skins": len(found.ratio),
+        "deviation": round(variance**0.5, 4),
+        "same side": correlation_by_distance(product, 1e3 * np.linalg.norm(one - other, axis=1)),
+        "mirror image": correlation_by_distance(
+            product[:, across], 1e3 * np.linalg.norm(one - other * [-1, 1, 1], axis=1)[across]
+        ),
+        "z": {
+            "all": _deviation(z),
+            "least": min(map(_deviation, z)),
+            "most": max(map(_deviation, z)),
+            "regions": {name: _deviation(z[:, where]) for name, where in regions(found.places).items()},
+        },
+    }
 
 
 def z_scores(found: LargeShapes) -> np.ndarray:
@@ -83,8 +93,10 @@ def z_scores(found: LargeShapes) -> np.ndarray:
 
 def correlation_by_distance(product: np.ndarray, apart_mm: np.ndarray) -> dict[str, float]:
     """The mean of products [..., N] of pairs, over the variance, by their distance [N]."""
-    return {f"{low} to {high} mm": round(float(np.nanmean(product[..., (apart_mm >= low) & (apart_mm < high)])), 3)
-            for low, high in zip(BINS_MM, BINS_MM[1:], strict=False)}
+    return {
+        f"{low} to {high} mm": round(float(np.nanmean(product[..., (apart_mm >= low) & (apart_mm < high)])), 3)
+        for low, high in zip(BINS_MM, BINS_MM[1:], strict=False)
+    }
 
 
 def regions(places: np.ndarray) -> dict[str, np.ndarray]:
@@ -93,20 +105,33 @@ def regions(places: np.ndarray) -> dict[str, np.ndarray]:
     x, z = np.abs(places[:, 0]), places[:, 2]
     nose_base = (height[NOSE_TIP] + height[MOUTH]) / 2
     nose = (x < NOSE_M) & (z > nose_base) & (z < height[BROW])
-    return {"forehead": z >= height[BROW], "nose": nose,
-            "around the eyes": (z > height[NOSE_TIP]) & (z < height[BROW]) & ~nose,
-            "cheeks": (z > nose_base) & (z <= height[NOSE_TIP]) & ~nose, "mouth and jaw": z <= nose_base}
+    return {
+        "forehead": z >= height[BROW],
+        "nose": nose,
+        "around the eyes": (z > height[NOSE_TIP]) & (z < height[BROW]) & ~nose,
+        "cheeks": (z > nose_base) & (z <= height[NOSE_TIP]) & ~nose,
+        "mouth and jaw": z <= nose_base,
+    }
 
 
 def sections(record: dict) -> Sections:
     """Heading and Markdown of each part of the page."""
     painted = record[PAINTED]
-    rows = [[kind, f"{of['deviation']:.3f}", side, *(f"{value:.2f}" for value in of[side].values())]
-            for kind, of in record.items() for side in ("same side", "mirror image")]
+    rows = [
+        [kind, f"{of['deviation']:.3f}", side, *(f"{value:.2f}" for value in of[side].values())]
+        for kind, of in record.items()
+        for side in ("same side", "mirror image")
+    ]
     head = ["light painted into the skins", "deviation", "correlation with", *painted["same side"]]
     names = list(painted["z"]["regions"])
-    scores = [[kind, *(f"{of['z'][name]:.2f}" for name in ("all", "least", "most")),
-               *(f"{of['z']['regions'][name]:.2f}" for name in names)] for kind, of in record.items()]
+    scores = [
+        [
+            kind,
+            *(f"{of['z'][name]:.2f}" for name in ("all", "least", "most")),
+            *(f"{of['z']['regions'][name]:.2f}" for name in names),
+        ]
+        for kind, of in record.items()
+    ]
     words = prose(f"""
         Of {painted["skins"]} painted skins of the VALID avatars, one of each base, the grey log ratio to their median,
         by distance; hair and make-up are left out. What light is painted into such skins and what their traits are
@@ -115,12 +140,19 @@ def sections(record: dict) -> Sections:
         {split.MIRROR_CORRELATION} of it with the mirror image, midway; where skins differ more than elsewhere
         (`core/weights/traits.json`), traits may be larger.
         """)
-    return [("How skins differ", words + "\n\n" + figures.markdown(head, rows)),
-            ("How well that holds for others", prose("""
+    return [
+        ("How skins differ", words + "\n\n" + figures.markdown(head, rows)),
+        (
+            "How well that holds for others",
+            prose("""
         Standard deviation of a skin's z-scores, its difference from the other skins over theirs at that place, one
         left out at a time: of all (aim: 0.8 to 1.25), of the skin with the least and the most, and of all by region
         (aim: 0.6 to 1.6).
-        """) + "\n\n" + figures.markdown(["z, light painted into the skins", "all", "least", "most", *names], scores))]
+        """)
+            + "\n\n"
+            + figures.markdown(["z, light painted into the skins", "all", "least", "most", *names], scores),
+        ),
+    ]
 
 
 def _deviation(scores: np.ndarray) -> float:

@@ -45,21 +45,39 @@ def main() -> int:
         write_video(film, pictures(0.0 if arguments.silent else JAW))
     measure_stage(capture.root, "frames", film.resolve(), "draft")
     cost = measure_stage(capture.root, "cameras", film.resolve(), "draft")
-    command = [sys.executable, "-m", "core", "run", str(film), str(capture.root), "--quality", "draft", "--until",
-               arguments.until]
+    command = [
+        sys.executable,
+        "-m",
+        "core",
+        "run",
+        str(film),
+        str(capture.root),
+        "--quality",
+        "draft",
+        "--until",
+        arguments.until,
+    ]
     said = subprocess.run(command, cwd=figures.ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     record = capture.read()
     stages = {stage: round(done["seconds"], 1) for stage, done in record["stages"].items()}
     findings = [finding["problem"] for done in record["stages"].values() for finding in done.get("findings", [])]
-    row = {"seconds": round(sum(stages.values()), 1), "stages": stages, "cost": cost, "exit": said.returncode,
-           "findings": {str(k): finding for k, finding in enumerate(findings)},
-           "cameras": record["stages"].get("cameras", {}).get("figures", {}), "stopped": record.get("stopped")}
+    row = {
+        "seconds": round(sum(stages.values()), 1),
+        "stages": stages,
+        "cost": cost,
+        "exit": said.returncode,
+        "findings": {str(k): finding for k, finding in enumerate(findings)},
+        "cameras": record["stages"].get("cameras", {}).get("figures", {}),
+        "stopped": record.get("stopped"),
+    }
     print(said.stdout[-2000:], *findings, row, sep="\n")
     if arguments.json:
-        figures.write_record(arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row},
-                             keep=True)
-    return (0 if any("stood still" in text for text in [*findings, (record.get("stopped") or {}).get("problem", "")])
-            else 1)
+        figures.write_record(
+            arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row}, keep=True
+        )
+    return (
+        0 if any("stood still" in text for text in [*findings, (record.get("stopped") or {}).get("problem", "")]) else 1
+    )
 
 
 def pictures(jaw: float):
@@ -67,7 +85,7 @@ def pictures(jaw: float):
     view = place_camera(0, 0.03, scale=SCALE)
     checks = np.random.default_rng(2).random((40, 40, 3), np.float32) ** 2
     shirt = images.linear_to_srgb(images.resize(checks, view.width, view.width))
-    y, x = np.mgrid[:view.height, :view.width]
+    y, x = np.mgrid[: view.height, : view.width]
     chest = np.sqrt(np.maximum((0.5 * view.width) ** 2 - (x - view.width / 2) ** 2, 0))
     worn = y > view.height - 0.16 * view.width - 0.25 * chest + 0.1 * view.width
     for i in range(FRAMES):

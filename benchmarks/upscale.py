@@ -63,11 +63,13 @@ CLOSE = 9.0
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rows", nargs="+", choices=("enlarging", "frames", "cost"),
-                        default=("enlarging", "frames", "cost"))
+    parser.add_argument(
+        "--rows", nargs="+", choices=("enlarging", "frames", "cost"), default=("enlarging", "frames", "cost")
+    )
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscale_benchmark")
-    parser.add_argument("--json", type=Path,
-                        help="where the figures go, such as docs/figures/upscale.json; those of other rows stay")
+    parser.add_argument(
+        "--json", type=Path, help="where the figures go, such as docs/figures/upscale.json; those of other rows stay"
+    )
     parser.add_argument("--picture", type=Path, help="close-ups of small map, Lanczos, network and truth side by side")
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
@@ -82,14 +84,22 @@ def main() -> None:
             found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
     for name, rows in found.items():
         columns = next(iter(rows.values()))
-        print(markdown([name, *columns], [[row, *(f"{values[column]:.4g}" for column in columns)]
-                                          for row, values in rows.items()]), end="\n\n")
+        print(
+            markdown(
+                [name, *columns],
+                [[row, *(f"{values[column]:.4g}" for column in columns)] for row, values in rows.items()],
+            ),
+            end="\n\n",
+        )
     if arguments.json:
+
         def keys(figures_by_name: dict[str, float]) -> dict[str, float]:
             return {figure.lower().replace(" ", "_"): value for figure, value in figures_by_name.items()}
 
-        keyed = {part: {row.replace("lanczos", "Lanczos"): keys(values) for row, values in rows.items()}
-                 for part, rows in found.items()}
+        keyed = {
+            part: {row.replace("lanczos", "Lanczos"): keys(values) for row, values in rows.items()}
+            for part, rows in found.items()
+        }
         write_record(arguments.json, "upscale", "python -m benchmarks.upscale", keyed, keep=True)
 
 
@@ -109,8 +119,10 @@ def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, floa
                     scores[method].append(compare(result, true))
                 if view == 0 and kind == "soft":
                     shots.append(_closeup(small, {method: results[method] for method in METHODS}, true))
-        found |= {f"{kind}, {method}": {name: round(float(np.mean([s[name] for s in rows])), 4) for name in rows[0]}
-                  for method, rows in scores.items()}
+        found |= {
+            f"{kind}, {method}": {name: round(float(np.mean([s[name] for s in rows])), 4) for name in rows[0]}
+            for method, rows in scores.items()
+        }
     if sheet:
         images.write_srgb(sheet, np.vstack([np.hstack(shots[:2]), np.hstack(shots[2:4])]), quality=86)
     return found
@@ -121,8 +133,10 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
     result, true = (maps[BORDER:-BORDER, BORDER:-BORDER] for maps in (result, true))
     figures = {}
     for name, channels in (("diffuse", slice(0, 3)), ("specular", slice(6, 7)), ("normal", slice(3, 6))):
-        one, other = (maps[..., channels] * (0.5 if name == "normal" else 1) + (0.5 if name == "normal" else 0)
-                      for maps in (result, true))
+        one, other = (
+            maps[..., channels] * (0.5 if name == "normal" else 1) + (0.5 if name == "normal" else 0)
+            for maps in (result, true)
+        )
         figures[f"{name} PSNR"] = float(-10 * np.log10(np.mean((one - other) ** 2)))
         figures[f"{name} SSIM"] = float(structural_similarity(one, other, channel_axis=2, data_range=1.0))
     diffuse, true_diffuse = (np.ascontiguousarray(maps[..., :3]) for maps in (result, true))
@@ -140,8 +154,14 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
 def cost(method: str, size: int = 1024) -> dict[str, float]:
     """Seconds and peak memory in GiB of enlarging maps of that size, in the process it is called in."""
     rng, blank = np.random.default_rng(0), np.ones((size, size, 3), np.float32)
-    maps = HeadMaps(rng.random((size, size, 3), np.float32), blank / np.sqrt(3), rng.random((size, size), np.float32),
-                    blank[..., 0], blank, blank[..., 0])
+    maps = HeadMaps(
+        rng.random((size, size, 3), np.float32),
+        blank / np.sqrt(3),
+        rng.random((size, size), np.float32),
+        blank[..., 0],
+        blank,
+        blank[..., 0],
+    )
     with spending() as spent:
         enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
     return {"seconds": round(spent.seconds, 1), "peak GiB": round(peak() / GIB, 2)}
@@ -160,9 +180,10 @@ def _closeup(small: np.ndarray, results: dict[str, np.ndarray], true: np.ndarray
     log = cv2.GaussianBlur(np.abs(cv2.Laplacian(true[..., 1], cv2.CV_32F)), (0, 0), side / 4)[side:-side, side:-side]
     row, column = (int(at) + side // 2 for at in np.unravel_index(log.argmax(), log.shape))
     nearest = np.repeat(np.repeat(np.moveaxis(small, 0, -1), FACTOR, 0), FACTOR, 1)
-    parts = [maps[row:row + side, column:column + side] for maps in (nearest, *results.values(), true)]
-    both = np.vstack([np.hstack([part[..., :3] for part in parts]),
-                      np.hstack([part[..., 3:6] * 0.5 + 0.5 for part in parts])])
+    parts = [maps[row : row + side, column : column + side] for maps in (nearest, *results.values(), true)]
+    both = np.vstack(
+        [np.hstack([part[..., :3] for part in parts]), np.hstack([part[..., 3:6] * 0.5 + 0.5 for part in parts])]
+    )
     return np.pad(both, ((0, 8), (0, 8), (0, 0)), constant_values=1)
 
 
@@ -181,8 +202,10 @@ def from_frames(work: Path) -> dict[str, dict[str, float]]:
             detail.guide(guided, images.read_data(capture.texture_detail), 1024, lambda done: None)
             for name, albedo in ((method, plain), (f"{method}, with the frames", guided)):
                 rows.setdefault(name, []).append(_fine_figures(albedo, true, seen))
-    return {name: {figure: round(float(np.mean([r[figure] for r in found])), 4) for figure in found[0]}
-            for name, found in rows.items()}
+    return {
+        name: {figure: round(float(np.mean([r[figure] for r in found])), 4) for figure in found[0]}
+        for name, found in rows.items()
+    }
 
 
 def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
@@ -221,10 +244,13 @@ def _fine_figures(albedo: np.ndarray, true: np.ndarray, observed: np.ndarray) ->
     spots, true_spots = (cv2.GaussianBlur(log, (0, 0), 0.7) - cv2.GaussianBlur(log, (0, 0), 4.0) for log in logs)
     near = np.zeros(inner.shape, bool)
     for row, column in moles(true_spots, inner & (template.mask("brows", 1024) < 0.1).repeat(2, 0).repeat(2, 1)):
-        near[row - 6:row + 7, column - 6:column + 7] = True
-    return {"PSNR": float(-10 * np.log10(((albedo - true)[inner] ** 2).mean())), "SSIM": float(ssim[inner].mean()),
-            "pores": float(np.corrcoef(fine[inner], true_fine[inner])[0, 1]),
-            "moles": float((spots * true_spots)[near].sum() / (true_spots[near] ** 2).sum())}
+        near[row - 6 : row + 7, column - 6 : column + 7] = True
+    return {
+        "PSNR": float(-10 * np.log10(((albedo - true)[inner] ** 2).mean())),
+        "SSIM": float(ssim[inner].mean()),
+        "pores": float(np.corrcoef(fine[inner], true_fine[inner])[0, 1]),
+        "moles": float((spots * true_spots)[near].sum() / (true_spots[near] ** 2).sum()),
+    }
 
 
 if __name__ == "__main__":

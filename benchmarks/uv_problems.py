@@ -81,8 +81,11 @@ class MaskedUvProblem:
         outside."""
         edge = cv2.morphologyEx((self.shadow > 0.5).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
         band = cv2.dilate(edge, np.ones((25 * len(self.albedo) // 1024 | 1,) * 2, np.uint8)) > 0
-        return {"shadow": self.face & (self.shadow > 0.5) & ~band, "band": self.face & band,
-                "outside": self.face & (self.shadow < 0.05) & ~band}
+        return {
+            "shadow": self.face & (self.shadow > 0.5) & ~band,
+            "band": self.face & band,
+            "outside": self.face & (self.shadow < 0.05) & ~band,
+        }
 
 
 def make_problem(subject: str, shadows: str, size: int, kind: str = "raw") -> MaskedUvProblem:
@@ -142,8 +145,10 @@ def lee_perry_smith() -> Path:
         uvs = np.asarray(scan.visual.uv) * [1, -1] + [0, 1]
         folder = CACHE / "lee_perry_smith_source"
         folder.mkdir(parents=True, exist_ok=True)
-        meshes.write_obj(folder / "head.obj",
-                         meshes.Mesh(np.asarray(scan.vertices), np.asarray(scan.faces), uvs, np.asarray(scan.faces)))
+        meshes.write_obj(
+            folder / "head.obj",
+            meshes.Mesh(np.asarray(scan.vertices), np.asarray(scan.faces), uvs, np.asarray(scan.faces)),
+        )
         with replacing(folder / f"{LEE_PERRY_SMITH.name}.jpg") as temporary:
             temporary.write_bytes((LEE_PERRY_SMITH / "Map-COL.jpg").read_bytes())
         carry(folder, out, folder / "head.obj", 1024, Reporter("carry"))
@@ -185,15 +190,19 @@ def _usable(shading: np.ndarray, kept: np.ndarray, shadow: np.ndarray) -> bool:
     face = template.mask("face", len(shadow)) > 0.5
     lightness = shading[face].mean(-1)
     dark = kept[face & (shadow > 0.5)]
-    return (MASKED[0] < _painted(shadow)[face].mean() < MASKED[1] and (shadow[face] > 0.5).mean() > MASKED[0] / 2
-            and 0.2 < dark.mean() < 0.75
-            and np.percentile(lightness, 3) > 0.3 * lightness.mean())
+    return (
+        MASKED[0] < _painted(shadow)[face].mean() < MASKED[1]
+        and (shadow[face] > 0.5).mean() > MASKED[0] / 2
+        and 0.2 < dark.mean() < 0.75
+        and np.percentile(lightness, 3) > 0.3 * lightness.mean()
+    )
 
 
 def _painted(shadow: np.ndarray) -> np.ndarray:
     """The mask an artist would paint over a shadow: all of it and a little more."""
-    return cv2.dilate((shadow > 0.08).astype(np.uint8),
-                      np.ones((9 * len(shadow) // 1024 | 1,) * 2, np.uint8)).astype(np.float32)
+    return cv2.dilate((shadow > 0.08).astype(np.uint8), np.ones((9 * len(shadow) // 1024 | 1,) * 2, np.uint8)).astype(
+        np.float32
+    )
 
 
 def _sh_part(shading: np.ndarray, normal: np.ndarray, face: np.ndarray) -> np.ndarray:

@@ -35,22 +35,32 @@ def main() -> None:
     seed = RESERVED["sample"]
     skin = make_skin(sample_parameters(seed), MAPS)
     with tempfile.TemporaryDirectory() as work:
+
         def shots(name: str, cameras: np.ndarray, room: bool = True) -> list[np.ndarray]:
             """Linear pictures through camera-to-world matrices [N, 4, 4]."""
-            render_frames(Path(work) / name, seed, skin,
-                          scene.Shot(cameras, list(range(len(cameras))), SAMPLES, SCALE, room=room), leaves=False)
+            render_frames(
+                Path(work) / name,
+                seed,
+                skin,
+                scene.Shot(cameras, list(range(len(cameras))), SAMPLES, SCALE, room=room),
+                leaves=False,
+            )
             return [images.read_linear(Path(work) / name / f"{k:05d}.png") for k in range(len(cameras))]
 
-        good = shots("good",
-                     np.stack([around(azimuth, 6 + 8 * np.sin(azimuth / 20)) for azimuth in (-60, -30, 0, 30, 60)]))
+        good = shots(
+            "good", np.stack([around(azimuth, 6 + 8 * np.sin(azimuth / 20)) for azimuth in (-60, -30, 0, 30, 60)])
+        )
         hasty = np.mean(shots("hasty", np.stack([around(-12 + a, 6) for a in np.linspace(0, SWING_DEG, BLUR)])), axis=0)
         far, near = shots("far", np.stack([around(0, 6, 1.7), around(0, 6, 0.24)]))
-        bare, = shots("bare", around(0, 6)[None], room=False)
+        (bare,) = shots("bare", around(0, 6)[None], room=False)
     noise = np.random.default_rng(0).normal(scale=0.006, size=good[2].shape)
     burnt, dark = np.minimum(4 * good[2], 1), np.maximum(0.04 * good[2] + noise, 0)
     for name, row in (("film_good", good), ("film_bad", [hasty, far, near, bare, burnt, dark])):
-        images.write_srgb(folder / f"{name}.jpg",
-                          np.hstack([images.linear_to_srgb(picture.astype(np.float32)) for picture in row]), quality=85)
+        images.write_srgb(
+            folder / f"{name}.jpg",
+            np.hstack([images.linear_to_srgb(picture.astype(np.float32)) for picture in row]),
+            quality=85,
+        )
 
 
 def around(azimuth_deg: float, height_deg: float, distance: float = scene.DISTANCE) -> np.ndarray:

@@ -49,9 +49,11 @@ def main() -> None:
     parser.add_argument("truth", type=Path)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
     parser.add_argument("--delighters", nargs="+", default=DELIGHTERS, help="of the row delighters")
-    parser.add_argument("--json", type=Path,
-                        help="where the table's figures go, such as docs/figures/whole_chain.json; those of other "
-                             "captures stay")
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="where the table's figures go, such as docs/figures/whole_chain.json; those of other captures stay",
+    )
     arguments = parser.parse_args()
     capture = Capture(arguments.capture.resolve())
     tone = skin_tone(arguments.truth)
@@ -62,9 +64,13 @@ def main() -> None:
         rows["delighters"] = {name: _row("delighter", capture, arguments.truth, of) for name, of in chosen.items()}
     print(json.dumps(rows, indent=1))
     if arguments.json:
-        write_record(arguments.json, "whole_chain",
-                     "python -m benchmarks.whole_chain CAPTURE TRUTH --rows chain solve_off true_mask mask delighters",
-                     _figures(capture, rows), keep=True)
+        write_record(
+            arguments.json,
+            "whole_chain",
+            "python -m benchmarks.whole_chain CAPTURE TRUTH --rows chain solve_off true_mask mask delighters",
+            _figures(capture, rows),
+            keep=True,
+        )
 
 
 def _figures(capture: Capture, rows: dict) -> dict:
@@ -72,12 +78,16 @@ def _figures(capture: Capture, rows: dict) -> dict:
     mask, and the mask's intersection over union; None is what was not run."""
     name, own = capture.root.stem, capture.read()["stages"]["delight"]["figures"]["delighter"]
     chains = {own: (rows.get("solve_off"), rows.get("chain"), rows.get("true_mask"))}
-    chains |= {delighter: (row["solve_off"], row, chains.get(delighter, (None,))[-1])
-               for delighter, row in rows.get("delighters", {}).items()}
+    chains |= {
+        delighter: (row["solve_off"], row, chains.get(delighter, (None,))[-1])
+        for delighter, row in rows.get("delighters", {}).items()
+    }
     found = {}
     for delighter, scores in chains.items():
-        cells = {column: {figure: score and score["raw"][figure] for figure in ("psnr", "ssim")}
-                 for column, score in zip(("solve_off", "solved", "true_mask"), scores, strict=True)}
+        cells = {
+            column: {figure: score and score["raw"][figure] for figure in ("psnr", "ssim")}
+            for column, score in zip(("solve_off", "solved", "true_mask"), scores, strict=True)
+        }
         found[f"{name}, {delighter}"] = {"capture": name, "delighter": delighter, **cells}
     return {"rows": found, **({"mask_iou": {name: rows["mask"]["iou"]}} if "mask" in rows else {})}
 
@@ -87,8 +97,9 @@ def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:
         return score_capture(capture, truth)
     with tempfile.TemporaryDirectory() as folder:
         copy = Capture(Path(folder) / "copy.wildcap")
-        shutil.copytree(capture.root, copy.root,
-                        ignore=shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "lock"))
+        shutil.copytree(
+            capture.root, copy.root, ignore=shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "lock")
+        )
         copy.shadow_mask.unlink(missing_ok=True)
         if row == "solve_off":
             return _score_texture(copy, truth, settings)
@@ -100,15 +111,25 @@ def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:
             run_stages(copy, settings, "delight", "texture", "shadow_mask", "solve")
             return {**score_capture(copy, truth), "solve_off": _score_texture(copy, truth, settings)}
         if row == "true_frames":
-            run_stages(copy, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings),
-                       "delight", "texture", "shadow_mask", "solve")
+            run_stages(
+                copy,
+                from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings),
+                "delight",
+                "texture",
+                "shadow_mask",
+                "solve",
+            )
             return {**score_capture(copy, truth), "solve_off": _score_texture(copy, truth, settings)}
         shadow, seen = _true_shadow(copy, truth, 512)
         if row == "mask":
             found = images.resize(images.read_mask(copy.shadow_mask_auto), 512, 512) > 0.5
             both = (found & shadow)[seen].sum()
-            return {"recall": float(both / shadow[seen].sum()), "iou": float(both / (found | shadow)[seen].sum()),
-                    "true_share": float(shadow[seen].mean()), "masked_share": float(found[seen].mean())}
+            return {
+                "recall": float(both / shadow[seen].sum()),
+                "iou": float(both / (found | shadow)[seen].sum()),
+                "true_share": float(shadow[seen].mean()),
+                "masked_share": float(found[seen].mean()),
+            }
         images.write_data(copy.shadow_mask, images.resize(shadow.astype(np.float32), 1024, 1024).clip(0, 1))
         run_stages(copy, settings, "solve")
         return score_capture(copy, truth)

@@ -57,8 +57,11 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="*", type=int, default=SEEDS)
     parser.add_argument("--subject", type=int)
     parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--json", type=Path,
-                        help="where the figures go, such as docs/figures/whole_head.json; those of other captures stay")
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="where the figures go, such as docs/figures/whole_head.json; those of other captures stay",
+    )
     asked = parser.parse_args()
     found = {}
     if asked.seeds:
@@ -69,8 +72,9 @@ def main() -> None:
         found[path.stem] = of_capture(Capture(path), asked.subject)
     print(json.dumps(found, indent=1))
     if asked.json:
-        write_record(asked.json, "whole_head", "python -m benchmarks.whole_head [--subject SEED] [CAPTURE]", found,
-                     keep=True)
+        write_record(
+            asked.json, "whole_head", "python -m benchmarks.whole_head [--subject SEED] [CAPTURE]", found, keep=True
+        )
 
 
 def whole(seed: int, surface: HeadSurface) -> dict:
@@ -83,33 +87,47 @@ def whole(seed: int, surface: HeadSurface) -> dict:
     shown = np.clip(2 * face, 0, 1)[..., None]
     diffuse = truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)
     specular = truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2 * (1 - shown[..., 0])
-    cut = replace(truth, confidence=(0.7 * face).astype(np.float32), seen=face.astype(np.float32),
-                  diffuse=diffuse.astype(np.float32),
-                  specular=specular.astype(np.float32))
+    cut = replace(
+        truth,
+        confidence=(0.7 * face).astype(np.float32),
+        seen=face.astype(np.float32),
+        diffuse=diffuse.astype(np.float32),
+        specular=specular.astype(np.float32),
+    )
     done, hidden = complete(cut, surface, Reporter("upscale"), seed), face < 0.02
     row: dict = {}
     for region in ("neck", "ears", "scalp"):
         where = hidden & (template.mask(region, size) > 0.9)
-        row[region] = {name: _error(*(_tone(m, surface) for m in (maps, truth)), where)
-                       for name, maps in (("fill", cut), ("completed", done))}
+        row[region] = {
+            name: _error(*(_tone(m, surface) for m in (maps, truth)), where)
+            for name, maps in (("fill", cut), ("completed", done))
+        }
     near = hidden & (template.mask("neck", size) > 0.9) & (surface.texel < 1.5 * np.median(surface.texel))
-    row["grain"] = {name: _grain(maps, near, surface) / _grain(truth, skin.numpy() > 0.99, surface)
-                    for name, maps in (("fill", cut), ("completed", done))}
+    row["grain"] = {
+        name: _grain(maps, near, surface) / _grain(truth, skin.numpy() > 0.99, surface)
+        for name, maps in (("fill", cut), ("completed", done))
+    }
     return row
 
 
 def hairs(seed: int, surface: HeadSurface) -> dict:
     """How well hair is found and taken away; the subject three times: bearded, shaven, without brows."""
-    bearded, shaven, bare = (_painted(surface, seed, **changes)
-                             for changes in ({"beard": 0.8, "beard_length": 1.0}, {"beard": 0.0},
-                                             {"beard": 0.0, "brow_density": 0.0}))
+    bearded, shaven, bare = (
+        _painted(surface, seed, **changes)
+        for changes in ({"beard": 0.8, "beard_length": 1.0}, {"beard": 0.0}, {"beard": 0.0, "brow_density": 0.0})
+    )
     found, none = hair.find(bearded, surface), hair.find(shaven, surface)
     cleaned, _ = hair.clean(bearded, found, surface)
     under = (_darker(bearded, bare) > 0.05) & (template.mask("scalp", surface.size) < 0.01)
-    return {"brows": _alike(none.brows, _darker(shaven, bare)), "beard": _alike(found.beard, _darker(bearded, shaven)),
-            "bare_chin": _cm2(none.beard, surface),
-            "below_hair": {"with hair": _error(bearded.diffuse, bare.diffuse, under),
-                           "clean": _error(cleaned, bare.diffuse, under)}}
+    return {
+        "brows": _alike(none.brows, _darker(shaven, bare)),
+        "beard": _alike(found.beard, _darker(bearded, shaven)),
+        "bare_chin": _cm2(none.beard, surface),
+        "below_hair": {
+            "with hair": _error(bearded.diffuse, bare.diffuse, under),
+            "clean": _error(cleaned, bare.diffuse, under),
+        },
+    }
 
 
 def of_capture(capture: Capture, subject: int | None = None) -> dict:
@@ -133,21 +151,36 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
             where = hidden & (template.mask(region, surface.size) > 0.9)
             return _error(*(_tone(m, surface) for m in (maps, truth)), where)
 
-        tones = {"tone": {region: {"fill": error(maps, region), "completed": error(done, region)}
-                          for region in ("neck", "ears", "scalp")}}
-    return {**tones, "completed_share_percent": report.figures["completed_share_percent"],
-            "border": {"fill": _step(maps, rings[0], rings[1], surface),
-                       "completed": _step(done, rings[0], rings[1], surface),
-                       "within": _step(maps, rings[0], rings[2], surface)},
-            "cut": {"fill": _cut(maps, surface), "completed": _cut(done, surface)},
-            "hair": {name: round(_cm2(getattr(found, name), surface), 2) for name in ("brows", "lashes", "beard")}}
+        tones = {
+            "tone": {
+                region: {"fill": error(maps, region), "completed": error(done, region)}
+                for region in ("neck", "ears", "scalp")
+            }
+        }
+    return {
+        **tones,
+        "completed_share_percent": report.figures["completed_share_percent"],
+        "border": {
+            "fill": _step(maps, rings[0], rings[1], surface),
+            "completed": _step(done, rings[0], rings[1], surface),
+            "within": _step(maps, rings[0], rings[2], surface),
+        },
+        "cut": {"fill": _cut(maps, surface), "completed": _cut(done, surface)},
+        "hair": {name: round(_cm2(getattr(found, name), surface), 2) for name in ("brows", "lashes", "beard")},
+    }
 
 
 def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
     skin = make_skin(replace(sample_parameters(seed), **changes), surface.size)
     one = np.ones((surface.size,) * 2, np.float32)
-    return HeadMaps(skin.diffuse.astype(np.float32), skin.normal.astype(np.float32), skin.specular, 0.7 * one,
-                    np.repeat(one[..., None], 3, 2), one)
+    return HeadMaps(
+        skin.diffuse.astype(np.float32),
+        skin.normal.astype(np.float32),
+        skin.specular,
+        0.7 * one,
+        np.repeat(one[..., None], 3, 2),
+        one,
+    )
 
 
 def _step(maps: HeadMaps, ring: np.ndarray, next_ring: np.ndarray, surface: HeadSurface) -> float:
@@ -160,8 +193,9 @@ def _step(maps: HeadMaps, ring: np.ndarray, next_ring: np.ndarray, surface: Head
 
 
 def _tone(maps: HeadMaps, surface: HeadSurface) -> np.ndarray:
-    return np.exp(cv2.GaussianBlur(np.log(np.maximum(maps.diffuse, 0.004)), (0, 0),
-                                   2.0 / float(np.median(surface.texel))))
+    return np.exp(
+        cv2.GaussianBlur(np.log(np.maximum(maps.diffuse, 0.004)), (0, 0), 2.0 / float(np.median(surface.texel)))
+    )
 
 
 def _cut(maps: HeadMaps, surface: HeadSurface) -> dict:
@@ -177,8 +211,9 @@ def _cut(maps: HeadMaps, surface: HeadSurface) -> dict:
 
 
 def _grain(maps: HeadMaps, mask: np.ndarray, surface: HeadSurface) -> float:
-    fine = grain.bands(np.log(np.maximum(maps.diffuse, 0.004)), np.ones(mask.shape, np.float32),
-                       float(np.median(surface.texel)))[2]
+    fine = grain.bands(
+        np.log(np.maximum(maps.diffuse, 0.004)), np.ones(mask.shape, np.float32), float(np.median(surface.texel))
+    )[2]
     return float(np.subtract(*np.percentile(fine[mask], [83, 17])))
 
 

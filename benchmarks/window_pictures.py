@@ -76,10 +76,11 @@ def draw(picture: WindowPicture, folder: Path) -> np.ndarray:
         shot = images.read_srgb(folder / f"{name}.png")[..., :3]
         height, width = shot.shape[:2]
         left, top, right, bottom = box
-        shot = shot[round(top * height):round(bottom * height), round(left * width):round(right * width)]
+        shot = shot[round(top * height) : round(bottom * height), round(left * width) : round(right * width)]
         scale = min(1.0, picture.width_px / shot.shape[1])
-        parts.append(images.resize(np.ascontiguousarray(shot), round(scale * shot.shape[1]),
-                                   round(scale * shot.shape[0])))
+        parts.append(
+            images.resize(np.ascontiguousarray(shot), round(scale * shot.shape[1]), round(scale * shot.shape[0]))
+        )
     return np.hstack(parts)
 
 

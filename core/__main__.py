@@ -67,64 +67,95 @@ def _log_of(arguments: list[str]) -> Path | None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("python -m core",
-                                     description="From a phone video of a face to a relightable head.")
+    parser = argparse.ArgumentParser(
+        "python -m core", description="From a phone video of a face to a relightable head."
+    )
     parser.add_argument("--version", action="version", version=f"WildCap {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_chain(commands)
     capture_commands.add_commands(commands)
     _add_white(commands)
     add_command(commands, "doctor", _doctor, "say what is installed, what is missing and what to do")
-    test = add_command(commands, "self-test", _self_test,
-                       "solve the sample head again on this machine, and compare it with what it should be")
+    test = add_command(
+        commands,
+        "self-test",
+        _self_test,
+        "solve the sample head again on this machine, and compare it with what it should be",
+    )
     test.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto")
     batch_commands.add_commands(commands)
     setup_commands.add_commands(commands)
-    commands.add_parser("train",
-                        help="train a network, or bring other skins in for it (developers): train prior --help, train "
-                             "carry --help")
+    commands.add_parser(
+        "train",
+        help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help",
+    )
     return parser
 
 
 def _add_chain(commands) -> None:
     """The chain, what it delivers, and what there is to choose from."""
     run = add_command(commands, "run", _run, "run the chain; a second run continues where the first stopped")
-    run.add_argument("source", metavar="SOURCE",
-                     help="a video, or a folder of photographs; - for the one the capture was made from")
-    run.add_argument("capture", metavar="CAPTURE", type=Path,
-                     help="the face's folder, usually NAME.wildcap; made if it is not there")
-    run.add_argument("--from", dest="first", metavar="STAGE",
-                     help="begin with this stage and run it even if nothing has changed")
+    run.add_argument(
+        "source", metavar="SOURCE", help="a video, or a folder of photographs; - for the one the capture was made from"
+    )
+    run.add_argument(
+        "capture", metavar="CAPTURE", type=Path, help="the face's folder, usually NAME.wildcap; made if it is not there"
+    )
+    run.add_argument(
+        "--from", dest="first", metavar="STAGE", help="begin with this stage and run it even if nothing has changed"
+    )
     run.add_argument("--until", dest="last", metavar="STAGE", help="end with this stage")
     run.add_argument("--quality", choices=settings.QUALITIES, default="standard")
-    run.add_argument("--send-frames", action="store_true",
-                     help="you agree that SwitchLight gets the selected frames, a person's face, and charges you; "
-                          "without it, the run stops before")
+    run.add_argument(
+        "--send-frames",
+        action="store_true",
+        help="you agree that SwitchLight gets the selected frames, a person's face, and charges you; "
+        "without it, the run stops before",
+    )
     command_settings.add_options(run, "run")
-    deliver = add_command(commands, "deliver", _deliver,
-                          "the maps as another program wants them, with the mesh as OBJ; other files and shape keys "
-                          "need the add-on", "CAPTURE")
+    deliver = add_command(
+        commands,
+        "deliver",
+        _deliver,
+        "the maps as another program wants them, with the mesh as OBJ; other files and shape keys need the add-on",
+        "CAPTURE",
+    )
     command_settings.add_options(deliver, "deliver")
-    add_command(commands, "settings", _settings,
-                "list every setting: its default, what it may be, its flag, what it does")
-    add_command(commands, "presets", _presets,
-                "say how each program gets its maps, and what each format drops: the tables of docs/guide/deliver.md")
+    add_command(
+        commands, "settings", _settings, "list every setting: its default, what it may be, its flag, what it does"
+    )
+    add_command(
+        commands,
+        "presets",
+        _presets,
+        "say how each program gets its maps, and what each format drops: the tables of docs/guide/deliver.md",
+    )
     add_command(commands, "stages", _stages, "list the stages of the chain")
-    cards = add_command(commands, "delighters", _delighters,
-                        "say of each way to take the light out where it runs, what leaves the machine and what it "
-                        "costs")
+    cards = add_command(
+        commands,
+        "delighters",
+        _delighters,
+        "say of each way to take the light out where it runs, what leaves the machine and what it costs",
+    )
     cards.add_argument("--markdown", action="store_true", help="as docs/delighters.md has it")
 
 
 def _add_white(commands) -> None:
-    white = add_command(commands, "white", _white,
-                        "measure the white point on a ColorChecker, a grey card or white paper in the frames",
-                        "CAPTURE")
-    white.add_argument("--frame", metavar="NAME",
-                       help="the frame with the card, as in the capture's frames folder; without it a ColorChecker is "
-                            "looked for")
-    white.add_argument("--at", metavar=("X", "Y"), nargs=2, type=float,
-                       help="a pixel of the card, from the frame's upper left")
+    white = add_command(
+        commands,
+        "white",
+        _white,
+        "measure the white point on a ColorChecker, a grey card or white paper in the frames",
+        "CAPTURE",
+    )
+    white.add_argument(
+        "--frame",
+        metavar="NAME",
+        help="the frame with the card, as in the capture's frames folder; without it a ColorChecker is looked for",
+    )
+    white.add_argument(
+        "--at", metavar=("X", "Y"), nargs=2, type=float, help="a pixel of the card, from the frame's upper left"
+    )
     white.add_argument("--card", choices=settings.CARDS, default="grey")
 
 
@@ -136,8 +167,14 @@ def _run(options: argparse.Namespace) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     capture = Capture(options.capture)
     wait_until_free(capture, lambda text: print(text, flush=True))
-    job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first,
-                    last=options.last, settings=run_settings, quality=options.quality)
+    job = write_job(
+        capture,
+        source="" if options.source == "-" else options.source,
+        first=options.first,
+        last=options.last,
+        settings=run_settings,
+        quality=options.quality,
+    )
     return terminal.follow(ROOT, capture, job, consent.by_flag(capture) if options.send_frames else {})
 
 
@@ -145,12 +182,15 @@ def _deliver(options: argparse.Namespace) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     capture = Capture(options.capture)
     if not capture.json.is_file():
-        raise Problem(f"There is no capture at {capture.root}.",
-                      "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
+        raise Problem(
+            f"There is no capture at {capture.root}.", "Check the name; `python -m core run SOURCE CAPTURE` makes one."
+        )
     wanted = {"format": "obj", "whole": True, **command_settings.read_options(options, "deliver").get("deliver", {})}
     if not wanted["whole"]:
-        raise Problem("A delivery without its mesh (deliver.whole off) is ended by Blender.",
-                      "Leave deliver.whole on, or deliver from the add-on's panel.")
+        raise Problem(
+            "A delivery without its mesh (deliver.whole off) is ended by Blender.",
+            "Leave deliver.whole on, or deliver from the add-on's panel.",
+        )
     chosen = {**settings.to_json(last_settings(capture)), "deliver": wanted}
     with read_only.stand_in(capture, wanted.get("folder", "")) as writable:
         plan = delivery_plan.plan(writable, settings.from_json(chosen).deliver)
@@ -178,8 +218,9 @@ def _stages(options: argparse.Namespace) -> int:
 
 
 def _delighters(options: argparse.Namespace) -> int:
-    print(delighter_cards.markdown() if options.markdown else delighter_cards.text(),
-          end="" if options.markdown else "\n")
+    print(
+        delighter_cards.markdown() if options.markdown else delighter_cards.text(), end="" if options.markdown else "\n"
+    )
     return 0
 
 
@@ -190,8 +231,10 @@ def _white(options: argparse.Namespace) -> int:
 
     capture = Capture(options.capture)
     if bool(options.frame) != bool(options.at):
-        raise Problem("--frame and --at go together.",
-                      "Name a frame and a pixel of the card in it, or neither to look for a ColorChecker.")
+        raise Problem(
+            "--frame and --at go together.",
+            "Name a frame and a pixel of the card in it, or neither to look for a ColorChecker.",
+        )
     if options.frame:
         path = capture.frames / options.frame
         capture.require("frames/")
@@ -227,8 +270,10 @@ def _train(arguments: list[str]) -> int:
     """Hands over to core/training, which is not part of the installed extension."""
     name = arguments[0] if arguments else ""
     if not name.isidentifier() or importlib.util.find_spec(f"{__package__}.training.{name}") is None:
-        raise Problem(f"There is nothing to train named {name!r}." if name else "The name of what to train is missing.",
-                      "Try `python -m core train prior --help` in a source checkout.")
+        raise Problem(
+            f"There is nothing to train named {name!r}." if name else "The name of what to train is missing.",
+            "Try `python -m core train prior --help` in a source checkout.",
+        )
     return importlib.import_module(f".training.{name}", __package__).main(arguments[1:]) or 0
 
 

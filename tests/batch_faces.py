@@ -14,7 +14,7 @@ from core.contract.settings import Settings
 
 from . import standin
 
-BEFORE_MASK = stages.STAGES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
+BEFORE_MASK = stages.STAGES[: stages.NAMES.index(stages.MASK_STAGE) + 1]
 
 
 def filmed(folder: Path, name: str, mood: dict | None = None) -> Capture:
@@ -50,8 +50,10 @@ def finish_up_to_mask(capture: Capture, settings: Settings) -> None:
 
 def planned(folder: Path, *captures: Capture, gate: str = "artist", settings: dict | None = None) -> Path:
     """A batch as a terminal plans it: with its captures in its own folder."""
-    faces = [record.BatchFace(capture.root.stem, capture.source, capture.root, "draft", settings or {})
-             for capture in captures]
+    faces = [
+        record.BatchFace(capture.root.stem, capture.source, capture.root, "draft", settings or {})
+        for capture in captures
+    ]
     record.write_batch(record.Batch(folder, tuple(faces), gate))
     return folder
 

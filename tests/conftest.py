@@ -51,10 +51,15 @@ WHOLE = pytest.StashKey()
 
 
 def pytest_addoption(parser):
-    parser.addoption("--messages", action="store_true",
-                     help="judge which messages were reached even where not all tests ran")
-    parser.addoption("--reached", type=Path, metavar="FOLDER",
-                     help="where the processes of a run keep which messages they reached; what is there counts")
+    parser.addoption(
+        "--messages", action="store_true", help="judge which messages were reached even where not all tests ran"
+    )
+    parser.addoption(
+        "--reached",
+        type=Path,
+        metavar="FOLDER",
+        help="where the processes of a run keep which messages they reached; what is there counts",
+    )
 
 
 def pytest_configure(config):

@@ -21,8 +21,12 @@ from core.worker.runner import run_job
 from . import standin
 
 SIDE = 16
-NORMALS = np.round((np.stack(np.meshgrid(np.linspace(-0.6, 0.6, SIDE), np.linspace(-0.5, 0.7, SIDE)), -1) * 0.5 + 0.5)
-                   * 65535) / 65535
+NORMALS = (
+    np.round(
+        (np.stack(np.meshgrid(np.linspace(-0.6, 0.6, SIDE), np.linspace(-0.5, 0.7, SIDE)), -1) * 0.5 + 0.5) * 65535
+    )
+    / 65535
+)
 """x and y of the normals as 16 bits store them, [S, S, 2]."""
 
 
@@ -68,10 +72,17 @@ def record_solve(capture: Capture) -> None:
     """capture.json of one whose maps were solved from what lies there now, by older code."""
     record = {"format": 2, "source": "/home/anna/film.mp4", "source_stamp": [["film.mp4", 7, 1]], "stages": {}}
     chosen = Settings()
-    record["stages"]["solve"] = {**capture.conditions(stages.by_name("solve"), chosen), "code": "of before",
-                                 "finished": "2026-11-22T00:00:00",
-                                 "version": "0.1.0", "seed": chosen.seed, "device": "cpu", "seconds": 1.0,
-                                 "figures": {}, "settings": {"steps": chosen.solve.steps, "prior": "/home/anna/prior"}}
+    record["stages"]["solve"] = {
+        **capture.conditions(stages.by_name("solve"), chosen),
+        "code": "of before",
+        "finished": "2026-11-22T00:00:00",
+        "version": "0.1.0",
+        "seed": chosen.seed,
+        "device": "cpu",
+        "seconds": 1.0,
+        "figures": {},
+        "settings": {"steps": chosen.solve.steps, "prior": "/home/anna/prior"},
+    }
     capture.json.write_text(json.dumps(record))
 
 
@@ -99,7 +110,7 @@ def png(path: Path) -> tuple[int, int, set[bytes]]:
     """Bit depth, colour type and the kinds of chunks of a PNG, from its bytes."""
     data, at, kinds = path.read_bytes(), 8, set()
     while at < len(data):
-        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        length, kind = struct.unpack(">I4s", data[at : at + 8])
         kinds.add(kind)
         at += 12 + length
     return data[24], data[25], kinds

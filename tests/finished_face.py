@@ -38,8 +38,11 @@ def make(root: Path, folder: Path) -> Path:
 def copy(finished: Path, to: Path, root: Path, monkeypatch) -> Capture:
     """The face in a copy of such a folder, judged by the code that made it: the tiny rooms'."""
     shutil.copytree(finished, to)
-    monkeypatch.setattr(freshness, "code_key",
-                        {stage.module: code_key(stage.module, root / "core") for stage in stages.STAGES}.__getitem__)
+    monkeypatch.setattr(
+        freshness,
+        "code_key",
+        {stage.module: code_key(stage.module, root / "core") for stage in stages.STAGES}.__getitem__,
+    )
     return Capture(to / "zoë.wildcap")
 
 
@@ -49,5 +52,8 @@ def states(capture: Capture) -> set[str]:
 
 def pictures(capture: Capture) -> dict[str, bytes]:
     """What slimming takes away, as far as it is there."""
-    return {name: content for name, content in kept_capture.contents(capture.root).items()
-            if name.startswith(stages.SLIMMED)}
+    return {
+        name: content
+        for name, content in kept_capture.contents(capture.root).items()
+        if name.startswith(stages.SLIMMED)
+    }

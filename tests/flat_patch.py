@@ -17,8 +17,9 @@ def make(root):
     """A capture, open, whose head is a flat square of 2 m that faces -Y, V up, and whose specular map has a mean of 0.4
     on cheeks and forehead."""
     standin.make(root)
-    root.joinpath("head.obj").write_text("v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf "
-                                         "1/1 2/2 3/3 4/4\n", encoding="ascii")
+    root.joinpath("head.obj").write_text(
+        "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n", encoding="ascii"
+    )
     record = {"format": 1, "source": "", "stages": {"upscale": {"figures": {"specular_mean": 0.4}, "seconds": 1}}}
     (root / "capture.json").write_text(json.dumps(record), encoding="utf-8")
     bpy.ops.wildcap.open_capture(directory=str(root))

@@ -35,10 +35,16 @@ def main() -> None:
     bpy.ops.wildcap.open_sample_head()
     item = bpy.context.scene.wildcap.captures[0]
     capture, head = addon["captures"].folder(item), addon["captures"].head(bpy.context, item)
-    seen = {"decimal_point": locale.localeconv()["decimal_point"], "capture": str(capture.root),
-            "height_m": round(head.dimensions.z, 3)}
-    seen["spaces"] = {node.name: node.image.colorspace_settings.name for node in head.active_material.node_tree.nodes
-                      if node.type == 'TEX_IMAGE'}
+    seen = {
+        "decimal_point": locale.localeconv()["decimal_point"],
+        "capture": str(capture.root),
+        "height_m": round(head.dimensions.z, 3),
+    }
+    seen["spaces"] = {
+        node.name: node.image.colorspace_settings.name
+        for node in head.active_material.node_tree.nodes
+        if node.type == 'TEX_IMAGE'
+    }
     props = bpy.context.scene.wildcap
     props.resolution, props.samples = 16, 1
     bpy.ops.wildcap.render()
@@ -47,7 +53,7 @@ def main() -> None:
     mask, image = addon["paint.mask_image"], addon["paint.session"].mask()
     seen["mask_space"] = image.colorspace_settings.name
     half = np.zeros(tuple(image.size)[::-1], np.float32)
-    half[:, :half.shape[1] // 2] = 0.5
+    half[:, : half.shape[1] // 2] = 0.5
     mask.set_values(image, half)
     bpy.ops.wildcap.finish_mask()
     seen["mask"] = round(float(mask.mask_values(mask.load(capture))[:, :8].mean()), 2)

@@ -24,8 +24,24 @@ def surface() -> HeadSurface:
 @cache
 def painted(beard: float = 0.0, brows: float = 1.0) -> HeadMaps:
     """A subject without scalp hair, moles and freckles, seen all over."""
-    skin = make_skin(replace(sample_parameters(4), beard=beard, beard_length=1.0, brow_density=brows, scalp_hair=0.0,
-                             moles=0.0, freckles=0.0), SIZE)
+    skin = make_skin(
+        replace(
+            sample_parameters(4),
+            beard=beard,
+            beard_length=1.0,
+            brow_density=brows,
+            scalp_hair=0.0,
+            moles=0.0,
+            freckles=0.0,
+        ),
+        SIZE,
+    )
     one = np.ones((SIZE, SIZE), np.float32)
-    return HeadMaps(skin.diffuse.astype(np.float32), skin.normal.astype(np.float32), skin.specular, 0.7 * one,
-                    np.repeat(one[..., None], 3, 2), one)
+    return HeadMaps(
+        skin.diffuse.astype(np.float32),
+        skin.normal.astype(np.float32),
+        skin.specular,
+        0.7 * one,
+        np.repeat(one[..., None], 3, 2),
+        one,
+    )

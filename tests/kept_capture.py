@@ -18,8 +18,11 @@ def make(root: Path) -> Capture:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*"))
-            if path.is_file() and path.name != ownership.RECORD}
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != ownership.RECORD
+    }
 
 
 def make_frames(capture: Capture, *names: str, text: str = "frame") -> None:

@@ -26,17 +26,25 @@ def usd(path: Path) -> dict:
     shapes = [UsdSkel.BlendShape(prim) for prim in prims if prim.IsA(UsdSkel.BlendShape)]
     hairs = [UsdGeom.BasisCurves(prim) for prim in prims if prim.IsA(UsdGeom.BasisCurves)]
     return {
-        "hairs": {hair.GetPrim().GetName(): [[list(point) for point in hair.GetPointsAttr().Get()],
-                                             list(hair.GetWidthsAttr().Get() or [])] for hair in hairs},
-        "metres_per_unit": UsdGeom.GetStageMetersPerUnit(stage), "up": UsdGeom.GetStageUpAxis(stage),
+        "hairs": {
+            hair.GetPrim().GetName(): [
+                [list(point) for point in hair.GetPointsAttr().Get()],
+                list(hair.GetWidthsAttr().Get() or []),
+            ]
+            for hair in hairs
+        },
+        "metres_per_unit": UsdGeom.GetStageMetersPerUnit(stage),
+        "up": UsdGeom.GetStageUpAxis(stage),
         "points": [list(point) for point in mesh.GetPointsAttr().Get()],
         "subdivision": mesh.GetSubdivisionSchemeAttr().Get(),
         "primvars": [primvar.GetPrimvarName() for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvars()],
         "to_world": [list(row) for row in UsdGeom.Xformable(mesh).ComputeLocalToWorldTransform(0)],
-        "shapes": {shape.GetPrim().GetName(): [list(offset) for offset in shape.GetOffsetsAttr().Get()]
-                   for shape in shapes},
-        "textures": {shader.GetInput("file").Get().path: shader.GetInput("sourceColorSpace").Get()
-                     for shader in textures},
+        "shapes": {
+            shape.GetPrim().GetName(): [list(offset) for offset in shape.GetOffsetsAttr().Get()] for shape in shapes
+        },
+        "textures": {
+            shader.GetInput("file").Get().path: shader.GetInput("sourceColorSpace").Get() for shader in textures
+        },
     }
 
 
@@ -49,8 +57,10 @@ def fbx(path: Path) -> dict:
     node = mesh.instances[0]
     shapes = [channel.target_shape for deformer in mesh.blend_deformers for channel in deformer.channels]
     return {
-        "metres_per_unit": scene.settings.unit_meters, "y_up": scene.settings.axes.up == ufbx.CoordinateAxis.POSITIVE_Y,
-        "faces": mesh.num_faces, "has_uvs": mesh.vertex_uv.exists,
+        "metres_per_unit": scene.settings.unit_meters,
+        "y_up": scene.settings.axes.up == ufbx.CoordinateAxis.POSITIVE_Y,
+        "faces": mesh.num_faces,
+        "has_uvs": mesh.vertex_uv.exists,
         "points": [[p.x, p.y, p.z] for p in mesh.vertices],
         "scale": [getattr(node.local_transform.scale, axis) for axis in "xyz"],
         "turn": [getattr(node.local_transform.rotation, axis) for axis in "wxyz"],

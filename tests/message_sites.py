@@ -15,8 +15,13 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PLACES = ("wildcap_addon", "core/worker", "core/contract/capture.py", "core/contract/settings.py",
-          "core/contract/setting_values.py")
+PLACES = (
+    "wildcap_addon",
+    "core/worker",
+    "core/contract/capture.py",
+    "core/contract/settings.py",
+    "core/contract/setting_values.py",
+)
 REASONS = "wildcap_addon/base_operator.py"  # the one file that hands a reason to Blender
 _reached: set[tuple[str, int]] = set()  # (file relative to the root, line that is being carried out)
 
@@ -62,14 +67,21 @@ def take_in(folder: Path) -> None:
 
 def unreached() -> list[str]:
     """The sentences that no test has had said so far, as FILE:LINE: SENTENCE."""
-    return [f"{file}:{call.lineno}: {ast.unparse(call)[:150]}" for file in sources() for call in sentences(file)
-            if not any((file, line) in _reached for line in range(call.lineno, call.end_lineno + 1))]
+    return [
+        f"{file}:{call.lineno}: {ast.unparse(call)[:150]}"
+        for file in sources()
+        for call in sentences(file)
+        if not any((file, line) in _reached for line in range(call.lineno, call.end_lineno + 1))
+    ]
 
 
 def sources() -> list[str]:
     """The files whose sentences count, relative to the root."""
-    found = [path for place in PLACES
-             for path in ([ROOT / place] if place.endswith(".py") else sorted((ROOT / place).rglob("*.py")))]
+    found = [
+        path
+        for place in PLACES
+        for path in ([ROOT / place] if place.endswith(".py") else sorted((ROOT / place).rglob("*.py")))
+    ]
     return [path.relative_to(ROOT).as_posix() for path in found]
 
 
@@ -77,8 +89,9 @@ def sources() -> list[str]:
 def sentences(file: str) -> list[ast.Call]:
     """The calls in a file that make a Problem of words, or give a reason; one that hands on another's words says
     nothing of its own."""
-    calls = [node for node in ast.walk(ast.parse((ROOT / file).read_text(encoding="utf-8")))
-             if isinstance(node, ast.Call)]
+    calls = [
+        node for node in ast.walk(ast.parse((ROOT / file).read_text(encoding="utf-8"))) if isinstance(node, ast.Call)
+    ]
     return [call for call in calls if _name(call) in ("Problem", "allowed")]
 
 

@@ -12,13 +12,23 @@ def lines(tree, indent: str = "") -> list[str]:
     for node in tree.nodes:
         if getattr(node, "node_tree", None) is not None:
             found += lines(node.node_tree, f"{indent}{node.name} / ")
-    found += [f"{indent}{link.from_node.name}.{_name(link.from_socket)} -> {link.to_node.name}.{_name(link.to_socket)}"
-              for link in tree.links]
+    found += [
+        f"{indent}{link.from_node.name}.{_name(link.from_socket)} -> {link.to_node.name}.{_name(link.to_socket)}"
+        for link in tree.links
+    ]
     return sorted(found)
 
 
-OPTIONS = ("operation", "use_clamp", "subsurface_method", "space", "attribute_name", "interpolation", "extension",
-           "uv_map")
+OPTIONS = (
+    "operation",
+    "use_clamp",
+    "subsurface_method",
+    "space",
+    "attribute_name",
+    "interpolation",
+    "extension",
+    "uv_map",
+)
 RENAMED = {"Factor": "Fac"}  # in Blender 5
 
 
@@ -31,14 +41,21 @@ def _details(node) -> list[str]:
     try:
         fresh = scratch.nodes.new(node.bl_idname)
         image = getattr(node, "image", None)
-        pictures = ([f"{bpy.path.basename(image.filepath)} {image.colorspace_settings.name}"] if image is not None
-                    else [])
-        options = [f"{name}={getattr(node, name)}" for name in OPTIONS if hasattr(node, name)
-                   and getattr(node, name) != getattr(fresh, name)]
+        pictures = (
+            [f"{bpy.path.basename(image.filepath)} {image.colorspace_settings.name}"] if image is not None else []
+        )
+        options = [
+            f"{name}={getattr(node, name)}"
+            for name in OPTIONS
+            if hasattr(node, name) and getattr(node, name) != getattr(fresh, name)
+        ]
         # a group node of no group has no sockets
         usual = [_value(socket) for socket in fresh.inputs] + [None] * len(node.inputs)
-        values = [f"{_name(socket)}={_value(socket)}" for socket, other in zip(node.inputs, usual, strict=False)
-                  if not socket.is_linked and _value(socket) and _value(socket) != other]
+        values = [
+            f"{_name(socket)}={_value(socket)}"
+            for socket, other in zip(node.inputs, usual, strict=False)
+            if not socket.is_linked and _value(socket) and _value(socket) != other
+        ]
         return pictures + options + values
     finally:
         bpy.data.node_groups.remove(scratch)

@@ -51,8 +51,9 @@ def capture_of(root, texture: np.ndarray, azimuths_deg, distort=lambda i, pictur
     capture, mesh = Capture(root), egg()
     names = [f"{i:05d}.jpg" for i in range(len(azimuths_deg))]
     capture.frames.mkdir(parents=True)
-    frames = [{"name": n, "video_frame": i, "time_s": i / 24, "sharpness": 1.0, "selected": True}
-              for i, n in enumerate(names)]
+    frames = [
+        {"name": n, "video_frame": i, "time_s": i / 24, "sharpness": 1.0, "selected": True} for i, n in enumerate(names)
+    ]
     capture.frames_json.write_text(json.dumps({"frames": frames}))
     write_cameras(capture.cameras, names, azimuths_deg)
     meshes.write_obj(capture.head, mesh)
@@ -60,16 +61,22 @@ def capture_of(root, texture: np.ndarray, azimuths_deg, distort=lambda i, pictur
     for i, view in enumerate(read_views(capture)):
         if light is not None:
             images.write_srgb(view.path, images.linear_to_srgb(photograph(caster, view, texture * light)), quality=98)
-        images.write_srgb((capture.delit / view.name).with_suffix(".png"),
-                          images.linear_to_srgb(distort(i, photograph(caster, view, texture))), 16)
+        images.write_srgb(
+            (capture.delit / view.name).with_suffix(".png"),
+            images.linear_to_srgb(distort(i, photograph(caster, view, texture))),
+            16,
+        )
     return capture
 
 
 def write_cameras(folder, names, azimuths_deg, distance: float = 0.5, height: float = 0.0) -> None:
     """A COLMAP model of cameras on a circle around the origin, looking at it."""
     model = pycolmap.Reconstruction()
-    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="PINHOLE", width=WIDTH, height=HEIGHT,
-                                                      params=[FOCAL, FOCAL, WIDTH / 2, HEIGHT / 2]))
+    model.add_camera_with_trivial_rig(
+        pycolmap.Camera(
+            camera_id=1, model="PINHOLE", width=WIDTH, height=HEIGHT, params=[FOCAL, FOCAL, WIDTH / 2, HEIGHT / 2]
+        )
+    )
     for i, (name, azimuth) in enumerate(zip(names, np.radians(azimuths_deg), strict=True)):
         centre = np.array([np.sin(azimuth) * distance, -np.cos(azimuth) * distance, height])
         forward = -centre / np.linalg.norm(centre)

@@ -14,8 +14,9 @@ class Block(nn.Module):
         super().__init__()
         self.norm1, self.norm2 = nn.LayerNorm(width, 1e-6), nn.LayerNorm(width, 1e-6)
         self.attn = nn.ModuleDict({"qkv": nn.Linear(width, 3 * width), "proj": nn.Linear(width, width)})
-        self.mlp = nn.Sequential(OrderedDict(fc1=nn.Linear(width, 4 * width), act=nn.GELU(),
-                                             fc2=nn.Linear(4 * width, width)))
+        self.mlp = nn.Sequential(
+            OrderedDict(fc1=nn.Linear(width, 4 * width), act=nn.GELU(), fc2=nn.Linear(4 * width, width))
+        )
 
     def forward(self, x):
         heads = self.attn["qkv"](self.norm1(x)).split(x.shape[-1], -1)
@@ -35,8 +36,10 @@ class Encoder(nn.Module):
         self.norm = nn.LayerNorm(width, 1e-6)
 
     def forward(self, picture):
-        x = self.patch_embed["proj"]((picture - torch.tensor([0.485, 0.456, 0.406])[:, None, None])
-                                     / torch.tensor([0.229, 0.224, 0.225])[:, None, None])
+        x = self.patch_embed["proj"](
+            (picture - torch.tensor([0.485, 0.456, 0.406])[:, None, None])
+            / torch.tensor([0.229, 0.224, 0.225])[:, None, None]
+        )
         width, side = x.shape[1], x.shape[2]
         for at in range(side):
             for k in range(width // 4):
@@ -54,13 +57,27 @@ class Base(nn.Module):
     def __init__(self, width, depth, channels):
         super().__init__()
         self.encoder = Encoder(width, depth)
-        layers = [layer for i in range(4)
-                  for layer in (nn.ConvTranspose2d(channels if i else width, channels, 4, 2, 1, bias=False),
-                                nn.InstanceNorm2d(channels), nn.SiLU())]
-        more = [layer for _ in range(4)
-                for layer in (nn.Conv2d(channels, channels, 1), nn.InstanceNorm2d(channels), nn.SiLU())]
-        self.decoder = nn.Sequential(OrderedDict(deconv_layers=nn.Sequential(*layers), conv_layers=nn.Sequential(*more),
-                                                 cls_conv=nn.Conv2d(channels, 3, 1)))
+        layers = [
+            layer
+            for i in range(4)
+            for layer in (
+                nn.ConvTranspose2d(channels if i else width, channels, 4, 2, 1, bias=False),
+                nn.InstanceNorm2d(channels),
+                nn.SiLU(),
+            )
+        ]
+        more = [
+            layer
+            for _ in range(4)
+            for layer in (nn.Conv2d(channels, channels, 1), nn.InstanceNorm2d(channels), nn.SiLU())
+        ]
+        self.decoder = nn.Sequential(
+            OrderedDict(
+                deconv_layers=nn.Sequential(*layers),
+                conv_layers=nn.Sequential(*more),
+                cls_conv=nn.Conv2d(channels, 3, 1),
+            )
+        )
 
     def forward(self, picture):
         return torch.sigmoid(self.decoder(self.encoder(picture)))
@@ -71,8 +88,11 @@ class Residual(nn.Module):
         super().__init__()
         convolutions = [nn.Conv2d(into, out, 3, padding=1), nn.Conv2d(out, out, 3, padding=1)]
         norms = [nn.BatchNorm2d(out if first else into), nn.BatchNorm2d(out)]
-        layers = [part for c, n in zip(convolutions, norms, strict=True)
-                  for part in ([c, n, nn.LeakyReLU(0.02)] if first else [n, nn.LeakyReLU(0.02), c])]
+        layers = [
+            part
+            for c, n in zip(convolutions, norms, strict=True)
+            for part in ([c, n, nn.LeakyReLU(0.02)] if first else [n, nn.LeakyReLU(0.02), c])
+        ]
         self.res_conv = nn.Sequential(*layers)
         if into != out:
             self.addtion_layer = nn.Conv2d(into, out, 1)
@@ -86,8 +106,11 @@ class Enhancer(nn.Module):
         super().__init__()
         self.inc_1 = Residual(6, w, first=True)
         for i, (into, out) in enumerate(((1, 2), (2, 4), (4, 8), (8, 8)), 1):
-            setattr(self, f"down{i}_1",
-                    nn.ModuleDict({"resdown_conv": nn.Sequential(nn.MaxPool2d(2), Residual(into * w, out * w))}))
+            setattr(
+                self,
+                f"down{i}_1",
+                nn.ModuleDict({"resdown_conv": nn.Sequential(nn.MaxPool2d(2), Residual(into * w, out * w))}),
+            )
         for i, (into, out) in enumerate(((16, 4), (8, 2), (4, 1), (2, 1)), 1):
             setattr(self, f"up{i}_1", nn.ModuleDict({"conv": Residual(into * w, out * w)}))
         self.outc_1 = nn.ModuleDict({"conv": nn.Conv2d(w, 3, 1)})

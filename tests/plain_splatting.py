@@ -10,16 +10,29 @@ for small surfels).
 import torch
 
 
-def rasterization_2dgs(means, quats, scales, opacities, colors, viewmats, Ks, width, height,  # noqa: N803
-                       render_mode, distloss, near_plane=0.01):
+def rasterization_2dgs(
+    means,
+    quats,
+    scales,
+    opacities,
+    colors,
+    viewmats,
+    Ks,
+    width,
+    height,  # noqa: N803
+    render_mode,
+    distloss,
+    near_plane=0.01,
+):
     assert render_mode == "RGB+ED" and colors.shape == (1, len(means), 3), (
         "gsplat 1.5.3 wants [C, N, D] colours where depth is rendered"
     )
     rotation, shift = viewmats[0, :3, :3], viewmats[0, :3, 3]
     y, x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
     # [P, 3]
-    rays = torch.stack([(x - Ks[0, 0, 2]) / Ks[0, 0, 0], (y - Ks[0, 1, 2]) / Ks[0, 1, 1], torch.ones_like(x)],
-                       -1).reshape(-1, 3)
+    rays = torch.stack(
+        [(x - Ks[0, 0, 2]) / Ks[0, 0, 0], (y - Ks[0, 1, 2]) / Ks[0, 1, 1], torch.ones_like(x)], -1
+    ).reshape(-1, 3)
     centres = means @ rotation.T + shift  # [N, 3], in the camera
     order = torch.argsort(centres[:, 2])
     centres = centres[order]
@@ -52,6 +65,17 @@ def rasterization_2dgs(means, quats, scales, opacities, colors, viewmats, Ks, wi
 
 def _matrices(quats):
     w, x, y, z = torch.nn.functional.normalize(quats, dim=-1).unbind(-1)
-    return torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),
-                        1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1).reshape(-1, 3, 3)
+    return torch.stack(
+        [
+            1 - 2 * (y * y + z * z),
+            2 * (x * y - w * z),
+            2 * (x * z + w * y),
+            2 * (x * y + w * z),
+            1 - 2 * (x * x + z * z),
+            2 * (y * z - w * x),
+            2 * (x * z - w * y),
+            2 * (y * z + w * x),
+            1 - 2 * (x * x + y * y),
+        ],
+        -1,
+    ).reshape(-1, 3, 3)

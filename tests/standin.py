@@ -18,6 +18,7 @@ SIDE = 64
 
 def png(pixels: list[list[tuple[int, ...]]]) -> bytes:
     """An 8 bit PNG, RGB or grey after the length of the first pixel; rows from the top."""
+
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
@@ -37,8 +38,10 @@ def egg(columns: int = 32, rows: int = 24) -> str:
         for c in range(columns + 1):
             u, v = c / columns, r / rows
             angle, height = (u - 0.5) * math.pi * 1.6, (v - 0.5) * math.pi * 0.98
-            vertices.append(f"v {0.08 * math.sin(angle) * math.cos(height):.6f} "
-                            f"{-0.1 * math.cos(angle) * math.cos(height):.6f} {0.12 * math.sin(height):.6f}")
+            vertices.append(
+                f"v {0.08 * math.sin(angle) * math.cos(height):.6f} "
+                f"{-0.1 * math.cos(angle) * math.cos(height):.6f} {0.12 * math.sin(height):.6f}"
+            )
             uvs.append(f"vt {u:.6f} {v:.6f}")
     for r in range(rows):
         for c in range(columns):
@@ -65,9 +68,11 @@ def make(root: Path, solved: bool = True) -> Path:
     return root
 
 
-POSES = {"00000.jpg": ((0.7036, 0.7036, 0.0951, 0.0308), (0.02, -0.03, 0.6)),
-         "00001.jpg": ((0.7109, 0.6562, -0.2187, 0.1288), (-0.05, 0.01, 0.5)),
-         "00002.jpg": ((math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0), (0.0, 0.0, 0.7))}
+POSES = {
+    "00000.jpg": ((0.7036, 0.7036, 0.0951, 0.0308), (0.02, -0.03, 0.6)),
+    "00001.jpg": ((0.7109, 0.6562, -0.2187, 0.1288), (-0.05, 0.01, 0.5)),
+    "00002.jpg": ((math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0), (0.0, 0.0, 0.7)),
+}
 """Frame -> rotation (w, x, y, z) and translation that take world points into its camera; the last looks at the face
 from in front."""
 WIDTH, HEIGHT, FOCAL, CENTRE = 720, 960, 900.0, (350.0, 490.0)
@@ -82,8 +87,9 @@ def add_evidence(root: Path) -> None:
         (root / "frames" / name).write_bytes(png([[(150 + 40 * i, 100, 80)] * (SIDE * 3 // 4)] * SIDE))
         delit = png([[(200, 150 + 20 * i, 130)] * (SIDE * 3 // 4)] * SIDE)
         (root / "delit" / name.replace(".jpg", ".png")).write_bytes(delit)
-    frames = [{"name": name, "selected": name != "00001.jpg", "sharpness": 0.2 + 0.01 * i}
-              for i, name in enumerate(POSES)]
+    frames = [
+        {"name": name, "selected": name != "00001.jpg", "sharpness": 0.2 + 0.01 * i} for i, name in enumerate(POSES)
+    ]
     (root / "frames" / "frames.json").write_text(json.dumps({"kind": "video", "frames": frames}), encoding="utf-8")
     camera = struct.pack("<QiiQQ4d", 1, 7, 2, WIDTH, HEIGHT, FOCAL, *CENTRE, -0.004)
     (root / "cameras" / "cameras.bin").write_bytes(camera)
@@ -92,7 +98,10 @@ def add_evidence(root: Path) -> None:
         images += struct.pack("<I7dI", number, *turn, *move, 7) + name.encode() + b"\0"
         images += struct.pack("<Q2dQ2dQ", 2, 1, 2, 3, 4, 5, 6)
     (root / "cameras" / "images.bin").write_bytes(images)
-    header = ("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-              "element face 2\nproperty list uchar int vertex_indices\nend_header\n")
-    (root / "scan.ply").write_text(header + "0 -0.1 0\n0.1 0 0\n0 0 0.1\n-0.1 0 0\n3 0 1 2\n3 0 2 3\n",
-                                   encoding="ascii")
+    header = (
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    (root / "scan.ply").write_text(
+        header + "0 -0.1 0\n0.1 0 0\n0 0 0.1\n-0.1 0 0\n3 0 1 2\n3 0 2 3\n", encoding="ascii"
+    )

@@ -52,9 +52,10 @@ class Service:
                     return self._json(404, {"message": "Not Found"})
                 if self.headers["x-api-key"] != KEY:
                     return self._json(401, {"message": "Unauthorized. Check your API Key"})
-                self._json(200,
-                           {"Credits": {"Free": service.credits, "Subscription": 0, "OneTime": 0,
-                                        "Total": service.credits}})
+                self._json(
+                    200,
+                    {"Credits": {"Free": service.credits, "Subscription": 0, "OneTime": 0, "Total": service.credits}},
+                )
 
             def do_POST(self):
                 with service._lock:
@@ -78,8 +79,9 @@ class Service:
 
             def _albedo(self):
                 body = self.rfile.read(int(self.headers["Content-Length"]))
-                parts = message_from_bytes(f"Content-Type: {self.headers['Content-Type']}\r\n\r\n".encode() + body,
-                                           policy=policy.HTTP)
+                parts = message_from_bytes(
+                    f"Content-Type: {self.headers['Content-Type']}\r\n\r\n".encode() + body, policy=policy.HTTP
+                )
                 fields = {part.get_param("name", header="content-disposition"): part for part in parts.iter_parts()}
                 if self.path != "/v1/acquire/albedo" or "source_image" not in fields:
                     return self._json(422, {"detail": [{"msg": "field required"}]})
@@ -87,9 +89,17 @@ class Service:
                 with service._lock:
                     source = fields["source_image"]
                     others = {name: part.get_payload() for name, part in fields.items() if name != "source_image"}
-                    service.calls.append({"path": self.path, "key": self.headers["x-api-key"], "picture": picture,
-                                          "agent": self.headers["User-Agent"], "file": source.get_filename(),
-                                          "type": source.get_content_type(), **others})
+                    service.calls.append(
+                        {
+                            "path": self.path,
+                            "key": self.headers["x-api-key"],
+                            "picture": picture,
+                            "agent": self.headers["User-Agent"],
+                            "file": source.get_filename(),
+                            "type": source.get_content_type(),
+                            **others,
+                        }
+                    )
                     what = service.plan.pop(0) if service.plan else "fine"
                 time.sleep(service.seconds)
                 if isinstance(what, tuple):
@@ -102,19 +112,21 @@ class Service:
                 self._picture(what)
 
             def _picture(self, what: str):
-                data = {"garbage": b"<html>so sorry</html>",
-                        "truncated": service.answer[:len(service.answer) // 2]}.get(what, service.answer)
+                data = {
+                    "garbage": b"<html>so sorry</html>",
+                    "truncated": service.answer[: len(service.answer) // 2],
+                }.get(what, service.answer)
                 self.send_response(200)
                 self.send_header("Content-Type", "image/png")
                 self.send_header("Content-Length", str(len(data)))
                 self.end_headers()
                 if what == "slow":
                     for i in range(len(data)):
-                        self.wfile.write(data[i:i + 1])
+                        self.wfile.write(data[i : i + 1])
                         if service.released.wait(0.05):
                             return
                 self._end_call()
-                self.wfile.write(data[:len(data) // 2] if what == "cut" else data)
+                self.wfile.write(data[: len(data) // 2] if what == "cut" else data)
 
             def _json(self, status: int, value, headers=()):
                 data = json.dumps(value).encode()

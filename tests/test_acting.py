@@ -52,8 +52,14 @@ def open_eyed(capture, addon):
     sockets = np.flatnonzero((asset.kind == 0) & (asset.parts[:, 2] > -0.02))
     rows = np.concatenate([np.arange(HEAD), HEAD + np.flatnonzero(asset.seam > 0), HEAD + COPIES + sockets])
     (capture / "head_open.obj").write_text("".join("v {:.7f} {:.7f} {:.7f}\n".format(*place) for place in rest[rows]))
-    eye = {"centre": [0.029, 0.003, -0.002], "radius": 0.0145, "gaze": [0.28, -0.96, 0.0], "openness": 0.5,
-           "iris_radius": 0.0058, "views": 6}
+    eye = {
+        "centre": [0.029, 0.003, -0.002],
+        "radius": 0.0145,
+        "gaze": [0.28, -0.96, 0.0],
+        "openness": 0.5,
+        "iris_radius": 0.0058,
+        "views": 6,
+    }
     (capture / "eyes.json").write_text(json.dumps({"left": eye, "right": {**eye, "centre": [-0.029, 0.003, -0.002]}}))
     (capture / "maps" / "irises.json").write_text(json.dumps({"left": [0.1, 0.2, 0.4], "right": [0.12, 0.2, 0.38]}))
     return rest, rows
@@ -76,7 +82,7 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     assert np.abs(rest[:HEAD] - solved).max() < 1e-6
     corners = np.empty(len(head.data.loops), np.int32)
     head.data.loops.foreach_get("vertex_index", corners)
-    skin = corners[:3 * 24356]
+    skin = corners[: 3 * 24356]
     assert skin.max() == HEAD + COPIES - 1  # the seams' lower side, and nothing from inside, became part of the skin
     assert np.abs(rest[skin].reshape(-1, 3, 3) - solved[_triangles()]).max() < 1e-6  # the cut moved no triangle
     assert head.data.materials[0].get("wildcap_skin")
@@ -84,7 +90,9 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     _uvs_apart(head)
     rough = np.empty(len(head.data.vertices), np.float32)
     head.data.attributes["wildcap_roughness"].data.foreach_get("value", rough)
-    assert np.ptp(rough[:HEAD]) > 0.05 and np.ptp(rough[HEAD:HEAD + COPIES]) > 0.01 and not rough[HEAD + COPIES:].any()
+    assert (
+        np.ptp(rough[:HEAD]) > 0.05 and np.ptp(rough[HEAD : HEAD + COPIES]) > 0.01 and not rough[HEAD + COPIES :].any()
+    )
 
     keys, lids = head.data.shape_keys, np.unique(skin[skin >= HEAD])
     blocks = keys.key_blocks
@@ -146,8 +154,9 @@ def test_a_head_that_was_filmed_with_open_eyes_looks_back(capture, addon, open_e
     assert front / np.linalg.norm(front) == pytest.approx([0.28, -0.96, 0.0], abs=0.01)
     image = np.array(head.data.materials[1].node_tree.nodes["WildCap Eye"].image.pixels[:]).reshape(512, 512, 4)
     radius = np.hypot(*(np.mgrid[:512, :512] + 0.5 - 256)) / 512
-    assert (image[(radius > 0.1) & (radius < 0.13)][:, 2]
-            > image[(radius > 0.1) & (radius < 0.13)][:, 0]).mean() > 0.9, "the blue that was measured"
+    assert (
+        image[(radius > 0.1) & (radius < 0.13)][:, 2] > image[(radius > 0.1) & (radius < 0.13)][:, 0]
+    ).mean() > 0.9, "the blue that was measured"
 
     keys.key_blocks["eyeBlinkLeft"].value = keys.key_blocks["eyeBlinkRight"].value = 1
     assert np.abs(shown(head)[:HEAD] - solved).max() < 2e-6  # closed lids are one unit away
@@ -175,7 +184,8 @@ def test_a_damaged_record_of_the_eyes_is_named_and_the_skin_is_there(capture, ad
 
 
 def test_values_animation_and_materials_stay_when_another_shape_comes_in_and_over_a_reload(
-        head, capture, addon, tmp_path):
+    head, capture, addon, tmp_path
+):
     keys, slots = head.data.shape_keys, list(head.data.materials)
     keys.key_blocks["jawOpen"].value = 0.4
     keys.key_blocks["browInnerUp"].keyframe_insert("value", frame=3)
@@ -225,8 +235,13 @@ def test_lids_that_were_filmed_open_are_warned_of(addon, tmp_path):
 
 
 def _triangles() -> np.ndarray:
-    return np.array([[int(corner.split("/")[0]) - 1 for corner in line.split()[1:]]
-                     for line in TEMPLATE.read_text().splitlines() if line.startswith("f ")])
+    return np.array(
+        [
+            [int(corner.split("/")[0]) - 1 for corner in line.split()[1:]]
+            for line in TEMPLATE.read_text().splitlines()
+            if line.startswith("f ")
+        ]
+    )
 
 
 def _kind(addon) -> np.ndarray:

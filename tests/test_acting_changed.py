@@ -26,8 +26,10 @@ def cut_neck(head) -> None:  # noqa: F811
 
 def places(head) -> dict[str, np.ndarray]:  # noqa: F811
     """Of the mesh and of each of its shape keys."""
-    return {"": coordinates(head.data.vertices),
-            **{key.name: coordinates(key.data) for key in head.data.shape_keys.key_blocks}}
+    return {
+        "": coordinates(head.data.vertices),
+        **{key.name: coordinates(key.data) for key in head.data.shape_keys.key_blocks},
+    }
 
 
 @pytest.mark.parametrize("own_key", [False, True])
@@ -103,7 +105,7 @@ def test_an_undo_gives_the_iris_its_colour_back(head):  # noqa: F811
 
     def told_and_shown() -> tuple[str, bool]:
         image = bpy.data.materials[material].node_tree.nodes["WildCap Eye"].image
-        red, _, blue, _ = image.pixels[4 * (256 * 512 + 305):][:4]  # half way from the pupil to the iris' rim
+        red, _, blue, _ = image.pixels[4 * (256 * 512 + 305) :][:4]  # half way from the pupil to the iris' rim
         return image["wildcap_iris"], bool(blue > red)
 
     bpy.ops.wildcap.iris(iris='brown')

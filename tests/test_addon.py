@@ -18,17 +18,28 @@ bpy = pytest.importorskip("bpy")
 
 
 def registered() -> set[str]:
-    names = {name
-             for kind in (bpy.types.Operator, bpy.types.Panel, bpy.types.UIList, bpy.types.PropertyGroup,
-                          bpy.types.AddonPreferences)
-             for name in (c.__name__ for c in kind.__subclasses__()) if name.startswith("WILDCAP")}
+    names = {
+        name
+        for kind in (
+            bpy.types.Operator,
+            bpy.types.Panel,
+            bpy.types.UIList,
+            bpy.types.PropertyGroup,
+            bpy.types.AddonPreferences,
+        )
+        for name in (c.__name__ for c in kind.__subclasses__())
+        if name.startswith("WILDCAP")
+    }
     kinds = {name for name in names if hasattr(bpy.types, name)}
     return kinds | ({"Scene.wildcap"} if hasattr(bpy.types.Scene, "wildcap") else set())
 
 
 def handlers() -> int:
-    return sum(getattr(f, "__module__", "").startswith("bl_ext.user_default.wildcap") for name in dir(bpy.app.handlers)
-               for f in (getattr(bpy.app.handlers, name) if isinstance(getattr(bpy.app.handlers, name), list) else ()))
+    return sum(
+        getattr(f, "__module__", "").startswith("bl_ext.user_default.wildcap")
+        for name in dir(bpy.app.handlers)
+        for f in (getattr(bpy.app.handlers, name) if isinstance(getattr(bpy.app.handlers, name), list) else ())
+    )
 
 
 def test_disabling_leaves_nothing_and_enabling_again_works(wildcap):
@@ -82,15 +93,22 @@ def test_every_place_on_the_disk_is_chosen_as_one_and_made_absolute(addon, tmp_p
     properties = addon("properties")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "faces.blend"))
     item = bpy.context.scene.wildcap.captures.add()
-    places = {name: field.metadata["path"] for name, field in properties.core_settings.known_settings().items()
-              if "path" in field.metadata}
+    places = {
+        name: field.metadata["path"]
+        for name, field in properties.core_settings.known_settings().items()
+        if "path" in field.metadata
+    }
     assert len(places) >= 8
     for name, kind in places.items():
         stage, own = name.split(".")
         group = getattr(item, stage)
         assert group.bl_rna.properties[own].subtype == ('DIR_PATH' if kind == "folder" else 'FILE_PATH'), name
-        for given, expected in (("//mine é/", tmp_path / "mine é"), ("mine", Path("mine").absolute()),
-                                ("~/mine", Path("~/mine").expanduser()), ("", "")):
+        for given, expected in (
+            ("//mine é/", tmp_path / "mine é"),
+            ("mine", Path("mine").absolute()),
+            ("~/mine", Path("~/mine").expanduser()),
+            ("", ""),
+        ):
             setattr(group, own, given)
             assert properties.job_settings(item)[stage][own] == str(expected), name
 
@@ -175,6 +193,7 @@ class FakeLayout:
         def call(*args, **kwargs):
             self.drawn.append((name, args, kwargs))
             return (self, self) if name == "panel" else self
+
         return call
 
     def __setattr__(self, name, value):
@@ -218,14 +237,17 @@ def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeyp
     addon("status").refresh(bpy.context)
     rows = drawn(addon("panel").WILDCAP_PT_stages)
     buttons = [(args[0], options["icon"]) for name, args, options in rows if name == "operator"]
-    assert buttons == [("wildcap.reconstruct", 'PLAY'),
-                       ("wildcap.reconstruct", 'FILE_REFRESH')], "the first that is to do, and the one that is done"
+    assert buttons == [("wildcap.reconstruct", 'PLAY'), ("wildcap.reconstruct", 'FILE_REFRESH')], (
+        "the first that is to do, and the one that is done"
+    )
     started = []
     monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **span: started.append((goal, span)))
     bpy.ops.wildcap.reconstruct(first="scan")
     bpy.ops.wildcap.reconstruct()
-    assert started == [("reconstruct", {"first": "scan", "last": "shadow_mask"}),
-                       ("reconstruct", {"first": None, "last": "shadow_mask"})]
+    assert started == [
+        ("reconstruct", {"first": "scan", "last": "shadow_mask"}),
+        ("reconstruct", {"first": None, "last": "shadow_mask"}),
+    ]
 
 
 def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, capture, monkeypatch):
@@ -270,8 +292,9 @@ def test_every_panel_draws_in_every_state(addon, capture):
         for cls in classes:
             if not hasattr(cls, "poll") or cls.poll(bpy.context):
                 seen += drawn(cls)
-        return [kwargs.get("text", args[1] if len(args) > 1 else "") for name, args, kwargs in seen
-                if name == "operator"]
+        return [
+            kwargs.get("text", args[1] if len(args) > 1 else "") for name, args, kwargs in seen if name == "operator"
+        ]
 
     draw_all()
     status.refresh(bpy.context)

@@ -49,11 +49,20 @@ def test_points_of_a_file_are_taken(capture, tmp_path):
     assert cli.main(["landmarks", "import", str(capture.root), str(tmp_path / "none.json")]) == 2
 
 
-@pytest.mark.parametrize("text",
-                         ["not json", "[]", '{"points": [1]}', '{"points": {"468": [0, 0, 0]}}',
-                          '{"points": {"nose": [0, 0, 0]}}',
-                          '{"points": {"1": [0, 0]}}', '{"points": {"1": [0, 0, 150]}}',
-                          '{"points": {"1": [0, 0, NaN]}}', '{"points": {"1": "abc"}}'])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "not json",
+        "[]",
+        '{"points": [1]}',
+        '{"points": {"468": [0, 0, 0]}}',
+        '{"points": {"nose": [0, 0, 0]}}',
+        '{"points": {"1": [0, 0]}}',
+        '{"points": {"1": [0, 0, 150]}}',
+        '{"points": {"1": [0, 0, NaN]}}',
+        '{"points": {"1": "abc"}}',
+    ],
+)
 def test_a_bad_file_is_a_problem_and_changes_nothing(capture, tmp_path, text):
     bad = tmp_path / "bad.json"
     bad.write_text(text)
@@ -90,5 +99,6 @@ def test_a_moved_landmark_takes_the_surface_along(tmp_path, monkeypatch, known):
     far = np.linalg.norm(points - points[MOUTH_CORNER], axis=1) > 0.05
     assert np.median(np.linalg.norm(at - points, axis=1)[far]) < 0.001, "the rest of the face stays"
     assert report.figures["flipped_triangles"] == 0
-    assert np.linalg.norm(np.array(json.loads(capture.landmarks.read_text())["points"][str(MOUTH_CORNER)])
-                          - wish) < 1e-5
+    assert (
+        np.linalg.norm(np.array(json.loads(capture.landmarks.read_text())["points"][str(MOUTH_CORNER)]) - wish) < 1e-5
+    )

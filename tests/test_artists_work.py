@@ -28,8 +28,16 @@ def obj(addon, item):
 def raise_by(path: Path, metres: float) -> None:
     """Moves every vertex of an OBJ up."""
     lines = [line.split() for line in path.read_text(encoding="utf-8").splitlines()]
-    path.write_text("\n".join(" ".join(["v", words[1], words[2], f"{float(words[3]) + metres:.6f}", *words[4:]])
-                              if words[:1] == ["v"] else " ".join(words) for words in lines) + "\n", encoding="utf-8")
+    path.write_text(
+        "\n".join(
+            " ".join(["v", words[1], words[2], f"{float(words[3]) + metres:.6f}", *words[4:]])
+            if words[:1] == ["v"]
+            else " ".join(words)
+            for words in lines
+        )
+        + "\n",
+        encoding="utf-8",
+    )
 
 
 @pytest.mark.parametrize("kept", ["painted", "packed"])

@@ -51,9 +51,11 @@ def test_faults_are_told_apart():
     assert "overlap" in atlas.faults(mirrored)[0]
     assert "no area" in atlas.faults(replace(mesh, uvs=np.full_like(mesh.uvs, 0.5)))[0]
     assert "left of" in atlas.faults(replace(mesh, uvs=mesh.uvs - [1, 0]))[0]
-    beside = replace(mesh, uvs=np.concatenate([mesh.uvs, mesh.uvs + [1, 0]]),
-                     face_uvs=np.where((np.arange(len(mesh.faces)) % 2 == 0)[:, None], mesh.face_uvs,
-                                       mesh.face_uvs + len(mesh.uvs)))
+    beside = replace(
+        mesh,
+        uvs=np.concatenate([mesh.uvs, mesh.uvs + [1, 0]]),
+        face_uvs=np.where((np.arange(len(mesh.faces)) % 2 == 0)[:, None], mesh.face_uvs, mesh.face_uvs + len(mesh.uvs)),
+    )
     assert atlas.faults(beside) == [] and {atlas.udim(t) for t in atlas.tiles(beside)} == {1001, 1002}
 
 
@@ -69,8 +71,10 @@ def test_split_seams_are_sewn_and_what_only_touches_is_not():
     sewn, index = surfaces.welded(mesh)
     assert len(sewn.vertices) == len(mesh.vertices) - 17 and np.allclose(sewn.vertices[index], mesh.vertices, atol=1e-6)
     a, b, c = mesh.vertices[mesh.faces[100]]
-    fin = Mesh(np.concatenate([mesh.vertices, [a, b, (a + b) / 2 + [0, 0, 1]]]),
-               np.concatenate([mesh.faces, len(mesh.vertices) + np.array([[0, 1, 2]])]))
+    fin = Mesh(
+        np.concatenate([mesh.vertices, [a, b, (a + b) / 2 + [0, 0, 1]]]),
+        np.concatenate([mesh.faces, len(mesh.vertices) + np.array([[0, 1, 2]])]),
+    )
     assert len(surfaces.welded(fin)[0].vertices) == len(sewn.vertices) + 3
 
 

@@ -41,7 +41,7 @@ def test_a_read_only_capture_is_delivered_elsewhere_and_looked_at_and_nothing_in
     assert main(["deliver", str(archive.root), "--to", str(tmp_path / "out")]) == 0, capsys.readouterr().err
     assert main(["status", str(archive.root)]) == 0
     assert contents(archive.root) == before
-    folder, = (tmp_path / "out").iterdir()
+    (folder,) = (tmp_path / "out").iterdir()
     assert folder.name.startswith("Zoe_et_moi_head") and list(folder.glob("*.obj"))
     assert not list((tmp_path / "out").glob(".*"))
     assert not any(path.is_symlink() for path in folder.rglob("*"))

@@ -30,10 +30,11 @@ def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
     for work, problem in ((refuse, "It cannot be."), (lambda task: 1 / 0, "An error inside WildCap stopped")):
         task = BackgroundTask("try", work)
         task.start()
-        ended, = follow(task, 20)
+        (ended,) = follow(task, 20)
         assert ended.problem.startswith(problem)
-    task = BackgroundTask("slow", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"],
-                                                        limit_s=0.2))
+    task = BackgroundTask(
+        "slow", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"], limit_s=0.2)
+    )
     task.start()
     assert isinstance(follow(task, 20)[-1], Done) and task.result[0] != 0, "what takes longer than it may is ended"
     task = BackgroundTask("sleep", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"]))
@@ -47,8 +48,10 @@ def test_a_cancel_ends_what_the_command_has_started(tmp_path):
     """venv runs pip's installer as a process of its own, which must not go on in a folder that the next installation
     begins with."""
     late = tmp_path / "late"
-    child = (f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(1); "
-             f"pathlib.Path({str(late)!r}).touch()")
+    child = (
+        f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(1); "
+        f"pathlib.Path({str(late)!r}).touch()"
+    )
     starter = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
     task = BackgroundTask("venv", lambda task: task.run([sys.executable, "-c", starter]))
     task.start()

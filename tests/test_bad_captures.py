@@ -46,18 +46,19 @@ def problems(report: Reporter) -> str:
 def test_missing_sides_are_named():
     whole = np.linspace(-75, 75, 16)
     assert coverage.missing(place(whole, 10 * np.sin(whole))) == []
-    left = " ".join(problem
-                    for problem, _ in coverage.missing(place(np.linspace(-75, 15, 10), 10 * np.sin(whole[:10]))))
+    left = " ".join(
+        problem for problem, _ in coverage.missing(place(np.linspace(-75, 15, 10), 10 * np.sin(whole[:10])))
+    )
     assert "Nothing was seen from the person's left side: the pictures end 15 degrees" in left and "right" not in left
-    right = " ".join(problem
-                     for problem, _ in coverage.missing(place(np.linspace(10, 80, 10), 10 * np.sin(whole[:10]))))
+    right = " ".join(
+        problem for problem, _ in coverage.missing(place(np.linspace(10, 80, 10), 10 * np.sin(whole[:10])))
+    )
     assert "Nothing was seen from the person's right side" in right and "before the nose" in right
     turned = place(np.array([-70, -60, -50, 40, 55, 70.0]), 10 * np.sin(whole[:6]))
     gap = " ".join(problem for problem, _ in coverage.missing(turned))
     assert (
         "Between 50 degrees to the person's right and 40 degrees to the person's left there is no picture: a gap of 90 "
-        "degrees"
-        in gap
+        "degrees" in gap
     )
     assert "one height" in coverage.missing(place(whole))[0][0]
 
@@ -89,8 +90,9 @@ def test_the_two_sides_of_a_symmetric_face_are_not_taken_for_each_others_mirror_
     names, found = [f"{i}.png" for i in range(3)], {}
     # from the right, and as if from the left
     for name, azimuth, flip in zip(names, (-30, -28, -33), (1, -1, -1), strict=True):
-        images.write_srgb(tmp_path / name,
-                          painted_head.photograph(place_camera(azimuth, 0.02, scale=2), wall=False)[:, ::flip])
+        images.write_srgb(
+            tmp_path / name, painted_head.photograph(place_camera(azimuth, 0.02, scale=2), wall=False)[:, ::flip]
+        )
         found[name] = faces.detect(images.read_srgb(tmp_path / name))
     assert find_mirrored(names, [], tmp_path, Reporter("cameras")) == ["0.png"], "by the pictures alone it is one"
     assert find_mirrored(names, [], tmp_path, Reporter("cameras"), found) == []
@@ -98,18 +100,23 @@ def test_the_two_sides_of_a_symmetric_face_are_not_taken_for_each_others_mirror_
 
 def test_a_head_that_turns_before_a_still_camera_is_told(tmp_path):
     for i, turn in enumerate(np.linspace(-32, 32, 9)):
-        images.write_srgb(tmp_path / "photos" / f"{i}.png",
-                          painted_head.photograph(place_camera(0, 0.03), turned_deg=turn))
+        images.write_srgb(
+            tmp_path / "photos" / f"{i}.png", painted_head.photograph(place_camera(0, 0.03), turned_deg=turn)
+        )
     report = solve(tmp_path / "photos", Capture(tmp_path / "face.wildcap"), features="plain")
     assert "The head turned while the camera stood still" in problems(report)
     assert report.figures["angular_coverage_deg"] == pytest.approx(64, abs=15)
 
 
-@pytest.mark.parametrize(("stood", "words"), [(True, "turned in front of a camera that stood still"),
-                                              (False, "the cameras follow the background, and the head moved")])
+@pytest.mark.parametrize(
+    ("stood", "words"),
+    [
+        (True, "turned in front of a camera that stood still"),
+        (False, "the cameras follow the background, and the head moved"),
+    ],
+)
 def test_a_head_that_moved_and_does_not_tell_its_own_motion_is_refused(stood, words):
-    film = Frames(tuple(FrameRecord(name=f"{i}.jpg", sharpness=1.0, selected=True) for i in range(9)),
-                  VIDEO)
+    film = Frames(tuple(FrameRecord(name=f"{i}.jpg", sharpness=1.0, selected=True) for i in range(9)), VIDEO)
     problem = solving._explained(film, ["Nothing fits."], {}, True, stood, None, Reporter("cameras"))
     assert words in problem.problem and "move the camera instead" in problem.remedy
 
@@ -117,9 +124,10 @@ def test_a_head_that_moved_and_does_not_tell_its_own_motion_is_refused(stood, wo
 def test_an_open_mouth_in_some_frames_is_told():
     face = faces.detect(painted_head.photograph(place_camera(0)))
     rng = np.random.default_rng(0)
-    found = {str(i): replace(face,
-                             landmarks=face.landmarks + rng.normal(0, 0.3, face.landmarks.shape).astype(np.float32))
-             for i in range(10)}
+    found = {
+        str(i): replace(face, landmarks=face.landmarks + rng.normal(0, 0.3, face.landmarks.shape).astype(np.float32))
+        for i in range(10)
+    }
     assert expression_changes(found) == []
     wide = face.landmarks.copy()
     wide[list(range(14, 15)), 1] += 0.3 * np.linalg.norm(wide[33] - wide[263])  # the lower lip goes down
@@ -132,8 +140,9 @@ def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
     """Nothing matches, and where a single side is seen the depths are those of other heads: the face lies on the
     picture, and the report says what it is."""
     for i, azimuth in enumerate(azimuths):
-        images.write_srgb(tmp_path / "photos" / f"{i}.png",
-                          painted_head.photograph(place_camera(azimuth, 0.02), wall=False))
+        images.write_srgb(
+            tmp_path / "photos" / f"{i}.png", painted_head.photograph(place_camera(azimuth, 0.02), wall=False)
+        )
     capture = Capture(tmp_path / "face.wildcap")
     report = solve(tmp_path / "photos", capture)
     assert report.figures["frames_registered"] == len(azimuths) and "overlap" not in problems(report)
@@ -145,7 +154,9 @@ def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
     width, true_width = np.ptp(head.vertices[:, 0]), np.ptp(truth.vertices[:, 0])
     assert width == pytest.approx(true_width, rel=0.08), "metres, by the distance of the pupils"
     for view, azimuth in zip(read_views(capture), azimuths, strict=True):
-        there, here = (seen.project(template.landmark_points(mesh))[0]
-                       for seen, mesh in ((place_camera(azimuth, 0.02), truth), (view, head)))
+        there, here = (
+            seen.project(template.landmark_points(mesh))[0]
+            for seen, mesh in ((place_camera(azimuth, 0.02), truth), (view, head))
+        )
         miss = np.linalg.norm(there - here, axis=1)[template.landmark_weights() > 0.2]
         assert np.median(miss) < 0.04 * np.ptp(there[:, 0]), "of the face's width"

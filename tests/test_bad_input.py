@@ -36,7 +36,7 @@ ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1"}
 @pytest.fixture(scope="module")
 def face(tmp_path_factory) -> Path:
     """Twelve frames of a face that wanders."""
-    crops = [astronaut()[5 + k:225 + k, 100 + 3 * k:340 + 3 * k] for k in range(12)]
+    crops = [astronaut()[5 + k : 225 + k, 100 + 3 * k : 340 + 3 * k] for k in range(12)]
     return video(tmp_path_factory.mktemp("Vidéos d'été") / "Chloé (1).mp4", crops)
 
 
@@ -56,8 +56,19 @@ def video(path: Path, pictures) -> Path:
 
 
 def run(source, capture: Capture, *options, within=()) -> subprocess.CompletedProcess:
-    command = [*within, sys.executable, "-B", "-m", "core", "run", str(source), str(capture.root), "--until", "frames",
-               *options]
+    command = [
+        *within,
+        sys.executable,
+        "-B",
+        "-m",
+        "core",
+        "run",
+        str(source),
+        str(capture.root),
+        "--until",
+        "frames",
+        *options,
+    ]
     return subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
 
 
@@ -88,14 +99,17 @@ def test_text_called_mp4(capture, tmp_path):
 
 def test_a_truncated_video(capture, face, tmp_path):
     cut = tmp_path / "cut.mp4"
-    cut.write_bytes(face.read_bytes()[:len(face.read_bytes()) // 3])  # the index of an MP4 is at its end
+    cut.write_bytes(face.read_bytes()[: len(face.read_bytes()) // 3])  # the index of an MP4 is at its end
     refused(cut, capture, "cut.mp4")
 
 
 def test_a_video_without_a_face(capture, tmp_path):
     noise = np.random.default_rng(0).integers(0, 255, (30, 40, 3), np.uint8)
-    refused(video(tmp_path / "wall.mp4",
-                  [np.kron(np.roll(noise, k, 1), np.ones((8, 8, 1), np.uint8)) for k in range(8)]), capture, "face")
+    refused(
+        video(tmp_path / "wall.mp4", [np.kron(np.roll(noise, k, 1), np.ones((8, 8, 1), np.uint8)) for k in range(8)]),
+        capture,
+        "face",
+    )
 
 
 def test_a_video_that_stands_still(capture, tmp_path):
@@ -113,8 +127,11 @@ def test_the_same_capture_takes_a_good_video_after_a_bad_one(capture, face, tmp_
 def test_accents_and_spaces_in_every_path(face, tmp_path):
     """Also in the path of the code itself, as in C:/Users/Chloé Müller."""
     root = tmp_path / "Chloé Müller" / "wild cap"
-    shutil.copytree(ROOT / "core", root / "core",
-                    ignore=shutil.ignore_patterns("__pycache__", "sample_head", "training", "synthetic"))
+    shutil.copytree(
+        ROOT / "core",
+        root / "core",
+        ignore=shutil.ignore_patterns("__pycache__", "sample_head", "training", "synthetic"),
+    )
     capture = Capture(tmp_path / "mes visages" / "été 🙂.wildcap")
     command = [sys.executable, "-B", "-m", "core", "run", str(face), str(capture.root), "--until", "frames"]
     result = subprocess.run(command, cwd=root, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
@@ -123,6 +140,7 @@ def test_accents_and_spaces_in_every_path(face, tmp_path):
 
 
 # -- disks
+
 
 def private_mounts() -> bool:
     if shutil.which("unshare") is None:
@@ -149,8 +167,9 @@ def test_a_full_disk_is_told_and_nothing_is_lost(face, tmp_path):
         {command} >/dev/null; echo "code $?"
         cat "{disk}/a.wildcap/shadow_mask.png"; ls "{disk}/a.wildcap/frames" | grep -c jpg
     """
-    result = subprocess.run(["unshare", "-rm", "sh", "-c", script], cwd=ROOT, env=ENVIRONMENT, capture_output=True,
-                            text=True, timeout=120)
+    result = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", script], cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=120
+    )
     assert result.stdout.split("\n")[:5] == ["code 2", "0", "code 0", "painted", "12"], result
     problem, remedy = result.stderr.strip().splitlines()
     assert problem.startswith("The disk is full") and remedy.endswith(".")
@@ -165,14 +184,16 @@ def test_a_read_only_folder_is_told(face, tmp_path):
         mount --bind "{folder}" "{folder}" && mount -o remount,bind,ro "{folder}"
         "{sys.executable}" -B -m core run "{face}" "{folder}/a.wildcap" --until frames; echo "code $?"
     """
-    result = subprocess.run(["unshare", "-rm", "sh", "-c", script], cwd=ROOT, env=ENVIRONMENT, capture_output=True,
-                            text=True, timeout=120)
+    result = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", script], cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=120
+    )
     assert result.stdout.strip() == "code 2", result
     problem, remedy = result.stderr.strip().splitlines()
     assert "read-only" in problem and remedy.endswith(".")
 
 
 # -- kill -9 and cancel in real stages
+
 
 def start(source, capture: Capture, **job) -> Worker:
     capture.root.mkdir(parents=True, exist_ok=True)

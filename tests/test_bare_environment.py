@@ -29,6 +29,7 @@ def run(command) -> tuple[int, str]:
 
 def without(*modules: str):
     """`run` where commands that need one of these modules fail, as on a Python that was stripped of them."""
+
     def run_without(command):
         if any(module in map(str, command) for module in modules):
             return 1, f"No module named {modules[0]}"
@@ -56,11 +57,17 @@ def wheels(tmp_path) -> Path:
 @pytest.mark.parametrize("stripped", [(), ("venv",), ("venv", "ensurepip")])
 def test_an_environment_is_made_whatever_its_python_lacks(tmp_path, wheels, stripped):
     folder = tmp_path / "Löser für Zoë"
-    python = bare_environment.make(folder, Path(sys.executable), tmp_path / "requirements",
-                                   without(*stripped) if stripped else run, wheels, wheel_only="ensurepip" in stripped)
-    said = environment.answer(python,
-                              "import sys, pip; print(sys.prefix); print(*sys.version_info[:2]); print(getattr(pip, "
-                              "'small', False))").splitlines()
+    python = bare_environment.make(
+        folder,
+        Path(sys.executable),
+        tmp_path / "requirements",
+        without(*stripped) if stripped else run,
+        wheels,
+        wheel_only="ensurepip" in stripped,
+    )
+    said = environment.answer(
+        python, "import sys, pip; print(sys.prefix); print(*sys.version_info[:2]); print(getattr(pip, 'small', False))"
+    ).splitlines()
     assert (
         Path(said[0]).samefile(folder)
         and said[1] == "{} {}".format(*sys.version_info)
@@ -84,8 +91,9 @@ def test_a_python_that_nothing_can_be_made_from_is_named(tmp_path, wheels):
     with pytest.raises(Problem, match="is not a working Python"):
         bare_environment.make(tmp_path / "env", tmp_path / "none", tmp_path / "requirements", without("venv"), wheels)
     with pytest.raises(Problem, match="No environment can be made from .* does not start"):
-        bare_environment.make(tmp_path / "env", tmp_path / "none", tmp_path / "requirements", lambda command: (0, ""),
-                              wheels)
+        bare_environment.make(
+            tmp_path / "env", tmp_path / "none", tmp_path / "requirements", lambda command: (0, ""), wheels
+        )
     with pytest.raises(Problem, match="does not answer"):
         bare_environment.unpack_pip(tmp_path / "env", b"")
     (wheels / PIP).write_bytes(b"")
@@ -96,8 +104,9 @@ def test_a_python_that_nothing_can_be_made_from_is_named(tmp_path, wheels):
     (wheels / PIP).write_bytes(broken.getvalue())
     pip_lock.write_text(f"pip==0.1 --hash=sha256:{hashlib.sha256(broken.getvalue()).hexdigest()}\n")
     with pytest.raises(Problem, match="pip does not work in"):
-        bare_environment.make(tmp_path / "env", Path(sys.executable), tmp_path / "requirements", run, wheels,
-                              wheel_only=True)
+        bare_environment.make(
+            tmp_path / "env", Path(sys.executable), tmp_path / "requirements", run, wheels, wheel_only=True
+        )
 
 
 def test_pip_is_checked_and_missed_by_name(tmp_path, wheels):
@@ -144,8 +153,10 @@ def test_pips_settings_are_read_as_pip_reads_them(tmp_path, monkeypatch):
         monkeypatch.delenv(name)
     file = tmp_path / "pip.conf"
     monkeypatch.setenv("PIP_CONFIG_FILE", str(file))
-    for text, value in (("[global]\nindex-url = https://a/simple\n", "https://a/simple"),
-                        ("[global]\nindex-url=b\n[install]\nindex-url = c\n", "c")):
+    for text, value in (
+        ("[global]\nindex-url = https://a/simple\n", "https://a/simple"),
+        ("[global]\nindex-url=b\n[install]\nindex-url = c\n", "c"),
+    ):
         file.write_text(text)
         assert pip_source.setting("index-url") == value
     monkeypatch.setenv("PIP_INDEX_URL", "https://mirror/simple")

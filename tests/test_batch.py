@@ -53,15 +53,17 @@ def test_one_that_stops_keeps_nobody(code, tmp_path):
     assert ran.returncode == 2 and ran.stderr == "" and ran.stdout.splitlines()[-1] == "4 faces: 1 done, 3 stopped"
     assert "head stopped: The face is not there. Film it." in said["b"] and "The disk is full" in said["c"]
     assert "There is no video or folder at" in said["d"]
-    assert states(batch) == {"a": DONE, "b": STOPPED, "c": TO_DO,
-                             "d": TO_DO}, "a disk with room again, a film that is back: nobody has to say so"
+    assert states(batch) == {"a": DONE, "b": STOPPED, "c": TO_DO, "d": TO_DO}, (
+        "a disk with room again, a film that is back: nobody has to say so"
+    )
     for face in batch.faces:
         tiny_batch.set_mood(face.capture, {})
     (tmp_path / "films" / "d.mp4").write_bytes(b"d")
     once = finished(batch)
     assert core(code, "batch", "run", batch.root).returncode == 2
-    assert states(batch) == {"a": DONE, "b": STOPPED, "c": DONE,
-                             "d": DONE}, "what has stopped at a face's own fault is not tried again by itself"
+    assert states(batch) == {"a": DONE, "b": STOPPED, "c": DONE, "d": DONE}, (
+        "what has stopped at a face's own fault is not tried again by itself"
+    )
     assert core(code, "batch", "retry", batch.root, "b").returncode == 0
     assert states(batch) == dict.fromkeys("abcd", DONE)
     assert finished(batch)["a"] == once["a"] and finished(batch)["b"]["frames"] == once["b"]["frames"]
@@ -98,8 +100,9 @@ def test_a_machine_that_has_gone_holds_nothing(code, tmp_path, monkeypatch):
     """Its lease is waited for and taken over, its face gone on with."""
     batch = make(code, tmp_path, "a")
     capture = batch.faces[0].capture
-    capture.lock.write_text(json.dumps({"host": "gone/1/2", "pid": 1, "began": "", "since": "2026-11-24T00:00:00",
-                                        "token": "x"}))
+    capture.lock.write_text(
+        json.dumps({"host": "gone/1/2", "pid": 1, "began": "", "since": "2026-11-24T00:00:00", "token": "x"})
+    )
     assert derive_state(batch, batch.faces[0]).machine == "gone"
     monkeypatch.setattr(lease, "TERM_S", 0.5)
     heard = []
@@ -148,9 +151,10 @@ def test_commands_do_the_batch_in_the_order_they_name(code, tmp_path):
         assert after in done, "each waits for one before it"
         assert subprocess.run(shlex.split(line), cwd=code, capture_output=True).returncode == 0
         done.add(name)
-    assert done == {"",
-                    *(f"{face}.{group}" for face in "ab"
-                      for group in ("head", "mask", "solve", "deliver"))} and states(batch) == {"a": DONE, "b": DONE}
+    assert done == {
+        "",
+        *(f"{face}.{group}" for face in "ab" for group in ("head", "mask", "solve", "deliver")),
+    } and states(batch) == {"a": DONE, "b": DONE}
     assert [task.name for task in lines.list_tasks(batch)] == []
 
 
@@ -158,9 +162,13 @@ def test_a_task_by_an_unknown_name_is_refused(code, tmp_path):
     batch = make(code, tmp_path, "a")
     for words, said in ((("z", "head"), "no face named 'z'"), (("a", "lunch"), "no task named 'lunch'")):
         assert said in core(code, "batch", "task", batch.root, *words).stderr
-    for words, said in ((("--at-once", 0), "less than one"), (("--address", "here"), "--on ray only"),
-                        (("--cores", 2), "--on ray only"), (("--on", "ray", "--at-once", 2), "--on local only"),
-                        (("z",), "no face named")):
+    for words, said in (
+        (("--at-once", 0), "less than one"),
+        (("--address", "here"), "--on ray only"),
+        (("--cores", 2), "--on ray only"),
+        (("--on", "ray", "--at-once", 2), "--on local only"),
+        (("z",), "no face named"),
+    ):
         assert said in core(code, "batch", "run", batch.root, *words).stderr
 
 
@@ -205,8 +213,11 @@ def test_a_stage_that_begins_is_told_at_once_and_how_far_it_is_once_in_a_while(c
         return tuple(json.loads((batch.root / local.PROGRESS).read_text())["working"]["a"].values())[:2]
 
     board.write(now=True)
-    for stage, done, expected in (("frames", 0, ("Frames", 0)), ("frames", 1, ("Frames", 0)),
-                                  ("cameras", 0, ("Cameras", 0))):
+    for stage, done, expected in (
+        ("frames", 0, ("Frames", 0)),
+        ("frames", 1, ("Frames", 0)),
+        ("cameras", 0, ("Cameras", 0)),
+    ):
         board.hear(face, Progress(stage, done, 2, "Starting"))
         assert told() == expected
 
@@ -225,7 +236,14 @@ def test_until_ends_each_face_there(code, tmp_path):
     batch = make(code, tmp_path, "ab")
     assert core(code, "batch", "run", batch.root, "--until", "mask").returncode == 0
     assert {name for stages in finished(batch).values() for name in stages} == {
-        "frames", "cameras", "scan", "registration", "delight", "texture", "shadow_mask"}
+        "frames",
+        "cameras",
+        "scan",
+        "registration",
+        "delight",
+        "texture",
+        "shadow_mask",
+    }
 
 
 def test_a_batch_travels_with_its_captures(code, tmp_path):
@@ -256,10 +274,12 @@ def test_what_is_delivered_is_what_the_maps_are_now(code, tmp_path):
 def test_contact_sheets_by_the_blender_that_is_named(code, tmp_path):
     """A program in Blender's place that writes the sheet, and two that do not."""
     blender = tmp_path / "blender"
-    blender.write_text(f"#!{sys.executable}\nimport sys, pathlib\nassert sys.argv[1:4] == ['--command', 'wildcap', "
-                       "'contact_sheet']\n"
-                       "folder = pathlib.Path(sys.argv[4], 'renders'); folder.mkdir(exist_ok=True); (folder / "
-                       "'contact_sheet.png').write_text('sheet')\n")
+    blender.write_text(
+        f"#!{sys.executable}\nimport sys, pathlib\nassert sys.argv[1:4] == ['--command', 'wildcap', "
+        "'contact_sheet']\n"
+        "folder = pathlib.Path(sys.argv[4], 'renders'); folder.mkdir(exist_ok=True); (folder / "
+        "'contact_sheet.png').write_text('sheet')\n"
+    )
     blender.chmod(0o755)
     batch = make(code, tmp_path, "a", None, "--blender", blender)
     core(code, "batch", "run", batch.root)

@@ -29,8 +29,10 @@ def open_captures(*captures: Capture) -> None:
 def test_a_batch_goes_on_without_blender_is_found_again_and_stops_within_two_seconds(addon, batches, wildcap, tmp_path):
     import addon_utils
 
-    first, second = (batch_faces.filmed(tmp_path / "films", name, {"cameras": "slow"} if name == "anna" else None)
-                     for name in ("anna", "bert"))
+    first, second = (
+        batch_faces.filmed(tmp_path / "films", name, {"cameras": "slow"} if name == "anna" else None)
+        for name in ("anna", "bert")
+    )
     open_captures(first, second)
     settings = bpy.context.scene.wildcap.captures[1]
     settings.seed = 7

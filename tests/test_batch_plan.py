@@ -38,24 +38,37 @@ def plan(folder, text: str, encoding="utf-8", **shared):
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 @pytest.mark.parametrize("start", ["", "\ufeff"])
 def test_a_table_as_spreadsheets_write_it(folder, separator, start):
-    rows = (("Video", "name", "tone", "white", "quality"), ("anna.mp4", "Anna", '"0.8,0.6,0.5"', "auto", ""),
-            ("", "", "", "", ""), ("zoë b.mov", "", "", "", "draft"))
+    rows = (
+        ("Video", "name", "tone", "white", "quality"),
+        ("anna.mp4", "Anna", '"0.8,0.6,0.5"', "auto", ""),
+        ("", "", "", "", ""),
+        ("zoë b.mov", "", "", "", "draft"),
+    )
     faces, faults = plan(folder, start + "\r\n".join(separator.join(row) for row in rows) + "\r\n")
     assert faults == [] and [(face.name, face.source, face.root.name, face.quality) for face in faces] == [
         ("Anna", folder / "anna.mp4", "Anna.wildcap", "standard"),
-        ("zoë b", folder / "zoë b.mov", "zoë b.wildcap", "draft")]
+        ("zoë b", folder / "zoë b.mov", "zoë b.wildcap", "draft"),
+    ]
     assert faces[0].settings == {"solve": {"skin_tone": "0.8,0.6,0.5", "white_point": "auto"}}
     assert faces[1].settings == {}
 
 
 def test_a_rows_settings_lie_over_the_files_and_those_over_the_shared_ones(folder):
     (folder / "own.json").write_text(
-        '{"solve": {"steps": 30, "skin_tone": "0.1,0.1,0.1"}, "registration": {"template": "head.obj"}}')
+        '{"solve": {"steps": 30, "skin_tone": "0.1,0.1,0.1"}, "registration": {"template": "head.obj"}}'
+    )
     (folder / "head.obj").write_text("v 0 0 0")
-    faces, _ = plan(folder, 'video,settings,tone\nanna.mp4,own.json,"0.7,0.6,0.5"\ncarl,,\n',
-                    solve={"steps": 9, "size": 256}, seed=4)
-    assert faces[0].settings == {"solve": {"steps": 30, "size": 256, "skin_tone": "0.7,0.6,0.5"}, "seed": 4,
-                                 "registration": {"template": str(folder / "head.obj")}}
+    faces, _ = plan(
+        folder,
+        'video,settings,tone\nanna.mp4,own.json,"0.7,0.6,0.5"\ncarl,,\n',
+        solve={"steps": 9, "size": 256},
+        seed=4,
+    )
+    assert faces[0].settings == {
+        "solve": {"steps": 30, "size": 256, "skin_tone": "0.7,0.6,0.5"},
+        "seed": 4,
+        "registration": {"template": str(folder / "head.obj")},
+    }
     assert faces[1].settings == {"solve": {"steps": 9, "size": 256}, "seed": 4}, "one row's values reach no other"
 
 
@@ -87,16 +100,25 @@ def test_a_batch_whose_folder_cannot_be_written_is_refused_by_name(folder, capsy
     assert said in told and str(batch) in told and "inside WildCap" not in told
 
 
-@pytest.mark.parametrize("row, said", [
-    (",x,,,,", "names no video"), ("gone.mp4,,,,,", "no video or folder at"),
-    ("anna.mp4,a/b,,,,", "cannot be the name"), ("anna.mp4,..,,,,", "cannot be the name"),
-    ("anna.mp4,CARL,,,,", "The name CARL is taken by Line 2"), ('anna.mp4,,"0.8,0.6",,,', "is not a colour"),
-    ('anna.mp4,,"0.8,0.6,x",,,', "is not a colour"),
-    ('anna.mp4,,"0.8,nan,0.5",,,', "is not a colour"), ("anna.mp4,,,white,,", "is not a colour"),
-    ("anna.mp4,,,,head.obj,", "no file or folder at"),
-    ("anna.mp4,,,,,gone.json", "cannot be read"), ("anna.mp4,,,,,shots.csv", "cannot be read"),
-    ("anna.mp4,,,,,,,extra", "more cells than there are columns"),
-    ("anna.mp4,,0.8,0.6,0.5,,", "more cells than there are columns")])
+@pytest.mark.parametrize(
+    "row, said",
+    [
+        (",x,,,,", "names no video"),
+        ("gone.mp4,,,,,", "no video or folder at"),
+        ("anna.mp4,a/b,,,,", "cannot be the name"),
+        ("anna.mp4,..,,,,", "cannot be the name"),
+        ("anna.mp4,CARL,,,,", "The name CARL is taken by Line 2"),
+        ('anna.mp4,,"0.8,0.6",,,', "is not a colour"),
+        ('anna.mp4,,"0.8,0.6,x",,,', "is not a colour"),
+        ('anna.mp4,,"0.8,nan,0.5",,,', "is not a colour"),
+        ("anna.mp4,,,white,,", "is not a colour"),
+        ("anna.mp4,,,,head.obj,", "no file or folder at"),
+        ("anna.mp4,,,,,gone.json", "cannot be read"),
+        ("anna.mp4,,,,,shots.csv", "cannot be read"),
+        ("anna.mp4,,,,,,,extra", "more cells than there are columns"),
+        ("anna.mp4,,0.8,0.6,0.5,,", "more cells than there are columns"),
+    ],
+)
 def test_a_row_that_cannot_be_used_is_told_by_its_line_and_the_rest_is_planned(folder, row, said):
     faces, faults = plan(folder, f"video,name,tone,white,template,settings\ncarl,,,,,\n{row}\nzoë b.mov,,,,,\n")
     assert [face.name for face in faces] == ["carl", "zoë b"]
@@ -108,9 +130,17 @@ def test_a_row_that_cannot_be_used_is_told_by_its_line_and_the_rest_is_planned(f
     )
 
 
-@pytest.mark.parametrize("text, said", [
-    ("", "names no video"), ("video\n", "names no video"), ("film,name\na,b\n", "'film' that means nothing"),
-    ("name\nb\n", "no column video"), ("video,video\na,b\n", "a column twice"), ("video\n\0\n", "not a text file")])
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("", "names no video"),
+        ("video\n", "names no video"),
+        ("film,name\na,b\n", "'film' that means nothing"),
+        ("name\nb\n", "no column video"),
+        ("video,video\na,b\n", "a column twice"),
+        ("video\n\0\n", "not a text file"),
+    ],
+)
 def test_a_table_that_is_none_is_refused(folder, text, said):
     with pytest.raises(Problem) as refused:
         plan(folder, text)
@@ -118,8 +148,11 @@ def test_a_table_that_is_none_is_refused(folder, text, said):
 
 
 def test_other_tables_that_cannot_be_read(folder):
-    for path, said in ((folder / "none.csv", "no table or folder"), (folder / "latin.csv", "UTF-8"),
-                       (folder / "long.csv", "cannot be read as a table")):
+    for path, said in (
+        (folder / "none.csv", "no table or folder"),
+        (folder / "latin.csv", "UTF-8"),
+        (folder / "long.csv", "cannot be read as a table"),
+    ):
         if path.name == "latin.csv":
             path.write_bytes("video\nzoë.mov\n".encode("latin-1"))
         if path.name == "long.csv":
@@ -131,8 +164,9 @@ def test_other_tables_that_cannot_be_read(folder):
 def test_a_folder_of_films(folder, capsys):
     (folder / "old.wildcap").mkdir()
     (folder / "old.wildcap" / "capture.json").write_text("{}")
-    assert main(["batch", "plan", str(folder), str(folder / "batch"), "--quality", "draft", "--set",
-                 "solve.steps=9"]) == 0
+    assert (
+        main(["batch", "plan", str(folder), str(folder / "batch"), "--quality", "draft", "--set", "solve.steps=9"]) == 0
+    )
     assert "4 faces planned" in capsys.readouterr().out
     batch = read_batch(folder / "batch")
     assert [face.name for face in batch.faces] == ["anna.avi", "anna.mp4", "carl", "zoë b"]
@@ -173,24 +207,32 @@ def test_planned_again_it_keeps_the_options_that_are_left_out(folder):
 
 def test_what_is_no_batch_is_left_alone(folder, capsys):
     new = ["plan", str(folder), str(folder / "b")]
-    for words, said in ((["plan", str(folder), str(folder)], "is no batch: it holds"),
-                        ([*new, "--to", "x"], "--deliver only"),
-                        ([*new, "--deliver", "lunch"], "deliver.preset"), (["status", str(folder)], "no batch at")):
+    for words, said in (
+        (["plan", str(folder), str(folder)], "is no batch: it holds"),
+        ([*new, "--to", "x"], "--deliver only"),
+        ([*new, "--deliver", "lunch"], "deliver.preset"),
+        (["status", str(folder)], "no batch at"),
+    ):
         assert main(["batch", *words]) == 2
         assert said in capsys.readouterr().err
     assert not (folder / "b").exists()
 
 
-@pytest.mark.parametrize("change, said", [
-    (lambda told: "{", "cannot be read"), (lambda told: "[]", "not a batch record"),
-    (lambda told: {**told, "format": 9}, "newer version"),
-    (lambda told: {**told, "gate": "door"}, "not a batch record"),
-    (lambda told: {**told, "faces": told["faces"] * 2}, "twice"),
-    (lambda told: {**told, "faces": [{**told["faces"][0], "name": "../x"}]}, "not a batch record"),
-    (lambda told: {**told, "faces": [{**told["faces"][0], "settings": {"solve": {"steps": "x"}}}]}, "steps"),
-    (lambda told: {**told, "faces": [{"name": "a"}]}, "not a batch record"),
-    (lambda told: {**told, "deliver": 3}, "the stage deliver have to be an object"),
-    (lambda told: {**told, "faces": [{**told["faces"][0], "source": 3}]}, "not a batch record")])
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (lambda told: "{", "cannot be read"),
+        (lambda told: "[]", "not a batch record"),
+        (lambda told: {**told, "format": 9}, "newer version"),
+        (lambda told: {**told, "gate": "door"}, "not a batch record"),
+        (lambda told: {**told, "faces": told["faces"] * 2}, "twice"),
+        (lambda told: {**told, "faces": [{**told["faces"][0], "name": "../x"}]}, "not a batch record"),
+        (lambda told: {**told, "faces": [{**told["faces"][0], "settings": {"solve": {"steps": "x"}}}]}, "steps"),
+        (lambda told: {**told, "faces": [{"name": "a"}]}, "not a batch record"),
+        (lambda told: {**told, "deliver": 3}, "the stage deliver have to be an object"),
+        (lambda told: {**told, "faces": [{**told["faces"][0], "source": 3}]}, "not a batch record"),
+    ],
+)
 def test_a_record_that_is_damaged_is_refused_and_kept(folder, change, said):
     main(["batch", "plan", str(folder), str(folder / "batch")])
     path = folder / "batch" / "batch.json"

@@ -58,8 +58,11 @@ def own_environment(monkeypatch):
 
 def account(batch) -> list[dict]:
     """What the nodes say that they began and finished."""
-    lines = [line for path in (batch.root / ray_task.LOGS).glob("*.jsonl")
-             for line in path.read_text(encoding="utf-8").splitlines()]
+    lines = [
+        line
+        for path in (batch.root / ray_task.LOGS).glob("*.jsonl")
+        for line in path.read_text(encoding="utf-8").splitlines()
+    ]
     return sorted(map(json.loads, lines), key=lambda line: line["at"])
 
 
@@ -96,8 +99,10 @@ def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, tmp_path):
     assert f"Another worker (process {os.getpid()}" in said["d"]
     assert states(batch) == dict.fromkeys("aefgh", DONE) | {"b": STOPPED, "c": TO_DO, "d": TO_DO}
     assert finished(batch)["h"] == once
-    begun, done = (collections.Counter((line["face"], line["stage"]) for line in account(batch)
-                                       if line["finished"] is whether) for whether in (False, True))
+    begun, done = (
+        collections.Counter((line["face"], line["stage"]) for line in account(batch) if line["finished"] is whether)
+        for whether in (False, True)
+    )
     assert set(done.values()) == {1} and len(done) == 4 * 10 + 2, "each stage once"
     again = {stage: count for stage, count in begun.items() if count > done[stage]}
     assert again == {("a", "scan"): 2, ("b", "scan"): 1}, "but for what was killed"
@@ -189,8 +194,10 @@ def test_a_task_of_ours_that_died_is_waited_for(code, tmp_path, monkeypatch):
     capture = batch.faces[0].capture
     monkeypatch.setattr("core.batch.task.ROOT", code)
     words = str(batch.root), "a", "head", 1
-    hold = ("import sys; from core.contract.capture import Capture\nwith Capture(sys.argv[1]).locked(): "
-            "print(flush=True); input()")
+    hold = (
+        "import sys; from core.contract.capture import Capture\nwith Capture(sys.argv[1]).locked(): "
+        "print(flush=True); input()"
+    )
     holding = [sys.executable, "-c", hold, capture.root]
     with subprocess.Popen(holding, cwd=code, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         process.stdout.readline()
@@ -222,8 +229,11 @@ def test_an_address_that_cannot_be_reached_is_told_in_seconds(code, tmp_path, ca
             "15 s, and what it takes to import Ray on a busy machine"
         )
         assert "No Ray cluster can be reached" in told.stderr and len(told.stderr.splitlines()) == 2, told.stderr
-    for words, said in ((("--address", gone), "Connection refused"), (("--address", "here"), "not the address of"),
-                        (("--cores", "0"), "less than one")):
+    for words, said in (
+        (("--address", gone), "Connection refused"),
+        (("--address", "here"), "not the address of"),
+        (("--cores", "0"), "less than one"),
+    ):
         assert main(["batch", "run", str(batch.root), "--on", "ray", *words]) == 2
         assert said in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "ray", None)
@@ -242,20 +252,27 @@ def test_real_stages_on_ray_give_the_bytes_of_a_local_run(tmp_path, monkeypatch)
     for room in {path.name for path in (ROOT / "core").iterdir()} - {*tiny_chain.GROUND, "__pycache__"}:
         (code / "core" / room).symlink_to(ROOT / "core" / room)
     tiny_chain.keep_pace(code)
-    settings = {"device": "cpu", "frames": {"max_frames": 12, "long_side": 320, "views": 3},
-                "scan": {"pairs": 3, "voxel_mm": 5.0}, "registration": {"iterations": 2}}
+    settings = {
+        "device": "cpu",
+        "frames": {"max_frames": 12, "long_side": 320, "views": 3},
+        "scan": {"pairs": 3, "voxel_mm": 5.0},
+        "registration": {"iterations": 2},
+    }
     (tmp_path / "small.json").write_text(json.dumps(settings))
     shots = tmp_path / "shots.csv"
     shots.write_text(f"video,name\n{ROOT / 'core/synthetic/sample/capture.mp4'},one\n")
     running = []
     for name, words in (("local", ("--on", "local")), ("ray", ("--on", "ray", "--cores", 1))):
-        assert core(code, "batch", "plan", shots, tmp_path / name, "--settings",
-                    tmp_path / "small.json").returncode == 0
+        assert (
+            core(code, "batch", "plan", shots, tmp_path / name, "--settings", tmp_path / "small.json").returncode == 0
+        )
         running.append(tiny_batch.start(code, "batch", "run", tmp_path / name, "--until", "head", *words))
     for process in running:
         out, err = process.communicate(timeout=400)
         assert process.returncode == 0 and err == "", out + err
     captures = [read_batch(tmp_path / name).faces[0].capture for name in ("local", "ray")]
-    written = [{file: content for stage in stages.STAGES[:4]
-                for file, content in same_maps.written(capture, stage).items()} for capture in captures]
+    written = [
+        {file: content for stage in stages.STAGES[:4] for file, content in same_maps.written(capture, stage).items()}
+        for capture in captures
+    ]
     assert written[0] == written[1] and len(written[0]) > 15

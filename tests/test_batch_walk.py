@@ -92,8 +92,9 @@ def test_the_walk_from_another_mode_and_over_a_face_that_is_damaged(addon, batch
     bpy.ops.object.mode_set(mode='OBJECT')
     anna.head.write_text("v 0 0 0\n")
     refuses("not one mesh with UVs", bpy.ops.wildcap.next_mask)
-    batch_faces.wait(addon,
-                     lambda: [face.name for face in batches.waiting()] == ["bert"] or len(batches.waiting()) == 2)
+    batch_faces.wait(
+        addon, lambda: [face.name for face in batches.waiting()] == ["bert"] or len(batches.waiting()) == 2
+    )
     bpy.ops.wildcap.next_mask()
     assert addon("paint.session").root() == str(bert.root)
     bert.shadow_mask_auto.unlink()
@@ -143,8 +144,9 @@ def test_what_a_machine_that_has_gone_left_is_no_obstacle(addon, batches, tmp_pa
 
 def test_a_folder_that_goes_away_while_it_is_looked_at(addon, batches, monkeypatch, tmp_path):
     folder = batch_faces.planned(tmp_path / "batch", batch_faces.filmed(tmp_path / "batch", "anna"))
-    monkeypatch.setattr(addon("batch_watch").state, "derive_state",
-                        lambda *_: (_ for _ in ()).throw(OSError(5, "Input/output error")))
+    monkeypatch.setattr(
+        addon("batch_watch").state, "derive_state", lambda *_: (_ for _ in ()).throw(OSError(5, "Input/output error"))
+    )
     bpy.ops.wildcap.open_batch(directory=str(folder))
     batch_faces.wait(addon, lambda: batches.view().count(state.STOPPED) == 1)
     assert "anna.wildcap cannot be read (Input/output error)" in batches.view().states["anna"].problem
@@ -158,7 +160,8 @@ def test_a_folder_that_goes_away_while_it_is_looked_at(addon, batches, monkeypat
     batch_faces.wait(addon, lambda: batches.view().runner == socket.gethostname())
     assert batches.view().progress == {}, "a figure that makes no sense is none"
     (folder / "progress.json").write_text(
-        '{"ended": 1, "of": 4, "left_s": 1230.0, "working": {"anna": {"stage": "Cameras", "share": 0.4, "eta_s": 1}}}')
+        '{"ended": 1, "of": 4, "left_s": 1230.0, "working": {"anna": {"stage": "Cameras", "share": 0.4, "eta_s": 1}}}'
+    )
     batch_faces.wait(addon, lambda: bool(batches.view().progress))
     assert (
         batches.line(batches.view()) == "anna: Cameras 40%, about 20 min left" and batches.share(batches.view()) == 0.25

@@ -12,11 +12,14 @@ from core.contract.capture import Capture
 
 
 def test_tones_are_summed_up_by_group():
-    rows = {"scene": [("tan", 2.0, 4.0, 1.5), ("tan", -1.0, 2.0, 1.5), ("dark", 3.0, 6.0, 1.0)],
-            "before": [("tan", 5.0, 7.0, np.nan)]}
+    rows = {
+        "scene": [("tan", 2.0, 4.0, 1.5), ("tan", -1.0, 2.0, 1.5), ("dark", 3.0, 6.0, 1.0)],
+        "before": [("tan", 5.0, 7.0, np.nan)],
+    }
     found = skin_tone.summary(rows, {"tan": 1, "dark": 1})
-    assert found["tan"]["scene"] == pytest.approx({"lightness": 0.5, "rms": 2.5 ** 0.5, "delta_e": 3.0, "stated": 1.5,
-                                                   "within_two": 1.0})
+    assert found["tan"]["scene"] == pytest.approx(
+        {"lightness": 0.5, "rms": 2.5**0.5, "delta_e": 3.0, "stated": 1.5, "within_two": 1.0}
+    )
     assert found["tan"]["before"]["stated"] is None and "before" not in found["dark"]
     assert (
         found["all"]["subjects"] == 2
@@ -35,16 +38,25 @@ def test_a_chains_rows_are_those_of_its_table(tmp_path):
     def score(psnr):
         return {"raw": {"psnr": psnr, "ssim": 0.9, "flip": 0.1}}
 
-    found = whole_chain._figures(capture,
-                                 {"chain": score(30.0), "solve_off": score(29.0), "true_mask": score(31.0),
-                                  "mask": {"iou": 0.8},
-                                  "delighters": {"none": {**score(24.0), "solve_off": score(16.0)}}})
+    found = whole_chain._figures(
+        capture,
+        {
+            "chain": score(30.0),
+            "solve_off": score(29.0),
+            "true_mask": score(31.0),
+            "mask": {"iou": 0.8},
+            "delighters": {"none": {**score(24.0), "solve_off": score(16.0)}},
+        },
+    )
     assert found["rows"]["scan, network"]["true_mask"] == {"psnr": 31.0, "ssim": 0.9}
     assert found["mask_iou"] == {"scan": 0.8}
-    assert found["rows"]["scan, none"] == {"capture": "scan", "delighter": "none",
-                                           "solve_off": {"psnr": 16.0, "ssim": 0.9},
-                                           "solved": {"psnr": 24.0, "ssim": 0.9},
-                                           "true_mask": {"psnr": None, "ssim": None}}
+    assert found["rows"]["scan, none"] == {
+        "capture": "scan",
+        "delighter": "none",
+        "solve_off": {"psnr": 16.0, "ssim": 0.9},
+        "solved": {"psnr": 24.0, "ssim": 0.9},
+        "true_mask": {"psnr": None, "ssim": None},
+    }
 
 
 def test_a_masks_row_has_the_columns_of_its_table():

@@ -28,12 +28,14 @@ def test_the_extension_is_enabled_without_a_word_of_numpys():
     assert "NumPy" not in ran.stderr and "Traceback" not in ran.stderr, ran.stderr
 
 
-@pytest.mark.parametrize("renderer", ["core.synthetic.render", "core.synthetic.people.render",
-                                      "benchmarks.long_films_render"])
+@pytest.mark.parametrize(
+    "renderer", ["core.synthetic.render", "core.synthetic.people.render", "benchmarks.long_films_render"]
+)
 def test_subjects_are_rendered_without_a_word_of_numpys(renderer):
     pytest.importorskip("bpy")
-    ran = subprocess.run([sys.executable, "-c", f"import os, {renderer}; os._exit(0)"], capture_output=True, text=True,
-                         cwd=ROOT)
+    ran = subprocess.run(
+        [sys.executable, "-c", f"import os, {renderer}; os._exit(0)"], capture_output=True, text=True, cwd=ROOT
+    )
     assert ran.returncode == 0 and not ran.stderr, ran.stderr
 
 

@@ -43,9 +43,17 @@ def filmed(tmp_path, monkeypatch):
     for i, azimuth in enumerate(AZIMUTHS):
         view = replace(place_camera(azimuth), name=f"{i}.png", path=tmp_path / f"{i}.png")
         images.write_srgb(view.path, np.full((view.height, view.width, 3), 0.5, np.float32))
-        seen = [faces.Eye(*(view.project(edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)])[0]
-                            for edge in lids.edges(head.mesh.vertices, side)),
-                          np.zeros(2), 0.0) for side in (0, 1)]
+        seen = [
+            faces.Eye(
+                *(
+                    view.project(edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)])[0]
+                    for edge in lids.edges(head.mesh.vertices, side)
+                ),
+                np.zeros(2),
+                0.0,
+            )
+            for side in (0, 1)
+        ]
         if i == 1:
             seen[0] = replace(seen[0], upper=seen[0].lower + 0.3 * (seen[0].upper - seen[0].lower))
         if i == 4:

@@ -52,9 +52,11 @@ def metashape_xml() -> str:
         world = camera_to_world(view)
         chunk = np.eye(4)
         chunk[:3, :3], chunk[:3, 3] = rotation.T @ world[:3, :3], rotation.T @ (world[:3, 3] - shift) / scale
-        cameras += (f'<camera id="{i}" sensor_id="0" component_id="0" '
-                    f'label="{name}"><transform>{" ".join(f"{x:.17g}" for x in chunk.ravel())}</transform>'
-                    "<orientation>1</orientation></camera>\n")
+        cameras += (
+            f'<camera id="{i}" sensor_id="0" component_id="0" '
+            f'label="{name}"><transform>{" ".join(f"{x:.17g}" for x in chunk.ravel())}</transform>'
+            "<orientation>1</orientation></camera>\n"
+        )
     k1, k2, k3 = RADIAL
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <document version="2.0.0"><chunk label="Chunk 1" enabled="true">
@@ -78,24 +80,48 @@ def realityscan_csv(header="#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4
         seen = view.rotation.T @ np.diag([1, -1, -1])
         pitch = np.degrees(np.arcsin(seen[2, 1]))
         heading, roll = np.degrees(np.arctan2(seen[0, 1], seen[1, 1])), np.degrees(np.arctan2(-seen[2, 0], seen[2, 2]))
-        values = (*view.centre, heading, pitch, roll, FOCAL / longer * 36, (CENTRE[0] - WIDTH / 2) / longer,
-                  (CENTRE[1] - HEIGHT / 2) / longer, *RADIAL, 0, TANGENTIAL[1], TANGENTIAL[0])
+        values = (
+            *view.centre,
+            heading,
+            pitch,
+            roll,
+            FOCAL / longer * 36,
+            (CENTRE[0] - WIDTH / 2) / longer,
+            (CENTRE[1] - HEIGHT / 2) / longer,
+            *RADIAL,
+            0,
+            TANGENTIAL[1],
+            TANGENTIAL[0],
+        )
         lines.append(f"{name}.JPG," + ",".join(f"{x:.17g}" for x in values))
     return "\n".join(lines) + "\n"
 
 
 def blender_json() -> str:
     """Without distortion, which Blender's cameras do not have."""
-    return json.dumps({"width": WIDTH, "height": HEIGHT, "focal_px": FOCAL, "cameras": [
-        {"name": name, "centre_px": CENTRE, "matrix_world": (camera_to_world(view) @ np.diag([1, -1, -1, 1])).tolist()}
-        for name, view in zip(NAMES, VIEWS, strict=True)]})
+    return json.dumps(
+        {
+            "width": WIDTH,
+            "height": HEIGHT,
+            "focal_px": FOCAL,
+            "cameras": [
+                {
+                    "name": name,
+                    "centre_px": CENTRE,
+                    "matrix_world": (camera_to_world(view) @ np.diag([1, -1, -1, 1])).tolist(),
+                }
+                for name, view in zip(NAMES, VIEWS, strict=True)
+            ],
+        }
+    )
 
 
 def colmap_model() -> pycolmap.Reconstruction:
     model = pycolmap.Reconstruction()
     params = [FOCAL, FOCAL, *CENTRE, *RADIAL[:2], *TANGENTIAL, RADIAL[2], 0, 0, 0]
-    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="FULL_OPENCV", width=WIDTH, height=HEIGHT,
-                                                      params=params))
+    model.add_camera_with_trivial_rig(
+        pycolmap.Camera(camera_id=1, model="FULL_OPENCV", width=WIDTH, height=HEIGHT, params=params)
+    )
     for i, (name, view) in enumerate(zip(NAMES, VIEWS, strict=True), 1):
         pose = pycolmap.Rigid3d(np.concatenate([view.rotation, view.translation[:, None]], 1))
         model.add_image_with_trivial_frame(pycolmap.Image(name=f"{name}.jpg", camera_id=1, image_id=i), pose)
@@ -109,8 +135,9 @@ def shot(tmp_path_factory):
     records = []
     for i, name in enumerate(NAMES):
         images.write_srgb(folder / f"{i:05d}.jpg", np.zeros((FRAME_HEIGHT, FRAME_WIDTH, 3), np.float32))
-        records.append(FrameRecord(name=f"{i:05d}.jpg", source=f"{name}.jpeg", video_frame=i, sharpness=1.0,
-                                   selected=True))
+        records.append(
+            FrameRecord(name=f"{i:05d}.jpg", source=f"{name}.jpeg", video_frame=i, sharpness=1.0, selected=True)
+        )
     return Frames(tuple(records), PHOTOGRAPHS), folder
 
 
@@ -167,17 +194,28 @@ def test_a_videos_frames_are_matched_by_number(tmp_path, shot):
     assert model.num_reg_images() == 4
 
 
-@pytest.mark.parametrize("name, text, says", [
-    ("a.xml", "<document><chunk>", "damaged"), ("a.xml", "<html></html>", "not Metashape"),
-    ("a.csv", "a,b,c\n1,2,3\n", "column name is missing"),
-    ("a.csv", "#name,x,y,alt,heading,pitch,roll,f\nA.jpg,1,2,three,0,0,0,30\n", "Line 2"), ("a.json", "{", "damaged"),
-    ("a.json", "{}", "not a list"),
-    ("a.json", '{"width": 10, "height": 10, "cameras": [{"frame": 1, "matrix_world": [[1]]}]}', "incomplete"),
-    ("a.json", '{"cameras": []}', "no solved camera"), ("a.fbx", "", "not a camera file"),
-    ("a.csv", "", "column name"),
-    ("a.xml", metashape_xml().replace("<k1>", "<k4>0.1</k4><k1>"), "k4"),
-    ("a.xml", metashape_xml().replace('class="adjusted"', 'class="x"').replace(
-        'type="frame"', 'type="fisheye"'), "fisheye"), ("a.csv", realityscan_csv().replace(",0,", ",0.2,"), "k4")])
+@pytest.mark.parametrize(
+    "name, text, says",
+    [
+        ("a.xml", "<document><chunk>", "damaged"),
+        ("a.xml", "<html></html>", "not Metashape"),
+        ("a.csv", "a,b,c\n1,2,3\n", "column name is missing"),
+        ("a.csv", "#name,x,y,alt,heading,pitch,roll,f\nA.jpg,1,2,three,0,0,0,30\n", "Line 2"),
+        ("a.json", "{", "damaged"),
+        ("a.json", "{}", "not a list"),
+        ("a.json", '{"width": 10, "height": 10, "cameras": [{"frame": 1, "matrix_world": [[1]]}]}', "incomplete"),
+        ("a.json", '{"cameras": []}', "no solved camera"),
+        ("a.fbx", "", "not a camera file"),
+        ("a.csv", "", "column name"),
+        ("a.xml", metashape_xml().replace("<k1>", "<k4>0.1</k4><k1>"), "k4"),
+        (
+            "a.xml",
+            metashape_xml().replace('class="adjusted"', 'class="x"').replace('type="frame"', 'type="fisheye"'),
+            "fisheye",
+        ),
+        ("a.csv", realityscan_csv().replace(",0,", ",0.2,"), "k4"),
+    ],
+)
 def test_wrong_files_are_refused_with_the_reason(name, text, says, tmp_path):
     (tmp_path / name).write_text(text)
     with pytest.raises(Problem, match=says) as caught:

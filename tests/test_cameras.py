@@ -45,18 +45,22 @@ def look(centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rotation, -rotation @ centre
 
 
-def on_plane(picture: np.ndarray, centre: np.ndarray, side: float, depth: float, rotation: np.ndarray,
-             translation: np.ndarray) -> tuple:
+def on_plane(
+    picture: np.ndarray, centre: np.ndarray, side: float, depth: float, rotation: np.ndarray, translation: np.ndarray
+) -> tuple:
     """A square picture in the plane y = depth about `centre` (x, z), seen by a camera: uint8 [HEIGHT, WIDTH, 3] and
     where it is."""
     n = picture.shape[0]
-    texel_to_plane = np.array([[side / n, 0, centre[0] - side / 2], [0, 0, depth], [0, -side / n, centre[1] + side / 2],
-                               [0, 0, 1]])
+    texel_to_plane = np.array(
+        [[side / n, 0, centre[0] - side / 2], [0, 0, depth], [0, -side / n, centre[1] + side / 2], [0, 0, 1]]
+    )
     homography = intrinsics() @ np.c_[rotation, translation] @ texel_to_plane
     half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])  # cv2 counts from pixel centres
     homography = np.linalg.inv(half) @ homography @ half
-    warp = [cv2.warpPerspective(p, homography, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
-            for p in (picture, np.full(picture.shape[:2], 255, np.uint8))]
+    warp = [
+        cv2.warpPerspective(p, homography, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
+        for p in (picture, np.full(picture.shape[:2], 255, np.uint8))
+    ]
     return warp[0], warp[1] > 127
 
 
@@ -173,8 +177,10 @@ def test_a_head_that_moves_before_a_still_background_is_told_from_one_at_rest(so
         picture = images.read_srgb(capture.frames / record.name)
         aside = round((record.face_box[2] - record.face_box[0]) / 3) if i % 2 else 0
         images.write_srgb(tmp_path / record.name, np.roll(picture, aside, 1))
-    still, moved = (find_head(model, find_landmarks(records, folder, Reporter("cameras")), 0.063)
-                    for folder in (capture.frames, tmp_path))
+    still, moved = (
+        find_head(model, find_landmarks(records, folder, Reporter("cameras")), 0.063)
+        for folder in (capture.frames, tmp_path)
+    )
     assert still.still and still.error_px < 5
     assert not moved.still
 

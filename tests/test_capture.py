@@ -110,7 +110,7 @@ def test_copies_of_masks_are_kept_in_the_order_in_which_they_were_made_wherever_
         copy = mask_history.keep(capture, capture.shadow_mask, content)
         assert copy.read_bytes() == content
     kept = [path.read_bytes() for path in sorted(capture.mask_history.iterdir())]
-    assert kept == contents[-mask_history.KEPT_MASKS:]
+    assert kept == contents[-mask_history.KEPT_MASKS :]
     (capture.mask_history / "shadow_mask_99999999_999999_999.png").write_bytes(b"named by somebody")
     assert mask_history.keep(capture, capture.shadow_mask, b"one more").exists()
 

@@ -64,8 +64,9 @@ def test_what_is_dropped_becomes_captures(addon, tmp_path):
     shots.mkdir()
     for name in ("a.jpg", "b.JPG"):
         (shots / name).write_bytes(b"0")
-    bpy.ops.wildcap.choose_video('INVOKE_DEFAULT', directory=str(tmp_path),
-                                 files=[{"name": "one.mp4"}, {"name": "TWO.MOV"}])
+    bpy.ops.wildcap.choose_video(
+        'INVOKE_DEFAULT', directory=str(tmp_path), files=[{"name": "one.mp4"}, {"name": "TWO.MOV"}]
+    )
     assert [chosen_source(item) for item in items()] == [str(tmp_path / "one.mp4"), str(tmp_path / "TWO.MOV")]
     bpy.ops.wildcap.choose_video('INVOKE_DEFAULT', directory=str(shots), files=[{"name": "a.jpg"}, {"name": "b.JPG"}])
     assert len(items()) == 3 and chosen_source(items()[2]) == str(shots) and bpy.context.scene.wildcap.active_index == 2
@@ -79,8 +80,11 @@ def test_drops_are_taken_where_the_tab_is_shown(addon):
     source = addon("capture.source")
     # not imported: it needs OpenCV
     stage = ast.parse((Path(__file__).parents[1] / "core" / "frames" / "photographs.py").read_text(encoding="utf-8"))
-    unread = next(ast.literal_eval(node.value) for node in stage.body
-                  if isinstance(node, ast.Assign) and node.targets[0].id == "UNREAD")
+    unread = next(
+        ast.literal_eval(node.value)
+        for node in stage.body
+        if isinstance(node, ast.Assign) and node.targets[0].id == "UNREAD"
+    )
     assert set(source.PHOTOGRAPHS) == {*hashes.PHOTOGRAPHS, *unread}
 
     def taken(tab: str) -> bool:
@@ -134,8 +138,9 @@ def test_save_as_elsewhere_keeps_the_link(addon, project, tmp_path):
     assert [Path(item.path) for item in items()] == [project / "anna.wildcap", project / "berta.wildcap"]
     shutil.move(tmp_path / "elsewhere" / "other.blend", tmp_path / "alone.blend")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "alone.blend"))
-    assert [Path(item.path) for item in items()] == [project / "anna.wildcap",
-                                                     project / "berta.wildcap"], "moved alone, it knows where they were"
+    assert [Path(item.path) for item in items()] == [project / "anna.wildcap", project / "berta.wildcap"], (
+        "moved alone, it knows where they were"
+    )
 
 
 @pytest.mark.parametrize("kept", [False, True], ids=["moved", "copied"])
@@ -149,8 +154,9 @@ def test_a_project_that_was_moved_or_copied_works_on_its_own_captures(addon, pro
     assert [Path(item.path) for item in items()] == [there / "anna.wildcap", there / "berta.wildcap"]
     found = {o.name: Path(o["wildcap_capture"]).parent for o in bpy.context.scene.objects}
     assert found == {"anna": there, "berta": there}
-    pictures = [Path(bpy.path.abspath(image.filepath)) for image in bpy.data.images if image.source == 'FILE'
-                and image.filepath]
+    pictures = [
+        Path(bpy.path.abspath(image.filepath)) for image in bpy.data.images if image.source == 'FILE' and image.filepath
+    ]
     assert pictures and all(path.is_relative_to(there) and path.is_file() for path in pictures)
 
 
@@ -234,8 +240,10 @@ def test_the_strip_shows_frames_of_the_texture_with_their_sharpness(addon, tmp_p
     item = items()[0]
     assert strip.of(item) is None and strip.look(str(root)) and strip.of(item) is None and panel.poll(bpy.context)
     (root / "frames").mkdir()
-    frames = [{"name": f"{i:05}.png", "selected": i % 4 == 1, "sharpness": 0.05 if i in (5, 6) else 0.2 + i / 1000}
-              for i in range(100)]
+    frames = [
+        {"name": f"{i:05}.png", "selected": i % 4 == 1, "sharpness": 0.05 if i in (5, 6) else 0.2 + i / 1000}
+        for i in range(100)
+    ]
     for frame in frames[:50]:
         (root / "frames" / frame["name"]).write_bytes(standin.plain((90, 80, 70)))
     (root / "frames" / "frames.json").write_text(json.dumps({"kind": "video", "frames": frames}), encoding="utf-8")

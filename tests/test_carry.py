@@ -21,8 +21,9 @@ def painted(tmp_path, monkeypatch):
     head as already laid over ours."""
     folder, head = tmp_path / "in", template.load()
     folder.mkdir()
-    other = meshes.Mesh(head.vertices, head.faces, 0.25 + 0.5 * np.stack([1 - head.uvs[:, 1], head.uvs[:, 0]], 1),
-                        head.face_uvs)
+    other = meshes.Mesh(
+        head.vertices, head.faces, 0.25 + 0.5 * np.stack([1 - head.uvs[:, 1], head.uvs[:, 0]], 1), head.face_uvs
+    )
     meshes.write_obj(folder / "head.obj", other)
     face, bary = raster.rasterize_uv(other, 512)
     points = raster.interpolate(head.vertices, head.faces, face, bary)

@@ -31,6 +31,7 @@ SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 
 # -- pictures
 
+
 def png_header(width: int, height: int) -> bytes:
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
@@ -45,7 +46,7 @@ def exr_header(path, side: int) -> bytes:
     content = bytearray(path.read_bytes())
     for field in (b"dataWindow\0box2i\0", b"displayWindow\0box2i\0"):
         at = content.index(field) + len(field) + 4
-        content[at:at + 16] = struct.pack("<4i", 0, 0, side - 1, side - 1)
+        content[at : at + 16] = struct.pack("<4i", 0, 0, side - 1, side - 1)
     return bytes(content) + bytes(8 * side)  # the places of its rows
 
 
@@ -64,7 +65,7 @@ def test_pixels_are_counted_before_memory_is_taken(tmp_path):
 def test_pictures_that_are_cut_off(tmp_path, suffix, left):
     whole, cut = tmp_path / f"whole{suffix}", tmp_path / f"cut{suffix}"
     (images.write_linear if suffix == ".exr" else images.write_srgb)(whole, RNG.random((64, 64, 3), np.float32))
-    cut.write_bytes(whole.read_bytes()[:int(left * whole.stat().st_size)])
+    cut.write_bytes(whole.read_bytes()[: int(left * whole.stat().st_size)])
     refused(lambda: images.read_srgb(cut), cut.name)
     images.read_srgb(whole)
 
@@ -76,11 +77,16 @@ def test_pictures_with_values_that_are_no_numbers(tmp_path, value):
     refused(lambda: images.read_linear(tmp_path / "texture.exr"), "texture.exr", "holds values")
     (tmp_path / "capture.json").write_text("{}")
     assert refused(lambda: images.read_linear(tmp_path / "texture.exr")).remedy.startswith(
-        "Run the stage Texture again")
+        "Run the stage Texture again"
+    )
     pixels = np.ones((4, 4, 3), np.float32)
     pixels[1, 2, 0] = value
-    for write, name in ((images.write_srgb, "a.png"), (images.write_linear, "a.exr"), (images.write_data, "a.png"),
-                        (images.write_packed, "a.png")):
+    for write, name in (
+        (images.write_srgb, "a.png"),
+        (images.write_linear, "a.exr"),
+        (images.write_data, "a.png"),
+        (images.write_packed, "a.png"),
+    ):
         wide = pixels if write is not images.write_packed else np.concatenate([pixels, pixels[..., :1]], 2)
         refused(lambda write=write, name=name, wide=wide: write(tmp_path / name, wide), name, "was not written")
         assert not (tmp_path / name).exists()
@@ -92,8 +98,12 @@ def test_pictures_with_values_that_are_no_numbers(tmp_path, value):
 
 def test_what_a_stage_writes_is_named_by_its_stage(tmp_path):
     (tmp_path / "capture.json").write_text("{}")
-    for name, stage in (("texture.exr", "texture"), ("maps/normal.png", "solve"), ("frames/00001.jpg", "frames"),
-                        ("delit/shadow/00001.png", "delight")):
+    for name, stage in (
+        ("texture.exr", "texture"),
+        ("maps/normal.png", "solve"),
+        ("frames/00001.jpg", "frames"),
+        ("delit/shadow/00001.png", "delight"),
+    ):
         assert checks.advise_remaking(tmp_path / name, "").endswith(f"in Stages (in a terminal: --from {stage}).")
     for theirs in (tmp_path / "shadow_mask.png", tmp_path / "a" / "frames" / "1.jpg"):
         assert checks.advise_remaking(theirs, "Mine.") == "Mine."
@@ -103,11 +113,15 @@ def test_what_a_stage_writes_is_named_by_its_stage(tmp_path):
 def test_unusual_pictures_are_read(tmp_path, mode):
     pil = pytest.importorskip("PIL.Image")
     path = tmp_path / ("Zoë – im Garten 1" + (".tif" if mode == "CMYK" else ".png"))
-    picture = (pil.fromarray(PICTURE[..., 0].astype(np.uint16) * 257) if mode == "I;16"
-               else pil.fromarray(PICTURE).convert(mode))
+    picture = (
+        pil.fromarray(PICTURE[..., 0].astype(np.uint16) * 257)
+        if mode == "I;16"
+        else pil.fromarray(PICTURE).convert(mode)
+    )
     picture.save(path)
-    truth = (PICTURE[..., :1].repeat(3, 2) / 255 if mode == "I;16"
-             else np.asarray(picture.convert("RGB"), np.float32) / 255)
+    truth = (
+        PICTURE[..., :1].repeat(3, 2) / 255 if mode == "I;16" else np.asarray(picture.convert("RGB"), np.float32) / 255
+    )
     found = images.read_srgb(path)
     assert found.shape == (24, 18, 3) and np.allclose(found, truth, atol=0.005)
 
@@ -164,15 +178,28 @@ def test_pictures_of_frames_have_their_shape(tmp_path):
 
 # -- meshes
 
-@pytest.mark.parametrize(("text", "words"), [
-    (SQUARE + "v nan 0 0\nf 1 2 3\n", "no numbers"), (SQUARE + "v 0 inf 0\nf 1 2 3\n", "no numbers"),
-    (SQUARE + "v 0 1e300 0\nf 1 2 3\n", "no numbers"),
-    (SQUARE + "vt 0 nan\nf 1/1 2/2 3/5\n", "no numbers"), (SQUARE + "v 0 zero 0\nf 1 2 3\n", "zero"),
-    (SQUARE + "v 0 1\nf 1 2 3\n", "line 9"),
-    (SQUARE + "f 1 2 5\n", "not in it"), (SQUARE + "f 1/1 2/2 3/5\n", "not in it"), (SQUARE + "f 0 1 2\n", "line 9"),
-    (SQUARE + "f -5 1 2\n", "line 9"),
-    (SQUARE + "f 1 2\n", "line 9"), (SQUARE + "f 1 2 x\n", "line 9"), (SQUARE + f"f 1 2 {10 ** 30}\n", "damaged"),
-    (SQUARE, "no faces"), ("\0\xff" * 99, "no faces")], ids=count())
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (SQUARE + "v nan 0 0\nf 1 2 3\n", "no numbers"),
+        (SQUARE + "v 0 inf 0\nf 1 2 3\n", "no numbers"),
+        (SQUARE + "v 0 1e300 0\nf 1 2 3\n", "no numbers"),
+        (SQUARE + "vt 0 nan\nf 1/1 2/2 3/5\n", "no numbers"),
+        (SQUARE + "v 0 zero 0\nf 1 2 3\n", "zero"),
+        (SQUARE + "v 0 1\nf 1 2 3\n", "line 9"),
+        (SQUARE + "f 1 2 5\n", "not in it"),
+        (SQUARE + "f 1/1 2/2 3/5\n", "not in it"),
+        (SQUARE + "f 0 1 2\n", "line 9"),
+        (SQUARE + "f -5 1 2\n", "line 9"),
+        (SQUARE + "f 1 2\n", "line 9"),
+        (SQUARE + "f 1 2 x\n", "line 9"),
+        (SQUARE + f"f 1 2 {10**30}\n", "damaged"),
+        (SQUARE, "no faces"),
+        ("\0\xff" * 99, "no faces"),
+    ],
+    ids=count(),
+)
 def test_damaged_objs(tmp_path, text, words):
     (tmp_path / "head.obj").write_text(text)
     refused(lambda: meshes.read_obj(tmp_path / "head.obj"), "head.obj", words)
@@ -181,9 +208,13 @@ def test_damaged_objs(tmp_path, text, words):
 def test_unusual_objs_are_read(tmp_path):
     path = tmp_path / "Zoë 1.obj"
     quad = SQUARE + "f 1/1 2/2 3/3 4/4\n"
-    written = [quad, "\ufeff# first\r\n" + quad.replace("\n", "\r\n"), SQUARE + "f -4/-4 -3/-3 -2/-2 -1/-1",
-               SQUARE + "f -4/-4 -3/-3 \\\n -2/-2 -1/-1\nv 9 9 9\nvt 9 9\n",
-               SQUARE.replace("\nv", " 0.5 0.5 0.5\nv") + "o a\ng b\ns 1\nf 1/1/ 2/2/ 3/3/ 4/4/\n"]
+    written = [
+        quad,
+        "\ufeff# first\r\n" + quad.replace("\n", "\r\n"),
+        SQUARE + "f -4/-4 -3/-3 -2/-2 -1/-1",
+        SQUARE + "f -4/-4 -3/-3 \\\n -2/-2 -1/-1\nv 9 9 9\nvt 9 9\n",
+        SQUARE.replace("\nv", " 0.5 0.5 0.5\nv") + "o a\ng b\ns 1\nf 1/1/ 2/2/ 3/3/ 4/4/\n",
+    ]
     for text in written:
         path.write_bytes(text.encode())
         mesh = meshes.read_obj(path)
@@ -207,17 +238,24 @@ def test_an_obj_of_our_own_is_read_in_blocks_as_it_is_line_by_line(tmp_path):
     for name in ("vertices", "faces", "uvs", "face_uvs"):
         one, other = getattr(blocks, name), getattr(lines, name)
         assert one.dtype == other.dtype and np.array_equal(one, other), name
-    for last, words in (("0/1 1/1 2/2", "line 131"), ("1/0 1/1 2/2", "line 131"), ("1/1 41/1 2/2", "not in it"),
-                        ("1/1 3/41 2/2", "not in it"), ("1/1 2", "line 131")):
+    for last, words in (
+        ("0/1 1/1 2/2", "line 131"),
+        ("1/0 1/1 2/2", "line 131"),
+        ("1/1 41/1 2/2", "not in it"),
+        ("1/1 3/41 2/2", "not in it"),
+        ("1/1 2", "line 131"),
+    ):
         path.write_text(f"{text}f {last}\n")
         refused(lambda: meshes.read_obj(path), "head.obj", words)
     path.write_text("v 9999999999.000000 0.000000 0.000000\n" + text)
     refused(lambda: meshes.read_obj(path), "head.obj", "no numbers")
 
 
-HEADER = ("ply\nformat {form} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float "
-          "z\nelement face {faces}\n"
-          "property list uchar int vertex_indices\nend_header\n")
+HEADER = (
+    "ply\nformat {form} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float "
+    "z\nelement face {faces}\n"
+    "property list uchar int vertex_indices\nend_header\n"
+)
 BODY = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
 
 
@@ -226,21 +264,37 @@ def binary(order: str, last: float = 0.0, index: int = 3) -> bytes:
     return vertices + struct.pack(f"{order}BiiiBiii", 3, 0, 1, 2, 3, 0, 2, index)
 
 
-@pytest.mark.parametrize(("form", "body"),
-                         [("ascii", BODY.encode()), ("ascii", BODY.rstrip().encode()),
-                          ("binary_little_endian", binary("<")),
-                          ("binary_big_endian", binary(">"))])
+@pytest.mark.parametrize(
+    ("form", "body"),
+    [
+        ("ascii", BODY.encode()),
+        ("ascii", BODY.rstrip().encode()),
+        ("binary_little_endian", binary("<")),
+        ("binary_big_endian", binary(">")),
+    ],
+)
 def test_plys_of_every_kind_are_read(tmp_path, form, body):
     (tmp_path / "a.ply").write_bytes(HEADER.format(form=form, vertices=4, faces=2).encode() + body)
     mesh = meshes.read_ply(tmp_path / "a.ply")
     assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]] and mesh.vertices[2].tolist() == [1, 1, 0]
 
 
-@pytest.mark.parametrize(("vertices", "faces", "body"), [
-    (4, 2, binary("<")[:-1]), (4, 2, binary("<")[:40]), (10 ** 12, 2, binary("<")), (4, 10 ** 15, binary("<")),
-    (-4, 2, binary("<")), ("many", 2, binary("<")),
-    (4, 2, binary("<", np.nan)), (4, 2, binary("<", np.inf)), (4, 2, binary("<", index=9)),
-    (4, 2, binary("<", index=-1)), (4, 0, binary("<")[:48])])
+@pytest.mark.parametrize(
+    ("vertices", "faces", "body"),
+    [
+        (4, 2, binary("<")[:-1]),
+        (4, 2, binary("<")[:40]),
+        (10**12, 2, binary("<")),
+        (4, 10**15, binary("<")),
+        (-4, 2, binary("<")),
+        ("many", 2, binary("<")),
+        (4, 2, binary("<", np.nan)),
+        (4, 2, binary("<", np.inf)),
+        (4, 2, binary("<", index=9)),
+        (4, 2, binary("<", index=-1)),
+        (4, 0, binary("<")[:48]),
+    ],
+)
 def test_damaged_plys(tmp_path, vertices, faces, body):
     header = HEADER.format(form="binary_little_endian", vertices=vertices, faces=faces)
     (tmp_path / "scan.ply").write_bytes(header.encode() + body)
@@ -251,8 +305,12 @@ def test_damaged_plys(tmp_path, vertices, faces, body):
 
 def test_meshes_that_are_none_are_not_written(tmp_path):
     points, faces = np.eye(3), np.array([[0, 1, 2]])
-    wrong = [Mesh(points * np.nan, faces), Mesh(points, faces + 1), Mesh(points, faces[:0]),
-             Mesh(points, faces, np.full((3, 2), np.inf), faces)]
+    wrong = [
+        Mesh(points * np.nan, faces),
+        Mesh(points, faces + 1),
+        Mesh(points, faces[:0]),
+        Mesh(points, faces, np.full((3, 2), np.inf), faces),
+    ]
     for mesh in wrong:
         for write, name in ((meshes.write_obj, "head.obj"), (meshes.write_ply, "scan.ply")):
             refused(lambda write=write, name=name, mesh=mesh: write(tmp_path / name, mesh), name, "was not written")
@@ -260,8 +318,10 @@ def test_meshes_that_are_none_are_not_written(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes here")
-@pytest.mark.parametrize(("name", "read"), [
-    ("a.jpg", images.read_srgb), ("a.exr", images.size), ("a.obj", meshes.read_obj), ("a.ply", meshes.read_ply)])
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [("a.jpg", images.read_srgb), ("a.exr", images.size), ("a.obj", meshes.read_obj), ("a.ply", meshes.read_ply)],
+)
 def test_a_pipe_under_a_file_s_name_is_refused_and_not_waited_for(tmp_path, name, read):
     os.mkfifo(tmp_path / name)
     refused(lambda: read(tmp_path / name), name)

@@ -34,6 +34,7 @@ FRAME = {"name": "00000.jpg", "sharpness": 0.5, "selected": True}
 
 # -- cameras
 
+
 @pytest.fixture
 def capture(tmp_path) -> Capture:
     """One frame with its camera."""
@@ -47,10 +48,12 @@ def capture(tmp_path) -> Capture:
 
 def write_model(capture: Capture, name: str, text: bool = False) -> None:
     model = pycolmap.Reconstruction()
-    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="PINHOLE", width=720, height=960,
-                                                      params=[900, 900, 360, 480]))
-    model.add_image_with_trivial_frame(pycolmap.Image(name=name, camera_id=1, image_id=1),
-                                       pycolmap.Rigid3d(np.eye(4)[:3]))
+    model.add_camera_with_trivial_rig(
+        pycolmap.Camera(camera_id=1, model="PINHOLE", width=720, height=960, params=[900, 900, 360, 480])
+    )
+    model.add_image_with_trivial_frame(
+        pycolmap.Image(name=name, camera_id=1, image_id=1), pycolmap.Rigid3d(np.eye(4)[:3])
+    )
     model.add_point3D(np.zeros(3), pycolmap.Track(), np.zeros(3, np.uint8))
     (model.write_text if text else model.write)(str(capture.cameras))
 
@@ -76,7 +79,7 @@ def test_models_that_promise_what_they_do_not_hold(capture, name):
 
 def test_a_track_of_a_thousand_million_images_takes_no_memory(capture):
     path = capture.cameras / "points3D.bin"
-    path.write_bytes(path.read_bytes()[:-8] + struct.pack("<Q", 10 ** 9))
+    path.write_bytes(path.read_bytes()[:-8] + struct.pack("<Q", 10**9))
     refused(lambda: read_views(capture), "points3D.bin")
 
 
@@ -89,9 +92,10 @@ def test_lenses_that_are_none(capture, at, value):
     refused(lambda: read_views(capture), "cameras of this capture")
 
 
-@pytest.mark.parametrize("name",
-                         ["../../private/x.jpg", "/etc/x.jpg", "a/b.jpg", "a\\b.jpg", "C:x.jpg", "..", ".", "", "a\0b",
-                          3, None, ["a"]])
+@pytest.mark.parametrize(
+    "name",
+    ["../../private/x.jpg", "/etc/x.jpg", "a/b.jpg", "a\\b.jpg", "C:x.jpg", "..", ".", "", "a\0b", 3, None, ["a"]],
+)
 def test_frames_have_names_without_a_path(capture, name):
     capture.frames_json.write_text(json.dumps({"frames": [{**FRAME, "name": name}]}))
     refused(lambda: read_frames(capture), "frames.json", "no name of a frame")
@@ -103,8 +107,9 @@ def test_frames_have_names_without_a_path(capture, name):
 
 def test_names_in_every_script_are_names(capture):
     for name in ("Zoë – 1 (2).jpg", "顔 写真.png", "a..b.jpg", "c.jpg"):
-        capture.frames_json.write_text(json.dumps({"frames": [{**FRAME, "name": name}]}, ensure_ascii=False),
-                                       encoding="utf-8")
+        capture.frames_json.write_text(
+            json.dumps({"frames": [{**FRAME, "name": name}]}, ensure_ascii=False), encoding="utf-8"
+        )
         assert read_frames(capture).records[0].name == name
 
 
@@ -112,18 +117,35 @@ def test_names_in_every_script_are_names(capture):
 
 DEEP = "[" * 100_000
 HUGE = "1" + "0" * 400
-WRONG = ["null", "[]", "3", DEEP, '{"a":' * 2000 + "1" + "}" * 2000, '{"stages": ' + HUGE + "}",
-         '{"stages": {"x": 1e400}}', '"\\ud800"', '{"stages": ["\\ud800"]}']
+WRONG = [
+    "null",
+    "[]",
+    "3",
+    DEEP,
+    '{"a":' * 2000 + "1" + "}" * 2000,
+    '{"stages": ' + HUGE + "}",
+    '{"stages": {"x": 1e400}}',
+    '"\\ud800"',
+    '{"stages": ["\\ud800"]}',
+]
 
 
-@pytest.mark.parametrize("text",
-                         [*WRONG, '{"stages": null}', '{"stages": {"solve": null}}',
-                          '{"stages": {"solve": {"seconds": "1"}}}',
-                          '{"stages": {}, "source": 3}', '{"stages": {}, "format": "2"}',
-                          '{"stages": {}, "stopped": {}}',
-                          '{"stages": {}, "source_stamp": [[1, 2]]}',
-                          '{"stages": {"solve": {"seconds": 1, "inputs": {}}}}',
-                          '{"stages": {"solve": {"seconds": 1, "findings": [3]}}}'], ids=count())
+@pytest.mark.parametrize(
+    "text",
+    [
+        *WRONG,
+        '{"stages": null}',
+        '{"stages": {"solve": null}}',
+        '{"stages": {"solve": {"seconds": "1"}}}',
+        '{"stages": {}, "source": 3}',
+        '{"stages": {}, "format": "2"}',
+        '{"stages": {}, "stopped": {}}',
+        '{"stages": {}, "source_stamp": [[1, 2]]}',
+        '{"stages": {"solve": {"seconds": 1, "inputs": {}}}}',
+        '{"stages": {"solve": {"seconds": 1, "findings": [3]}}}',
+    ],
+    ids=count(),
+)
 def test_capture_records_of_every_wrong_kind(tmp_path, text, capsys):
     capture = Capture(tmp_path)
     capture.json.write_text(text)
@@ -163,8 +185,11 @@ def test_names_that_are_no_text(tmp_path, capsys):
     photographs = tmp_path / "photos"
     photographs.mkdir()
     (photographs / "a\udcff.jpg").write_bytes(b"")
-    for source, root in ((photographs, "a.wildcap"), (tmp_path / "film\udcff.mp4", "a.wildcap"),
-                         ("", "a\udcff.wildcap")):
+    for source, root in (
+        (photographs, "a.wildcap"),
+        (tmp_path / "film\udcff.mp4", "a.wildcap"),
+        ("", "a\udcff.wildcap"),
+    ):
         refused(lambda source=source, root=root: write_job(Capture(tmp_path / root), source=source), "udcff", "Rename")
     assert main(["run", str(photographs), str(tmp_path / "b.wildcap")]) == 2
     assert "not in UTF-8" in capsys.readouterr().err
@@ -172,12 +197,15 @@ def test_names_that_are_no_text(tmp_path, capsys):
 
 # -- what is delivered
 
+
 def deliver(root, change=lambda capture: None, **settings) -> tuple[Message, str]:
     """How a delivery ended, and its log, after `change` was done to a solved capture."""
     capture, said = delivered.make(root), []
     change(capture)
-    ended = run_job(write_job(capture, tool="deliver",
-                              settings={"deliver": {"format": "obj", "whole": True}, **settings}), said.append)
+    ended = run_job(
+        write_job(capture, tool="deliver", settings={"deliver": {"format": "obj", "whole": True}, **settings}),
+        said.append,
+    )
     assert isinstance(ended, Done) == bool(list(capture.exports.glob("*")))
     return ended, " ".join(message.text for message in said if isinstance(message, Log))
 
@@ -185,16 +213,24 @@ def deliver(root, change=lambda capture: None, **settings) -> tuple[Message, str
 def cut(name: str, left: float):
     def change(capture: Capture) -> None:
         path = capture.root / name
-        path.write_bytes(path.read_bytes()[:int(left * path.stat().st_size)])
+        path.write_bytes(path.read_bytes()[: int(left * path.stat().st_size)])
         if left == 0.6:
             delivered.record_solve(capture)  # nothing on record tells that it was whole
+
     return change
 
 
-@pytest.mark.parametrize(("name", "left"),
-                         [("maps/normal.png", 0.5), ("maps/diffuse_albedo.png", 0.9), ("maps/specular_albedo.png", 0.5),
-                          ("head.obj", 0.5),
-                          ("head.obj", 0.6), ("maps/normal.png", 0.0)])
+@pytest.mark.parametrize(
+    ("name", "left"),
+    [
+        ("maps/normal.png", 0.5),
+        ("maps/diffuse_albedo.png", 0.9),
+        ("maps/specular_albedo.png", 0.5),
+        ("head.obj", 0.5),
+        ("head.obj", 0.6),
+        ("maps/normal.png", 0.0),
+    ],
+)
 def test_cut_files_are_not_delivered(tmp_path, name, left):
     ended, _ = deliver(tmp_path / "a.wildcap", cut(name, left))
     assert isinstance(ended, Failed) and name.split("/")[-1] in ended.problem and ended.remedy.endswith(".")
@@ -212,15 +248,28 @@ def test_what_is_out_of_date_is_not_delivered_and_what_is_older_is_named(tmp_pat
     )
     ended, _ = deliver(tmp_path / "c.wildcap", lambda capture: images.write_data(capture.shadow_mask, np.ones((8, 8))))
     assert isinstance(ended, Failed) and "shadow_mask.png changed" in ended.problem
-    ended, _ = deliver(tmp_path / "d.wildcap",
-                       lambda capture: images.write_data(capture.maps / "normal.png", np.ones((8, 16))))
+    ended, _ = deliver(
+        tmp_path / "d.wildcap", lambda capture: images.write_data(capture.maps / "normal.png", np.ones((8, 16)))
+    )
     assert isinstance(ended, Failed) and "normal.png" in ended.problem
 
 
 # -- other programs' cameras
 
-@pytest.mark.parametrize("camera", [{"width": 0}, {"height": -5}, {"width": HUGE}, {"focal_px": "NaN"},
-                                    {"focal_px": 1e300 * 10}, {"name": "a" + "1" * 5000}, {"frame": DEEP}], ids=count())
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        {"width": 0},
+        {"height": -5},
+        {"width": HUGE},
+        {"focal_px": "NaN"},
+        {"focal_px": 1e300 * 10},
+        {"name": "a" + "1" * 5000},
+        {"frame": DEEP},
+    ],
+    ids=count(),
+)
 def test_cameras_of_other_programs(tmp_path, camera):
     sound = {"width": 720, "height": 960, "focal_px": 900.0, "name": "1", "matrix_world": np.eye(4).tolist()}
     for value, right in ((sound | camera, list(camera) == ["name"]), (sound, True)):

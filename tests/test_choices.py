@@ -80,7 +80,7 @@ def test_the_wipe_shows_a_frame_before_and_after_and_leaves_no_image_behind(addo
         picture = delighters._icons["wipe"]
         pixels = list(picture.image_pixels_float)
         start = 4 * (side // 2 * side + math.floor(x * side))
-        return [round(255 * value) for value in pixels[start:start + 4]]
+        return [round(255 * value) for value in pixels[start : start + 4]]
 
     manager.wildcap_wipe = 0.5
     images = len(bpy.data.images)
@@ -131,5 +131,9 @@ def test_the_chain_can_begin_at_any_stage(addon, capture, item, monkeypatch):
         bpy.ops.wildcap.reconstruct(first="dreams")
     Capture(capture).set_source(capture.parent / "face.mp4")
     bpy.ops.wildcap.reconstruct(first="delight")
-    assert started == [("solve", "upscale", None), ("solve", "transfer", None), ("solve", None, None),
-                       ("reconstruct", "delight", "shadow_mask")]
+    assert started == [
+        ("solve", "upscale", None),
+        ("solve", "transfer", None),
+        ("solve", None, None),
+        ("reconstruct", "delight", "shadow_mask"),
+    ]

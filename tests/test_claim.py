@@ -3,7 +3,6 @@
 """Which folder becomes a capture: a new one, an empty one, or one that is or was a capture; any other is refused, and
 nothing in it is touched."""
 
-
 import pytest
 
 from core.contract import ownership
@@ -26,8 +25,11 @@ def test_a_folder_that_holds_something_else_is_never_taken_over(tmp_path):
     (album / "frames" / "holiday.jpg").write_bytes(b"a picture")
     before = contents(tmp_path)
     capture = Capture(album)
-    for attempt in (lambda: capture.claim(), lambda: capture.set_source(tmp_path / "film.mp4"),
-                    lambda: write_job(capture)):
+    for attempt in (
+        lambda: capture.claim(),
+        lambda: capture.set_source(tmp_path / "film.mp4"),
+        lambda: write_job(capture),
+    ):
         with pytest.raises(Problem, match="is no capture: it holds frames"):
             attempt()
     with pytest.raises(Problem, match="is no capture"), capture.locked():
@@ -45,7 +47,8 @@ def test_a_capture_whose_record_was_deleted_to_start_anew_is_one_still_and_loses
     first = Capture(tmp_path / "by 0.1.0.wildcap")  # which kept no record of what it wrote
     first.root.mkdir()
     (first.root / "job.json").write_text(
-        '{"capture": "/x", "source": "", "from": null, "until": null, "settings": {}, "quality": "draft"}')
+        '{"capture": "/x", "source": "", "from": null, "until": null, "settings": {}, "quality": "draft"}'
+    )
     first.shadow_mask.write_text("painted")
     first.claim()
     assert first.read()["stages"] == {} and first.shadow_mask.read_text() == "painted"
@@ -61,7 +64,9 @@ def test_a_source_inside_the_capture_is_refused(capture):
     (capture.root / "my film.mp4").write_bytes(b"film")
     (capture.root / "frames").mkdir()
     for source in (capture.root / "my film.mp4", capture.root / "frames", capture.root):
-        for attempt in (lambda source=source: capture.set_source(source),
-                        lambda source=source: write_job(capture, source=source)):
+        for attempt in (
+            lambda source=source: capture.set_source(source),
+            lambda source=source: write_job(capture, source=source),
+        ):
             with pytest.raises(Problem, match="lies in the capture"):
                 attempt()

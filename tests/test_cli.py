@@ -29,8 +29,14 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def core(*words, cwd=ROOT, **options) -> subprocess.CompletedProcess:
-    return subprocess.run([sys.executable, "-B", "-m", "core", *map(str, words)], cwd=cwd, capture_output=True,
-                          text=True, timeout=120, **options)
+    return subprocess.run(
+        [sys.executable, "-B", "-m", "core", *map(str, words)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        **options,
+    )
 
 
 def refused(*words, cwd=ROOT) -> list[str]:
@@ -68,8 +74,12 @@ def test_every_command_has_its_help(capsys):
         parser = waiting.pop()
         seen.append(parser.prog)
         assert parser.format_help().startswith("usage: python -m core")
-        waiting += [each for action in parser._actions if isinstance(action, argparse._SubParsersAction)
-                    for each in action.choices.values()]
+        waiting += [
+            each
+            for action in parser._actions
+            if isinstance(action, argparse._SubParsersAction)
+            for each in action.choices.values()
+        ]
     assert {f"python -m core {words}" for words in ("run", "landmarks set", "mask import", "batch task")} <= set(seen)
     with pytest.raises(SystemExit):
         command_line.main(["landmarks", "set", "a.wildcap", "152", "0.1", "0.2"])
@@ -95,32 +105,64 @@ def test_run_until_then_on_then_status(tiny, capture, film):
     assert str(film) in status and status.count("done") == len(stages.STAGES)
     (capture.root / "texture.exr").write_text("edited")
     status = dict(line.split()[:2] for line in core("status", capture.root, cwd=tiny).stdout.splitlines())
-    assert (status["delight"], status["texture"], status["shadow_mask"],
-            status["upscale"]) == ("done", "done", "stale", "done")
-    assert core("run", film, capture.root, "--from", "delight", "--until", "delight", "--quality", "draft",
-                cwd=tiny).stdout.count("done in") == 1
+    assert (status["delight"], status["texture"], status["shadow_mask"], status["upscale"]) == (
+        "done",
+        "done",
+        "stale",
+        "done",
+    )
+    assert (
+        core(
+            "run", film, capture.root, "--from", "delight", "--until", "delight", "--quality", "draft", cwd=tiny
+        ).stdout.count("done in")
+        == 1
+    )
 
 
 def test_options_reach_the_stages(tiny, capture, film, tmp_path):
     for name in ("config.json", "ckpt.pth"):
         (tmp_path / name).touch()
-    core("run", film, capture.root, "--skin-tone", "0.6,0.5,0.4", "--delighter", "folder", "--folder", tmp_path,
-         "--seed", "7", "--quality", "film", "--prior", tmp_path, cwd=tiny)
+    core(
+        "run",
+        film,
+        capture.root,
+        "--skin-tone",
+        "0.6,0.5,0.4",
+        "--delighter",
+        "folder",
+        "--folder",
+        tmp_path,
+        "--seed",
+        "7",
+        "--quality",
+        "film",
+        "--prior",
+        tmp_path,
+        cwd=tiny,
+    )
     record = capture.read()["stages"]
     assert read_portable(record["solve"]["settings"]["prior"], capture.root) == tmp_path
     assert record["solve"]["settings"]["skin_tone"] == "0.6,0.5,0.4" and record["solve"]["seed"] == 7
     assert record["solve"]["settings"]["steps"] == preset("film").solve.steps
-    assert record["delight"]["settings"].items() >= {"delighter": "folder",
-                                                     "folder": ".."}.items(), "it travels with the capture"
+    assert record["delight"]["settings"].items() >= {"delighter": "folder", "folder": ".."}.items(), (
+        "it travels with the capture"
+    )
 
 
-@pytest.mark.parametrize("option, said", [
-    (["--skin-tone", "pink"], "not a colour"), (["--skin-tone", "200,160,1400"], "not a colour"),
-    (["--white-point", "0,1,1"], "not a colour"), (["--with", "gone"], "--with (solve.together)"),
-    (["--template", "gone.obj"], "--template (registration.template)"), (["--prior", "gone"], "--prior (solve.prior)"),
-    (["--cameras", "gone"], "--cameras (cameras.import_from)"),
-    (["--delighter", "folder"], "--folder (delight.folder)"),
-    (["--softened", "gone"], "--softened (shadow_mask.softened)")])
+@pytest.mark.parametrize(
+    "option, said",
+    [
+        (["--skin-tone", "pink"], "not a colour"),
+        (["--skin-tone", "200,160,1400"], "not a colour"),
+        (["--white-point", "0,1,1"], "not a colour"),
+        (["--with", "gone"], "--with (solve.together)"),
+        (["--template", "gone.obj"], "--template (registration.template)"),
+        (["--prior", "gone"], "--prior (solve.prior)"),
+        (["--cameras", "gone"], "--cameras (cameras.import_from)"),
+        (["--delighter", "folder"], "--folder (delight.folder)"),
+        (["--softened", "gone"], "--softened (shadow_mask.softened)"),
+    ],
+)
 def test_what_a_later_stage_cannot_use_is_refused_before_the_first_one_runs(tiny, capture, film, option, said):
     problem, _ = refused("run", film, capture.root, *option, cwd=tiny)
     assert said in problem and not capture.read()["stages"] and not (capture.root / "frames").exists()
@@ -149,12 +191,21 @@ def test_a_failure_is_two_lines(tiny, capture, film):
     assert "ZeroDivisionError" in problem and "scan.log" in remedy
 
 
-@pytest.mark.parametrize("words", [
-    ("run", "a", "b", "--from", "solve", "--until", "frames"), ("run", "a", "b", "--until", "lunch"),
-    ("run", "/no/such/video.mp4", "CAPTURE"),
-    ("run", "-", "CAPTURE"), ("run", "a", "b", "--folder", "c"), ("run", "a", "b", "--checkpoint", "c"),
-    ("status", "/no/such/capture"), ("mask", "import", "CAPTURE", "mask.png"), ("train",), ("train", "patience"),
-])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "a", "b", "--from", "solve", "--until", "frames"),
+        ("run", "a", "b", "--until", "lunch"),
+        ("run", "/no/such/video.mp4", "CAPTURE"),
+        ("run", "-", "CAPTURE"),
+        ("run", "a", "b", "--folder", "c"),
+        ("run", "a", "b", "--checkpoint", "c"),
+        ("status", "/no/such/capture"),
+        ("mask", "import", "CAPTURE", "mask.png"),
+        ("train",),
+        ("train", "patience"),
+    ],
+)
 def test_what_cannot_be_is_refused_in_two_lines(capture, words):
     refused(*(capture.root if word == "CAPTURE" else word for word in words))
 
@@ -176,8 +227,10 @@ def test_a_capture_of_a_newer_version_is_refused(capture, film):
 
 
 def test_the_command_line_loads_nothing_heavy():
-    code = ("import sys; import core.__main__; print(sorted({'numpy', 'torch', 'cv2', 'OpenImageIO', 'pycolmap'} & "
-            "set(sys.modules)))")
+    code = (
+        "import sys; import core.__main__; print(sorted({'numpy', 'torch', 'cv2', 'OpenImageIO', 'pycolmap'} & "
+        "set(sys.modules)))"
+    )
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True).stdout.strip() == "[]"
 
 
@@ -194,7 +247,7 @@ def painted(capture) -> Capture:
 def half(height: int, width: int) -> np.ndarray:
     """Black above, white below."""
     mask = np.zeros((height, width), np.float32)
-    mask[height // 2:] = 1
+    mask[height // 2 :] = 1
     return mask
 
 

@@ -14,8 +14,9 @@ from tests.test_acting import COPIES, HEAD, coordinates, shown, write_head  # no
 from tests.test_acting import head as head  # noqa: E402  (a fixture)
 from tests.test_gaze import degrees  # noqa: E402
 
-KINDS = {f"{side} {what}" for side in ("Left", "Right")
-         for what in ("Eye", "Cornea", "Lid Margin", "Wet Line", "Caruncle")} | {"Teeth", "Tongue"}
+KINDS = {
+    f"{side} {what}" for side in ("Left", "Right") for what in ("Eye", "Cornea", "Lid Margin", "Wet Line", "Caruncle")
+} | {"Teeth", "Tongue"}
 OPENINGS = (0.0, 0.3, 0.6, 1.0)
 LOOKS = ("Up", "Down", "In", "Out")
 DRAWN: dict = {}
@@ -27,6 +28,7 @@ def drawn_once(addon, monkeypatch):
     and they are drawn for the first test alone."""
     pictures = addon("acting.close_up.pictures")
     for draw in (pictures.iris_pattern, pictures.white_pattern):
+
         def drawn(draw=draw):
             if draw.__name__ not in DRAWN:
                 DRAWN[draw.__name__] = draw()
@@ -75,9 +77,10 @@ def ball_and_gaze(head, side: str) -> tuple[np.ndarray, np.ndarray]:  # noqa: F8
 
 
 def tree_of(thing) -> BVHTree:
-    return BVHTree.FromPolygons(seen(thing).tolist(),
-                                [list(p.vertices)
-                                 for p in thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons])
+    return BVHTree.FromPolygons(
+        seen(thing).tolist(),
+        [list(p.vertices) for p in thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons],
+    )
 
 
 def test_an_eye_is_as_deep_as_lifes_and_inside_of_the_heads_own_ball(close_up, addon):
@@ -124,7 +127,7 @@ def test_it_looks_where_the_empty_is_and_a_bone_can_hold_that(close_up, addon):
     centre, gaze = ball_and_gaze(close_up, "Left")
     assert degrees(gaze, np.array((0.1, -0.5, 0.03)) - centre) < 3.5
     for thing in things(close_up).values():
-        for curve in (thing.animation_data.drivers if thing.animation_data else []):
+        for curve in thing.animation_data.drivers if thing.animation_data else []:
             assert curve.driver.is_valid and curve.driver.is_simple_expression
 
 
@@ -174,8 +177,10 @@ def test_a_lid_is_one_sheet_of_skin(close_up, addon):
 
 
 def test_it_goes_as_it_came_and_an_undo_takes_it_back(head, addon):  # noqa: F811
-    before = {name: {block.name for block in getattr(bpy.data, name)}
-              for name in ("objects", "meshes", "materials", "images", "node_groups", "shape_keys")}
+    before = {
+        name: {block.name for block in getattr(bpy.data, name)}
+        for name in ("objects", "meshes", "materials", "images", "node_groups", "shape_keys")
+    }
     rest = shown(head)
     bpy.ops.ed.undo_push(message="before")
     bpy.ops.wildcap.close_up()
@@ -199,8 +204,11 @@ def test_it_goes_as_it_came_and_an_undo_takes_it_back(head, addon):  # noqa: F81
 
 
 def test_it_follows_another_shape_and_another_colour_and_what_was_set_stays(close_up, addon, capture):
-    iris = next(slot.material for slot in things(close_up)["Left Eye"].material_slots
-                if slot.material["wildcap_inside"] == "iris")
+    iris = next(
+        slot.material
+        for slot in things(close_up)["Left Eye"].material_slots
+        if slot.material["wildcap_inside"] == "iris"
+    )
     shader = next(node for node in iris.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
     shader.inputs["Roughness"].default_value = 0.77
     bpy.ops.wildcap.iris(iris='blue')
@@ -279,6 +287,6 @@ def about_the_mouth(head, addon) -> BVHTree:  # noqa: F811
     near = np.linalg.norm(places - places[asset.copies[asset.seam == 0]].mean(0), axis=1) < 0.08
     corners = np.empty(len(head.data.loops), np.int32)
     head.data.loops.foreach_get("vertex_index", corners)
-    triangles = corners[:3 * len(asset.triangles)].reshape(-1, 3)
+    triangles = corners[: 3 * len(asset.triangles)].reshape(-1, 3)
     used, triangles = np.unique(triangles[near[triangles[:, 0]]], return_inverse=True)
     return BVHTree.FromPolygons(places[used].tolist(), triangles.reshape(-1, 3).tolist())

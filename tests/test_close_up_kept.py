@@ -20,8 +20,10 @@ def test_what_was_modelled_stays_and_is_named_and_the_rest_follows_the_head(clos
     worn["Right Eye"].location.y -= 0.001
     worn["Tongue"].vertex_groups.new(name="Jaw").add([0], 1.0, 'REPLACE')
     worn["Left Cornea"].data.uv_layers[0].data[5].uv.x += 0.1
-    kept = {kind: (worn[kind].data, worn[kind].location.copy(), coordinates(worn[kind].data.vertices))
-            for kind in ("Teeth", "Right Wet Line", "Left Eye", "Right Eye", "Tongue", "Left Cornea")}
+    kept = {
+        kind: (worn[kind].data, worn[kind].location.copy(), coordinates(worn[kind].data.vertices))
+        for kind in ("Teeth", "Right Wet Line", "Left Eye", "Right Eye", "Tongue", "Left Cornea")
+    }
     place = worn["Right Cornea"].location.copy()
     write_head(capture, 0.9)
     bpy.ops.wildcap.bring_in_head()
@@ -62,6 +64,7 @@ def test_what_the_artist_lets_the_cornea_shade_stays(close_up):  # noqa: F811
 def test_a_head_that_is_subdivided_keeps_its_skin(head):  # noqa: F811
     """The close-up hides vertices by their numbers, which are those of the mesh and not of its subdivision: this makes
     a quad of each corner that is shown."""
+
     def faces():
         return head.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons
 
@@ -77,12 +80,19 @@ def test_a_head_that_is_subdivided_keeps_its_skin(head):  # noqa: F811
 def test_depths_of_light_and_relief_grow_with_the_head(head):  # noqa: F811
     """As the skin's do: 1.2 mm in enamel are 12 mm in that of a head of ten times the size, and what the artist set
     grows along."""
+
     def lengths() -> dict[str, float]:
-        nodes = {(slot.material.name.split()[-1], node.type): node for thing in head.children
-                 for slot in thing.material_slots if "wildcap_inside" in slot.material
-                 for node in slot.material.node_tree.nodes}
-        return {"enamel": nodes["Enamel", 'BSDF_PRINCIPLED'].inputs["Subsurface Scale"],
-                "iris": nodes["Iris", 'BUMP'].inputs["Distance"]}
+        nodes = {
+            (slot.material.name.split()[-1], node.type): node
+            for thing in head.children
+            for slot in thing.material_slots
+            if "wildcap_inside" in slot.material
+            for node in slot.material.node_tree.nodes
+        }
+        return {
+            "enamel": nodes["Enamel", 'BSDF_PRINCIPLED'].inputs["Subsurface Scale"],
+            "iris": nodes["Iris", 'BUMP'].inputs["Distance"],
+        }
 
     def resize(factor: float) -> None:
         head.scale = (factor,) * 3
@@ -91,10 +101,12 @@ def test_depths_of_light_and_relief_grow_with_the_head(head):  # noqa: F811
     resize(10)
     bpy.ops.wildcap.close_up()
     made = lengths()
-    assert {name: socket.default_value for name, socket in made.items()} == pytest.approx({"enamel": 0.012,
-                                                                                           "iris": 0.003})
+    assert {name: socket.default_value for name, socket in made.items()} == pytest.approx(
+        {"enamel": 0.012, "iris": 0.003}
+    )
     made["iris"].default_value = 0.006
     resize(2)
     bpy.ops.wildcap.assemble_material()
-    assert {name: socket.default_value for name, socket in made.items()} == pytest.approx({"enamel": 0.0024,
-                                                                                           "iris": 0.0012})
+    assert {name: socket.default_value for name, socket in made.items()} == pytest.approx(
+        {"enamel": 0.0024, "iris": 0.0012}
+    )

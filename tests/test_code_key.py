@@ -114,12 +114,21 @@ def test_a_line_in_a_shared_module_changes_exactly_the_stages_that_depend_on_it(
     assert changed(before, copy) == set()
 
 
-@pytest.mark.parametrize(("file", "expected"), [
-    ("light/sunlight.py", {"delight", "shadow_mask"}), ("face/beard.py", {"solve", "upscale"}),
-    ("geometry/noise.py", {"upscale"}),
-    ("imaging/images.py", set(stages.NAMES)), ("cameras/colmap.py", {"cameras"}),
-    ("cameras/importers/metashape.py", {"cameras"}),
-    ("solve/sampler.py", {"solve"}), ("__init__.py", set()), ("synthetic/skin.py", set()), ("worker/runner.py", set())])
+@pytest.mark.parametrize(
+    ("file", "expected"),
+    [
+        ("light/sunlight.py", {"delight", "shadow_mask"}),
+        ("face/beard.py", {"solve", "upscale"}),
+        ("geometry/noise.py", {"upscale"}),
+        ("imaging/images.py", set(stages.NAMES)),
+        ("cameras/colmap.py", {"cameras"}),
+        ("cameras/importers/metashape.py", {"cameras"}),
+        ("solve/sampler.py", {"solve"}),
+        ("__init__.py", set()),
+        ("synthetic/skin.py", set()),
+        ("worker/runner.py", set()),
+    ],
+)
 def test_known_dependents(copy, file, expected):
     """By hand: colmap.py is run as a process of its own; the version alone changes nothing."""
     before = keys(copy)
@@ -133,8 +142,12 @@ def test_a_shipped_file_changes_the_stages_that_read_it(copy):
     (copy / "weights").unlink()
     shutil.copytree(CORE / "weights", copy / "weights")
     assert changed(before, copy) == set()
-    for name, expected in (("tones.json", {"solve"}), ("upscaler.safetensors", {"upscale"}),
-                           ("delighter.safetensors", {"delight"}), ("prior.safetensors", {"solve", "upscale"})):
+    for name, expected in (
+        ("tones.json", {"solve"}),
+        ("upscaler.safetensors", {"upscale"}),
+        ("delighter.safetensors", {"delight"}),
+        ("prior.safetensors", {"solve", "upscale"}),
+    ):
         (copy / "weights" / name).write_bytes(b"other weights")
         assert changed(before, copy) == expected
         shutil.copyfile(CORE / "weights" / name, copy / "weights" / name)
@@ -157,13 +170,21 @@ def test_modules_that_read_shipped_files_name_them():
 def shipped_paths(file: str) -> list[str]:
     """The paths of shipped files that a module speaks of."""
     tree = ast.parse((CORE / file).read_text(encoding="utf-8"))
-    return [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)
-            and re.fullmatch(r"(weights|assets)(/\S*)?", node.value)]
+    return [
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant)
+        and isinstance(node.value, str)
+        and re.fullmatch(r"(weights|assets)(/\S*)?", node.value)
+    ]
 
 
-WORDS = ('"""Another docstring."""', "# a comment",
-         "def shade(normal,\n          light):\n    'Words.'\n    return normal*light   # more words",
-         "SIZE = 3\n'What it is.'")
+WORDS = (
+    '"""Another docstring."""',
+    "# a comment",
+    "def shade(normal,\n          light):\n    'Words.'\n    return normal*light   # more words",
+    "SIZE = 3\n'What it is.'",
+)
 BARE = ("def shade(normal, light): return normal * light", "SIZE = 3")
 
 
@@ -176,31 +197,45 @@ def written(source: str) -> str:
 def test_docstrings_comments_and_layout_do_not_count_and_code_does():
     assert written("\n".join(WORDS)) == written("\n".join(BARE))
     assert written("f'a' f'b{x}' 'c'") == written("f'ab{x}c'")
-    for one, other in (("a = 1", "a = 2"), ("a = 1", "a = True"), ("a = 1", "a = 1.0"), ("a = 'x'", "a = b'x'"),
-                       ("f(a, *b)", "f(*a, b)"),
-                       ("a < b", "a <= b"), ("def f(a, /): ...", "def f(a): ..."), ("x = None", "x = ..."),
-                       ("f'{a!r}'", "f'{a}'"),
-                       ("{**a, b: c}", "{b: c, **a}"), ("f('x')", "f()"), ("return_ = [1, [2]]", "return_ = [[1], 2]")):
+    for one, other in (
+        ("a = 1", "a = 2"),
+        ("a = 1", "a = True"),
+        ("a = 1", "a = 1.0"),
+        ("a = 'x'", "a = b'x'"),
+        ("f(a, *b)", "f(*a, b)"),
+        ("a < b", "a <= b"),
+        ("def f(a, /): ...", "def f(a): ..."),
+        ("x = None", "x = ..."),
+        ("f'{a!r}'", "f'{a}'"),
+        ("{**a, b: c}", "{b: c, **a}"),
+        ("f('x')", "f()"),
+        ("return_ = [1, [2]]", "return_ = [[1], 2]"),
+    ):
         assert written(one) != written(other), one
 
 
 def test_only_a_plain_name_after_the_package_means_a_module_that_is_run(copy):
     with open(copy / "scan" / "pairs.py", "a", encoding="utf-8") as source:
-        source.write('\nname = "x"\nNAMES = (f"{__package__}{name}", f"{__package__}", f"{name}.colmap", '
-                     'f"{__package__}.pairs")\n')
+        source.write(
+            '\nname = "x"\nNAMES = (f"{__package__}{name}", f"{__package__}", f"{name}.colmap", '
+            'f"{__package__}.pairs")\n'
+        )
     forget()
     of_scan = code_key.modules("core.scan", copy)
     assert "cameras/colmap.py" not in of_scan and "scan/pairs.py" in of_scan
 
 
 def test_every_python_gives_the_same_keys():
-    installed = [path for version in VERSIONS
-                 for path in (shutil.which(f"python{version}"),
-                              *Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))]
+    installed = [
+        path
+        for version in VERSIONS
+        for path in (shutil.which(f"python{version}"), *Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))
+    ]
     answers = {}
     for python in (sys.executable, *filter(None, installed)):
-        asked = subprocess.run([python, "-E", "-s", "-B", "-c", KEYS.format(str(ROOT))], capture_output=True, text=True,
-                               cwd="/")
+        asked = subprocess.run(
+            [python, "-E", "-s", "-B", "-c", KEYS.format(str(ROOT))], capture_output=True, text=True, cwd="/"
+        )
         if asked.returncode == 0:  # a version manager's stub may stand for a Python that is not installed
             version, _, answer = asked.stdout.partition(") ")
             answers[version] = answer

@@ -75,18 +75,21 @@ def test_every_setting_can_be_set(capture, name, tmp_path, capsys):
 def test_a_flag_says_the_same_as_set(capture, name):
     text, _ = other(name)
     field = find_setting(name)
-    needed = {"delight.folder": ["--delighter", "folder"], "delight.checkpoint": ["--delighter", "opendelight"],
-              "delight.switchlight_preview": ["--delighter", "switchlight"],
-              "registration.new_atlas": ["--template", "mine.obj"]}.get(name, [])
+    needed = {
+        "delight.folder": ["--delighter", "folder"],
+        "delight.checkpoint": ["--delighter", "opendelight"],
+        "delight.switchlight_preview": ["--delighter", "switchlight"],
+        "registration.new_atlas": ["--template", "mine.obj"],
+    }.get(name, [])
     words = [field.metadata["flag"]] if isinstance(field.default, bool) else [field.metadata["flag"], text]
     command = "deliver" if name in DELIVER else "run"
     by_set = job(capture, *needed, "--set", f"{name}={text}", command=command)
     assert job(capture, *needed, *words, command=command) == by_set
 
 
-@pytest.mark.parametrize("name",
-                         [name for name in known_settings() if isinstance(find_setting(name).default, bool)
-                          and name in RUN])
+@pytest.mark.parametrize(
+    "name", [name for name in known_settings() if isinstance(find_setting(name).default, bool) and name in RUN]
+)
 def test_a_switch_has_many_words(capture, name):
     for words, state in (("on true YES 1", True), ("off False no 0", False)):
         assert {value(job(capture, "--set", f"{name}={word}"), name) for word in words.split()} == {state}
@@ -95,11 +98,29 @@ def test_a_switch_has_many_words(capture, name):
 def test_a_file_lies_over_the_quality_and_set_and_flags_over_the_file(capture, tmp_path):
     (tmp_path / "mine.json").write_text(
         '\ufeff{"seed": 3, "solve": {"steps": 7, "size": 256, "skin_tone": "0.5,0.4,0.3"}, '
-        '"deliver": {"preset": "unreal"}}', encoding="utf-8")
-    settings = job(capture, "--quality", "draft", "--settings", "mine.json", "--set", "solve.size=128", "--set",
-                   "solve.grid_cells=8", "--skin-tone", "auto")
-    assert (settings.seed, settings.solve.steps, settings.solve.size, settings.solve.grid_cells,
-            settings.solve.skin_tone) == (3, 7, 128, 8, "auto")
+        '"deliver": {"preset": "unreal"}}',
+        encoding="utf-8",
+    )
+    settings = job(
+        capture,
+        "--quality",
+        "draft",
+        "--settings",
+        "mine.json",
+        "--set",
+        "solve.size=128",
+        "--set",
+        "solve.grid_cells=8",
+        "--skin-tone",
+        "auto",
+    )
+    assert (
+        settings.seed,
+        settings.solve.steps,
+        settings.solve.size,
+        settings.solve.grid_cells,
+        settings.solve.skin_tone,
+    ) == (3, 7, 128, 8, "auto")
     assert settings.solve.guidance == preset("draft").solve.guidance
     assert json.loads(capture.job.read_text(encoding="utf-8"))["quality"] == "draft"
     assert job(capture, "--settings", "mine.json", command="deliver").deliver.preset == "unreal"
@@ -111,11 +132,16 @@ def test_a_file_lies_over_the_quality_and_set_and_flags_over_the_file(capture, t
 def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "studio").mkdir()
-    places = {"delight": {"delighter": "folder", "folder": "delit"}, "solve": {"prior": "~/authors"},
-              "registration": {"template": ""}, "cameras": {"import_from": str(tmp_path / "rig.json")}}
+    places = {
+        "delight": {"delighter": "folder", "folder": "delit"},
+        "solve": {"prior": "~/authors"},
+        "registration": {"template": ""},
+        "cameras": {"import_from": str(tmp_path / "rig.json")},
+    }
     (tmp_path / "studio" / "mine.json").write_text(json.dumps(places), encoding="utf-8")
-    settings = job(capture, "--settings", "studio/mine.json", "--set", "texture.perceptual_network=vgg", "--softened",
-                   "~/soft")
+    settings = job(
+        capture, "--settings", "studio/mine.json", "--set", "texture.perceptual_network=vgg", "--softened", "~/soft"
+    )
     assert settings.delight.folder == str(tmp_path / "studio" / "delit")
     assert settings.solve.prior == str(tmp_path / "home" / "authors")
     assert settings.registration.template == "" and settings.cameras.import_from == str(tmp_path / "rig.json")
@@ -126,28 +152,39 @@ def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
     assert job(capture, "--settings", "studio/mine.json", "--set", "delight.folder=").delight.folder == ""
 
 
-@pytest.mark.parametrize(("words", "said"), [
-    (["--set", "solve.steps"], "--set solve.steps gives no value. Write --set solve.steps=VALUE, as solve.steps=20."),
-    (["--set", "solve.stps=5"], "no setting named 'solve.stps'. Did you mean solve.steps?"),
-    (["--set", "slove.steps=5"], "Did you mean solve.steps?"),
-    (["--set", "solve.steps=many"], "solve.steps is 'many', which is not a whole number. It goes from 4 to 600."),
-    (["--set", "solve.steps=5.5"], "not a whole number"),
-    (["--set", "solve.steps="], "'', which is not a whole number"),
-    (["--set", "solve.steps=3"], "solve.steps is 3. It goes from 4 to 600."),
-    (["--set", "scan.voxel_mm=wide"], "which is not a number. It goes from 0.3 to 5 mm."),
-    (["--set", "scan.voxel_mm=nan"], "It goes from 0.3 to 5 mm."),
-    (["--set", "upscale.hair=perhaps"], "upscale.hair is 'perhaps'. It is on or off."),
-    (["--set", "scan.method=magic"], "Choose one of auto, stereo, splats."),
-    (["--seed", "-1"], "seed is -1. It goes from 0 to 2147483647."),
-    (["--set", "seed=1", "--seed", "2"], "--seed and --set seed=1 ask for two values of seed. Leave one of them out."),
-    (["--set", "scan.pairs=5", "--set", "scan.pairs=6"], "ask for two values of scan.pairs."),
-    (["--set", "deliver.preset=unreal"],
-     "`core run` has no use for deliver.preset. It is a setting of `core deliver`."),
-    (["--new-atlas"], "--new-atlas goes with --template only."),
-    (["--folder", "x", "--delighter", "none"], "--folder goes with --delighter folder only."),
-    (["--checkpoint", "x"], "--checkpoint goes with --delighter opendelight only."),
-    (["--preview"], "--preview and --send-frames go with --delighter switchlight"),
-])
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ["--set", "solve.steps"],
+            "--set solve.steps gives no value. Write --set solve.steps=VALUE, as solve.steps=20.",
+        ),
+        (["--set", "solve.stps=5"], "no setting named 'solve.stps'. Did you mean solve.steps?"),
+        (["--set", "slove.steps=5"], "Did you mean solve.steps?"),
+        (["--set", "solve.steps=many"], "solve.steps is 'many', which is not a whole number. It goes from 4 to 600."),
+        (["--set", "solve.steps=5.5"], "not a whole number"),
+        (["--set", "solve.steps="], "'', which is not a whole number"),
+        (["--set", "solve.steps=3"], "solve.steps is 3. It goes from 4 to 600."),
+        (["--set", "scan.voxel_mm=wide"], "which is not a number. It goes from 0.3 to 5 mm."),
+        (["--set", "scan.voxel_mm=nan"], "It goes from 0.3 to 5 mm."),
+        (["--set", "upscale.hair=perhaps"], "upscale.hair is 'perhaps'. It is on or off."),
+        (["--set", "scan.method=magic"], "Choose one of auto, stereo, splats."),
+        (["--seed", "-1"], "seed is -1. It goes from 0 to 2147483647."),
+        (
+            ["--set", "seed=1", "--seed", "2"],
+            "--seed and --set seed=1 ask for two values of seed. Leave one of them out.",
+        ),
+        (["--set", "scan.pairs=5", "--set", "scan.pairs=6"], "ask for two values of scan.pairs."),
+        (
+            ["--set", "deliver.preset=unreal"],
+            "`core run` has no use for deliver.preset. It is a setting of `core deliver`.",
+        ),
+        (["--new-atlas"], "--new-atlas goes with --template only."),
+        (["--folder", "x", "--delighter", "none"], "--folder goes with --delighter folder only."),
+        (["--checkpoint", "x"], "--checkpoint goes with --delighter opendelight only."),
+        (["--preview"], "--preview and --send-frames go with --delighter switchlight"),
+    ],
+)
 def test_what_cannot_be_is_refused(capture, words, said, capsys):
     assert main(["run", "-", str(capture.root), *words]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
@@ -164,13 +201,22 @@ def test_two_words_for_one_value_are_no_contradiction(capture):
     assert job(capture, "--skin-tone", "").solve.skin_tone == "auto", "an empty variable of a script says nothing"
 
 
-@pytest.mark.parametrize(("content", "said"), [
-    (None, "mine.json cannot be read"), (b"", "cannot be read"), (b"{", "cannot be read"),
-    (b"\xff\xfe\x00", "cannot be read"), (b"[1]", "object, not [1]"),
-    (b'"solve"', "object, not 'solve'"), (b'{"solve": [5]}', "settings of the stage solve have to be an object"),
-    (b'{"solve": {"prior": 5}}', "not a str"),
-    (b'{"slove": {}}', "Did you mean solve?"), (b'{"scan": {"voxel_mm": NaN}}', "0.3 to 5 mm"),
-    (b"[" * 100_000, "cannot be read")])
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "mine.json cannot be read"),
+        (b"", "cannot be read"),
+        (b"{", "cannot be read"),
+        (b"\xff\xfe\x00", "cannot be read"),
+        (b"[1]", "object, not [1]"),
+        (b'"solve"', "object, not 'solve'"),
+        (b'{"solve": [5]}', "settings of the stage solve have to be an object"),
+        (b'{"solve": {"prior": 5}}', "not a str"),
+        (b'{"slove": {}}', "Did you mean solve?"),
+        (b'{"scan": {"voxel_mm": NaN}}', "0.3 to 5 mm"),
+        (b"[" * 100_000, "cannot be read"),
+    ],
+)
 def test_a_settings_file_that_is_none_is_refused(capture, tmp_path, content, said, capsys):
     if content is not None:
         (tmp_path / "mine.json").write_bytes(content)

@@ -63,7 +63,7 @@ def test_how_bright_the_frames_were_is_over_the_skin_that_they_showed(tmp_path):
     skin = (alone.skin * alone.weight > 0.5).numpy()
     assert np.median(alone.filmed.numpy()[skin]) == pytest.approx(1, rel=1e-3), "of the texture, where no other is"
     lit = np.full((SIZE, SIZE, 3), 0.4, np.float32)
-    lit[:, :SIZE // 2] = 0.1
+    lit[:, : SIZE // 2] = 0.1
     lit[:, SIZE // 2] = 0.2
     images.write_srgb(capture.texture_filmed, images.linear_to_srgb(lit))
     filmed = read_evidence(capture, read_filmed_head(capture), SIZE).filmed.numpy()
@@ -73,8 +73,9 @@ def test_how_bright_the_frames_were_is_over_the_skin_that_they_showed(tmp_path):
 def laid_in(seed: int, size: float, count: int = 60000) -> Errors:
     """Errors with known deviations, all of them `size` times as large."""
     rng = np.random.default_rng(seed)
-    parts = np.stack([np.ones(count), rng.exponential(0.002, count), rng.random(count) < 0.3,
-                      rng.uniform(0.5, 8, count)], 1)
+    parts = np.stack(
+        [np.ones(count), rng.exponential(0.002, count), rng.random(count) < 0.3, rng.uniform(0.5, 8, count)], 1
+    )
     sigma = size * np.sqrt(parts @ np.square(LAID_IN))
     return Errors(f"person {seed}", rng.normal(0, sigma), parts, sigma)
 

@@ -40,8 +40,9 @@ def dark_room(tmp_path_factory):
     azimuths = (-36, -12, 12, 36)
     names = [f"{i:05d}.jpg" for i in range(len(azimuths))]
     capture.frames.mkdir(parents=True)
-    records = [{"name": n, "video_frame": i, "time_s": i, "sharpness": 1.0, "selected": True}
-               for i, n in enumerate(names)]
+    records = [
+        {"name": n, "video_frame": i, "time_s": i, "sharpness": 1.0, "selected": True} for i, n in enumerate(names)
+    ]
     capture.frames_json.write_text(json.dumps({"frames": records}))
     painted_egg.write_cameras(capture.cameras, names, azimuths, 0.42, 0.05)
     meshes.write_obj(capture.head, mesh)
@@ -96,14 +97,29 @@ def test_without_a_highlight_none_is_found(dark_room):
 
 def test_the_table_says_the_gap_and_leaves_out_what_was_not_measured():
     def row(psnr, **more):
-        return {"psnr": psnr - 1, "psnr_after_gain": psnr, "ssim_after_gain": 0.9, "flip_after_gain": 0.1,
-                "detail": 0.8, "mole_contrast": None, **more}
+        return {
+            "psnr": psnr - 1,
+            "psnr_after_gain": psnr,
+            "ssim_after_gain": 0.9,
+            "flip_after_gain": 0.1,
+            "detail": 0.8,
+            "mole_contrast": None,
+            **more,
+        }
 
     textures = {"wild_texture": row(29.0), "flash_texture": row(33.0)}
-    people = {"tan": {"wild": row(30.0), "flash": row(33.5), "limit": row(40.0), **textures},
-              "dark": {"wild": row(32.0), "flash": row(34.5), "limit": row(42.0), **textures,
-                       "studio_texture": row(31.0), "studio": row(31.5, seconds=80.0, proposed_mask_percent=0.4)},
-              "light": {"wild": row(10.0)}}
+    people = {
+        "tan": {"wild": row(30.0), "flash": row(33.5), "limit": row(40.0), **textures},
+        "dark": {
+            "wild": row(32.0),
+            "flash": row(34.5),
+            "limit": row(42.0),
+            **textures,
+            "studio_texture": row(31.0),
+            "studio": row(31.5, seconds=80.0, proposed_mask_percent=0.4),
+        },
+        "light": {"wild": row(10.0)},
+    }
     mean = controlled.means(people)
     assert (
         mean["flash"]["psnr_after_gain"] == 34
@@ -121,17 +137,25 @@ def test_the_table_says_the_gap_and_leaves_out_what_was_not_measured():
 
 def test_people_of_a_record_stay_where_others_are_measured(tmp_path, monkeypatch, capsys):
     def row(psnr):
-        return {"psnr": psnr, "psnr_after_gain": psnr, "ssim_after_gain": 0.9, "flip_after_gain": 0.1, "detail": 0.8,
-                "mole_contrast": None}
+        return {
+            "psnr": psnr,
+            "psnr_after_gain": psnr,
+            "ssim_after_gain": 0.9,
+            "flip_after_gain": 0.1,
+            "detail": 0.8,
+            "mole_contrast": None,
+        }
 
     def rows(psnr):
-        return {name: row(psnr + i)
-                for i, name in enumerate(("wild_texture", "wild", "flash_texture", "flash", "limit"))}
+        return {
+            name: row(psnr + i) for i, name in enumerate(("wild_texture", "wild", "flash_texture", "flash", "limit"))
+        }
 
     def run(name, psnr):
         monkeypatch.setattr(controlled, "measure", lambda folder, person: rows(psnr))
-        monkeypatch.setattr("sys.argv",
-                            ["controlled", str(tmp_path), "--only", name, "--json", str(tmp_path / "out.json")])
+        monkeypatch.setattr(
+            "sys.argv", ["controlled", str(tmp_path), "--only", name, "--json", str(tmp_path / "out.json")]
+        )
         assert controlled.main() == 0
         return json.loads((tmp_path / "out.json").read_text())["figures"]
 

@@ -27,23 +27,43 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 def lines(text):
     """First cell of each row -> its other cells, of the last table that has it."""
-    return {cells[0].strip(" *"): [cell.strip() for cell in cells[1:]] for line in text.splitlines()
-            if (cells := line.strip("|").split("|"))}
+    return {
+        cells[0].strip(" *"): [cell.strip() for cell in cells[1:]]
+        for line in text.splitlines()
+        if (cells := line.strip("|").split("|"))
+    }
 
 
 def test_what_a_face_that_was_filmed_with_open_eyes_had_already_is_no_click():
-    cost = {"plain": {"seconds": 10.2, "peak_mib": 1024.0}, "add_face_units": None,
-            "close_up": {"seconds": 4.12, "mib": 81.6}, "grow_hair": {"seconds": 1.3, "mib": 18.2},
-            "render": {"seconds": 11.0, "peak_mib": 1536.0}, "hairs": 9, "vertices": 8}
+    cost = {
+        "plain": {"seconds": 10.2, "peak_mib": 1024.0},
+        "add_face_units": None,
+        "close_up": {"seconds": 4.12, "mib": 81.6},
+        "grow_hair": {"seconds": 1.3, "mib": 18.2},
+        "render": {"seconds": 11.0, "peak_mib": 1536.0},
+        "hairs": 9,
+        "vertices": 8,
+    }
     assert lines(acting_table(figures.Figures.of({"faces": {"a": cost}}).faces))["a"] == [
-        "with the material", "4.1 s, 82 MiB", "1.3 s, 18 MiB", "9", "8", "10 s, 1.0 GiB", "11 s, 1.5 GiB"]
+        "with the material",
+        "4.1 s, 82 MiB",
+        "1.3 s, 18 MiB",
+        "9",
+        "8",
+        "10 s, 1.0 GiB",
+        "11 s, 1.5 GiB",
+    ]
 
 
 def test_table_says_what_was_measured_what_not_and_what_was_disturbed():
-    found = {"machine": {}, "standard": {**dict.fromkeys(stages.NAMES, DONE), "solve": {**DONE, "others": 0.74}},
-             "draft": {"solve": {**DONE, "seconds": 3.6}},
-             "solve-2048": {"solve": {"over_s": 600.0, "load": 0.0}},
-             "solve-512": {"solve": {**DONE, "processor_s": 5.0}}, "frames-60": {"frames": {**DONE, "others": None}}}
+    found = {
+        "machine": {},
+        "standard": {**dict.fromkeys(stages.NAMES, DONE), "solve": {**DONE, "others": 0.74}},
+        "draft": {"solve": {**DONE, "seconds": 3.6}},
+        "solve-2048": {"solve": {"over_s": 600.0, "load": 0.0}},
+        "solve-512": {"solve": {**DONE, "processor_s": 5.0}},
+        "frames-60": {"frames": {**DONE, "others": None}},
+    }
     found["together"] = {whole: together(found, whole) for whole in ("standard", "float32")}
     assert together(found, "draft") is None, "a stage of it was not measured"
     assert found["together"]["standard"] == {"minutes": 2.1, "processor_minutes": 3.3, "peak_mb": 1640, "others": 0.74}
@@ -68,10 +88,10 @@ def test_the_exponent_is_that_of_the_growth(power):
 
 def test_every_row_is_in_a_table():
     shown = {(row, stage) for _, _, grown in GROWTH for stage, rows in grown.items() for row in rows}
-    assert {(name, stage) for name, row in ROWS.items() if name not in WHOLES[:3]
-            for stage in row.stages} <= shown
-    assert all(len(rows) == len(values) and set(rows) <= {*ROWS, ""} for _, values, grown in GROWTH
-               for rows in grown.values())
+    assert {(name, stage) for name, row in ROWS.items() if name not in WHOLES[:3] for stage in row.stages} <= shown
+    assert all(
+        len(rows) == len(values) and set(rows) <= {*ROWS, ""} for _, values, grown in GROWTH for rows in grown.values()
+    )
 
 
 def test_idle_and_waiting_processors_are_not_busy():
@@ -124,15 +144,22 @@ def test_stage_that_fails_and_stage_that_takes_too_long_are_told(tmp_path):
 
 
 def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
-    asked, options = [], SimpleNamespace(work=tmp_path, json=tmp_path / "costs.json", capture=None,
-                                         film=chain.VIDEO, limit_s=600, again=False)
+    asked, options = (
+        [],
+        SimpleNamespace(
+            work=tmp_path, json=tmp_path / "costs.json", capture=None, film=chain.VIDEO, limit_s=600, again=False
+        ),
+    )
     found_on = chain.machine()
 
     def measure(capture, stage, *given):
         asked.append(stage)
         capture.mkdir(exist_ok=True)
-        return ({"problem": "The disk is full.", "remedy": "Free some space."} if stage == "scan"
-                and asked.count("scan") == 1 else DONE)
+        return (
+            {"problem": "The disk is full.", "remedy": "Free some space."}
+            if stage == "scan" and asked.count("scan") == 1
+            else DONE
+        )
 
     monkeypatch.setattr(chain, "measure_stage", measure)
     whole = list(stages.NAMES)
@@ -151,8 +178,9 @@ def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
 
 
 def test_what_was_disturbed_is_measured_once_more_and_the_better_one_kept(tmp_path, monkeypatch):
-    options = SimpleNamespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, film=None, limit_s=600,
-                              again=True)
+    options = SimpleNamespace(
+        work=tmp_path, json=tmp_path / "costs.json", capture=None, film=None, limit_s=600, again=True
+    )
     busy = {"frames": [0.1], "cameras": [0.9, 1.5, 0.3, 0.0], "scan": [0.0]}
     capture = tmp_path / "standard.wildcap"
     monkeypatch.setitem(ROWS, "standard", StageRun(("frames", "cameras", "scan")))
@@ -181,10 +209,15 @@ def test_video_is_played_to_and_fro_with_new_noise():
 
 def test_views_are_chosen_anew(tmp_path):
     capture = Capture(tmp_path)
-    frames = [{"name": f"{i:05d}.jpg", "sharpness": 0.5 + 0.01 * (i % 3), "yaw_deg": float(3 * i - 45),
-               "selected": True} for i in range(30)]
+    frames = [
+        {"name": f"{i:05d}.jpg", "sharpness": 0.5 + 0.01 * (i % 3), "yaw_deg": float(3 * i - 45), "selected": True}
+        for i in range(30)
+    ]
     write_json(capture.frames_json, {"kind": "video", "frames": frames})
     chain.select(capture, 8)
-    chosen = [i for i, frame in enumerate(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"])
-              if frame["selected"]]
+    chosen = [
+        i
+        for i, frame in enumerate(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"])
+        if frame["selected"]
+    ]
     assert len(chosen) == 8 and max(np.diff(chosen)) <= 6, "spread over the turn"

@@ -56,9 +56,12 @@ def seams(mesh) -> set:
 @pytest.mark.parametrize("by", ["the button", "Assemble Material"])
 def test_weights_uv_maps_attributes_slots_and_seams_stay_on_a_head_that_is_cut_open(by, addon, request, worked_on):
     obj, mesh = worked_on, worked_on.data
-    before = {"Mine": values(mesh.uv_layers["Mine"].data, "uv", 2), "seams": seams(mesh),
-              "wear": values(mesh.attributes["wear"].data, "color", 4),
-              "flag": values(mesh.attributes["flag"].data, "value", 1, bool)}
+    before = {
+        "Mine": values(mesh.uv_layers["Mine"].data, "uv", 2),
+        "seams": seams(mesh),
+        "wear": values(mesh.attributes["wear"].data, "color", 4),
+        "flag": values(mesh.attributes["flag"].data, "value", 1, bool),
+    }
     name, skin = mesh.name, mesh.materials[0]
     if by == "Assemble Material":
         request.getfixturevalue("open_eyed")
@@ -71,20 +74,25 @@ def test_weights_uv_maps_attributes_slots_and_seams_stay_on_a_head_that_is_cut_o
     weights = np.array([sum(part.weight for part in vertex.groups) for vertex in mesh.vertices])
     expected = np.where(np.arange(HEAD) < HEAD // 2, 0.5, 0)
     expected[3] = 0.25
-    assert np.allclose(weights[:HEAD], expected) and np.allclose(weights[HEAD:HEAD + COPIES], expected[asset.copies])
-    assert not weights[HEAD + COPIES:].any()
+    assert np.allclose(weights[:HEAD], expected) and np.allclose(weights[HEAD : HEAD + COPIES], expected[asset.copies])
+    assert not weights[HEAD + COPIES :].any()
     assert [layer.name for layer in mesh.uv_layers] == ["UVMap", "Mine"] and mesh.uv_layers.active_index == 1
     assert mesh.uv_layers["UVMap"].active_render
-    for kept, known in ((values(mesh.uv_layers["Mine"].data, "uv", 2), before["Mine"]),
-                        (values(mesh.attributes["wear"].data, "color", 4), before["wear"]),
-                        (values(mesh.attributes["flag"].data, "value", 1, bool), before["flag"])):
-        assert np.array_equal(kept[:len(known)], known) and known.any()
-    assert not values(mesh.uv_layers["Mine"].data, "uv", 2)[3 * TRIANGLES:].any()
+    for kept, known in (
+        (values(mesh.uv_layers["Mine"].data, "uv", 2), before["Mine"]),
+        (values(mesh.attributes["wear"].data, "color", 4), before["wear"]),
+        (values(mesh.attributes["flag"].data, "value", 1, bool), before["flag"]),
+    ):
+        assert np.array_equal(kept[: len(known)], known) and known.any()
+    assert not values(mesh.uv_layers["Mine"].data, "uv", 2)[3 * TRIANGLES :].any()
     group = values(mesh.attributes["group"].data, "value", 1, np.int32)[:, 0]
     assert np.array_equal(group[:TRIANGLES], np.arange(TRIANGLES)) and not group[TRIANGLES:].any()
     assert not seams(mesh) ^ before["seams"] and len(before["seams"]) > 1000
     assert [material.name for material in mesh.materials] == [
-        skin.name, *(f"{obj.name} {inside}" for inside in ("Eyes", "Mouth", "Teeth")), "Beanie"]
+        skin.name,
+        *(f"{obj.name} {inside}" for inside in ("Eyes", "Mouth", "Teeth")),
+        "Beanie",
+    ]
     slots = values(mesh.polygons, "material_index", 1, np.int32)[:, 0]
     assert (slots[:HATTED] == 4).all() and (slots[HATTED:TRIANGLES] == 0).all() and slots[TRIANGLES:].max() == 3
     assert list(obj.modifiers.keys()) == ["Sub"]

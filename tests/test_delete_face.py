@@ -37,9 +37,16 @@ def test_the_list_comes_first_and_then_all_of_it_goes(addon, face):
     )
     follow(addon)
     told = " ".join(operator.tell())
-    assert all(words in told
-               for words in ("Maps", "1 files stay", "notes.txt", "The video and what was delivered elsewhere stay",
-                             "loses its maps"))
+    assert all(
+        words in told
+        for words in (
+            "Maps",
+            "1 files stay",
+            "notes.txt",
+            "The video and what was delivered elsewhere stay",
+            "loses its maps",
+        )
+    )
     assert (face / "head.obj").is_file(), "it only told"
     follow(addon) if operator.tell() is None else pytest.fail("what was told once is looked at anew")
     bpy.ops.wildcap.delete_face()

@@ -41,8 +41,9 @@ def write_cameras(capture: Capture, angles=(-30, -10, 10, 30), size=(240, 320)) 
     """Cameras on an arc in front of the head, which looks along -Y, 0.5 m away."""
     model = pycolmap.Reconstruction()
     width, height = size
-    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=width, height=height,
-                             params=[1.3 * height, width / 2, height / 2], camera_id=1)
+    camera = pycolmap.Camera(
+        model="SIMPLE_PINHOLE", width=width, height=height, params=[1.3 * height, width / 2, height / 2], camera_id=1
+    )
     model.add_camera_with_trivial_rig(camera)
     target = np.array([0.0, -0.05, 0.0])
     for i, angle in enumerate(np.radians(angles)):
@@ -55,8 +56,10 @@ def write_cameras(capture: Capture, angles=(-30, -10, 10, 30), size=(240, 320)) 
         model.add_image_with_trivial_frame(pycolmap.Image(name=f"{i:05d}.png", camera_id=1, image_id=i + 1), pose)
     capture.cameras.mkdir(parents=True)
     model.write_binary(str(capture.cameras))
-    frames = [{"name": f"{i:05d}.png", "video_frame": 6 * i + 9, "time_s": 0.25 * i, "sharpness": 1.0,
-               "selected": i < 3} for i in range(len(angles))]
+    frames = [
+        {"name": f"{i:05d}.png", "video_frame": 6 * i + 9, "time_s": 0.25 * i, "sharpness": 1.0, "selected": i < 3}
+        for i in range(len(angles))
+    ]
     write_json(capture.frames_json, {"frames": frames})
 
 
@@ -199,8 +202,9 @@ def test_quarter_of_the_skin_in_shadow_does_not_move_the_light():
     shadow = np.cos(9 * normals[:, 0] + 4 * normals[:, 2]) > np.cos(0.25 * np.pi)  # leaves
     sky, sun = transfer @ SKY, np.maximum(normals @ SUN, 0)[:, None] * SUN_COLOUR
     colours = SKIN * (sky + ~shadow[:, None] * sun) * np.exp(rng.normal(0, 0.03, (len(normals), 1)))
-    light, reached, _ = fit_light(colours, normals, transfer, lambda d: (normals @ d > 0).astype(float),
-                                  np.ones(len(normals)))
+    light, reached, _ = fit_light(
+        colours, normals, transfer, lambda d: (normals @ d > 0).astype(float), np.ones(len(normals))
+    )
     delit = SKIN * (sky + sun) / (light.ambient(transfer) + light.direct(normals))
     assert np.quantile(np.abs(np.log(delit / np.median(delit, 0))), 0.95) < 0.06
     clear = sun[:, 1] > 0.5 * sky[:, 1]
@@ -208,8 +212,9 @@ def test_quarter_of_the_skin_in_shadow_does_not_move_the_light():
 
 
 def test_folder_pictures_are_matched_by_name_or_by_video_frame(capture, tmp_path):
-    frames = {view.name: np.full((320, 240, 3), 0.1 * (i + 1), np.float32)
-              for i, view in enumerate(read_views(capture))}
+    frames = {
+        view.name: np.full((320, 240, 3), 0.1 * (i + 1), np.float32) for i, view in enumerate(read_views(capture))
+    }
     for name, pixels in frames.items():
         images.write_srgb(capture.frames / name, pixels)
     folder = tmp_path / "delit elsewhere"

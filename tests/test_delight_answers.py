@@ -41,8 +41,10 @@ def test_of_two_equal_and_independent_answers_the_mean_is_best(people):
 
 
 def test_people_count_alike_however_often_they_were_filmed():
-    rows = {name: {"person": person, **dict.fromkeys(delight_answers.ROWS, error)}
-            for name, person, error in (("a", "anna", 0.1), ("b", "ben", 0.3), ("c", "ben", 0.5))}
+    rows = {
+        name: {"person": person, **dict.fromkeys(delight_answers.ROWS, error)}
+        for name, person, error in (("a", "anna", 0.1), ("b", "ben", 0.3), ("c", "ben", 0.5))
+    }
     means = delight_answers.over_people(rows)
     assert means["frames"] == pytest.approx(0.2) and "| **over people** | 0.200 |" in delight_answers.table(rows)
 

@@ -76,9 +76,17 @@ def test_the_feature_distance_is_nought_for_the_truth_alone(truth):
     assert score_picture(lit(truth, np.where(truth.shadow, 0.5, 1)[..., None]), truth.albedo, truth)["features"] > 0.05
 
 
-@pytest.mark.parametrize(("lightness", "b", "group"),
-                         [(75, 12, "very light"), (70, 20, "light"), (62, 18, "intermediate"), (56, 20, "tan"),
-                          (45, 18, "brown"), (30, 12, "dark")])
+@pytest.mark.parametrize(
+    ("lightness", "b", "group"),
+    [
+        (75, 12, "very light"),
+        (70, 20, "light"),
+        (62, 18, "intermediate"),
+        (56, 20, "tan"),
+        (45, 18, "brown"),
+        (30, 12, "dark"),
+    ],
+)
 def test_tones_fall_into_their_groups(lightness, b, group):
     from skimage.color import lab2rgb
 
@@ -87,8 +95,9 @@ def test_tones_fall_into_their_groups(lightness, b, group):
 
 def test_rows_of_a_set_without_a_capture(truth):
     shade = np.where(truth.shadow, 0.5, 1)[..., None]
-    photographs = [Photograph(name, lit(truth, light), truth, group=name)
-                   for name, light in (("one", 0.9), ("two", shade))]
+    photographs = [
+        Photograph(name, lit(truth, light), truth, group=name) for name, light in (("one", 0.9), ("two", shade))
+    ]
     results = delight.measure_rows(Photographs(photographs), Settings(), features=False, only=["none", "flat"])
     assert results["none"]["pictures"] == 2 and results["none"]["groups"]["one"]["figures"]["psnr"] > 50
     assert results["none"]["groups"]["two"]["figures"]["psnr"] < 30
@@ -104,8 +113,13 @@ def test_where_the_network_is_no_better_is_told():
         return {"pictures": 1, "figures": known, "groups": {"dark": {"pictures": 1, "figures": {**known, "ssim": 0.7}}}}
 
     network = row(psnr=20, ssim=0.8, flip=0.3, detail=0.4, shadow_step=-0.1)
-    results = {"set": {"none": row(psnr=18, ssim=0.7, flip=0.4, detail=0.6, shadow_step=0.9),
-                       "shading": {"not_run": "why"}, "network": network}}
+    results = {
+        "set": {
+            "none": row(psnr=18, ssim=0.7, flip=0.4, detail=0.6, shadow_step=0.9),
+            "shading": {"not_run": "why"},
+            "network": network,
+        }
+    }
     assert shortfalls(results) == ["set: dark: ssim 0.700 of network, 0.700 of none"]
     results["set"]["shading"] = row(psnr=21, ssim=0.7, flip=0.4, shadow_step=-0.05)
     short = {line.split(" of ")[0] for line in shortfalls(results)}
@@ -118,8 +132,9 @@ def test_a_photograph_that_is_refused_stays_as_it_is(truth, monkeypatch):
             raise Problem("It is too dark.", "Take another.")
         return srgb, None
 
-    monkeypatch.setattr(delight.delight, "PHOTOGRAPHERS",
-                        {"halves": halves, "never": lambda srgb, settings: halves(0 * srgb, settings)})
+    monkeypatch.setattr(
+        delight.delight, "PHOTOGRAPHERS", {"halves": halves, "never": lambda srgb, settings: halves(0 * srgb, settings)}
+    )
     photographs = Photographs([Photograph(f"{light}", lit(truth, light), truth) for light in (0.9, 0.1)])
     results = delight.measure_rows(photographs, Settings(), features=False, only=["halves", "never"])
     assert results["halves, one photograph"]["pictures"] == 2 and results["halves, one photograph"]["refused"] == 1
@@ -169,8 +184,9 @@ def test_a_portrait_is_made_once_and_is_its_albedo_in_some_light(tmp_path, monke
 
 
 @pytest.mark.skipif(not FACEOLAT.is_dir(), reason="the light stage's photographs are not at hand")
-@pytest.mark.parametrize(("person", "raw", "flat"),
-                         [("049", (20.16, 0.722), (24.87, 0.864)), ("071", (21.27, 0.798), (25.46, 0.878))])
+@pytest.mark.parametrize(
+    ("person", "raw", "flat"), [("049", (20.16, 0.722), (24.87, 0.864)), ("071", (21.27, 0.798), (25.46, 0.878))]
+)
 def test_the_floors_of_the_light_stage(monkeypatch, person, raw, flat):
     # slow, and not what is asked
     monkeypatch.setattr(pictures, "flip_evaluate", lambda true, *_, **__: (np.zeros(true.shape[:2]), 0, {}))

@@ -136,11 +136,19 @@ def test_how_bright_a_frame_came_out_is_told_by_its_skin_and_not_by_the_wall_beh
     have it stays, skin brighter than any is brought down to the brightest."""
     light, face = 0.5, np.zeros((32, 32), np.float32)
     face[4:28, 9:23] = 1
-    linear = np.where(cv2.resize(face, (96, 96), interpolation=cv2.INTER_NEAREST)[..., None] > 0, skin * light,
-                      np.float32([0.9, 0.95, 1.0]))
+    linear = np.where(
+        cv2.resize(face, (96, 96), interpolation=cv2.INTER_NEAREST)[..., None] > 0,
+        skin * light,
+        np.float32([0.9, 0.95, 1.0]),
+    )
     srgb = images.linear_to_srgb(np.broadcast_to(linear, (96, 96, 3)))
-    look = ShadingEstimate((0, 0, 96), np.full((32, 32, 3), np.log(light), np.float32), 0 * face,
-                           np.zeros((32, 32, 3), np.float32), np.where(face > 0, 0, -1))
+    look = ShadingEstimate(
+        (0, 0, 96),
+        np.full((32, 32, 3), np.log(light), np.float32),
+        0 * face,
+        np.zeros((32, 32, 3), np.float32),
+        np.where(face > 0, 0, -1),
+    )
     albedo, _ = divide(srgb, look, face)
     assert images.srgb_to_linear(albedo)[36:60, 40:56] == pytest.approx(expected, rel=0.01)
 
@@ -195,9 +203,21 @@ def test_below_hair_the_mean_of_both_answers_counts_at_the_level_of_the_skin_aro
 
 
 def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
-    small = {"model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1]},
-             "training": {"pairs": 1, "echo": 2, "rate": 1e-3, "minutes": 1, "skins": 1, "people": 1, "views": 1,
-                          "held_out": 1, "seed": 0, "workers": 0}}
+    small = {
+        "model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1]},
+        "training": {
+            "pairs": 1,
+            "echo": 2,
+            "rate": 1e-3,
+            "minutes": 1,
+            "skins": 1,
+            "people": 1,
+            "views": 1,
+            "held_out": 1,
+            "seed": 0,
+            "workers": 0,
+        },
+    }
     monkeypatch.setitem(delighter.CONFIGS, "cpu", small)
     monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
 
@@ -210,14 +230,16 @@ def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
     monkeypatch.setattr(delighter, "prepare_people", prepare)
     monkeypatch.setattr(people, "TEXELS", 256)
     with pytest.raises(Problem, match="There are no people in"):
-        delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET,
-                                  TrainingRun(growing=True, work=tmp_path / "work"))
+        delighter.train_delighter(
+            "cpu", tmp_path / "out.safetensors", QUIET, TrainingRun(growing=True, work=tmp_path / "work")
+        )
     out = tmp_path / "out.safetensors"
     first = delighter.train_delighter("cpu", out, QUIET, TrainingRun(0.01, tmp_path / "work"))
     second = delighter.train_delighter("cpu", out, QUIET, TrainingRun(0.02, tmp_path / "work"))
     assert second["steps"] > first["steps"] > 0 and second["started"] == "random weights" and len(second["people"]) == 1
-    begun = delighter.train_delighter("cpu", tmp_path / "third.safetensors", QUIET,
-                                      TrainingRun(0.01, _emptied(tmp_path / "work"), start=out))
+    begun = delighter.train_delighter(
+        "cpu", tmp_path / "third.safetensors", QUIET, TrainingRun(0.01, _emptied(tmp_path / "work"), start=out)
+    )
     assert begun["started"] == "the weights before"
     assert json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["held_out"]["none"] > 0
     assert not set(second["seeds"]) & set(second["held_out_seeds"])
@@ -241,8 +263,9 @@ def _prepared(seeds, work):
             continue
         place.mkdir(parents=True)
         mesh = subject_mesh(seed)
-        stage = olat.LightStage(mesh, vertex_normals(mesh).astype(np.float32),
-                                np.ones((len(mesh.vertices), olat.LIGHTS), bool))
+        stage = olat.LightStage(
+            mesh, vertex_normals(mesh).astype(np.float32), np.ones((len(mesh.vertices), olat.LIGHTS), bool)
+        )
         np.save(place / "visible.npy", np.packbits(stage.visible, axis=1))
         plain = np.broadcast_to(np.float32([0, 0, 1]), (64, 64, 3))
         view = random_camera(sight.landmarks_of(stage), SIDE_PX, np.random.default_rng(seed))

@@ -21,8 +21,11 @@ def test_every_delighter_has_a_card_of_whole_sentences():
     order = [name for name in CARDS if name in delighter_cards.choices()]
     assert order == list(delighter_cards.choices()), "in the order they are offered"
     for name, card in CARDS.items():
-        for text in (card.what, *(getattr(card, field) for field, _ in delighter_cards.FACTS),
-                     *(why for _, why in card.needed)):
+        for text in (
+            card.what,
+            *(getattr(card, field) for field, _ in delighter_cards.FACTS),
+            *(why for _, why in card.needed),
+        ):
             assert text[0].isupper() and text.endswith((".", ".)")) and "  " not in text, (name, text)
 
 
@@ -58,14 +61,15 @@ def test_what_is_missing_is_said_of_the_settings_that_may_not_stay_empty():
 
 def test_the_docs_have_the_cards_as_they_are():
     page = (ROOT / "docs" / "delighters.md").read_text(encoding="utf-8")
-    told = page[page.index("<!-- cards -->\n") + len("<!-- cards -->\n"):page.index("<!-- end of cards -->")]
+    told = page[page.index("<!-- cards -->\n") + len("<!-- cards -->\n") : page.index("<!-- end of cards -->")]
     assert told.strip() == delighter_cards.markdown().strip(), (
         "python -m core delighters --markdown prints what belongs there"
     )
 
 
 def test_the_terminal_has_them():
-    shown = subprocess.run([sys.executable, "-B", "-m", "core", "delighters"], cwd=ROOT, capture_output=True, text=True,
-                           timeout=60).stdout
+    shown = subprocess.run(
+        [sys.executable, "-B", "-m", "core", "delighters"], cwd=ROOT, capture_output=True, text=True, timeout=60
+    ).stdout
     for name in delighter_cards.choices():
         assert CARDS[name].what in shown and CARDS[name].leaves in shown

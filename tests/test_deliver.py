@@ -59,8 +59,10 @@ def deliver(capture, **settings) -> Path:
     group = bpy.context.scene.wildcap.captures[0].deliver
     for name, value in settings.items():
         setattr(group, name, value)
-    before = {kind: len(getattr(bpy.data, kind))
-              for kind in ("objects", "meshes", "materials", "images", "scenes", "shape_keys")}
+    before = {
+        kind: len(getattr(bpy.data, kind))
+        for kind in ("objects", "meshes", "materials", "images", "scenes", "shape_keys")
+    }
     assert bpy.ops.wildcap.deliver() == {'FINISHED'}
     after = {kind: len(getattr(bpy.data, kind)) for kind in before}
     assert after == before and bpy.context.window.scene.name != "WildCap Delivery", "nothing of it stays in the .blend"
@@ -98,7 +100,7 @@ def same_points(a: np.ndarray, b: np.ndarray, size: float) -> None:
 def glb(path: Path) -> tuple[dict, bytes]:
     data = path.read_bytes()
     length = struct.unpack("<I", data[12:16])[0]
-    return json.loads(data[20:20 + length]), data[28 + length:]
+    return json.loads(data[20 : 20 + length]), data[28 + length :]
 
 
 def wrapped(document: dict) -> set[int]:
@@ -107,8 +109,9 @@ def wrapped(document: dict) -> set[int]:
 
 
 def by_another_reader(path: Path) -> dict:
-    result = subprocess.run([sys.executable, Path(__file__).with_name("mesh_reader.py"), path], capture_output=True,
-                            text=True)
+    result = subprocess.run(
+        [sys.executable, Path(__file__).with_name("mesh_reader.py"), path], capture_output=True, text=True
+    )
     assert result.returncode == 0, result.stderr
     return json.loads(result.stdout)
 
@@ -123,9 +126,10 @@ def test_gltf_in_one_file(capture):
     stored = []
     for image in document["images"]:
         view = document["bufferViews"][image["bufferView"]]
-        stored.append(binary[view["byteOffset"]:view["byteOffset"] + view["byteLength"]])
-    assert {(folder / "textures" / f"face_{name}.png").read_bytes()
-            for name in ("albedo", "normal")} == set(stored), "the worker's bytes, not saved again"
+        stored.append(binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]])
+    assert {(folder / "textures" / f"face_{name}.png").read_bytes() for name in ("albedo", "normal")} == set(stored), (
+        "the worker's bytes, not saved again"
+    )
     assert wrapped(document) == {CLAMPED}, "crown and neck, its upper and lower border, do not mix"
     mesh = document["meshes"][0]
     assert mesh["extras"]["targetNames"] == list(KEYS) and mesh.get("weights", [0, 0]) == [0, 0]
@@ -151,8 +155,9 @@ def test_gltf_with_files_refers_to_the_delivered_maps(capture):
 def test_a_metahuman_gets_open_eyes_and_no_shape_keys(capture):
     pytest.importorskip("ufbx")
     bpy.context.scene.wildcap.captures[0].deliver.preset = 'metahuman'
-    with pytest.raises(RuntimeError,
-                       match="MetaHuman from Mesh wants a head with open eyes, and this one's lids are closed"):
+    with pytest.raises(
+        RuntimeError, match="MetaHuman from Mesh wants a head with open eyes, and this one's lids are closed"
+    ):
         bpy.ops.wildcap.deliver()
     head, moved = bpy.data.objects["face"], truth()
     for name, rows in (("eyesOpenLeft", slice(200, 210)), ("eyesOpenRight", slice(300, 310))):
@@ -196,7 +201,10 @@ def test_usd_with_blend_shapes_and_colour_spaces(capture):
         offsets = np.array(read["shapes"][name])
         assert np.allclose(offsets[np.linalg.norm(offsets, axis=1) > 1e-6], move, atol=1e-6)
     assert {Path(name).name: space for name, space in read["textures"].items()} == {
-        "face_albedo.png": "sRGB", "face_normal.png": "raw", "face_roughness.png": "raw"}
+        "face_albedo.png": "sRGB",
+        "face_normal.png": "raw",
+        "face_roughness.png": "raw",
+    }
     assert all(not Path(name).is_absolute() and (folder / name).is_file() for name in read["textures"])
 
 
@@ -233,7 +241,8 @@ def test_the_artists_own_mesh_has_a_material_per_tile(capture):
 
 
 def test_a_read_only_capture_is_delivered_to_another_folder_and_nothing_in_it_changes(
-        addon, capture, tmp_path, monkeypatch):
+    addon, capture, tmp_path, monkeypatch
+):
     access = os.access
 
     def read_only(path, mode):
@@ -245,7 +254,7 @@ def test_a_read_only_capture_is_delivered_to_another_folder_and_nothing_in_it_ch
         bpy.ops.wildcap.deliver()
     bpy.context.scene.wildcap.captures[0].deliver.folder = str(tmp_path / "out")
     assert bpy.ops.wildcap.deliver() == {'FINISHED'}
-    folder, = (tmp_path / "out").iterdir()
+    (folder,) = (tmp_path / "out").iterdir()
     assert (
         list(folder.glob("*.glb"))
         and list((folder / "textures").iterdir())
@@ -263,12 +272,16 @@ def test_a_head_with_face_units_keeps_their_names_their_moves_and_its_eyes(captu
     names = mesh["extras"]["targetNames"]
     units = [key.name for key in keys.key_blocks[1:] if not key.name.startswith("eyesHalf")]
     assert names == units and len(names) == 54 and not any(mesh.get("weights", []))
-    assert [document["materials"][part["material"]]["name"].split()[-2:][0]
-            for part in mesh["primitives"]][1:] == ["Eyes", "Mouth", "Teeth"]
+    assert [document["materials"][part["material"]]["name"].split()[-2:][0] for part in mesh["primitives"]][1:] == [
+        "Eyes",
+        "Mouth",
+        "Teeth",
+    ]
     eyes = document["materials"][mesh["primitives"][1]["material"]]["pbrMetallicRoughness"]
     assert "baseColorTexture" in eyes, "iris and white"
-    basis, moved = (np.array([point.co for point in key.data])
-                    for key in (keys.reference_key, keys.key_blocks["jawOpen"]))
+    basis, moved = (
+        np.array([point.co for point in key.data]) for key in (keys.reference_key, keys.key_blocks["jawOpen"])
+    )
     span = np.abs(moved - basis).max(0)
     found = [document["accessors"][part["targets"][names.index("jawOpen")]["POSITION"]] for part in mesh["primitives"]]
     stored = np.abs([(accessor["min"], accessor["max"]) for accessor in found]).max((0, 1))

@@ -14,16 +14,22 @@ pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages"
 from . import delivered  # noqa: E402
 from .test_deliver import by_another_reader, capture, deliver, glb  # noqa: E402, F401  (capture is a fixture)
 
-POINTS = np.array([[[0, -0.1, 0.02], [0, -0.103, 0.021], [0, -0.106, 0.023]],
-                   [[0.01, -0.1, 0.02], [0.01, -0.104, 0.02], [0.011, -0.107, 0.02]]], np.float32)
+POINTS = np.array(
+    [
+        [[0, -0.1, 0.02], [0, -0.103, 0.021], [0, -0.106, 0.023]],
+        [[0.01, -0.1, 0.02], [0.01, -0.104, 0.02], [0.011, -0.107, 0.02]],
+    ],
+    np.float32,
+)
 
 
 @pytest.fixture
 def hairy(capture, addon):  # noqa: F811
     """The capture, with two hairs of 0.08 mm on its head."""
     head = bpy.context.view_layer.objects.active
-    addon("groom.curves").grow_part(bpy.context, head, "brows", POINTS, np.full((2, 3), 4e-5),
-                                    np.array([[0.02, 0.01, 0.01], [0.04, 0.03, 0.03]]))
+    addon("groom.curves").grow_part(
+        bpy.context, head, "brows", POINTS, np.full((2, 3), 4e-5), np.array([[0.02, 0.01, 0.01], [0.04, 0.03, 0.03]])
+    )
     return capture
 
 
@@ -32,7 +38,7 @@ def test_usd_holds_the_hairs_in_their_place_and_thickness(hairy):
         pytest.skip("no usd-core here, or a Blender without USD")
     folder = deliver(hairy, format="usd")
     read = by_another_reader(folder / "face.usdc")
-    (name, (points, widths)), = read["hairs"].items()
+    ((name, (points, widths)),) = read["hairs"].items()
     assert "brows" in name and np.allclose(points, POINTS.reshape(-1, 3), atol=1e-6)
     assert np.allclose(widths, 8e-5, rtol=1e-3)
     assert len(bpy.data.hair_curves) == 1, "the artist's own"

@@ -32,4 +32,4 @@ def test_pictures_of_the_artists_own_materials_take_no_maps_place(capture):  # n
     assert (folder / "textures" / "face_albedo.png").read_bytes() == maps["diffuse_albedo"]
     document, binary = glb(folder / "face.glb")
     views = [document["bufferViews"][image["bufferView"]] for image in document["images"]]
-    assert {binary[v["byteOffset"]:v["byteOffset"] + v["byteLength"]] for v in views} == {*packed, *maps.values()}
+    assert {binary[v["byteOffset"] : v["byteOffset"] + v["byteLength"]] for v in views} == {*packed, *maps.values()}

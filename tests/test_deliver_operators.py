@@ -37,8 +37,10 @@ def test_hair_and_close_up_that_a_delivery_leaves_out_are_told(addon, capture): 
         return [words in panel for words in (hair, eyes)]
 
     assert told() == [False, False]
-    for key, data in ((captures.HAIR_KEY, bpy.data.hair_curves.new("Brow")),
-                      (captures.CLOSE_UP_KEY, bpy.data.meshes.new("Eye"))):
+    for key, data in (
+        (captures.HAIR_KEY, bpy.data.hair_curves.new("Brow")),
+        (captures.CLOSE_UP_KEY, bpy.data.meshes.new("Eye")),
+    ):
         thing = bpy.data.objects.new(data.name, data)
         bpy.context.scene.collection.objects.link(thing)
         thing.parent, thing[key] = head, "brows"
@@ -81,8 +83,10 @@ def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the
 def test_views_selection_and_the_active_object_are_afterwards_as_they_were(capture):  # noqa: F811
     delivered.in_tiles(capture)
     scene, head = bpy.context.scene, bpy.context.view_layer.objects.active
-    camera, cube = (bpy.data.objects.new(name, data) for name, data in (
-        ("Camera", bpy.data.cameras.new("Camera")), ("Cube", bpy.data.meshes.new("Cube"))))
+    camera, cube = (
+        bpy.data.objects.new(name, data)
+        for name, data in (("Camera", bpy.data.cameras.new("Camera")), ("Cube", bpy.data.meshes.new("Cube")))
+    )
     for thing in (camera, cube):
         scene.collection.objects.link(thing)
     scene.camera = camera

@@ -77,18 +77,24 @@ def test_channels_are_packed_as_unity_and_unreal_read_them(capture):
     mask = four_channels(folder(capture, preset="unity_hdrp") / "textures" / "Zoe_et_moi_MaskMap.png")
     assert np.allclose(mask, [0, 1, 1, 0.6], atol=0.003)
     urp = four_channels(folder(capture, preset="unity_urp") / "textures" / "Zoe_et_moi_SpecGlossMap.png")
-    assert np.allclose(images.srgb_to_linear(urp[:, [0, -1], 0]), [0.0278 * 2 / 3, 0.0278 * 4 / 3],
-                       atol=5e-4) and np.allclose(urp[..., 3], 0.6, atol=0.003)
+    assert np.allclose(
+        images.srgb_to_linear(urp[:, [0, -1], 0]), [0.0278 * 2 / 3, 0.0278 * 4 / 3], atol=5e-4
+    ) and np.allclose(urp[..., 3], 0.6, atol=0.003)
     unreal = folder(capture, preset="unreal") / "textures"
     assert np.allclose(images.read_data(unreal / "T_Zoe_et_moi_ORM.png"), [1, 0.4, 0], atol=0.003)
-    assert np.allclose(images.read_data(unreal / "T_Zoe_et_moi_Specular.png")[:, [0, -1], 0] * 0.08,
-                       [0.0278 * 2 / 3, 0.0278 * 4 / 3], atol=3e-4)
+    assert np.allclose(
+        images.read_data(unreal / "T_Zoe_et_moi_Specular.png")[:, [0, -1], 0] * 0.08,
+        [0.0278 * 2 / 3, 0.0278 * 4 / 3],
+        atol=3e-4,
+    )
     weight = images.read_data(folder(capture, preset="arnold") / "textures" / "Zoe_et_moi_specular.1001.exr")
     assert np.allclose(weight[:, [0, -1], 0], [2 / 3, 4 / 3], atol=1e-3), "EXR keeps what is above 1"
 
 
-@pytest.mark.parametrize(("pictures", "colour", "depth", "tag"), [
-    ("png8", "srgb", 8, b"sRGB"), ("png16", "srgb", 16, b"sRGB"), ("png16", "linear", 16, b"gAMA")])
+@pytest.mark.parametrize(
+    ("pictures", "colour", "depth", "tag"),
+    [("png8", "srgb", 8, b"sRGB"), ("png16", "srgb", 16, b"sRGB"), ("png16", "linear", 16, b"gAMA")],
+)
 def test_pngs_have_the_depth_and_say_their_colour_space(capture, pictures, colour, depth, tag):
     delivered.deliver(capture, pictures=pictures, colour=colour, **OBJ)
     made = folder(capture) / "textures"
@@ -100,8 +106,9 @@ def test_pngs_have_the_depth_and_say_their_colour_space(capture, pictures, colou
     )
     stored = images.read_data(made / "Zoe_et_moi_albedo.png")
     linear = stored if colour == "linear" else images.srgb_to_linear(stored)
-    assert np.allclose(linear, images.read_linear(capture.maps / "diffuse_albedo.exr"),
-                       atol=4e-3 if depth == 8 else 3e-4)
+    assert np.allclose(
+        linear, images.read_linear(capture.maps / "diffuse_albedo.exr"), atol=4e-3 if depth == 8 else 3e-4
+    )
 
 
 def test_exr_is_linear_half_float_and_numbered_by_tile(capture):
@@ -114,8 +121,11 @@ def test_exr_is_linear_half_float_and_numbered_by_tile(capture):
     spec = oiio.ImageInput.open(str(made / "Zoe_et_moi_base_color.1001.exr")).spec()
     linear = ("lin_srgb", "Linear", "lin_rec709", "lin_rec709_scene")
     assert str(spec.format) == "half" and spec.getattribute("oiio:ColorSpace") in linear
-    assert np.allclose(images.read_data(made / "Zoe_et_moi_base_color.1001.exr"),
-                       images.read_data(capture.maps / "diffuse_albedo.exr"), atol=3e-4)
+    assert np.allclose(
+        images.read_data(made / "Zoe_et_moi_base_color.1001.exr"),
+        images.read_data(capture.maps / "diffuse_albedo.exr"),
+        atol=3e-4,
+    )
     displacement = images.read_data(made / "Zoe_et_moi_displacement.1001.exr")
     assert np.allclose(displacement, -0.2, atol=1e-4), "centimetres, as the mesh"
 
@@ -179,8 +189,9 @@ def test_the_obj_is_read_by_another_reader_in_the_targets_unit(capture, preset, 
     target = folder(capture, preset=preset)
     read = part_of(target / "Zoe_et_moi.obj")
     truth = meshes.read_obj(capture.head)
-    corners = np.concatenate([truth.vertices[truth.faces][..., [0, 2, 1]] * [factor, factor, -factor],
-                              truth.uvs[truth.face_uvs]], -1)
+    corners = np.concatenate(
+        [truth.vertices[truth.faces][..., [0, 2, 1]] * [factor, factor, -factor], truth.uvs[truth.face_uvs]], -1
+    )
     found = np.concatenate([read.vertices[read.faces], read.visual.uv[read.faces]], -1)
     assert len(read.faces) == len(truth.faces)
     for a, b in ((found, corners), (corners, found)):
@@ -188,8 +199,11 @@ def test_the_obj_is_read_by_another_reader_in_the_targets_unit(capture, preset, 
             "Y up, face towards Z, each corner with its UV"
         )
     assert read.visual.material.image.size == (SIDE, SIDE)
-    named = [line.split(maxsplit=1)[1] for line in (target / "Zoe_et_moi.mtl").read_text().splitlines()
-             if line.startswith(("map_", "norm"))]
+    named = [
+        line.split(maxsplit=1)[1]
+        for line in (target / "Zoe_et_moi.mtl").read_text().splitlines()
+        if line.startswith(("map_", "norm"))
+    ]
     assert len(named) >= 3 and all((target / name).is_file() for name in named)
 
 
@@ -200,8 +214,10 @@ def test_a_mesh_of_several_tiles_gets_a_material_for_each(capture):
     albedos = {path.name for path in (target / "textures").glob("*_BaseColor*")}
     assert albedos == {f"T_Zoe_et_moi_BaseColor.{tile}.png" for tile in (1001, 1002)}
     parts = trimesh.load_scene(target / "Zoe_et_moi.obj", process=False).geometry.values()
-    shades = sorted((round(np.array(part.visual.material.image)[0, 0, 0] / 255, 2), part.visual.uv[:, 0].min() >= 1)
-                    for part in parts)
+    shades = sorted(
+        (round(np.array(part.visual.material.image)[0, 0, 0] / 255, 2), part.visual.uv[:, 0].min() >= 1)
+        for part in parts
+    )
     assert shades == [(0.25, False), (0.5, True)]
     assert isinstance(delivered.deliver(capture, what="scan", **OBJ), Done)
     textures = {path.name for path in (folder(capture, "scan") / "textures").iterdir()}
@@ -219,8 +235,9 @@ def test_provenance_tells_all_and_no_folder(capture):
     assert told["versions"]["packages"]["numpy"] == np.__version__ and told["versions"]["Python"]
     prior = next(entry for entry in told["weights"] if entry["name"] == "prior.safetensors")
     assert len(prior["sha256"]) == 64 and prior["licence"] == "GPL-3.0-or-later" and prior["notices"]
-    assert set(told["files"]) == {path.relative_to(folder(capture)).as_posix()
-                                  for path in folder(capture).rglob("*.*")} - {"provenance.json"}
+    assert set(told["files"]) == {
+        path.relative_to(folder(capture)).as_posix() for path in folder(capture).rglob("*.*")
+    } - {"provenance.json"}
 
 
 def test_a_video_that_is_there_is_named_with_its_hash(capture, tmp_path):
@@ -228,8 +245,9 @@ def test_a_video_that_is_there_is_named_with_its_hash(capture, tmp_path):
     capture.set_source(tmp_path / "film.mp4")
     delivered.deliver(capture, **OBJ)
     told = json.loads((folder(capture) / "provenance.json").read_text())
-    assert told["capture"]["sources"] == [{"name": "film.mp4", "bytes": 7,
-                                           "sha256": hashlib.sha256(b"a film\n").hexdigest()}]
+    assert told["capture"]["sources"] == [
+        {"name": "film.mp4", "bytes": 7, "sha256": hashlib.sha256(b"a film\n").hexdigest()}
+    ]
 
 
 def test_what_was_delivered_before_survives_a_full_disk_and_a_cancel(capture, monkeypatch):
@@ -258,12 +276,18 @@ def test_a_folder_that_cannot_be_written_and_one_that_is_not_ours_are_refused(ca
     assert "no delivery has put there" in ended.problem and mine.read_text() == "mine"
 
 
-@pytest.mark.parametrize(("settings", "words"), [
-    ({"format": "glb", "pictures": "exr"}, "cannot hold EXR"), ({"format": "glb", "colour": "linear"}, "sRGB only"),
-    ({"pictures": "exr", "colour": "srgb", "format": "obj"}, "hold linear light"),
-    ({"pictures": "png8", "colour": "linear", "format": "obj"}, "too few"),
-    ({"format": "fbx", "whole": True}, "written by Blender"), ({"what": "scan"}, "no scan"),
-    ({"what": "own_mesh"}, "no fitted mesh of yours")])
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"format": "glb", "pictures": "exr"}, "cannot hold EXR"),
+        ({"format": "glb", "colour": "linear"}, "sRGB only"),
+        ({"pictures": "exr", "colour": "srgb", "format": "obj"}, "hold linear light"),
+        ({"pictures": "png8", "colour": "linear", "format": "obj"}, "too few"),
+        ({"format": "fbx", "whole": True}, "written by Blender"),
+        ({"what": "scan"}, "no scan"),
+        ({"what": "own_mesh"}, "no fitted mesh of yours"),
+    ],
+)
 def test_choices_that_do_not_go_together_are_refused_with_a_remedy(capture, settings, words):
     ended = delivered.deliver(capture, **settings)
     assert isinstance(ended, Failed) and words in ended.problem and ended.remedy.endswith(".")

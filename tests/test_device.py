@@ -39,15 +39,25 @@ def machine(monkeypatch, **devices) -> list[str]:
     return tried
 
 
-@pytest.mark.parametrize(("card", "taken", "reason"), [
-    ((MAP + 0.01, 0.1), "cuda", "cuda takes 0.10 s for one pass of the network, the CPU 1.00 s."),
-    ((MAP, 1.5), "cpu", "cuda is slower than the CPU: 1.50 s against 1.00 s"),
-    ((MAP + 0.5, 0.1), "cpu", "cuda computes something else than the CPU."),
-    ((MAP * float("nan"), 0.1), "cpu", "cuda computes something else than the CPU."),
-    (RuntimeError("no kernel image is available\nfor execution"), "cpu",
-     "does not run the network (RuntimeError: no kernel image is available)."),
-    (torch.cuda.OutOfMemoryError("CUDA out of memory."), "cpu",
-     "does not run the network (OutOfMemoryError: CUDA out of memory).")])
+@pytest.mark.parametrize(
+    ("card", "taken", "reason"),
+    [
+        ((MAP + 0.01, 0.1), "cuda", "cuda takes 0.10 s for one pass of the network, the CPU 1.00 s."),
+        ((MAP, 1.5), "cpu", "cuda is slower than the CPU: 1.50 s against 1.00 s"),
+        ((MAP + 0.5, 0.1), "cpu", "cuda computes something else than the CPU."),
+        ((MAP * float("nan"), 0.1), "cpu", "cuda computes something else than the CPU."),
+        (
+            RuntimeError("no kernel image is available\nfor execution"),
+            "cpu",
+            "does not run the network (RuntimeError: no kernel image is available).",
+        ),
+        (
+            torch.cuda.OutOfMemoryError("CUDA out of memory."),
+            "cpu",
+            "does not run the network (OutOfMemoryError: CUDA out of memory).",
+        ),
+    ],
+)
 def test_a_card_is_taken_where_it_computes_the_same_and_faster(monkeypatch, card, taken, reason):
     machine(monkeypatch, cpu=(MAP, 1.0), cuda=card)
     proof = device.prove()

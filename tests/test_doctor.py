@@ -46,7 +46,7 @@ def problems(report: Reporter) -> str:
 
 
 def wander(i: int, picture=FACE) -> np.ndarray:
-    return picture[i:i + 260, 2 * i:2 * i + 280]
+    return picture[i : i + 260, 2 * i : 2 * i + 280]
 
 
 def shaken(picture: np.ndarray, length: int) -> np.ndarray:
@@ -56,7 +56,7 @@ def shaken(picture: np.ndarray, length: int) -> np.ndarray:
 def lids_closed(picture: np.ndarray) -> np.ndarray:
     """The skin above each eye drawn down over it."""
     marks = faces.detect(picture).landmarks[:, :2]
-    y, x = np.mgrid[0:picture.shape[0], 0:picture.shape[1]].astype(np.float32)
+    y, x = np.mgrid[0 : picture.shape[0], 0 : picture.shape[1]].astype(np.float32)
     source = y.copy()
     for corners, upper, lower, brow in ((faces.RIGHT_EYE, 159, 145, 105), (faces.LEFT_EYE, 386, 374, 334)):
         a, b = marks[list(corners)]
@@ -108,35 +108,55 @@ def test_two_equal_faces_are_a_problem_and_a_smaller_one_is_passed_over(tmp_path
 
 def record(**other) -> FrameRecord:
     """A frame with nothing wrong."""
-    return FrameRecord(**{"name": "00000.jpg", "time_s": 0.0, "size": (720, 960), "sharpness": 0.2, "selected": False,
-                          "face_box": (200, 300, 520, 720),
-                          "yaw_deg": 0.0, "blur": 0.5, "brightness": 0.6, "noise": 0.002, **other})
+    return FrameRecord(
+        **{
+            "name": "00000.jpg",
+            "time_s": 0.0,
+            "size": (720, 960),
+            "sharpness": 0.2,
+            "selected": False,
+            "face_box": (200, 300, 520, 720),
+            "yaw_deg": 0.0,
+            "blur": 0.5,
+            "brightness": 0.6,
+            "noise": 0.002,
+            **other,
+        }
+    )
 
 
 def around(low=-60, high=60, step=3, **other) -> list[FrameRecord]:
-    return [record(name=f"{i:05d}.jpg", yaw_deg=float(yaw), **other)
-            for i, yaw in enumerate(range(low, high + 1, step))]
+    return [
+        record(name=f"{i:05d}.jpg", yaw_deg=float(yaw), **other) for i, yaw in enumerate(range(low, high + 1, step))
+    ]
 
 
-@pytest.mark.parametrize(("records", "words"), [
-    (around(), ""),
-    (around(low=0), "left side of the face is not seen at all"),
-    (around(high=12), "right side of the face is hardly seen: the camera came only 12 degrees"),
-    (around(low=-12, high=9, step=1),
-     "from in front only: the camera came 12 degrees around to its left and 9 to its right"),
-    ([r for r in around() if not 0 < r.yaw_deg < 40], "Between 0 and 42 degrees"),
-    (around(brightness=0.12), "too dark"),
-    (around(clipped=0.2), "overexposed: 20% of it"),
-    (around(noise=0.04), "noisy"),
-    ([replace(r, gain=(1 + 0.4 * i / 40,) * 3) for i, r in enumerate(around())], "exposure changed by 40%"),
-    ([replace(r, gain=(1 + 0.1 * i / 20 - 0.1, 1.0, 1.1 - 0.1 * i / 20)) for i, r in enumerate(around())],
-     "white balance changed"),
-    (around(face_box=[300, 400, 400, 540]), "small in the picture: 14%"),
-    (around(face_box=[60, 60, 160, 190], size=[240, 320]), "only 100 pixels wide"),
-    (around(blur=0.75), "blurred in most"),
-    (around(step=15), "only 9 frames"),
-    (around()[:40] + [record(face_box=None, yaw_deg=None)] * 40, "No face was found in 40 of 80 frames"),
-])
+@pytest.mark.parametrize(
+    ("records", "words"),
+    [
+        (around(), ""),
+        (around(low=0), "left side of the face is not seen at all"),
+        (around(high=12), "right side of the face is hardly seen: the camera came only 12 degrees"),
+        (
+            around(low=-12, high=9, step=1),
+            "from in front only: the camera came 12 degrees around to its left and 9 to its right",
+        ),
+        ([r for r in around() if not 0 < r.yaw_deg < 40], "Between 0 and 42 degrees"),
+        (around(brightness=0.12), "too dark"),
+        (around(clipped=0.2), "overexposed: 20% of it"),
+        (around(noise=0.04), "noisy"),
+        ([replace(r, gain=(1 + 0.4 * i / 40,) * 3) for i, r in enumerate(around())], "exposure changed by 40%"),
+        (
+            [replace(r, gain=(1 + 0.1 * i / 20 - 0.1, 1.0, 1.1 - 0.1 * i / 20)) for i, r in enumerate(around())],
+            "white balance changed",
+        ),
+        (around(face_box=[300, 400, 400, 540]), "small in the picture: 14%"),
+        (around(face_box=[60, 60, 160, 190], size=[240, 320]), "only 100 pixels wide"),
+        (around(blur=0.75), "blurred in most"),
+        (around(step=15), "only 9 frames"),
+        (around()[:40] + [record(face_box=None, yaw_deg=None)] * 40, "No face was found in 40 of 80 frames"),
+    ],
+)
 def test_each_shortcoming_has_its_sentence_and_a_good_capture_none(records, words):
     report = Reporter("frames")
     diagnose(records, [], False, report)
@@ -156,8 +176,16 @@ def test_a_face_in_blurred_frames_alone_is_told():
 
 def test_of_a_few_photographs_the_blurred_one_is_named():
     report = Reporter("frames")
-    records = [record(name=f"{i:05d}.jpg", source=f"IMG_{i}.jpg", time_s=None, yaw_deg=12.0 * i - 54,
-                      blur=0.86 if i == 4 else 0.45) for i in range(10)]
+    records = [
+        record(
+            name=f"{i:05d}.jpg",
+            source=f"IMG_{i}.jpg",
+            time_s=None,
+            yaw_deg=12.0 * i - 54,
+            blur=0.86 if i == 4 else 0.45,
+        )
+        for i in range(10)
+    ]
     diagnose(records, [], True, report)
     told = [finding for finding in report.findings if "blurred" in finding["problem"]]
     assert [finding["problem"] for finding in told] == ["1 of 10 photographs is blurred: IMG_4.jpg."]
@@ -239,6 +267,7 @@ def test_blinks_are_told_by_what_the_eyes_do_else():
     assert not blinks([(0.36 - 0.004 * i, 0.12 + 0.004 * i) for i in range(60)], time).any(), "a turn of the head"
     one_eye = [(0.1, 0.34) if i == 30 else eye for i, eye in enumerate(eyes)]
     assert not blinks(one_eye, time).any(), "one eye alone is a mistake or a wink"
-    assert blinks([(0.1, 0.1) if i == 2 else None if i == 5 else (0.3, 0.3) for i in range(9)],
-                  [None] * 9).nonzero()[0].tolist() == [2]
+    assert blinks([(0.1, 0.1) if i == 2 else None if i == 5 else (0.3, 0.3) for i in range(9)], [None] * 9).nonzero()[
+        0
+    ].tolist() == [2]
     assert not blinks([None] * 3, [None] * 3).any()

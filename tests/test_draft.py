@@ -37,8 +37,9 @@ class Related:
         return torch.cat([maps[:, :3], SLOPE * maps[:, :3].mean(1, keepdim=True).expand(-1, 4, -1, -1)], 1)
 
     def draw(self, generator):
-        return torch.einsum("ij,njhw->nihw", torch.linalg.cholesky(self.covariance),
-                            torch.randn(1, 7, SIZE, SIZE, generator=generator))
+        return torch.einsum(
+            "ij,njhw->nihw", torch.linalg.cholesky(self.covariance), torch.randn(1, 7, SIZE, SIZE, generator=generator)
+        )
 
 
 def test_what_the_albedo_tells_is_restored_and_the_albedo_stays():
@@ -68,5 +69,5 @@ def test_the_shipped_prior_restores_a_held_out_subject(seed):
     part = slice(0, 192), slice(64, 256)
     patch = restore_maps(prior, drawn[None][(..., *part)], coords, 0, part)[0]
     inner = slice(8, 64), slice(128, 184)  # of the whole map, far from the part's cut sides
-    there = patch[:, inner[0], inner[1].start - 64:inner[1].stop - 64]
+    there = patch[:, inner[0], inner[1].start - 64 : inner[1].stop - 64]
     assert (there - out[(slice(None), *inner)]).abs().max() < 0.02

@@ -12,8 +12,18 @@ from .drawn import drawn
 
 bpy = pytest.importorskip("bpy")
 
-WORK = ("open", "os.scandir", "os.listdir", "os.mkdir", "os.rename", "os.remove", "shutil.copyfile", "subprocess.Popen",
-        "socket.connect", "import")
+WORK = (
+    "open",
+    "os.scandir",
+    "os.listdir",
+    "os.mkdir",
+    "os.rename",
+    "os.remove",
+    "shutil.copyfile",
+    "subprocess.Popen",
+    "socket.connect",
+    "import",
+)
 _listening: list = []  # the list that notes go to, while there is one
 
 
@@ -82,8 +92,9 @@ def test_no_panel_works_while_it_is_drawn(addon, tmp_path, state):
 
 def test_a_sidebar_is_narrow_below_a_width_in_the_users_own_units(addon):
     base = addon("base_panel")
-    widths = [type("Drawn", (), {"region": region and type("Region", (), {"width": region})})
-              for region in (201, 291, None)]
+    widths = [
+        type("Drawn", (), {"region": region and type("Region", (), {"width": region})}) for region in (201, 291, None)
+    ]
     assert [base.narrow(context) for context in widths] == [True, False, False]
 
 

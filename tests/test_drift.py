@@ -24,7 +24,7 @@ def exposed(linear: np.ndarray, gain=1.0) -> np.ndarray:
 def walk(count: int) -> list[np.ndarray]:
     """Linear pictures of a camera that moves before a person and what is behind her."""
     whole = images.srgb_to_linear(astronaut().astype(np.float32) / 255) * 0.7
-    return [whole[i:i + 360, 2 * i:2 * i + 400] for i in range(count)]
+    return [whole[i : i + 360, 2 * i : 2 * i + 400] for i in range(count)]
 
 
 def errors(gains: np.ndarray, true: np.ndarray) -> np.ndarray:
@@ -49,9 +49,14 @@ def test_a_steady_exposure_is_left_alone():
 
 
 def noise(rng, cells: int, width: int, height: int) -> np.ndarray:
-    return np.exp(0.5
-                  * cv2.resize(rng.normal(size=(height // cells, width // cells, 1)).astype(np.float32),
-                               (width, height), interpolation=cv2.INTER_CUBIC))
+    return np.exp(
+        0.5
+        * cv2.resize(
+            rng.normal(size=(height // cells, width // cells, 1)).astype(np.float32),
+            (width, height),
+            interpolation=cv2.INTER_CUBIC,
+        )
+    )
 
 
 def turning_head(angle: float, skin: np.ndarray, wall: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -67,10 +72,12 @@ def turning_head(angle: float, skin: np.ndarray, wall: np.ndarray) -> tuple[np.n
         (np.arctan2(right, near) + angle + np.pi) / (2 * np.pi) * skin.shape[1],
         np.arccos(np.clip(up, -1, 1)) / np.pi * skin.shape[0],
     )
-    albedo = cv2.remap(skin, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR,
-                       borderMode=cv2.BORDER_WRAP)[..., None]
-    return np.where(inside[..., None], albedo * shade[..., None] * np.array([0.5, 0.36, 0.28]),
-                    wall[..., None] * 0.3).astype(np.float32), inside
+    albedo = cv2.remap(skin, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)[
+        ..., None
+    ]
+    return np.where(
+        inside[..., None], albedo * shade[..., None] * np.array([0.5, 0.36, 0.28]), wall[..., None] * 0.3
+    ).astype(np.float32), inside
 
 
 @pytest.mark.parametrize("behind", ["a textured wall", "an empty wall"])
@@ -79,8 +86,9 @@ def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, behind, expo
     rng = np.random.default_rng(3)
     skin = noise(rng, 8, 1200, 480)[..., None]
     wall = noise(rng, 9, WIDTH, HEIGHT) if behind == "a textured wall" else np.ones((HEIGHT, WIDTH), np.float32)
-    true = (np.exp(0.25 * np.sin(np.arange(24) / 8))[:, None] * np.ones(3) if exposure == "drifting"
-            else np.ones((24, 3)))
+    true = (
+        np.exp(0.25 * np.sin(np.arange(24) / 8))[:, None] * np.ones(3) if exposure == "drifting" else np.ones((24, 3))
+    )
     contents = []
     for i in range(24):
         picture, inside = turning_head(0.035 * i, skin, wall)

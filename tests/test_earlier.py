@@ -26,8 +26,12 @@ def solve(capture, truth, until, quality):
 def folders(tmp_path):
     """A checkout whose solve says what it was asked for, and two captures with a truth."""
     checkout = tmp_path / "checkout"
-    for path, text in (("core/__init__.py", ""), ("core/capture.py", "class Capture:\n    def __init__(self, root):\n"
-                        "        self.root = root\n"), ("benchmarks/__init__.py", ""), ("benchmarks/people.py", SOLVE)):
+    for path, text in (
+        ("core/__init__.py", ""),
+        ("core/capture.py", "class Capture:\n    def __init__(self, root):\n        self.root = root\n"),
+        ("benchmarks/__init__.py", ""),
+        ("benchmarks/people.py", SOLVE),
+    ):
         (checkout / path).parent.mkdir(parents=True, exist_ok=True)
         (checkout / path).write_text(text)
     for name in ("anna", "ben"):
@@ -93,16 +97,35 @@ def test_its_captures_were_made_by_one_code_whatever_their_inputs(folders):
 
 
 def test_people_are_compared_on_the_same_captures():
-    before = Figures.of({"people": {"solved": {"ann": {"psnr": 25.0, "captures": 3},
-                                               "bob": {"psnr": 20.0, "captures": 1},
-                                               "cat": {"psnr": 22.0, "captures": 2}}}})
+    before = Figures.of(
+        {
+            "people": {
+                "solved": {
+                    "ann": {"psnr": 25.0, "captures": 3},
+                    "bob": {"psnr": 20.0, "captures": 1},
+                    "cat": {"psnr": 22.0, "captures": 2},
+                }
+            }
+        }
+    )
     bob = {"solved": {"psnr": 24.0, "psnr_shared": 23.0, "psnr_alone": 26.0}}
-    now = Figures.of({"people": {"solved": {"ann": {"psnr": 27.0, "captures": 3}, "bob": {"psnr": 30.0, "captures": 3},
-                                            "cat": {"psnr": 31.0, "captures": 3}}},
-                      "captures": {"bob": bob, "bob_below": {"solved": {"psnr": 33.0, "psnr_alone": 33.0}}}})
+    now = Figures.of(
+        {
+            "people": {
+                "solved": {
+                    "ann": {"psnr": 27.0, "captures": 3},
+                    "bob": {"psnr": 30.0, "captures": 3},
+                    "cat": {"psnr": 31.0, "captures": 3},
+                }
+            },
+            "captures": {"bob": bob, "bob_below": {"solved": {"psnr": 33.0, "psnr_alone": 33.0}}},
+        }
+    )
     scores = state_0_1_0.paired(before, now, "solved")
-    assert {method: list(people) for method, people in scores.items()} == {"solved, 0.1.0": ["ann", "bob"],
-                                                                           "solved": ["ann", "bob"]}
+    assert {method: list(people) for method, people in scores.items()} == {
+        "solved, 0.1.0": ["ann", "bob"],
+        "solved": ["ann", "bob"],
+    }
     assert scores["solved"]["ann"]["psnr"] == 27.0 and scores["solved"]["bob"]["psnr"] == 24.0
     assert scores["solved"]["bob"]["psnr_shared"] == 26.0, "of one capture, the light that is shared is its own"
 
@@ -110,5 +133,6 @@ def test_people_are_compared_on_the_same_captures():
 def test_the_page_names_the_captures_that_were_left_out():
     today = Figures.of({"captures": {"ann": {}, "ann_below": {}, "bob": {}}})
     assert state_0_1_0.left_out(Figures.of({"captures": {"ann": {}}}), today) == (
-        "Not taken through it were ann_below, bob.")
+        "Not taken through it were ann_below, bob."
+    )
     assert state_0_1_0.left_out(today, today) == "None was left out."

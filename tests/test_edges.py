@@ -62,9 +62,14 @@ def test_a_mask_without_a_shadow_stays_as_it_was_painted():
     assert np.array_equal(edge.alpha, painted) and edge.on_edge.max() == 0
 
 
-@pytest.mark.parametrize("painted",
-                         [np.zeros((64, 64), np.float32), np.ones((64, 64), np.float32),
-                          np.eye(64, dtype=np.float32) * (np.arange(64) == 30)])
+@pytest.mark.parametrize(
+    "painted",
+    [
+        np.zeros((64, 64), np.float32),
+        np.ones((64, 64), np.float32),
+        np.eye(64, dtype=np.float32) * (np.arange(64) == 30),
+    ],
+)
 def test_any_mask_gives_a_finite_alpha(painted):
     light = np.random.default_rng(0).uniform(0.2, 1, (64, 64, 3))
     for weight in (0, 1):

@@ -29,8 +29,9 @@ def write_wheel(folder: Path, name: str, version: str = "1.0", code: str = "") -
         info = f"{name}-{version}.dist-info"
         wheel.writestr(f"{name}.py", code)
         wheel.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
-        wheel.writestr(f"{info}/WHEEL",
-                       "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        wheel.writestr(
+            f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+        )
         wheel.writestr(f"{info}/RECORD", f"{name}.py,,\n{info}/METADATA,,\n{info}/WHEEL,,\n{info}/RECORD,,\n")
     return path
 
@@ -41,8 +42,10 @@ def write_lock(requirements: Path, *wheels: Path) -> None:
     lines = []
     for wheel in wheels:
         pinned, size = "{}=={}".format(*wheel.name.split("-")[:2]), wheel.stat().st_size
-        lines += [f"{pinned} --hash=sha256:{hashlib.sha256(wheel.read_bytes()).hexdigest()}\n",
-                  f"# {pinned}: {size} bytes, {3 * size} on disk\n"]
+        lines += [
+            f"{pinned} --hash=sha256:{hashlib.sha256(wheel.read_bytes()).hexdigest()}\n",
+            f"# {pinned}: {size} bytes, {3 * size} on disk\n",
+        ]
     (requirements / "locks" / f"{HERE}.txt").write_text("".join(lines))
 
 
@@ -72,6 +75,7 @@ def bare(tmp_path_factory) -> Path:
 def made_before(bare, monkeypatch) -> None:
     """An environment is not made, which takes seconds, but copied from one that was: for what comes after that. How
     one is made from nothing, and made anew, is asked for by the tests without this, and by test_bare_environment.py."""
+
     def make(folder: Path, base: Path, requirements: Path, run, wheels=None, wheel_only=False, keep="") -> Path:
         empty(folder, keep)
         shutil.copytree(bare, folder, symlinks=True, dirs_exist_ok=True)
@@ -81,8 +85,9 @@ def made_before(bare, monkeypatch) -> None:
 
 
 def install(folder: Path, local: Path, **options) -> list:
-    task = installation.installation(folder, local, folder.with_name("install.log"), None,
-                                     installation.PackageSource(**options))
+    task = installation.installation(
+        folder, local, folder.with_name("install.log"), None, installation.PackageSource(**options)
+    )
     task.start()
     return follow(task)
 
@@ -118,8 +123,9 @@ def test_wherever_pip_is_set_up_to_put_packages_this_environment_gets_them(local
     monkeypatch.setenv("PIP_USER", "1")
     for name in ("PIP_TARGET", "PIP_PREFIX", "PIP_CONSTRAINT"):
         monkeypatch.setenv(name, str(tmp_path / "elsewhere"))
-    task = BackgroundTask("index", lambda task: index.plan_installation(
-        local, installation.base_python(), "cpu", "pytorch", task.run))
+    task = BackgroundTask(
+        "index", lambda task: index.plan_installation(local, installation.base_python(), "cpu", "pytorch", task.run)
+    )
     task.start()
     assert isinstance(follow(task)[-1], Done) and task.result.packages.keys() == {"tinytorch", "tinynets"}
     assert isinstance(install(tmp_path / "env", local)[-1], Done)
@@ -140,7 +146,7 @@ def test_an_environment_of_an_older_wildcap_is_brought_up_to_date(local, made_be
 def test_an_environment_whose_files_are_gone_is_repaired(local, made_before, tmp_path):
     folder = tmp_path / "env"
     assert isinstance(install(folder, local)[-1], Done)
-    module, = folder.rglob("tinytorch.py")
+    (module,) = folder.rglob("tinytorch.py")
     module.unlink()
     told = verify(python_of(folder), local, importing=True)
     assert told == ["tinytorch does not load: ModuleNotFoundError: No module named 'tinytorch'."]
@@ -160,8 +166,10 @@ def test_what_cannot_be_loaded_after_two_tries_is_told(local, made_before, tmp_p
     with zipfile.ZipFile(tmp_path / "wheels" / "broken-1.0-py3-none-any.whl", "w") as wheel:
         wheel.writestr("broken.py", "raise OSError('no such library')")
         wheel.writestr("broken-1.0.dist-info/METADATA", "Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
-        wheel.writestr("broken-1.0.dist-info/WHEEL",
-                       "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        wheel.writestr(
+            "broken-1.0.dist-info/WHEEL",
+            "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+        )
         wheel.writestr("broken-1.0.dist-info/RECORD", "")
     (local / "worker.txt").write_text("broken==1.0\n")
     write_lock(local, tmp_path / "wheels" / "broken-1.0-py3-none-any.whl")
@@ -175,8 +183,9 @@ def test_what_cannot_be_loaded_after_two_tries_is_told(local, made_before, tmp_p
 
 
 def test_a_cancelled_installation_says_so(local, tmp_path):
-    task = installation.installation(tmp_path / "env", local, tmp_path / "install.log", None,
-                                     installation.PackageSource())
+    task = installation.installation(
+        tmp_path / "env", local, tmp_path / "install.log", None, installation.PackageSource()
+    )
     task.start()
     task.cancel()
     assert isinstance(follow(task)[-1], Cancelled)
@@ -199,15 +208,19 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, made_befor
     commands: list[list[str]] = []
     work(task, lambda command: commands.append(list(map(str, command))) or BackgroundTask.run(task, command))
     assert len(commands) == 2 and all("--require-hashes" in command for command in commands), (
-        "nothing that runs here comes unchecked, pip's own update neither")
+        "nothing that runs here comes unchecked, pip's own update neither"
+    )
     assert str(local / "locks" / "pip.txt") in commands[0]
     huge = replace(plan, disk=1 << 60)
     with pytest.raises(Problem, match="are needed while"):
         index.check_space(huge, tmp_path)
     with pytest.raises(Problem, match=r"did not answer as expected \(No matching distribution\)"):
-        work(task,
-             lambda command: (1, "ERROR: No matching distribution.") if "--report" in command
-             else BackgroundTask.run(task, command))
+        work(
+            task,
+            lambda command: (
+                (1, "ERROR: No matching distribution.") if "--report" in command else BackgroundTask.run(task, command)
+            ),
+        )
     wheels[0].unlink()
     task = BackgroundTask("index", work)
     task.start()

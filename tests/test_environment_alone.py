@@ -20,8 +20,9 @@ def test_a_cancel_while_every_package_is_tried_ends_the_try_within_two_seconds(l
     told = tmp_path / "told.txt"
     code = f"import os, time\nopen({str(told)!r}, 'w').write(str(os.getpid()))\ntime.sleep(120)\n"
     write_lock(local, write_wheel(tmp_path / "wheels", "tinytorch", code=code))
-    task = installation.installation(tmp_path / "env", local, tmp_path / "install.log", None,
-                                     installation.PackageSource())
+    task = installation.installation(
+        tmp_path / "env", local, tmp_path / "install.log", None, installation.PackageSource()
+    )
     task.start()
     deadline = time.monotonic() + 100
     while not (told.is_file() and told.read_text()):
@@ -41,8 +42,17 @@ def test_one_at_a_time_works_on_a_folder_and_who_was_killed_holds_nothing(local,
     """Another Blender at work in the folder, as its lock says; then it is killed."""
     folder = tmp_path / "env"
     other = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
-    _lock(folder).write_text(json.dumps({"host": processes.name_host(), "pid": other.pid, "since": "noon",
-                                         "began": processes._began(other.pid), "token": "x"}))
+    _lock(folder).write_text(
+        json.dumps(
+            {
+                "host": processes.name_host(),
+                "pid": other.pid,
+                "since": "noon",
+                "began": processes._began(other.pid),
+                "token": "x",
+            }
+        )
+    )
     final = install(folder, local)[-1]
     assert f"Another worker (process {other.pid} on" in final.problem and "on this installation" in final.problem
     assert not folder.exists() and _lock(folder).exists()

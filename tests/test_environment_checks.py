@@ -31,12 +31,21 @@ def test_this_environment_is_judged_fit():
 
 
 def test_what_is_wrong_is_said():
-    good = {"python": [3, 11], "versions": {name: version + "+cpu" for name, version in required(REQUIREMENTS).items()},
-            "opencv": ["opencv-contrib-python-headless"], "errors": {}, "device": "cpu"}
+    good = {
+        "python": [3, 11],
+        "versions": {name: version + "+cpu" for name, version in required(REQUIREMENTS).items()},
+        "opencv": ["opencv-contrib-python-headless"],
+        "errors": {},
+        "device": "cpu",
+    }
     assert judge(good, REQUIREMENTS) == []
-    bad = {**good, "python": [3, 9], "versions": {**good["versions"], "torch": None, "av": "1.0"},
-           "opencv": ["opencv-contrib-python-headless", "opencv-python"],
-           "errors": {"torch": "OSError: cannot open libc10.so"}}
+    bad = {
+        **good,
+        "python": [3, 9],
+        "versions": {**good["versions"], "torch": None, "av": "1.0"},
+        "opencv": ["opencv-contrib-python-headless", "opencv-python"],
+        "errors": {"torch": "OSError: cannot open libc10.so"},
+    }
     problems = judge(bad, REQUIREMENTS)
     assert len(problems) == 5
     for words in ("3.9", "torch", "av is 1.0", "opencv-python", "libc10"):

@@ -44,8 +44,9 @@ def test_views_are_brought_to_one_albedo():
     agrees."""
     mesh = template.load()
     nowhere = np.zeros(len(mesh.vertices))
-    head = LitHead(Head(mesh), vertex_normals(mesh), np.zeros((len(nowhere), 9)), 1 - nowhere, nowhere, nowhere, None,
-                   np.ones(3))
+    head = LitHead(
+        Head(mesh), vertex_normals(mesh), np.zeros((len(nowhere), 9)), 1 - nowhere, nowhere, nowhere, None, np.ones(3)
+    )
     face, bary = template.landmarks()
     landmarks = (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
     views, looks = [], []
@@ -55,8 +56,16 @@ def test_views_are_brought_to_one_albedo():
         slope = np.linspace(-0.2, 0.2, 96, dtype=np.float32)[None, :, None] * (seed == 2)
         log = np.full((96, 96, 3), np.log(0.3), np.float32)
         views.append(view)
-        looks.append(ShadingEstimate((0.0, 0.0, 96.0), log - np.log(0.4) + np.float32(off) + slope,
-                                     np.zeros((96, 96), np.float32), log, where, at))
+        looks.append(
+            ShadingEstimate(
+                (0.0, 0.0, 96.0),
+                log - np.log(0.4) + np.float32(off) + slope,
+                np.zeros((96, 96), np.float32),
+                log,
+                where,
+                at,
+            )
+        )
     even = even_out(head, views, looks)
 
     def spread(answers):

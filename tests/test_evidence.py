@@ -140,9 +140,15 @@ def test_what_is_missing_or_damaged_is_told_and_nothing_comes_in_while_painting(
     assert not cameras()
 
 
-@pytest.mark.parametrize("ask", [lambda: bpy.ops.wildcap.bring_in_cameras(), lambda: bpy.ops.wildcap.compare_delit(),
-                                 lambda: bpy.ops.wildcap.pick_white_point(frame="00000.jpg", uv=(0.5, 0.5))],
-                         ids=["cameras", "delit", "card"])
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda: bpy.ops.wildcap.bring_in_cameras(),
+        lambda: bpy.ops.wildcap.compare_delit(),
+        lambda: bpy.ops.wildcap.pick_white_point(frame="00000.jpg", uv=(0.5, 0.5)),
+    ],
+    ids=["cameras", "delit", "card"],
+)
 def test_what_was_slimmed_away_is_made_again_for_whoever_looks_at_it(addon, reconstructed, monkeypatch, ask):
     folder, frames = Capture(reconstructed), stages.by_name("frames")
     folder.finish(frames, folder.conditions(frames, Settings()), 1.0, Settings(), {}, "0.2.0")

@@ -25,7 +25,8 @@ WANTED = (
     r"farm/flamenco/wildcap\.js",
     r"blender_manifest\.toml",
     r"LICENSE",
-    r"README\.md", r"requirements/(worker|perceptual|cuda|farm)\.txt",
+    r"README\.md",
+    r"requirements/(worker|perceptual|cuda|farm)\.txt",
     r"requirements/locks/([a-z0-9_]+-3\.[0-9]+(-cpu|-cuda)?|pip)\.txt",
     r"wildcap_addon/([a-z_]+/){0,2}[a-z_]+\.py",
     r"core/README\.md",
@@ -36,14 +37,27 @@ WANTED = (
     r"core/weights/face_nets/([a-z_]+\.tflite|NOTICE\.md|LICENSE\.txt)",
     r"core/assets/([A-Z]+\.md|head\.obj|head\.json|identity\.npz|masks/[a-z_]+\.png)",
     r"core/assets/[a-z_]+\.(png|json|npz|md)",
-    r"core/assets/sample_head/.+\.(obj|png|exr|json|npz)", r"core/[a-z_]+/(README\.md|[a-z0-9_]+\.(npz|json))",
+    r"core/assets/sample_head/.+\.(obj|png|exr|json|npz)",
+    r"core/[a-z_]+/(README\.md|[a-z0-9_]+\.(npz|json))",
 )
-NEEDED = ("__init__.py", "__main__.py", "farm/flamenco/wildcap.js", "blender_manifest.toml", "LICENSE",
-          "requirements/worker.txt", "requirements/locks/pip.txt",
-          "core/weights/face_nets/face_landmark.tflite", "core/weights/face_nets/NOTICE.md",
-          "wildcap_addon/__init__.py",
-          "wildcap_addon/relight/headless.py", "core/contract/settings.py", "core/worker/__main__.py",
-          "core/worker/client.py", "core/solve/__init__.py", "core/assets/head.obj")
+NEEDED = (
+    "__init__.py",
+    "__main__.py",
+    "farm/flamenco/wildcap.js",
+    "blender_manifest.toml",
+    "LICENSE",
+    "requirements/worker.txt",
+    "requirements/locks/pip.txt",
+    "core/weights/face_nets/face_landmark.tflite",
+    "core/weights/face_nets/NOTICE.md",
+    "wildcap_addon/__init__.py",
+    "wildcap_addon/relight/headless.py",
+    "core/contract/settings.py",
+    "core/worker/__main__.py",
+    "core/worker/client.py",
+    "core/solve/__init__.py",
+    "core/assets/head.obj",
+)
 
 
 @pytest.fixture(scope="module")

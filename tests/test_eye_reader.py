@@ -36,8 +36,10 @@ def work(tmp_path_factory):
     for seed in (1000, 9000):
         (folder / f"figure_{seed}").mkdir()
         for view in range(training.VIEWS):
-            eye_sights.save(folder / f"figure_{seed}" / f"{view}.npz",
-                            eye_sights.see_eye(scene, view % 2 == 1, np.random.default_rng([seed, view])))
+            eye_sights.save(
+                folder / f"figure_{seed}" / f"{view}.npz",
+                eye_sights.see_eye(scene, view % 2 == 1, np.random.default_rng([seed, view])),
+            )
     return folder
 
 
@@ -63,8 +65,14 @@ def test_an_eye_comes_upright_with_its_outer_corner_to_the_left(turn, left):
     move = eye_reader.to_eye_crop(np.stack([outer, inner]), left)
     places = np.stack([outer, inner, (outer + inner) / 2 + 20 * down]) @ move[:, :2].T + move[:, 2]
     width = SIDE_PX / eye_reader.SPAN_EYE_WIDTHS
-    assert np.allclose(places, [[SIDE_PX / 2 - width / 2, SIDE_PX / 2], [SIDE_PX / 2 + width / 2, SIDE_PX / 2],
-                                [SIDE_PX / 2, SIDE_PX / 2 + 20 * width / 60]])
+    assert np.allclose(
+        places,
+        [
+            [SIDE_PX / 2 - width / 2, SIDE_PX / 2],
+            [SIDE_PX / 2 + width / 2, SIDE_PX / 2],
+            [SIDE_PX / 2, SIDE_PX / 2 + 20 * width / 60],
+        ],
+    )
 
 
 def test_a_sight_knows_the_white_and_the_iris_of_the_eye_in_its_middle(sights):
@@ -135,8 +143,9 @@ def test_missing_weights_are_a_problem(tmp_path):
 
 def test_growing_needs_figures(tmp_path):
     with pytest.raises(Problem, match="There are no figures"):
-        training.train_eyes("cpu", tmp_path / "eyes.safetensors", QUIET,
-                            TrainingRun(1, tmp_path / "work", growing=True))
+        training.train_eyes(
+            "cpu", tmp_path / "eyes.safetensors", QUIET, TrainingRun(1, tmp_path / "work", growing=True)
+        )
 
 
 def test_a_little_training_beats_the_constant_answer(work, tiny):

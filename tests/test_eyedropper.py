@@ -23,7 +23,7 @@ def marked(name: str, is_float: bool, side: int = 256):
     image = bpy.data.images.new(name, side, side, float_buffer=is_float)
     pixels = np.full((side, side, 4), 0.5, np.float32)
     row, column = int(V * side), int(U * side)
-    pixels[row - 20:row + 20, column - 20:column + 20, :3] = (0.8, 0.4, 0.2)
+    pixels[row - 20 : row + 20, column - 20 : column + 20, :3] = (0.8, 0.4, 0.2)
     image.pixels.foreach_set(pixels.ravel())
     return image
 

@@ -38,8 +38,13 @@ def direct():
 
     base = read_base()
     builder = HeadBuilder(base)
-    wanted = ("head/head-oval", "head/head-fat-incr", "chin/chin-width-incr", "mouth/mouth-scale-horiz-incr",
-              "nose/nose-scale-vert-incr")
+    wanted = (
+        "head/head-oval",
+        "head/head-fat-incr",
+        "chin/chin-width-incr",
+        "mouth/mouth-scale-horiz-incr",
+        "nose/nose-scale-vert-incr",
+    )
     body = base.vertices + 0.7 * sum(base.target(name) for name in wanted)
     return base, builder, body, builder.head(body)
 
@@ -72,8 +77,9 @@ def test_what_lines_the_mouth_keeps_its_shape_in_every_head(enabled_extension, a
         assert (inner[rows[left], 0] > inner[other[left], 0]).all()
     edges = np.concatenate([asset.faces[:, :2], asset.faces[:, 1:3]]) - first
     edges = edges[np.isin(edges, rows).all(1)]
-    before, after = (np.linalg.norm(np.diff(places[edges], axis=1)[:, 0], axis=1)
-                     for places in (asset.parts, rest[first:]))
+    before, after = (
+        np.linalg.norm(np.diff(places[edges], axis=1)[:, 0], axis=1) for places in (asset.parts, rest[first:])
+    )
     long = before > 0.001
     ratio = after[long] / before[long]
     assert len(ratio) > 1000 and ratio.min() > 0.5 and ratio.max() < 1.6
@@ -95,7 +101,7 @@ def test_a_carried_unit_is_makehumans_own_on_that_head(asset, direct, acting):
         if name.startswith(EYES) or name == "tongueOut":
             continue  # those the closed head cannot show
         truth = (builder.head(body + base.target(f"faceunits/{name}")) - head)[away]
-        found = dense(acting[0], acting[1][name])[:len(head)][away]
+        found = dense(acting[0], acting[1][name])[: len(head)][away]
         worst.append(np.linalg.norm(found - truth) / np.linalg.norm(truth))
         assert worst[-1] < 0.2, name
     assert np.median(worst) < 0.1 and len(worst) == 37
@@ -152,7 +158,7 @@ def test_lips_and_lids_do_not_pass_through_each_other_and_hardly_a_triangle_turn
 
 
 def test_eyes_and_teeth_lie_behind_closed_lids_and_lips(asset, acting):
-    head, inner = acting[0][:len(asset.template)], acting[0][-len(asset.parts):]
+    head, inner = acting[0][: len(asset.template)], acting[0][-len(asset.parts) :]
     for kind, ball in ((1, asset.balls[0]), (2, asset.balls[1])):
         eye = inner[asset.kind == kind]
         arm = asset.template - ball[:3]

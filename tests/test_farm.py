@@ -38,11 +38,15 @@ def test_what_nodes_say_is_paired(tmp_path):
     def line(at, pid, stage, finished):
         return json.dumps({"at": at, "face": "f", "stage": stage, "finished": finished, "pid": pid}) + "\n"
 
-    (logs / "a.jsonl").write_text(line(1, 7, "frames", False) + line(2, 7, "frames", True) + line(3, 7, "scan", False)
-                                  + '{"at": 4, "fa')
+    (logs / "a.jsonl").write_text(
+        line(1, 7, "frames", False) + line(2, 7, "frames", True) + line(3, 7, "scan", False) + '{"at": 4, "fa'
+    )
     (logs / "b.jsonl").write_text(line(5, 8, "scan", False) + line(6, 8, "scan", True))
-    assert farm_batch.read_account(tmp_path) == [Begun("a", 7, "f", "frames", 1, 2),
-                                                 Begun("a", 7, "f", "scan", 3, None), Begun("b", 8, "f", "scan", 5, 6)]
+    assert farm_batch.read_account(tmp_path) == [
+        Begun("a", 7, "f", "frames", 1, 2),
+        Begun("a", 7, "f", "scan", 3, None),
+        Begun("b", 8, "f", "scan", 5, 6),
+    ]
 
 
 def test_what_was_done_twice_or_lost_for_no_reason_is_found():

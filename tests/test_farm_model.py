@@ -14,8 +14,20 @@ from core.contract.capture import Capture
 from core.contract.messages import Problem
 
 STARTS = {name: {"seconds": 9.0, "processor_s": 1.0} for name in farm_model.STARTS}
-EVEN = Assumptions(faces=1000, eur_core_hour=0.1, eur_gpu_hour=1.0, eur_gb_month=0.5, eur_artist_hour=30.0, months=2.0,
-                   repeats=0.0, gpu_solve_minutes=6.0, gate_minutes=1.5, film_mb=100.0, storage_mb_s=100.0, workers=10)
+EVEN = Assumptions(
+    faces=1000,
+    eur_core_hour=0.1,
+    eur_gpu_hour=1.0,
+    eur_gb_month=0.5,
+    eur_artist_hour=30.0,
+    months=2.0,
+    repeats=0.0,
+    gpu_solve_minutes=6.0,
+    gate_minutes=1.5,
+    film_mb=100.0,
+    storage_mb_s=100.0,
+    workers=10,
+)
 
 
 def costs(**other) -> dict:
@@ -60,7 +72,14 @@ def test_twice_the_faces_cost_twice_as_much_and_repeats_cost_the_machines_alone(
     assert {key: pytest.approx(2 * value) for key, value in once.items()} == twice
     plain, again = (model_farm(costs(), disk(), STARTS, Assumptions(repeats=share))["totals"] for share in (0.0, 0.5))
     assert {key for key in plain if again[key] == pytest.approx(1.5 * plain[key])} == {
-        "used_core_hours", "core_hours", "eur_cores", "gpu_hours", "core_hours_beside_gpu", "eur_with_gpu", "days"}
+        "used_core_hours",
+        "core_hours",
+        "eur_cores",
+        "gpu_hours",
+        "core_hours_beside_gpu",
+        "eur_with_gpu",
+        "days",
+    }
     assert all(again[key] == plain[key] for key in ("tb", "eur_disk", "artist_hours"))
 
 
@@ -80,9 +99,12 @@ def test_a_task_reads_what_comes_before_it_and_writes_its_own():
 
 def test_other_numbers_of_frames_are_told_where_they_were_measured_to_their_end():
     fast = {"seconds": 6.0, "processor_s": 7.0, "peak_mb": 1}
-    rows = {"frames-300": dict.fromkeys(("frames", "cameras", "scan"), fast),
-            "frames-30": dict.fromkeys(("frames", "cameras", "scan"), fast),
-            "frames-120": {"frames": fast, "cameras": {"over_s": 480.0}}, "views-8": {"delight": fast}}
+    rows = {
+        "frames-300": dict.fromkeys(("frames", "cameras", "scan"), fast),
+        "frames-30": dict.fromkeys(("frames", "cameras", "scan"), fast),
+        "frames-120": {"frames": fast, "cameras": {"over_s": 480.0}},
+        "views-8": {"delight": fast},
+    }
     found = model_farm(costs(**rows), disk(), STARTS, EVEN)["frames"]
     assert list(found) == ["30", "300"] and found["30"]["seconds"] == 7 * 36 + 3 * 6
     assert "| 300 | 270 s |" in page(model_farm(costs(**rows), disk(), STARTS, EVEN))
@@ -113,8 +135,9 @@ def test_costs_without_a_whole_standard_row_are_refused():
 
 def test_the_page_is_what_the_record_and_todays_costs_give():
     record = figures.read_record("farm_model")["figures"]
-    again = model_farm(figures.read_record("costs")["figures"], record["disk_mb"], record["starts"],
-                  Assumptions(**record["assumed"]))
+    again = model_farm(
+        figures.read_record("costs")["figures"], record["disk_mb"], record["starts"], Assumptions(**record["assumed"])
+    )
     assert figures.plain(again) == record and farm_model.PAGE.read_text(encoding="utf-8") == page(record), (
         f"run `{farm_model.COMMAND.split(' --cap')[0]}`"
     )
@@ -122,9 +145,11 @@ def test_the_page_is_what_the_record_and_todays_costs_give():
 
 
 def test_the_command_uses_measurements_again_and_takes_other_assumptions(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(sys, "argv",
-                        ["farm_model", "--faces", "200", "--json", str(tmp_path / "x.json"), "--page",
-                         str(tmp_path / "x.md")])
+    monkeypatch.setattr(
+        sys,
+        "argv",
+        ["farm_model", "--faces", "200", "--json", str(tmp_path / "x.json"), "--page", str(tmp_path / "x.md")],
+    )
     assert farm_model.main() == 0 and "# What 200 faces cost" in (tmp_path / "x.md").read_text(encoding="utf-8")
     written, published = figures.read_record("x", tmp_path), figures.read_record("farm_model")
     assert written["figures"]["disk_mb"] == published["figures"]["disk_mb"]

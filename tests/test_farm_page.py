@@ -32,7 +32,7 @@ print(f"{{len(jobs) + 1}};cluster")
 
 def rows(heading: str) -> list[list[str]]:
     """The cells of the table whose first column is called so."""
-    lines = PAGE[PAGE.index(f"| {heading} |"):].partition("\n\n")[0].splitlines()[2:]
+    lines = PAGE[PAGE.index(f"| {heading} |") :].partition("\n\n")[0].splitlines()[2:]
     return [[cell.strip(" `*") for cell in line.strip("|").split("|")] for line in lines]
 
 
@@ -41,8 +41,9 @@ def test_the_tables_are_those_of_the_code():
     tasks = rows("task")
     assert [row[0] for row in tasks if row[0] != "the gate"] == [group.name for group in GROUPS]
     assert [row[0] for row in tasks if "GPU" in row[2]] == [group.name for group in GROUPS if group.on_device]
-    labels = re.findall(r"description|key: \"(\w+)\"",
-                        (ROOT / "farm" / "flamenco" / "wildcap.js").read_text(encoding="utf-8"))
+    labels = re.findall(
+        r"description|key: \"(\w+)\"", (ROOT / "farm" / "flamenco" / "wildcap.js").read_text(encoding="utf-8")
+    )
     named = {name.strip().lower().replace(" ", "_") for row in rows("setting") for name in row[0].split(",")}
     assert named == set(filter(None, labels))
 
@@ -67,10 +68,21 @@ def test_the_loop_for_slurm_submits_and_chains_every_task(tmp_path):
     sbatch.chmod(0o755)
     loop = re.search(r"```bash\n(.*?)```", PAGE, re.DOTALL)[1]
     loop = loop.replace("python /opt/wildcap/code", f"'{sys.executable}' '{program}'")
-    ended = subprocess.run(["bash", "-euo", "pipefail", "-c", loop], capture_output=True, text=True, cwd="/", env={
-        **os.environ, "PATH": f"{sbatch.parent}:{os.environ['PATH']}", "BATCH": str(batch), "SBATCH_LOG": str(log)})
+    ended = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", loop],
+        capture_output=True,
+        text=True,
+        cwd="/",
+        env={
+            **os.environ,
+            "PATH": f"{sbatch.parent}:{os.environ['PATH']}",
+            "BATCH": str(batch),
+            "SBATCH_LOG": str(log),
+        },
+    )
     assert ended.returncode == 0, ended.stderr
     names = [f"{face}.{group.name}" for face in ("Bert", "Zoë d'Arc") for group in GROUPS]
     before = ["" if name.endswith(GROUPS[0].name) else other for name, other in zip(names, ["", *names], strict=False)]
     assert [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()] == [
-        {"name": name, "after": after, "code": 0} for name, after in zip(names, before, strict=True)]
+        {"name": name, "after": after, "code": 0} for name, after in zip(names, before, strict=True)
+    ]

@@ -82,8 +82,10 @@ def test_a_face_that_was_measured_elsewhere_has_the_same_contrasts():
     for name, landmarks in json.loads((FACEOLAT / "landmarks.json").read_text()).items():
         landmarks, (person, camera) = np.array(landmarks, float), name.split("_")
         face = images.read_mask(FACEOLAT / "align_mask_face" / f"{name}.png") > 127 / 255 + 1e-3
-        for path in (FACEOLAT / "align_diffuse" / f"{name}.png",
-                     next(iter(sorted((FACEOLAT / "align_image" / person / camera).glob("*.png"))))):
+        for path in (
+            FACEOLAT / "align_diffuse" / f"{name}.png",
+            next(iter(sorted((FACEOLAT / "align_image" / person / camera).glob("*.png")))),
+        ):
             srgb = images.read_srgb(path)
             wanted = theirs.contrasts(srgb.astype(np.float64), landmarks, face)
             assert contrasts(srgb, landmarks, face) == pytest.approx(wanted, abs=1e-4)

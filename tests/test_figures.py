@@ -10,8 +10,12 @@ from core.contract.messages import Problem
 
 
 def test_a_record_is_read_as_it_was_written(tmp_path):
-    figures.write_record(tmp_path / "one.json", "demo", "make demo",
-                         {"rows": {"b": {"psnr": np.float32(0.5)}, "a": {"views": np.int64(14), "none": None}}})
+    figures.write_record(
+        tmp_path / "one.json",
+        "demo",
+        "make demo",
+        {"rows": {"b": {"psnr": np.float32(0.5)}, "a": {"views": np.int64(14), "none": None}}},
+    )
     record = figures.read_record("one", tmp_path)
     assert record["benchmark"] == "demo" and record["command"] == "make demo" and "commit" in record
     assert record["figures"] == {"rows": {"b": {"psnr": 0.5}, "a": {"views": 14, "none": None}}}

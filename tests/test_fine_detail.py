@@ -73,11 +73,11 @@ def test_the_band_takes_the_place_of_what_was_made_up():
     albedo = images.linear_to_srgb(np.repeat(np.exp(coarse + bands[1])[..., None], 3, 2)).astype(np.float32)
     before = albedo.copy()
     certain = np.zeros((size, size), np.float32)
-    certain[:, size // 2:] = 1
+    certain[:, size // 2 :] = 1
     guide(albedo, np.stack([bands[0] * certain, certain], -1), 32, lambda done: None)
-    assert np.abs(albedo - before)[:, :size // 2].max() < 1e-5
-    log = np.log(images.srgb_to_linear(albedo)).mean(-1)[16:-16, size // 2 + 16:-16]
-    there = np.s_[16:-16, size // 2 + 16:-16]
+    assert np.abs(albedo - before)[:, : size // 2].max() < 1e-5
+    log = np.log(images.srgb_to_linear(albedo)).mean(-1)[16:-16, size // 2 + 16 : -16]
+    there = np.s_[16:-16, size // 2 + 16 : -16]
     got = (log - coarse[there]).ravel()
     like_first, like_second = (np.corrcoef(got, bands[k][there].ravel())[0, 1] for k in (0, 1))
     assert like_first > 0.97 and abs(like_second) < 0.2

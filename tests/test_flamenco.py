@@ -52,8 +52,15 @@ def compiled(**settings) -> list[dict]:
 
 
 def test_the_job_type_is_es5_and_uses_what_is_documented_alone():
-    for newer in ("let a = 1;", "var f = (x) => x;", "var a = `b`;", "for (var a of []) {}", "class A {}",
-                  "var {a} = {};", "compileJob(job); path.join('a')"):
+    for newer in (
+        "let a = 1;",
+        "var f = (x) => x;",
+        "var a = `b`;",
+        "for (var a of []) {}",
+        "class A {}",
+        "var {a} = {};",
+        "compileJob(job); path.join('a')",
+    ):
         with pytest.raises(dukpy.JSRuntimeError):  # what this engine does not know would be found
             dukpy.evaljs([STAND_INS, SCRIPT + newer], settings=GIVEN)
     assert not re.search(r"\bconst\b", SCRIPT), "the one newer word that this engine takes"
@@ -76,8 +83,15 @@ def test_a_face_is_the_chain_of_the_batchs_tasks():
     assert [task["type"] for task in made] == ["cuda" if group.on_device else "misc" for group in GROUPS]
     assert made[0]["after"] == [] and all(task["after"] == [before["name"]] for before, task in pairwise(made))
     for task, group in zip(made, GROUPS, strict=True):
-        assert task["commands"] == [{"name": "exec", "parameters": {"exe": "{wildcap_python}", "args": [
-            "{wildcap}", "batch", "task", "{shots}/batch", "Anna", group.name]}}]
+        assert task["commands"] == [
+            {
+                "name": "exec",
+                "parameters": {
+                    "exe": "{wildcap_python}",
+                    "args": ["{wildcap}", "batch", "task", "{shots}/batch", "Anna", group.name],
+                },
+            }
+        ]
 
 
 def test_faces_do_not_wait_for_each_other_and_the_gate_parts_the_chain():
@@ -87,8 +101,9 @@ def test_faces_do_not_wait_for_each_other_and_the_gate_parts_the_chain():
         made = compiled(faces="Anna/Bert", part=part)
         assert [task["name"] for task in made] == [f"{face}.{name}" for face in ("Anna", "Bert") for name in asked]
         assert [task["name"] for task in made if not task["after"]] == [f"Anna.{asked[0]}", f"Bert.{asked[0]}"]
-        assert all(other.partition(".")[0] == task["name"].partition(".")[0] for task in made
-                   for other in task["after"])
+        assert all(
+            other.partition(".")[0] == task["name"].partition(".")[0] for task in made for other in task["after"]
+        )
 
 
 @pytest.mark.parametrize("name", ["Zoë d'Arc", 'the "tall" one', "Smith, John", " blank ", "a;b & c $HOME", "脸"])
@@ -97,15 +112,25 @@ def test_names_and_paths_reach_the_command_as_they_are(name):
     assert args[3:] == [f"S:\\new shots\\{name}", name, "deliver"]
 
 
-@pytest.mark.parametrize(("settings", "words"), [
-    ({"faces": None}, "setting faces is empty"), ({"faces": ""}, "setting faces is empty"),
-    ({"faces": "  "}, "setting faces is empty"),
-    ({"faces": "/"}, "no face's name"), ({"faces": "Anna//Bert"}, "no face's name"),
-    ({"faces": "Anna/ /Bert"}, "no face's name"),
-    ({"faces": "--help"}, "no face's name"), ({"faces": "shots\\Anna"}, "no face's name"),
-    ({"faces": "Anna\nBert"}, "no face's name"),
-    ({"faces": "Anna/Bert/Anna"}, "names Anna twice"), ({"faces": 7}, "no text"), ({"faces": ["Anna"]}, "no text"),
-    ({"batch": None}, "setting batch is empty"), ({"part": "half"}, "all, to the masks, from the masks")])
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"faces": None}, "setting faces is empty"),
+        ({"faces": ""}, "setting faces is empty"),
+        ({"faces": "  "}, "setting faces is empty"),
+        ({"faces": "/"}, "no face's name"),
+        ({"faces": "Anna//Bert"}, "no face's name"),
+        ({"faces": "Anna/ /Bert"}, "no face's name"),
+        ({"faces": "--help"}, "no face's name"),
+        ({"faces": "shots\\Anna"}, "no face's name"),
+        ({"faces": "Anna\nBert"}, "no face's name"),
+        ({"faces": "Anna/Bert/Anna"}, "names Anna twice"),
+        ({"faces": 7}, "no text"),
+        ({"faces": ["Anna"]}, "no text"),
+        ({"batch": None}, "setting batch is empty"),
+        ({"part": "half"}, "all, to the masks, from the masks"),
+    ],
+)
 def test_settings_that_make_no_sense_are_refused_with_a_sentence(settings, words):
     with pytest.raises(dukpy.JSRuntimeError, match=re.escape(words)):
         compiled(**settings)
@@ -117,7 +142,7 @@ def submitted(job: dict, variables: dict[str, tuple[str, str]]) -> list[dict]:
     settings = {}
     for key, value in job["settings"].items():
         for name, (here, _) in variables.items():
-            value = f"{{{name}}}{value[len(here):]}" if value.startswith(here) else value
+            value = f"{{{name}}}{value[len(here) :]}" if value.startswith(here) else value
         settings[key] = value
     return compiled(**{key: None for key in GIVEN} | settings)
 
@@ -141,8 +166,9 @@ def farm(tmp_path):
 
 
 def call(program: Path, folder: Path, *words) -> subprocess.CompletedProcess:
-    return subprocess.run([sys.executable, str(program), *map(str, words)], cwd=folder, capture_output=True, text=True,
-                          encoding="utf-8")
+    return subprocess.run(
+        [sys.executable, str(program), *map(str, words)], cwd=folder, capture_output=True, text=True, encoding="utf-8"
+    )
 
 
 def moods(batch: Path, **of: dict):
@@ -159,8 +185,10 @@ def jobs_of(program: Path, folder: Path, batch: Path) -> list[dict]:
 
 def test_the_commands_do_the_work_on_a_machine_that_sees_the_storage_elsewhere(farm, tmp_path):
     program, storage = farm
-    assert call(program, tmp_path, "batch", "plan", storage / "films", storage / "batch", "--gate",
-                "artist").returncode == 0
+    assert (
+        call(program, tmp_path, "batch", "plan", storage / "films", storage / "batch", "--gate", "artist").returncode
+        == 0
+    )
     moods(storage / "batch")
     seen = tmp_path / "vol"
     variables = {"shots": (str(storage), str(seen))}
@@ -174,8 +202,12 @@ def test_the_commands_do_the_work_on_a_machine_that_sees_the_storage_elsewhere(f
             for task in submitted(job, variables):
                 assert set(task["after"]) <= set(ended)
                 parameters = task["commands"][0]["parameters"]
-                done = subprocess.run([sent(word, values) for word in (parameters["exe"], *parameters["args"])],
-                                      cwd=tmp_path, capture_output=True, text=True)
+                done = subprocess.run(
+                    [sent(word, values) for word in (parameters["exe"], *parameters["args"])],
+                    cwd=tmp_path,
+                    capture_output=True,
+                    text=True,
+                )
                 assert done.returncode == 0, done.stderr
                 ended.append(task["name"])
         seen.rename(storage)
@@ -203,8 +235,9 @@ def test_a_film_that_stops_fails_its_own_job_alone(farm, tmp_path):
     assert parts == [(name, "all") for name in ("Anna", "Zoë d'Arc")]
     values = {"wildcap_python": sys.executable, "wildcap": str(program)}
     task = submitted(jobs[0], {})[0]["commands"][0]["parameters"]
-    stopped = subprocess.run([sent(word, values) for word in (task["exe"], *task["args"])], cwd=tmp_path,
-                             capture_output=True, text=True)
+    stopped = subprocess.run(
+        [sent(word, values) for word in (task["exe"], *task["args"])], cwd=tmp_path, capture_output=True, text=True
+    )
     assert stopped.returncode == 2 and "The face is not there.\nFilm it." in stopped.stderr
 
 
@@ -212,15 +245,17 @@ def test_the_lines_of_commands_run_in_any_folder_and_end_the_batch(farm, tmp_pat
     program, storage = farm
     call(program, tmp_path, "batch", "plan", storage / "films", storage / "batch")
     moods(storage / "batch")
-    lines = [line.split("\t")
-             for line in call(program, tmp_path, "batch", "commands", storage / "batch").stdout.splitlines()]
+    lines = [
+        line.split("\t") for line in call(program, tmp_path, "batch", "commands", storage / "batch").stdout.splitlines()
+    ]
     assert len(lines) == 2 * len(GROUPS)
     assert [after for _, after, _ in lines][:4] == ["", "Anna.head", "Anna.mask", "Anna.solve"]
     for _, _, command in lines[:4]:
         assert subprocess.run(command, shell=True, cwd="/", capture_output=True).returncode == 0
     assert "Anna                 done" in call(program, tmp_path, "batch", "status", storage / "batch").stdout
-    elsewhere = call(program, tmp_path, "batch", "commands", storage / "batch", "--python", "py", "--wildcap",
-                     "/opt/wild cap").stdout.splitlines()
+    elsewhere = call(
+        program, tmp_path, "batch", "commands", storage / "batch", "--python", "py", "--wildcap", "/opt/wild cap"
+    ).stdout.splitlines()
     assert shlex.split(elsewhere[0].split("\t")[2])[:2] == ["py", "/opt/wild cap"] and len(elsewhere) == len(GROUPS)
 
 

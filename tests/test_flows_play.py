@@ -16,6 +16,7 @@ def outcomes(monkeypatch, *codes: int) -> list:
     def run(command, **_):
         asked.append(command[1:])
         return subprocess.CompletedProcess(command, left.pop(0), "what it said")
+
     monkeypatch.setattr(gui.subprocess, "run", run)
     return asked
 

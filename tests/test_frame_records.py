@@ -124,11 +124,23 @@ def test_older_and_newer_files_are_read(tmp_path):
     assert "kind" not in json.loads((tmp_path / "again" / "frames.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("text",
-                         ["", "{", "[]", "3", "{}", '{"frames": 3}', '{"frames": [3]}', '{"frames": ["00000.jpg"]}',
-                          '{"frames": [{"name": "00000.jpg"}]}',
-                          json.dumps({"frames": [{**OLDEST, "name": 3}]}),
-                          json.dumps({"frames": [{**OLDEST, "sharpness": "much"}]}), WRITTEN[:-40]])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "3",
+        "{}",
+        '{"frames": 3}',
+        '{"frames": [3]}',
+        '{"frames": ["00000.jpg"]}',
+        '{"frames": [{"name": "00000.jpg"}]}',
+        json.dumps({"frames": [{**OLDEST, "name": 3}]}),
+        json.dumps({"frames": [{**OLDEST, "sharpness": "much"}]}),
+        WRITTEN[:-40],
+    ],
+)
 def test_a_damaged_file_is_a_problem(tmp_path, text):
     with pytest.raises(Problem, match="frames of this capture cannot be read") as problem:
         read_frames(capture_with(tmp_path, text))

@@ -36,9 +36,9 @@ def moving_face(index: int) -> np.ndarray:
     """uint8 [SIZE, SIZE, 3]: a face that wanders, with the frame's number in eight black or white blocks along the
     lower edge."""
     left, top = 100 + 2 * (index % 20), 10 + index % 20
-    picture = np.ascontiguousarray(astronaut()[top:top + SIZE, left:left + SIZE])
+    picture = np.ascontiguousarray(astronaut()[top : top + SIZE, left : left + SIZE])
     for bit in range(8):
-        picture[-24:, bit * 24:(bit + 1) * 24] = 255 * (index >> bit & 1)
+        picture[-24:, bit * 24 : (bit + 1) * 24] = 255 * (index >> bit & 1)
     return picture
 
 
@@ -74,8 +74,9 @@ def refused(capture: Capture, source, **settings) -> Problem:
     return caught.value
 
 
-@pytest.mark.parametrize(("name", "codec"),
-                         [("vidéo.mp4", "libx264"), ("IMG 0001.MOV", "libx265"), ("clip.mkv", "libx264")])
+@pytest.mark.parametrize(
+    ("name", "codec"), [("vidéo.mp4", "libx264"), ("IMG 0001.MOV", "libx265"), ("clip.mkv", "libx264")]
+)
 def test_frames_are_those_the_record_says(capture, tmp_path, name, codec):
     source = write_video(tmp_path / "une entrée" / name, [moving_face(i) for i in range(50)], codec)
     record, report = take(capture, source, max_frames=12, views=5)
@@ -107,8 +108,8 @@ def test_rotation_metadata_is_honoured(capture, tmp_path, quarter_turns):
     matrix = {1: (0, 1, -1, 0), 2: (-1, 0, 0, -1), 3: (0, -1, 1, 0)}[quarter_turns]  # clockwise by as many quarters
     a, b, c, d = (value * 65536 for value in matrix)
     at = data.index(b"tkhd") + 4 + 40
-    assert struct.unpack(">9i", data[at:at + 36])[0] == 65536  # the identity, where the specification puts it
-    data[at:at + 36] = struct.pack(">9i", a, b, 0, c, d, 0, 0, 0, 0x40000000)
+    assert struct.unpack(">9i", data[at : at + 36])[0] == 65536  # the identity, where the specification puts it
+    data[at : at + 36] = struct.pack(">9i", a, b, 0, c, d, 0, 0, 0, 0x40000000)
     path.write_bytes(data)
     record, _ = take(capture, path)
     picture = images.read_srgb(capture.frames / record["frames"][3]["name"])
@@ -126,8 +127,9 @@ def test_rec709_video_keeps_its_colour(capture, tmp_path):
         stream.codec_context.colorspace = 1
         for picture in shown:
             frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            container.mux(stream.encode(frame.reformat(format="yuv420p", src_colorspace="DEFAULT",
-                                                       dst_colorspace="ITU709")))
+            container.mux(
+                stream.encode(frame.reformat(format="yuv420p", src_colorspace="DEFAULT", dst_colorspace="ITU709"))
+            )
         container.mux(stream.encode())
     record, _ = take(capture, path)
     picture = images.read_srgb(capture.frames / record["frames"][0]["name"])
@@ -203,7 +205,7 @@ def test_a_cut_off_recording_gives_what_is_there_or_says_so(capture, tmp_path):
     (tmp_path / "cut.mp4").write_bytes(whole.read_bytes()[:-4000])  # an MP4's index comes last
     assert "cut off" in refused(capture, tmp_path / "cut.mp4").problem
     streamed = write_video(tmp_path / "streamed.mkv", pictures).read_bytes()
-    (tmp_path / "cut.mkv").write_bytes(streamed[:len(streamed) // 2])
+    (tmp_path / "cut.mkv").write_bytes(streamed[: len(streamed) // 2])
     record, _ = take(capture, tmp_path / "cut.mkv")
     assert 10 < len(record["frames"]) < 40
     for frame in record["frames"][:-1]:
@@ -212,7 +214,7 @@ def test_a_cut_off_recording_gives_what_is_there_or_says_so(capture, tmp_path):
 
 def test_damage_in_the_middle_does_not_stop_it(capture, tmp_path):
     data = bytearray(write_video(tmp_path / "damaged.mkv", [moving_face(i) for i in range(40)]).read_bytes())
-    data[len(data) // 2:len(data) // 2 + 3000] = bytes(3000)
+    data[len(data) // 2 : len(data) // 2 + 3000] = bytes(3000)
     (tmp_path / "damaged.mkv").write_bytes(data)
     record, _ = take(capture, tmp_path / "damaged.mkv")
     assert len(record["frames"]) >= 10
@@ -242,9 +244,12 @@ def test_bad_sources_end_in_a_sentence(capture, tmp_path):
 def test_no_face_and_no_motion_are_told(capture, tmp_path):
     rng = np.random.default_rng(0)
     scene = cv2.resize(rng.integers(0, 255, (40, 60, 3), np.uint8), (360, 240), interpolation=cv2.INTER_CUBIC)
-    assert "No face" in refused(capture,
-                                write_video(tmp_path / "wall.mp4",
-                                            [np.ascontiguousarray(scene[:, i:i + 240]) for i in range(6)])).problem
+    assert (
+        "No face"
+        in refused(
+            capture, write_video(tmp_path / "wall.mp4", [np.ascontiguousarray(scene[:, i : i + 240]) for i in range(6)])
+        ).problem
+    )
     assert "did not move" in refused(capture, write_video(tmp_path / "still.mp4", [moving_face(0)] * 8)).problem
 
 

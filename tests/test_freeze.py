@@ -19,8 +19,15 @@ def captures(tmp_path):
         record = json.loads((root / "capture.json").read_text())
         record["stages"]["texture"] = {"version": "0.1.0", "code": "abc", "seconds": 3}
         (root / "capture.json").write_text(json.dumps(record))
-        for path in ("head.obj", "texture_filmed.png", "delit/00000.png", "delit/shadow/00000.png", "frames/00000.jpg",
-                     "checkpoints/solve.safetensors", *(["texture.exr"] if name != "untextured" else [])):
+        for path in (
+            "head.obj",
+            "texture_filmed.png",
+            "delit/00000.png",
+            "delit/shadow/00000.png",
+            "frames/00000.jpg",
+            "checkpoints/solve.safetensors",
+            *(["texture.exr"] if name != "untextured" else []),
+        ):
             (root / path).parent.mkdir(exist_ok=True, parents=True)
             (root / path).write_text(f"{name} {path}")
     return tmp_path
@@ -56,8 +63,11 @@ def test_a_change_is_named(captures, monkeypatch, capsys):
     capsys.readouterr()
     monkeypatch.setattr("sys.argv", ["freeze", "--check", str(out)])
     assert freeze.main() == 1
-    assert capsys.readouterr().out.splitlines() == ["anna: head.obj is missing.", "ben: delit/00001.png was added.",
-                                                    "ben: texture.exr has changed."]
+    assert capsys.readouterr().out.splitlines() == [
+        "anna: head.obj is missing.",
+        "ben: delit/00001.png was added.",
+        "ben: texture.exr has changed.",
+    ]
 
 
 def test_nothing_is_kept_in_the_repository_or_of_nothing(captures):

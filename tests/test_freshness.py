@@ -128,7 +128,7 @@ def test_a_video_is_what_it_holds_wherever_and_whenever_it_was_put(capture, tmp_
 
 
 def test_a_capture_that_was_copied_to_another_disk_with_its_video_is_the_same(capture, tmp_path):
-    for copied in (tmp_path / "other disk", ):
+    for copied in (tmp_path / "other disk",):
         shutil.copytree(tmp_path / "project", copied / "project", copy_function=shutil.copyfile)  # new times everywhere
         shutil.rmtree(tmp_path / "project")
         there = Capture(copied / "project" / capture.root.name)
@@ -172,8 +172,9 @@ def test_a_long_video_is_known_by_its_size_and_blocks_from_its_first_byte_to_its
     assert not same_source(before, stamp(length=4999))
     assert same_source(before, stamp(40)), "between two blocks: the price of not reading a long film"
     whole = stamp(length=1000)
-    assert all(not same_source(whole, stamp(place, 1000))
-               for place in (0, 15, 40, 999)), "up to WHOLE_BYTES every byte counts"
+    assert all(not same_source(whole, stamp(place, 1000)) for place in (0, 15, 40, 999)), (
+        "up to WHOLE_BYTES every byte counts"
+    )
 
 
 # -- paths
@@ -194,8 +195,11 @@ def test_paths_in_a_capture_are_relative_where_both_may_be_moved_together(tmp_pa
 
 def test_a_job_names_no_folder_that_a_copy_would_not_have(capture, tmp_path):
     (tmp_path / "model.json").write_text("{}", encoding="utf-8")
-    path = write_job(capture, source=tmp_path / "project" / "film.mp4",
-                     settings={"cameras": {"import_from": str(tmp_path / "model.json")}})
+    path = write_job(
+        capture,
+        source=tmp_path / "project" / "film.mp4",
+        settings={"cameras": {"import_from": str(tmp_path / "model.json")}},
+    )
     assert str(tmp_path) not in path.read_text(encoding="utf-8")
     job = read_job(path)
     assert job.capture.root == capture.root and job.source == str(tmp_path / "project" / "film.mp4")
@@ -225,7 +229,7 @@ def first_format(tmp_path) -> Capture:
 
 
 MADE_WITH = {"seed": 3, "cameras": {"interpupillary_mm": 61.0}}
-FINISHED = stages.NAMES[:stages.NAMES.index("upscale")]
+FINISHED = stages.NAMES[: stages.NAMES.index("upscale")]
 
 
 def verdicts(capture: Capture, **changed) -> dict[str, str]:
@@ -262,8 +266,9 @@ def test_a_run_keeps_what_older_code_made_says_so_and_forced_makes_it_again(capt
     from core.worker import runner
 
     ran, said = [], []
-    monkeypatch.setattr(runner, "_room",
-                        lambda step: type("Room", (), {"run": staticmethod(lambda *_: ran.append(step.name))}))
+    monkeypatch.setattr(
+        runner, "_room", lambda step: type("Room", (), {"run": staticmethod(lambda *_: ran.append(step.name))})
+    )
     monkeypatch.setattr(freshness, "code_key", lambda module: "another version's")
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
     runner.run_job(write_job(capture, last="cameras"), said.append)
@@ -284,7 +289,11 @@ def test_a_capture_of_this_format_is_refused_by_what_knows_only_the_first(captur
 def test_a_stage_that_asks_what_the_parser_saw_is_stale_when_that_changes():
     """Read from the sources: who imports face/shown_parts.py reads texture_parts.png."""
     core = Path(stages.__file__).parents[1]
-    asking = {stage for stage in stages.STAGES for file in (core / stage.module.split(".")[1]).rglob("*.py")
-              if "shown_parts" in file.read_text(encoding="utf-8")}
+    asking = {
+        stage
+        for stage in stages.STAGES
+        for file in (core / stage.module.split(".")[1]).rglob("*.py")
+        if "shown_parts" in file.read_text(encoding="utf-8")
+    }
     assert {stage.name for stage in asking} == {"shadow_mask", "solve", "upscale"}
     assert all(stages.PARTS in stage.optional_reads for stage in asking) and stages.PARTS in together.TOLD

@@ -87,8 +87,10 @@ def test_eyes_turn_as_far_as_the_guide_says(head, addon):  # noqa: F811
     """Outwards, inwards, up and down: in degrees from straight ahead, at the most that the units are driven to."""
     gaze = addon("acting.gaze")
     eye = gaze._eye(head, 0)
-    most = {way: angle(eye.ahead, 1) + gaze.MOST_LOOK * (angle(eye.turned[way], 1) - angle(eye.ahead, 1))
-            for way, angle in (("Out", gaze._yaw), ("In", gaze._yaw), ("Up", gaze._pitch), ("Down", gaze._pitch))}
+    most = {
+        way: angle(eye.ahead, 1) + gaze.MOST_LOOK * (angle(eye.turned[way], 1) - angle(eye.ahead, 1))
+        for way, angle in (("Out", gaze._yaw), ("In", gaze._yaw), ("Up", gaze._pitch), ("Down", gaze._pitch))
+    }
     assert [round(abs(float(np.degrees(most[way])))) for way in ("Out", "In", "Up", "Down")] == [19, 17, 10, 15]
 
 

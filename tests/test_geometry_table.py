@@ -10,16 +10,30 @@ from benchmarks.costs import meter
 RESULTS = {
     "sample": {
         "stages": {"frames": {"seconds": 3.2, "peak_mb": 411}, "texture": {"seconds": 25.0, "peak_mb": 1900}},
-        "stopped": None, "cameras": {"frames": 60, "registered_percent": 100.0, "reprojection_px": 0.5,
-                    "against_truth": {"centre_error_median_percent": 0.1234, "rotation_error_median_deg": 0.11,
-                                      "focal_px": 918.0, "true_focal_px": 933.0}},
+        "stopped": None,
+        "cameras": {
+            "frames": 60,
+            "registered_percent": 100.0,
+            "reprojection_px": 0.5,
+            "against_truth": {
+                "centre_error_median_percent": 0.1234,
+                "rotation_error_median_deg": 0.11,
+                "focal_px": 918.0,
+                "true_focal_px": 933.0,
+            },
+        },
         "scan": {"own": {}, "against_truth": {"by_cameras": {"median_mm": 0.61, "p90_mm": 1.2, "p95_mm": 1.9}}},
         "head": {"not_measured": "ValueError: no mesh"},
-        "texture": {"own": {},
-                    "alone": {"aligned": {"psnr": 41.8, "ssim": 0.973, "detail": 0.965, "mole_contrast": None,
-                                          "seconds": 20.0},
-                              "perceptual": {"not_run": "The network is not installed. Install it."}}}},
-    "bust": {"stages": {}, "stopped": {"stage": "frames", "problem": "No face was found.", "remedy": "Film a face."}}}
+        "texture": {
+            "own": {},
+            "alone": {
+                "aligned": {"psnr": 41.8, "ssim": 0.973, "detail": 0.965, "mole_contrast": None, "seconds": 20.0},
+                "perceptual": {"not_run": "The network is not installed. Install it."},
+            },
+        },
+    },
+    "bust": {"stages": {}, "stopped": {"stage": "frames", "problem": "No face was found.", "remedy": "Film a face."}},
+}
 
 
 def rows(text):
@@ -45,11 +59,17 @@ def test_figures_dashes_and_reasons():
 
 
 def test_what_is_published_makes_the_same_tables(tmp_path):
-    long = {**RESULTS,
-            "bust": {**RESULTS["bust"], "head": {"own": {"median_mm": 0.217, "folds": [1, 2], "shapes": 40}},
-                     "picture": "bust.jpg"}}
-    figures.write_record(tmp_path / "geometry.json", "geometry", "python -m benchmarks.geometry FOLDER",
-                         geometry_table.published(long))
+    long = {
+        **RESULTS,
+        "bust": {
+            **RESULTS["bust"],
+            "head": {"own": {"median_mm": 0.217, "folds": [1, 2], "shapes": 40}},
+            "picture": "bust.jpg",
+        },
+    }
+    figures.write_record(
+        tmp_path / "geometry.json", "geometry", "python -m benchmarks.geometry FOLDER", geometry_table.published(long)
+    )
     assert geometry_table.table(figures.read_record("geometry", tmp_path)["figures"]) == geometry_table.table(long)
 
 

@@ -33,14 +33,29 @@ def with_rims(srgb: np.ndarray, thick: int = 4) -> np.ndarray:
     middles = [marks[list(corners)].mean(0) for corners in (faces.RIGHT_EYE, faces.LEFT_EYE)]
     reach = 0.36 * np.linalg.norm(middles[1] - middles[0])
     for middle in middles:
-        cv2.circle(over, np.round(middle + [0, 0.15 * reach]).astype(int).tolist(), round(reach), (0.03, 0.03, 0.03),
-                   thick, cv2.LINE_AA)
+        cv2.circle(
+            over,
+            np.round(middle + [0, 0.15 * reach]).astype(int).tolist(),
+            round(reach),
+            (0.03, 0.03, 0.03),
+            thick,
+            cv2.LINE_AA,
+        )
     across = (middles[1] - middles[0]) / np.linalg.norm(middles[1] - middles[0])
-    ends = [(middles[0] + reach * across, middles[1] - reach * across), (middles[0] - reach * across, marks[234]),
-            (middles[1] + reach * across, marks[454])]
+    ends = [
+        (middles[0] + reach * across, middles[1] - reach * across),
+        (middles[0] - reach * across, marks[234]),
+        (middles[1] + reach * across, marks[454]),
+    ]
     for a, b in ends:
-        cv2.line(over, np.round(a).astype(int).tolist(), np.round(b).astype(int).tolist(), (0.03, 0.03, 0.03), thick,
-                 cv2.LINE_AA)
+        cv2.line(
+            over,
+            np.round(a).astype(int).tolist(),
+            np.round(b).astype(int).tolist(),
+            (0.03, 0.03, 0.03),
+            thick,
+            cv2.LINE_AA,
+        )
     return over
 
 
@@ -63,7 +78,7 @@ def test_rims_are_told_from_a_bare_face():
 
 def test_a_capture_with_glasses_is_refused_and_the_artist_can_overrule_it(tmp_path):
     worn = with_rims(FACE)
-    pictures = [worn[k:k + 260, 2 * k:2 * k + 280] for k in range(0, 40, 10)]
+    pictures = [worn[k : k + 260, 2 * k : 2 * k + 280] for k in range(0, 40, 10)]
     with pytest.raises(Problem, match="wears glasses in 4 of 4 frames") as raised:
         take(tmp_path, pictures)
     assert "without glasses" in raised.value.remedy and "no_glasses" in raised.value.remedy
@@ -108,8 +123,10 @@ def test_what_lies_behind_the_head_is_not_drawn():
     camera = pycolmap.Camera(model="PINHOLE", width=200, height=200, params=[300, 300, 100, 100])
     view = View("", Path(), camera, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0, 0, 0.4]), True)
     bare = np.full((200, 200, 3), 0.5, np.float32)
-    shown = [glasses.put_on(bare, view, np.full((200, 200), depth), pair, 1.0, np.random.default_rng(1))
-             for depth in (9.0, 0.1)]
+    shown = [
+        glasses.put_on(bare, view, np.full((200, 200), depth), pair, 1.0, np.random.default_rng(1))
+        for depth in (9.0, 0.1)
+    ]
     pixels, _ = view.project(np.concatenate(pair.rims))
     rows, columns = pixels.astype(int).T[::-1]
     assert shown[0][rows, columns].mean() < 0.35, "black rims where the rims project"

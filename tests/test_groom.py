@@ -27,14 +27,18 @@ def upper_lids(vertices: np.ndarray, asset) -> np.ndarray:
 def write_strands(folder, vertices: np.ndarray, asset, count: int = 40) -> dict[str, np.ndarray]:
     """Straight hairs of 6 mm off the skin above the eyes, and lashes before them; their points by part."""
     rng = np.random.default_rng(1)
-    above = vertices[(np.abs(vertices[:, 0]) < 0.05) & (vertices[:, 2] > 0.012) & (vertices[:, 2] < 0.022)
-                     & (vertices[:, 1] < -0.02)]
+    above = vertices[
+        (np.abs(vertices[:, 0]) < 0.05) & (vertices[:, 2] > 0.012) & (vertices[:, 2] < 0.022) & (vertices[:, 1] < -0.02)
+    ]
     points, arrays = {}, {}
     for part, places in (("brows", above), ("lashes", upper_lids(vertices, asset))):
         roots = places[rng.choice(len(places), count)]
         points[part] = (roots[:, None] + np.linspace(0, 0.006, 5)[None, :, None] * [0, -1.0, 0.2]).astype(np.float32)
-        arrays |= {f"{part}_points": points[part], f"{part}_radius": np.full((count, 5), 4e-5, np.float32),
-                   f"{part}_colour": np.full((count, 3), 0.03, np.float32)}
+        arrays |= {
+            f"{part}_points": points[part],
+            f"{part}_radius": np.full((count, 5), 4e-5, np.float32),
+            f"{part}_colour": np.full((count, 3), 0.03, np.float32),
+        }
     with replacing(folder / "strands.npz") as temporary, open(temporary, "wb") as file:
         np.savez_compressed(file, **arrays)
     return points
@@ -215,15 +219,31 @@ def test_hair_goes_out_and_comes_back_by_blenders_own_exporters(strands, addon, 
     assert counts == [40, 40]
 
 
-@pytest.mark.parametrize("harm, told", [
-    (lambda path: path.unlink(), "no hair to grow yet"), (lambda path: path.write_bytes(b"PK no zip"), "is damaged"),
-    (lambda path: np.savez(path, brows_points=np.zeros((2, 3)), brows_radius=np.zeros(2),
-                           brows_colour=np.zeros((2, 3))), "is damaged"),
-    (lambda path: path.write_bytes(path.read_bytes()[:900] + b"\0" * 40 + path.read_bytes()[940:]), "is damaged"),
-    (lambda path: np.savez(path, brows_points=np.zeros((2, 5, 3)), brows_radius=np.full((2, 5), np.nan),
-                           brows_colour=np.zeros((2, 3))), "is damaged"),
-    (lambda path: np.savez_compressed(path, brows_points=np.zeros(40 << 20)), "more than 256 MB"),
-    (lambda path: np.savez(path, nothing=np.zeros(1)), "No brows and no beard")])
+@pytest.mark.parametrize(
+    "harm, told",
+    [
+        (lambda path: path.unlink(), "no hair to grow yet"),
+        (lambda path: path.write_bytes(b"PK no zip"), "is damaged"),
+        (
+            lambda path: np.savez(
+                path, brows_points=np.zeros((2, 3)), brows_radius=np.zeros(2), brows_colour=np.zeros((2, 3))
+            ),
+            "is damaged",
+        ),
+        (lambda path: path.write_bytes(path.read_bytes()[:900] + b"\0" * 40 + path.read_bytes()[940:]), "is damaged"),
+        (
+            lambda path: np.savez(
+                path,
+                brows_points=np.zeros((2, 5, 3)),
+                brows_radius=np.full((2, 5), np.nan),
+                brows_colour=np.zeros((2, 3)),
+            ),
+            "is damaged",
+        ),
+        (lambda path: np.savez_compressed(path, brows_points=np.zeros(40 << 20)), "more than 256 MB"),
+        (lambda path: np.savez(path, nothing=np.zeros(1)), "No brows and no beard"),
+    ],
+)
 def test_hair_that_is_not_there_or_damaged_is_said(capture, strands, addon, harm, told):
     harm(capture / "maps" / "strands.npz")
     with pytest.raises(RuntimeError, match=told):

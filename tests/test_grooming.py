@@ -79,8 +79,9 @@ def groomed(cover: float, seed: int = 0) -> tuple[dict, np.ndarray]:
     skin = np.broadcast_to(SKIN, (SIZE, SIZE, 3)).astype(np.float32)
     albedo = (1 - mask[..., None]) * skin + mask[..., None] * HAIR
     none = np.zeros((SIZE, SIZE), np.float32)
-    maps = HeadMaps(albedo.astype(np.float32), none[..., None] + [0, 0, 1], none, none + 1,
-                    none[..., None] + np.ones(3), none + 1)
+    maps = HeadMaps(
+        albedo.astype(np.float32), none[..., None] + [0, 0, 1], none, none + 1, none[..., None] + np.ones(3), none + 1
+    )
     return grooming.groom(maps, Hair(mask, none, none, none), skin, surface(), seed), mask
 
 

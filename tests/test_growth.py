@@ -41,8 +41,14 @@ def found(skin: np.ndarray, layers: list[tuple[np.ndarray, np.ndarray]], parts: 
     for share, colour in layers:
         albedo = albedo * (1 - share[..., None]) + share[..., None] * colour
     one = np.ones((SIZE, SIZE), np.float32)
-    maps = HeadMaps(albedo.astype(np.float32), one[..., None] * [0, 0, 1], 0.35 * one, 0.7 * one,
-                    np.repeat(one[..., None], 3, 2), one)
+    maps = HeadMaps(
+        albedo.astype(np.float32),
+        one[..., None] * [0, 0, 1],
+        0.35 * one,
+        0.7 * one,
+        np.repeat(one[..., None], 3, 2),
+        one,
+    )
     return hair.find(maps, surface(), parts)
 
 
@@ -52,10 +58,16 @@ def answer(brows: float = 0.0, beard: float = 0.0) -> np.ndarray:
     return np.stack([brows * where_brows, beard * where_beard, np.zeros((SIZE, SIZE))], -1).astype(np.float32)
 
 
-@pytest.mark.parametrize(("skin", "colour", "sure", "mean", "spread"), [
-    (LIGHT, BLACK, 0.8, 0.4, 0.25), (DARK, WHITE, 0.8, 0.4, 0.25), (LIGHT, WHITE, 0.8, 0.4, 0.25),
-    (LIGHT, BLACK, 0.3, 0.12, 0.05)],
-    ids=["dark beard", "white beard on dark skin", "white beard on light skin", "stubble"])
+@pytest.mark.parametrize(
+    ("skin", "colour", "sure", "mean", "spread"),
+    [
+        (LIGHT, BLACK, 0.8, 0.4, 0.25),
+        (DARK, WHITE, 0.8, 0.4, 0.25),
+        (LIGHT, WHITE, 0.8, 0.4, 0.25),
+        (LIGHT, BLACK, 0.3, 0.12, 0.05),
+    ],
+    ids=["dark beard", "white beard on dark skin", "white beard on light skin", "stubble"],
+)
 def test_a_beard_covers_as_much_as_was_painted(skin, colour, sure, mean, spread):
     """Within 0.06 in the mean, with black brows above it; nothing is found beside it."""
     where_brows, where = regions()
@@ -70,7 +82,7 @@ def test_a_bare_chin_that_the_parser_doubts_has_no_beard_whatever_moles_it_has()
     where_brows, where = regions()
     mole = np.zeros((SIZE, SIZE))
     v, u = np.unravel_index(cv2.distanceTransform(where.astype(np.uint8), cv2.DIST_L2, 5).argmax(), where.shape)
-    mole[v:v + 2, u:u + 2] = 1
+    mole[v : v + 2, u : u + 2] = 1
     seen = found(LIGHT, [(strewn(where_brows, 0.6, 0.3, 1), BLACK), (mole, BLACK)], answer(0.8, 0.1))
     assert where[mole > 0].all() and seen.beard[where].mean() < 0.01 and seen.beard[mole > 0].max() < 0.1
 

@@ -19,12 +19,16 @@ from .conftest import ROOT
 PAGES = {path.name: path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs" / "guide").glob("*.md"))}
 MESSAGES = re.findall(r"^\| (?!message|---|\*\*)(.+?) \|", PAGES["trouble.md"], flags=re.MULTILINE)
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PROSE = "\n".join(re.sub(r"^\| message.*?\n\n", "", text, flags=re.MULTILINE | re.DOTALL)
-                  for text in (*PAGES.values(), README))
+PROSE = "\n".join(
+    re.sub(r"^\| message.*?\n\n", "", text, flags=re.MULTILINE | re.DOTALL) for text in (*PAGES.values(), README)
+)
 BUTTONS = sorted({name.rstrip(".,:") for name in re.findall(r"\*\*(.+?)\*\*", PROSE, flags=re.DOTALL)})
 NOT_BUTTONS = {"WildCap"}  # the tab
-COMMANDS = re.findall(r"^    .*?(?:-m core|--command wildcap) (.*)$",
-                      (ROOT / "docs" / "terminal.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+COMMANDS = re.findall(
+    r"^    .*?(?:-m core|--command wildcap) (.*)$",
+    (ROOT / "docs" / "terminal.md").read_text(encoding="utf-8"),
+    flags=re.MULTILINE,
+)
 OF_BLENDER = {"contact_sheet", "relight", "turntable"}
 """Words that the add-on alone knows; its others hand their options on."""
 
@@ -52,8 +56,10 @@ def test_a_message_of_the_guide_is_one_that_is_said(message):
 @pytest.mark.parametrize("button", BUTTONS)
 def test_a_button_of_the_guide_is_there(button):
     name = " ".join(button.split())
-    said = {each.replace("_", " ").casefold()
-            for each in (*sentences(), *(setting.rpartition(".")[2] for setting in known_settings()))}
+    said = {
+        each.replace("_", " ").casefold()
+        for each in (*sentences(), *(setting.rpartition(".")[2] for setting in known_settings()))
+    }
     assert name in NOT_BUTTONS or name.casefold() in said, name
 
 
@@ -85,8 +91,10 @@ def anchors(path: Path) -> set[str]:
 
 @pytest.mark.parametrize("page", docs(), ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_links_and_pictures_lead_somewhere(page):
-    for target, anchor in re.findall(r"\]\((?!https?:|mailto:)([^)#\s]*)(?:#([^)\s]+))?\)",
-                                     re.sub(r"`[^`\n]*`", "", page.read_text(encoding="utf-8"))):
+    for target, anchor in re.findall(
+        r"\]\((?!https?:|mailto:)([^)#\s]*)(?:#([^)\s]+))?\)",
+        re.sub(r"`[^`\n]*`", "", page.read_text(encoding="utf-8")),
+    ):
         there = page if not target else page.parent / target
         assert there.exists(), target
         assert not anchor or anchor in anchors(there), f"{target}#{anchor}"

@@ -53,8 +53,11 @@ colorspaces:
 
 def install(profile: Path) -> Path:
     """The built zip unpacked as an extension of a profile; its folder."""
-    subprocess.run([sys.executable, str(TOOL), "build", "--source-dir", str(ROOT), "--output-dir", str(profile)],
-                   check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, str(TOOL), "build", "--source-dir", str(ROOT), "--output-dir", str(profile)],
+        check=True,
+        capture_output=True,
+    )
     folder = profile / "extensions" / "user_default" / "wildcap"
     with zipfile.ZipFile(next(profile.glob("*.zip"))) as file:
         file.extractall(folder)
@@ -63,10 +66,21 @@ def install(profile: Path) -> Path:
 
 def spend(profile: Path, *words: str, before: tuple[str, ...] = (), **environment: str) -> tuple[dict, str]:
     """What habits.py saw under these circumstances, and all that was printed."""
-    variables = {**os.environ, "BLENDER_USER_RESOURCES": str(profile), "HOME": str(profile),
-                 "PYTHONDONTWRITEBYTECODE": "1", **environment}
-    result = subprocess.run([*before, sys.executable, str(ROOT / "tests" / "habits.py"), *words], env=variables,
-                            cwd=profile, capture_output=True, text=True, timeout=300)
+    variables = {
+        **os.environ,
+        "BLENDER_USER_RESOURCES": str(profile),
+        "HOME": str(profile),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        **environment,
+    }
+    result = subprocess.run(
+        [*before, sys.executable, str(ROOT / "tests" / "habits.py"), *words],
+        env=variables,
+        cwd=profile,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     printed = "".join(text.split("Started.\n")[-1] for text in (result.stdout, result.stderr))
     found = [line.removeprefix("SEEN ") for line in result.stdout.splitlines() if line.startswith("SEEN ")]
     assert result.returncode == 0 and found and "Traceback" not in printed, printed[-4000:]
@@ -110,8 +124,11 @@ def test_a_studios_own_colour_configuration(tmp_path):
     install(tmp_path)
     (tmp_path / "studio.ocio").write_text(CONFIGURATION, encoding="utf-8")
     seen, printed = spend(tmp_path, OCIO=str(tmp_path / "studio.ocio"))
-    assert seen["spaces"] == {"WildCap Albedo": "Studio Picture", "WildCap Specular": "Studio Numbers",
-                              "WildCap Normal": "Studio Numbers"}
+    assert seen["spaces"] == {
+        "WildCap Albedo": "Studio Picture",
+        "WildCap Specular": "Studio Numbers",
+        "WildCap Normal": "Studio Numbers",
+    }
     assert seen["mask_space"] == "Studio Numbers" and seen["mask"] == 0.5 and seen["render"]
     assert "no sRGB by a known name" in printed and "no view without a look" in printed, "the artist is told"
 
@@ -128,6 +145,7 @@ assert locale.str(1.5) == "1,5"
 import pytest
 sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "tests/test_camera_import.py::test_known_cameras_come_back_exactly"]))
 """
-    result = subprocess.run([sys.executable, "-c", code], env={**os.environ, **environment}, cwd=ROOT,
-                            capture_output=True, text=True)
+    result = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **environment}, cwd=ROOT, capture_output=True, text=True
+    )
     assert result.returncode == 0 and "passed" in result.stdout, result.stdout[-3000:]

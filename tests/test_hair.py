@@ -68,9 +68,12 @@ def test_the_skin_below_is_nearer_to_the_skin_painted_without_hair(heads, found)
         assert cleaned[share == 0].tobytes() == heads[name].diffuse[share == 0].tobytes()
         hairy = darker(heads[name], heads["hairless"]) > 0.05
         hairy &= template.mask("scalp", SIZE) < 0.01
-        off = [np.abs(images.linear_to_srgb(albedo[hairy])
-                      - images.linear_to_srgb(heads["hairless"].diffuse[hairy])).mean()
-               for albedo in (heads[name].diffuse, cleaned)]
+        off = [
+            np.abs(
+                images.linear_to_srgb(albedo[hairy]) - images.linear_to_srgb(heads["hairless"].diffuse[hairy])
+            ).mean()
+            for albedo in (heads[name].diffuse, cleaned)
+        ]
         assert off[1] < 0.75 * off[0], (name, off)
         assert share[template.mask("lips", SIZE) > 0.9].mean() < 0.02
 
@@ -96,5 +99,6 @@ def test_the_stage_writes_the_masks_and_the_clean_albedo(heads, tmp_path):
     assert report.figures["beard_cm2"] > 1 and report.figures["completed_share_percent"] > 20
     written = {path.name for path in capture.maps_4k.iterdir()}
     assert written == {*stages.MAPS, "brows.png", "lashes.png", "beard.png", "clean_albedo.png", stages.STRANDS}
-    assert all(capture.picture("upscale", name).is_file()
-               for name in ("before_and_after_completion", "albedo_hair_skin_below"))
+    assert all(
+        capture.picture("upscale", name).is_file() for name in ("before_and_after_completion", "albedo_hair_skin_below")
+    )

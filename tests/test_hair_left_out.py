@@ -54,8 +54,9 @@ def sees(monkeypatch, module, views, head, mask, otherwise=None):
     def parse(srgb, landmarks):
         assert landmarks.shape == (468, 2)
         share = shown[round(float(srgb.mean()) * 10) - 1]
-        return SimpleNamespace(of=lambda *names: share if "hair" in names else 0 * share,
-                               known=lambda: np.ones_like(share))
+        return SimpleNamespace(
+            of=lambda *names: share if "hair" in names else 0 * share, known=lambda: np.ones_like(share)
+        )
 
     monkeypatch.setattr(module.parser, "parse", parse)
 
@@ -63,8 +64,7 @@ def sees(monkeypatch, module, views, head, mask, otherwise=None):
 @pytest.fixture
 def observations(views, head):
     surface = head.unfold(SIZE)
-    return [observe(view, hold(np.full((view.height, view.width, 3), 0.5)), surface, 1.0)
-            for view in views], surface
+    return [observe(view, hold(np.full((view.height, view.width, 3), 0.5)), surface, 1.0) for view in views], surface
 
 
 def left_out(seen, surface) -> np.ndarray:
@@ -109,14 +109,16 @@ def test_a_strand_that_one_view_shows_counts_in_that_one(monkeypatch, views, hea
 
     def with_strand(share):
         share = share.copy()
-        share[:, share.shape[1] // 2 - 12:share.shape[1] // 2 + 12] = 1
+        share[:, share.shape[1] // 2 - 12 : share.shape[1] // 2 + 12] = 1
         return share
 
     sees(monkeypatch, parts_shown, views, head, scalp, {1: with_strand})
     left_out(seen, surface)
     face = (template.mask("face", SIZE) > 0.5) & (foreign_edge(scalp) + scalp < 0.5)
-    lost = [(face & (was > 0) & (o.weight < 0.5 * was)).sum() / (face & (was > 0)).sum()
-            for o, was in zip(seen, before, strict=True)]
+    lost = [
+        (face & (was > 0) & (o.weight < 0.5 * was)).sum() / (face & (was > 0)).sum()
+        for o, was in zip(seen, before, strict=True)
+    ]
     assert lost[1] > 0.05 and max(lost[:1] + lost[2:]) < 0.02
 
 

@@ -20,9 +20,13 @@ from .test_delight import SUN, render_frames, write_cameras
 
 SIZE = 64
 STAGES = ("delight", "texture", "shadow_mask", "solve", "upscale", "transfer")
-SETTINGS = {"delight": {"delighter": "shading"}, "texture": {"size": 256},
-            "solve": {**SHORT, "skin_tone": "auto", "steps": 4}, "transfer": {"scan": False},
-            "upscale": {"size": 1024, "method": "lanczos"}}
+SETTINGS = {
+    "delight": {"delighter": "shading"},
+    "texture": {"size": 256},
+    "solve": {**SHORT, "skin_tone": "auto", "steps": 4},
+    "transfer": {"scan": False},
+    "upscale": {"size": 1024, "method": "lanczos"},
+}
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +57,9 @@ def test_what_is_worked_out_from_a_head_is_the_rasters_own_and_made_once():
     face, bary = raster.rasterize_uv(mesh, SIZE)
     assert np.array_equal(head.raster(SIZE)[0], face) and np.array_equal(head.raster(SIZE)[1], bary)
     assert head.raster(SIZE)[0] is head.raster(SIZE)[0] and head.normals is head.normals and head.caster is head.caster
-    assert np.array_equal(head.interpolate(mesh.vertices, SIZE),
-                          raster.interpolate(mesh.vertices, mesh.faces, face, bary))
+    assert np.array_equal(
+        head.interpolate(mesh.vertices, SIZE), raster.interpolate(mesh.vertices, mesh.faces, face, bary)
+    )
     surface = head.unfold(SIZE)
     assert np.array_equal(surface.covered, face >= 0)
     assert np.array_equal(surface.points, head.interpolate(mesh.vertices, SIZE)[surface.covered])
@@ -68,8 +73,17 @@ def test_what_is_shared_cannot_be_written_to(tmp_path):
     meshes.write_obj(capture.head, template.load())
     head = read_head(capture)
     surface = head.unfold(SIZE)
-    for array in (head.mesh.vertices, head.mesh.faces, head.mesh.uvs, head.mesh.face_uvs, head.normals,
-                  *head.raster(SIZE), surface.points, surface.normals, surface.covered):
+    for array in (
+        head.mesh.vertices,
+        head.mesh.faces,
+        head.mesh.uvs,
+        head.mesh.face_uvs,
+        head.normals,
+        *head.raster(SIZE),
+        surface.points,
+        surface.normals,
+        surface.covered,
+    ):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
     assert head.built_in

@@ -28,8 +28,9 @@ def blenders(vertices, faces) -> set:
 
 
 def test_two_triangles_through_each_other_are_found():
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, -1], [0.3, 0.2, 1], [0.2, 0.3, 1], [2, 0, 0],
-                         [2, 1, 0.0]])
+    vertices = np.array(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, -1], [0.3, 0.2, 1], [0.2, 0.3, 1], [2, 0, 0], [2, 1, 0.0]]
+    )
     faces = np.array([[0, 1, 2], [3, 4, 5], [1, 6, 7]])
     assert intersections.intersecting(vertices, faces).tolist() == [[0, 1]]
     assert len(intersections.intersecting(vertices + [0, 0, 5 * 1], faces[[0, 2]])) == 0
@@ -104,7 +105,8 @@ def _eyes_opened(truth, points, lids):
         inside = (across**2 + ((truth - middle)[:, 2] / 0.007) ** 2 < 1) & near
         changed[inside, 1] += 0.004
     rims = np.array(eyes.LID_MARKS)
-    middles = np.where((marks[rims, 0] < points[[33, 263], 0].mean())[:, None], points[[33, 133]].mean(0),
-                       points[[263, 362]].mean(0))
+    middles = np.where(
+        (marks[rims, 0] < points[[33, 263], 0].mean())[:, None], points[[33, 133]].mean(0), points[[263, 362]].mean(0)
+    )
     marks[rims, 2] += np.where(marks[rims, 2] > middles[:, 2], 0.005, -0.003)
     return changed, marks

@@ -30,10 +30,10 @@ def test_a_brightened_picture_is_its_linear_values_times_the_gain(tmp_path):
     images.write_srgb(path, np.random.default_rng(0).random((256, 256, 3), np.float32), bits=16)
     gain = np.array([0.2, -0.1, 0.03])
     brighter = read_held(path).brightened(gain)
-    assert np.array_equal(brighter.linear(ROWS, COLUMNS),
-                          (images.read_linear(path) * np.exp(gain)).astype(np.float32))
-    assert np.array_equal(brighter.linear(ROWS, COLUMNS),
-                          hold(images.read_linear(path)).brightened(gain).linear(ROWS, COLUMNS))
+    assert np.array_equal(brighter.linear(ROWS, COLUMNS), (images.read_linear(path) * np.exp(gain)).astype(np.float32))
+    assert np.array_equal(
+        brighter.linear(ROWS, COLUMNS), hold(images.read_linear(path)).brightened(gain).linear(ROWS, COLUMNS)
+    )
 
 
 def test_of_a_picture_no_more_is_kept_than_the_head_with_a_margin_and_there_nothing_changes(tmp_path):

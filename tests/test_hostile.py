@@ -27,8 +27,19 @@ def test_hostile_inputs_do_no_harm():
     """Others each time; what is printed of a fault tells the seed, and WILDCAP_HOSTILE=COUNT:SEED tries the same ones
     again."""
     count, _, seed = os.environ.get("WILDCAP_HOSTILE", f"25:{secrets.randbelow(1_000_000)}").partition(":")
-    command = [sys.executable, "-m", "benchmarks.hostile", "--count", count, "--seed", seed, "--until", "scan",
-               "--delighter", "none"]
+    command = [
+        sys.executable,
+        "-m",
+        "benchmarks.hostile",
+        "--count",
+        count,
+        "--seed",
+        seed,
+        "--until",
+        "scan",
+        "--delighter",
+        "none",
+    ]
     ended = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
     assert ended.returncode == 0, ended.stdout[-4000:] + ended.stderr[-2000:]
 
@@ -44,13 +55,21 @@ def case(tmp_path) -> Case:
     (root / "written.jsonl").write_text(json.dumps({"path": "head.obj", "hash": "x"}) + "\n")
     (place / "brought").mkdir()
     (place / "brought" / "mask.png").write_bytes(b"spoiled")
-    return Case(place, ["mask", "import", str(root), "mask.png"], place / "brought" / "mask.png", ("mask.png",),
-                ("head.obj",), "", b"spoiled")
+    return Case(
+        place,
+        ["mask", "import", str(root), "mask.png"],
+        place / "brought" / "mask.png",
+        ("mask.png",),
+        ("head.obj",),
+        "",
+        b"spoiled",
+    )
 
 
 def ended(code: int, errors: str = "", **other) -> Ended:
-    return Ended(**{"code": code, "output": errors, "errors": errors, "seconds": 1.0, "peak": 1 << 28, "hung": False,
-                    **other})
+    return Ended(
+        **{"code": code, "output": errors, "errors": errors, "seconds": 1.0, "peak": 1 << 28, "hung": False, **other}
+    )
 
 
 def test_the_judge_is_content_with_a_good_end_and_with_a_refusal_that_names_the_file(case):
@@ -58,12 +77,18 @@ def test_the_judge_is_content_with_a_good_end_and_with_a_refusal_that_names_the_
     assert hostile_run.judge(case, ended(2, "mask.png is damaged.\nSave it again.\n")) == []
 
 
-@pytest.mark.parametrize(("found", "words"), [
-    (ended(1, "Traceback (most recent call last):\n  x\n"), "traceback"), (ended(-11), "SIGSEGV"),
-    (ended(0, hung=True), "did not end"),
-    (ended(0, peak=5 << 30), "GB"), (ended(2, "An error inside WildCap stopped it.\nRun again.\n"), "inside WildCap"),
-    (ended(2, "A picture is damaged.\nSave it again.\n"), "does not name mask.png"),
-    (ended(2, "mask.png is damaged\n"), "no problem and remedy")])
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (ended(1, "Traceback (most recent call last):\n  x\n"), "traceback"),
+        (ended(-11), "SIGSEGV"),
+        (ended(0, hung=True), "did not end"),
+        (ended(0, peak=5 << 30), "GB"),
+        (ended(2, "An error inside WildCap stopped it.\nRun again.\n"), "inside WildCap"),
+        (ended(2, "A picture is damaged.\nSave it again.\n"), "does not name mask.png"),
+        (ended(2, "mask.png is damaged\n"), "no problem and remedy"),
+    ],
+)
 def test_the_judge_finds_every_bad_end(case, found, words):
     assert any(words in fault for fault in hostile_run.judge(case, found))
 

@@ -39,8 +39,10 @@ def test_on_ict_facekit_with_random_weights_of_the_released_shape(capture, ict_f
     if not weights.is_dir():
         pytest.skip(f"{weights} is missing")
     meshes.write_obj(capture.head, person()[0])
-    for theirs, ours in ((ict_fitted[0].own_head, capture.own_head),
-                         (ict_fitted[0].own_head_skin, capture.own_head_skin)):
+    for theirs, ours in (
+        (ict_fitted[0].own_head, capture.own_head),
+        (ict_fitted[0].own_head_skin, capture.own_head_skin),
+    ):
         shutil.copyfile(theirs, ours)
     kept = seen_layouts(monkeypatch)
     solve.run(capture, settings(weights, steps=6), Reporter("solve"))

@@ -84,9 +84,10 @@ def _targets(file: str, node: ast.ImportFrom) -> list[str]:
     package = file.split("/")[:-1]
     assert node.level <= len(package) + 1, f"{file}:{node.lineno} climbs out of the repository"
     # [] is the extension itself
-    base = package[:len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
-    return list(dict.fromkeys(".".join([*base, alias.name] if _is_module(*base, alias.name) else base)
-                              for alias in node.names))
+    base = package[: len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
+    return list(
+        dict.fromkeys(".".join([*base, alias.name] if _is_module(*base, alias.name) else base) for alias in node.names)
+    )
 
 
 @cache
@@ -117,8 +118,12 @@ def _none(offending):
 
 
 def test_core_imports_itself_relatively_and_never_climbs_above_itself():
-    _none(i for i in CORE if (i.level and i.target.split(".")[0] != "core")
-          or (not i.level and i.target.split(".")[0] in ("core", "wildcap_addon")))
+    _none(
+        i
+        for i in CORE
+        if (i.level and i.target.split(".")[0] != "core")
+        or (not i.level and i.target.split(".")[0] in ("core", "wildcap_addon"))
+    )
 
 
 def test_core_knows_nothing_of_blender():
@@ -160,8 +165,9 @@ def test_no_module_imports_itself_in_a_circle():
     found = imports("__init__.py", "core", "wildcap_addon", "benchmarks")
     edges: dict[str, set[str]] = {}
     for i in found:
-        edges.setdefault(i.file.removesuffix(".py").replace("/", ".").removesuffix("__init__").removesuffix("."),
-                         set()).add(i.target)
+        edges.setdefault(
+            i.file.removesuffix(".py").replace("/", ".").removesuffix("__init__").removesuffix("."), set()
+        ).add(i.target)
     assert len(edges) > 300 and "" in edges, "the extension's root is one of them"
     while leaves := {name for name, targets in edges.items() if not targets & edges.keys()}:
         edges = {name: targets for name, targets in edges.items() if name not in leaves}
@@ -170,8 +176,11 @@ def test_no_module_imports_itself_in_a_circle():
 
 def test_the_add_on_imports_of_core_the_ground_floor_only():
     assert any(i.target.startswith("core.") for i in ADDON)
-    _none(i for i in ADDON if i.target.split(".")[0] == "core"
-          and (not i.level or (i.target != "core" and room(i.target) not in GROUND)))
+    _none(
+        i
+        for i in ADDON
+        if i.target.split(".")[0] == "core" and (not i.level or (i.target != "core" and room(i.target) not in GROUND))
+    )
 
 
 def test_the_add_on_imports_itself_relatively():
@@ -179,8 +188,9 @@ def test_the_add_on_imports_itself_relatively():
 
 
 def test_rooms_of_the_add_on_do_not_import_each_other():
-    rooms = {path.name for path in (ROOT / "wildcap_addon").iterdir() if path.is_dir()
-             and (path / "__init__.py").is_file()}
+    rooms = {
+        path.name for path in (ROOT / "wildcap_addon").iterdir() if path.is_dir() and (path / "__init__.py").is_file()
+    }
     inside = [i for i in ADDON if own_room(i.file) in rooms and i.level and i.target.startswith("wildcap_addon.")]
     _none(i for i in inside if room(i.target) in rooms - {own_room(i.file)})
 
@@ -198,6 +208,7 @@ def test_pictures_and_weights_go_through_one_door(folder):
 
 def test_import_targets_are_read_right():
     """The reading itself: a module, a name in a module, and a package."""
+
     def targets(file, source):
         return _targets(file, ast.parse(source).body[0])
 

@@ -63,7 +63,7 @@ class Painted:
         picture = colour * shade[..., None] * lit
         for ball in self.opened.balls:  # a window in the cornea
             x, y = view.project((ball.centre + ball.radius * ball.gaze + [0.0015, 0, 0.0015])[None])[0][0].astype(int)
-            picture[y - 3:y + 3, x - 3:x + 3] = 1
+            picture[y - 3 : y + 3, x - 3 : x + 3] = 1
         return images.linear_to_srgb((picture * (face >= 0)[..., None]).astype(np.float32))
 
     def eyeball(self, side: int) -> Eyeball:
@@ -82,8 +82,9 @@ class Painted:
 
 
 def apart(found, true) -> float:
-    return float(deltaE_ciede2000(*(rgb2lab(images.linear_to_srgb(np.float32(v)).reshape(1, 1, 3))
-                                    for v in (found, true)))[0, 0])
+    return float(
+        deltaE_ciede2000(*(rgb2lab(images.linear_to_srgb(np.float32(v)).reshape(1, 1, 3)) for v in (found, true)))[0, 0]
+    )
 
 
 def test_two_irises_have_the_middle_of_what_was_measured_but_for_a_brown_and_a_blue_one():
@@ -137,7 +138,7 @@ def test_the_iris_is_what_lids_and_pupil_leave_of_it():
     radius = 0.0059 * view.camera.mean_focal_length() / disc
     move = np.array([[1.0, 0, SIDE_PX / 2 - middle[0]], [0, 1.0, SIDE_PX / 2 - middle[1]]])
     share = np.zeros((SIDE_PX, SIDE_PX), np.float32)
-    share[SIDE_PX // 2:] = 1
+    share[SIDE_PX // 2 :] = 1
     rows, columns = iris.find_iris_pixels(view, eye, EyeShares(share, share, move), shape)
     x, y = columns + 0.5 - middle[0], rows + 0.5 - middle[1]
     assert len(rows) == pytest.approx(np.pi * radius**2 * (0.85**2 - 0.55**2) / 2, rel=0.1)

@@ -126,8 +126,9 @@ def test_the_preview_is_read_again_when_it_is_newer(addon, tmp_path):
     for number, colour in enumerate([(255, 0, 0), (0, 255, 0), (0, 0, 255)]):
         picture.write_bytes(standin.plain(colour))
         os.utime(picture, (1e9 + number, 1e9 + number))  # Blender tells thumbnails apart by whole seconds
-        seen.append((preview.icon(picture),
-                     tuple(round(c) for c in preview._icons[str(picture)].image_pixels_float[:3])))
+        seen.append(
+            (preview.icon(picture), tuple(round(c) for c in preview._icons[str(picture)].image_pixels_float[:3]))
+        )
     preview.forget()
     assert len({icon for icon, _ in seen}) == 1
     assert [colour for _, colour in seen] == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]

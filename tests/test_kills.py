@@ -41,8 +41,19 @@ TRIALS = 5
 
 def test_a_handful_of_kills_loses_nothing_and_ends_in_the_same_bytes():
     seed = time.time_ns() % 10**6
-    command = [sys.executable, "-m", "benchmarks.kills", "--count", str(TRIALS), "--seed", str(seed), "--until", "scan",
-               "--delighter", "none"]
+    command = [
+        sys.executable,
+        "-m",
+        "benchmarks.kills",
+        "--count",
+        str(TRIALS),
+        "--seed",
+        str(seed),
+        "--until",
+        "scan",
+        "--delighter",
+        "none",
+    ]
     ended = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
     assert ended.returncode == 0, ended.stdout[-4000:] + ended.stderr[-2000:]
 
@@ -68,9 +79,11 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
     undisturbed.copy(place.parent / "end", place)
     assert kills_judge.judge_kill(place, known) == [] and kills_judge.judge_resume(place, undisturbed, "frames") == []
     for name, content, fault in (
-        ("frames/00000.jpg", b"a fra", "no complete content"), ("frames/00001.jpg", b"", "no complete content"),
+        ("frames/00000.jpg", b"a fra", "no complete content"),
+        ("frames/00001.jpg", b"", "no complete content"),
         ("frames/retouched.psd", b"", "is changed"),
-        ("capture.json", b"{", "is no JSON"), ("report.html", b"<html>", "is cut off"),
+        ("capture.json", b"{", "is no JSON"),
+        ("report.html", b"<html>", "is cut off"),
         ("../anna.txt", b"", "beside the capture is changed"),
         ("preview/albedo.png", b"\x89PNG", "cannot be read"),
         ("checkpoints/solve.safetensors", b"\1", "cannot be read"),
@@ -88,12 +101,17 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
 
 
 def test_the_judge_finds_what_is_left_after_the_run_that_goes_on(place):
-    undisturbed = Undisturbed(place.parent, {}, ("frames",),
-                              known={"frames/00000.jpg": {read_hash(capture_at(place).frames / "00000.jpg")}})
+    undisturbed = Undisturbed(
+        place.parent, {}, ("frames",), known={"frames/00000.jpg": {read_hash(capture_at(place).frames / "00000.jpg")}}
+    )
     place.rename(place.parent / "end")
-    for name, fault in ((".scan.1.tmp.ply", "is left"), ("lock.succeeding", "is left"),
-                        ("kept/frames/00000.jpg", "nobody had changed it"),
-                        ("../stray.txt", "lies beside"), ("lock", "the lock is not free")):
+    for name, fault in (
+        (".scan.1.tmp.ply", "is left"),
+        ("lock.succeeding", "is left"),
+        ("kept/frames/00000.jpg", "nobody had changed it"),
+        ("../stray.txt", "lies beside"),
+        ("lock", "the lock is not free"),
+    ):
         undisturbed.copy(place.parent / "end", place)
         path = capture_at(place).root / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -106,9 +124,11 @@ def test_the_judge_finds_what_is_left_after_the_run_that_goes_on(place):
     assert "the stage cameras is not on record" in kills_judge.judge_resume(place, undisturbed, "cameras")
 
 
-@pytest.mark.parametrize("moment",
-                         [kills_worker.Moment(after_s=0.3), kills_worker.Moment(write=3),
-                          kills_worker.Moment(write=3, late_s=0.05)], ids=str)
+@pytest.mark.parametrize(
+    "moment",
+    [kills_worker.Moment(after_s=0.3), kills_worker.Moment(write=3), kills_worker.Moment(write=3, late_s=0.05)],
+    ids=str,
+)
 def test_a_process_is_struck_at_its_moment(tmp_path, moment):
     def work() -> None:
         for number in range(1000):
@@ -125,8 +145,9 @@ def test_a_process_is_struck_at_its_moment(tmp_path, moment):
 
 def test_a_process_may_be_struck_as_soon_as_it_is_there(tmp_path):
     for _ in range(20):
-        forked = kills_worker.Forked(lambda: time.sleep(60), tmp_path, tmp_path / "told",
-                                     kills_worker.Moment(after_s=0.0))
+        forked = kills_worker.Forked(
+            lambda: time.sleep(60), tmp_path, tmp_path / "told", kills_worker.Moment(after_s=0.0)
+        )
         assert forked.strike() and forked.code == -signal.SIGKILL
 
 
@@ -134,10 +155,12 @@ def test_a_camera_model_that_did_not_fit_on_the_disk_gets_no_name(tmp_path):
     """pycolmap writes what fits, and says nothing of the rest."""
     model = pycolmap.Reconstruction()
     for number in range(1, 20):
-        model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=number, model="PINHOLE", width=720, height=960,
-                                                          params=[900, 900, 360, 480]))
-        model.add_image_with_trivial_frame(pycolmap.Image(name=f"{number:05d}.jpg", camera_id=number, image_id=number),
-                                           pycolmap.Rigid3d(np.eye(4)[:3]))
+        model.add_camera_with_trivial_rig(
+            pycolmap.Camera(camera_id=number, model="PINHOLE", width=720, height=960, params=[900, 900, 360, 480])
+        )
+        model.add_image_with_trivial_frame(
+            pycolmap.Image(name=f"{number:05d}.jpg", camera_id=number, image_id=number), pycolmap.Rigid3d(np.eye(4)[:3])
+        )
     cameras = tmp_path / "cameras"
 
     def attempt() -> None:
@@ -172,6 +195,7 @@ def test_a_checkpoint_that_did_not_fit_on_the_disk_is_told_by_name(tmp_path, mon
 
 def with_limit(most_bytes: int, attempt) -> str:
     """The problem of an attempt, in a process of its own in which no file may be longer; '' for none."""
+
     def work() -> str:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))

@@ -12,12 +12,51 @@ import pytest
 from core.contract import stages
 
 ROOT = Path(__file__).resolve().parent.parent
-TOP = {".ci", ".github", ".gitignore", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md",
-       "__init__.py", "__main__.py", "benchmarks",
-       "blender_manifest.toml", "core", "docs", "farm", "pyproject.toml", "requirements", "tests", "wildcap_addon"}
-ROOMS = {"assets", "batch", "cameras", "contract", "delight", "deliver", "face", "frames", "geometry", "imaging",
-         "light", "registration", "scan",
-         "shadow_mask", "solve", "synthetic", "texture", "training", "transfer", "upscale", "weights", "worker"}
+TOP = {
+    ".ci",
+    ".github",
+    ".gitignore",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "LICENSE",
+    "Makefile",
+    "README.md",
+    "__init__.py",
+    "__main__.py",
+    "benchmarks",
+    "blender_manifest.toml",
+    "core",
+    "docs",
+    "farm",
+    "pyproject.toml",
+    "requirements",
+    "tests",
+    "wildcap_addon",
+}
+ROOMS = {
+    "assets",
+    "batch",
+    "cameras",
+    "contract",
+    "delight",
+    "deliver",
+    "face",
+    "frames",
+    "geometry",
+    "imaging",
+    "light",
+    "registration",
+    "scan",
+    "shadow_mask",
+    "solve",
+    "synthetic",
+    "texture",
+    "training",
+    "transfer",
+    "upscale",
+    "weights",
+    "worker",
+}
 LOOSE = {"README.md", "__init__.py", "__main__.py"}
 """What of core lies in no room."""
 VAGUE = {"util", "utils", "helper", "helpers", "common", "manager", "service", "misc"}
@@ -28,8 +67,12 @@ TREE_BYTES = 66_000_000
 @cache
 def tracked() -> tuple[Path, ...]:
     """The files of the repository, without what git ignores; new ones count before they are committed."""
-    listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT,
-                            capture_output=True, text=True)
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
     if listed.returncode:
         pytest.skip("not a git checkout")
     return tuple(path for path in map(Path, filter(None, listed.stdout.split("\0"))) if (ROOT / path).is_file())
@@ -56,8 +99,11 @@ def test_files_are_read_in_one_sitting():
 
 
 def test_names_say_what_is_in_them():
-    assert not [path for path in tracked()
-                if VAGUE & {*(part.lower() for part in path.parts[:-1]), *path.stem.lower().split("_")}]
+    assert not [
+        path
+        for path in tracked()
+        if VAGUE & {*(part.lower() for part in path.parts[:-1]), *path.stem.lower().split("_")}
+    ]
 
 
 def test_every_source_says_whose_it_is_and_what_it_is():

@@ -58,11 +58,13 @@ def test_one_that_has_ended_is_replaced_at_once_also_where_its_number_went_to_an
 ):
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    texts = [written_by(pid=dead.pid), written_by(began="long ago"),
-             written_by(host=processes.name_host().partition("/")[0] + "/00000000/1"),
-             # the last by 0.1.0
-             json.dumps({"pid": dead.pid, "host": processes.name_host().partition("/")[0],
-                         "start": "2026-11-22T00:00:00"})]
+    texts = [
+        written_by(pid=dead.pid),
+        written_by(began="long ago"),
+        written_by(host=processes.name_host().partition("/")[0] + "/00000000/1"),
+        # the last by 0.1.0
+        json.dumps({"pid": dead.pid, "host": processes.name_host().partition("/")[0], "start": "2026-11-22T00:00:00"}),
+    ]
     for text in texts:
         capture.lock.write_text(text)
         began = time.monotonic()
@@ -102,8 +104,13 @@ def test_one_that_was_killed_while_it_took_a_lease_over_leaves_nothing_beside_it
 def test_a_refresh_that_is_seen_keeps_the_lease_whatever_time_it_tells(capture, monkeypatch):
     monkeypatch.setattr(lease, "TERM_S", 3.0)
     capture.lock.write_text(written_by(host="another machine"))
-    beat = subprocess.Popen([sys.executable, "-c",
-                             f"import os, time; time.sleep(1); os.utime({str(capture.lock)!r}, (5, 5)); time.sleep(1)"])
+    beat = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            f"import os, time; time.sleep(1); os.utime({str(capture.lock)!r}, (5, 5)); time.sleep(1)",
+        ]
+    )
     with pytest.raises(Problem, match="another machine"), capture.locked():
         pass
     beat.wait()
@@ -155,8 +162,9 @@ def test_a_disk_that_does_not_answer_for_a_moment_costs_nobody_the_lease(capture
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has a disk that is always full")
 def test_a_lock_that_does_not_fit_on_the_disk_is_not_left_behind(capture, monkeypatch):
-    monkeypatch.setattr(lease, "open", lambda descriptor, mode: os.close(descriptor) or open("/dev/full", mode),
-                        raising=False)
+    monkeypatch.setattr(
+        lease, "open", lambda descriptor, mode: os.close(descriptor) or open("/dev/full", mode), raising=False
+    )
     with pytest.raises(Problem, match="The disk is full"), capture.locked():
         pass
     assert not capture.lock.exists()
@@ -179,15 +187,20 @@ def test_who_was_replaced_writes_nothing_more(capture):
         write_json(capture.root / "texture.json", 1)
         capture.lock.write_text(written_by())
         before = {path: path.read_bytes() for path in capture.root.iterdir()}
-        for attempt in (lambda: write_json(capture.root / "texture.json", 2),
-                        lambda: capture.forget(["frames"]) or capture.stop("x", Problem("a", "b"))):
+        for attempt in (
+            lambda: write_json(capture.root / "texture.json", 2),
+            lambda: capture.forget(["frames"]) or capture.stop("x", Problem("a", "b")),
+        ):
             with pytest.raises(Problem, match="taken this capture over"):
                 attempt()
         taken = pytest.raises(Problem, match="taken this capture over")
         with taken, replacing(capture.root / "deep" / "new.txt") as temporary:
             temporary.write_text("x")
-        after = {path: path.read_bytes() for path in capture.root.iterdir() if path.is_file()
-                 and path.name != "written.jsonl"}
+        after = {
+            path: path.read_bytes()
+            for path in capture.root.iterdir()
+            if path.is_file() and path.name != "written.jsonl"
+        }
     assert all(before[path] == content for path, content in after.items())
 
 

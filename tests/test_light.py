@@ -34,8 +34,10 @@ def floor(half: float = 0.1, sphere: float | None = None) -> Mesh:
 
 def test_an_open_surface_under_a_white_sky_is_shaded_one_whichever_way_it_faces():
     ball = trimesh.creation.icosphere(2, radius=0.1)
-    found = light.trace_transfer(ball.vertices, ball.vertices / 0.1, RayCaster(Mesh(ball.vertices, ball.faces)),
-                                 rays=512) @ WHITE_SKY
+    found = (
+        light.trace_transfer(ball.vertices, ball.vertices / 0.1, RayCaster(Mesh(ball.vertices, ball.faces)), rays=512)
+        @ WHITE_SKY
+    )
     assert np.allclose(found, 1, atol=0.03)
 
 
@@ -48,9 +50,9 @@ def test_one_direction_of_the_sky_is_lambert_s_answer_to_it():
 
 def test_the_sun_on_a_floor_follows_the_cosine_and_casts_no_shadow():
     rng, sun = np.random.default_rng(0), np.array([0.6, 0, 0.8])
-    shading, shadow, normals = light.bake(floor(), 64,
-                                          light.SkyAndSun(0 * WHITE_SKY, sun, np.array([1.0, 0.5, 0.25]), 0.01), "self",
-                                          rng)
+    shading, shadow, normals = light.bake(
+        floor(), 64, light.SkyAndSun(0 * WHITE_SKY, sun, np.array([1.0, 0.5, 0.25]), 0.01), "self", rng
+    )
     assert np.allclose(shading, 0.8 * np.array([1.0, 0.5, 0.25]) + 0.005, atol=1e-3)
     assert shadow.max() == 0 and np.allclose(normals, [0, 0, 1])
 
@@ -58,8 +60,9 @@ def test_the_sun_on_a_floor_follows_the_cosine_and_casts_no_shadow():
 def test_a_sphere_shades_a_disc_of_its_size_where_the_sun_says_so():
     rng, sun = np.random.default_rng(0), np.array([0.6, 0, 0.8])
     size, half, height = 128, 0.1, 0.08
-    _, shadow, _ = light.bake(floor(half, height), size, light.SkyAndSun(WHITE_SKY, sun, np.ones(3), 0.002), "self",
-                              rng)
+    _, shadow, _ = light.bake(
+        floor(half, height), size, light.SkyAndSun(WHITE_SKY, sun, np.ones(3), 0.002), "self", rng
+    )
     row, column = np.nonzero(shadow > 0.5)
     x, y = ((column + 0.5) / size * 2 - 1) * half, (1 - (row + 0.5) / size * 2) * half
     assert abs(x.mean() + height * 0.6 / 0.8) < 0.002 and abs(y.mean()) < 0.002
@@ -70,8 +73,10 @@ def test_a_sphere_shades_a_disc_of_its_size_where_the_sun_says_so():
 def test_a_larger_sun_softens_the_shadow_s_edge():
     sun = np.array([0.6, 0, 0.8])
     suns = [light.SkyAndSun(WHITE_SKY, sun, np.ones(3), radius) for radius in (0.002, 0.15)]
-    soft = [((s > 0.01) & (s < 0.99)).mean()
-            for s in (light.bake(floor(0.1, 0.08), 96, each, "self", np.random.default_rng(0))[1] for each in suns)]
+    soft = [
+        ((s > 0.01) & (s < 0.99)).mean()
+        for s in (light.bake(floor(0.1, 0.08), 96, each, "self", np.random.default_rng(0))[1] for each in suns)
+    ]
     assert soft[1] > 3 * soft[0]
 
 

@@ -49,8 +49,9 @@ def cost(taken: torch.Tensor, tone: float, shadow: float = 0.0, **recipe) -> flo
     shader = Drawn(taken, mask)
     denoised = torch.full((1, 7, SIZE, SIZE), 2 * tone - 1)
     texture = tone * shader.main(None) * (1 - shadow * mask)
-    o = Observation(texture, torch.ones(SIZE, SIZE), torch.ones(SIZE, SIZE), torch.zeros(1), shader, ring,
-                    missing=MISSING)
+    o = Observation(
+        texture, torch.ones(SIZE, SIZE), torch.ones(SIZE, SIZE), torch.zeros(1), shader, ring, missing=MISSING
+    )
     return float(light_loss(None, denoised, o, replace(RECIPE, **recipe)))
 
 

@@ -22,15 +22,16 @@ SIZE = 32
 def begun(shading) -> Start:
     """A half ball of even albedo 0.4 under `shading`(normal) [3, S, S], as the solver begins it: with the even light of
     the texture's mean."""
-    y, x = (torch.meshgrid(*[torch.linspace(-0.95, 0.95, SIZE)] * 2, indexing="ij"))
+    y, x = torch.meshgrid(*[torch.linspace(-0.95, 0.95, SIZE)] * 2, indexing="ij")
     inside = (x**2 + y**2 < 0.9).float()
     normal = torch.stack([x, -(1 - x**2 - y**2).clamp_min(0.05).sqrt(), -y])
     normal = normal / normal.norm(dim=0)
     reference = torch.cat([torch.full((1, 3, SIZE, SIZE), 2 * 0.4 - 1), torch.zeros(1, 4, SIZE, SIZE)], 1)
     texture = 0.4 * shading(normal, x)
     shader = Shader(normal, torch.zeros(SIZE, SIZE), (4, 4))
-    o = Observation(texture, inside, torch.ones(SIZE, SIZE), torch.zeros(1, 2, SIZE, SIZE), shader,
-                    torch.zeros(SIZE, SIZE))
+    o = Observation(
+        texture, inside, torch.ones(SIZE, SIZE), torch.zeros(1, 2, SIZE, SIZE), shader, torch.zeros(SIZE, SIZE)
+    )
     mean = (texture * inside).sum((1, 2)) / inside.sum() / 0.4
     state = State(0, None, reference, Lights(constant_light(mean), torch.zeros(1, 9, 4, 4), torch.ones(3)))
     return Start(torch.full((3,), 0.4), OURS, reference, 1.0, torch.zeros(SIZE, SIZE), {1: o}, state)
@@ -85,11 +86,20 @@ def test_an_even_sky_is_an_even_irradiance_and_a_point_is_a_cosine():
 
 def test_the_table_marks_the_best_and_its_ties():
     def score(psnr, step):
-        return {"raw": {"psnr": psnr}, "gain": {"psnr": psnr, "ssim": 0.9, "flip": 0.1}, "detail": 0.5,
-                "shadow_step": step}
+        return {
+            "raw": {"psnr": psnr},
+            "gain": {"psnr": psnr, "ssim": 0.9, "flip": 0.1},
+            "detail": 0.5,
+            "shadow_step": step,
+        }
 
-    rows = {"delit": {"wildcap": {"0": score(30.0, -0.1), "1": score(30.4, -0.1)}, "regions 5": {"0": score(29.9, 0.2)},
-                      "texture": {"0": score(29.0, None)}}}
+    rows = {
+        "delit": {
+            "wildcap": {"0": score(30.0, -0.1), "1": score(30.4, -0.1)},
+            "regions 5": {"0": score(29.9, 0.2)},
+            "texture": {"0": score(29.0, None)},
+        }
+    }
     text = comparison_table.table({"people": comparison_table.means([rows, rows])})
     lines = {line.split("|")[1].strip(): line for line in text.splitlines()}
     assert "**30.00**" in lines["delit: wildcap"] and "**-0.10**" in lines["delit: wildcap"]
@@ -103,11 +113,14 @@ def test_the_table_marks_the_best_and_its_ties():
 
 def test_differences_are_taken_person_by_person():
     """Two people who differ by 10 dB, and ours ahead of the texture by 2 dB in one and by 1 in the other."""
+
     def score(psnr, flip):
         return {"raw": {"psnr": psnr}, "gain": {"psnr": psnr, "flip": flip}}
 
-    people = {name: {"delit": {"wildcap": {"0": score(base + ahead, 0.1)}, "texture": {"0": score(base, 0.1 + less)}}}
-              for name, base, ahead, less in (("a", 30.0, 2.0, -0.02), ("b", 20.0, 1.0, -0.01))}
+    people = {
+        name: {"delit": {"wildcap": {"0": score(base + ahead, 0.1)}, "texture": {"0": score(base, 0.1 + less)}}}
+        for name, base, ahead, less in (("a", 30.0, 2.0, -0.02), ("b", 20.0, 1.0, -0.01))
+    }
     mean, error = comparison_table.paired(people)["delit"]["texture"]["PSNR, dB"]
     assert (mean, error) == (pytest.approx(1.5), pytest.approx(0.5))
     line = comparison_table.paired_table(people).splitlines()[-1]

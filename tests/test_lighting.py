@@ -3,7 +3,6 @@
 """Spherical harmonic shading against quadrature, the grid's interpolation, the closed-form global light, and what holds
 it to an even one."""
 
-
 import numpy as np
 import pytest
 import torch
@@ -50,8 +49,9 @@ def test_constant_light_shades_a_sphere_evenly():
     directions, _ = sphere(20, 40)
     shader = Shader(directions.float(), torch.zeros(20, 40), (2, 2))
     lights = Lights(constant_light(torch.tensor([0.5, 1.0, 2.0])), torch.zeros(3, 9, 2, 2), torch.ones(3))
-    assert torch.allclose(shader.total(lights), torch.tensor([0.5, 1.0, 2.0])[:, None, None].expand(3, 20, 40),
-                          atol=1e-6)
+    assert torch.allclose(
+        shader.total(lights), torch.tensor([0.5, 1.0, 2.0])[:, None, None].expand(3, 20, 40), atol=1e-6
+    )
 
 
 @pytest.mark.parametrize("coloured", [True, False])
@@ -61,8 +61,11 @@ def test_local_light_lives_inside_the_mask_only(coloured):
     alpha[10:20, 12:30] = 0.7
     shader = Shader(directions.float(), alpha, (5, 5))
     generator = torch.Generator().manual_seed(0)
-    lights = Lights(torch.randn(3, 9, generator=generator),
-                    torch.randn(1 if coloured else 3, 9, 5, 5, generator=generator), torch.rand(3, generator=generator))
+    lights = Lights(
+        torch.randn(3, 9, generator=generator),
+        torch.randn(1 if coloured else 3, 9, 5, 5, generator=generator),
+        torch.rand(3, generator=generator),
+    )
     difference = shader.total(lights) - shader.main(lights)
     assert difference[:, alpha == 0].abs().max() == 0
     assert difference[:, alpha > 0].abs().mean() > 0.1
@@ -92,4 +95,3 @@ def test_global_light_is_found_in_closed_form():
     texture = albedo * torch.einsum("ck,khw->chw", gamma, basis)
     texture[:, :10], weight[:10] = 9.0, 0.0  # what is masked must not matter
     assert torch.allclose(fit_global(texture, albedo, basis, weight, ridge=1e-9), gamma, atol=1e-4)
-

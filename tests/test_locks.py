@@ -28,8 +28,18 @@ REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 
 
 def describe(**other) -> str:
-    return json.dumps({"python": [3, 11], "system": "linux", "machine": "x86_64", "bits": 64, "macos": "",
-                       "libc": ["glibc", "2.39"], "free_threaded": False, **other})
+    return json.dumps(
+        {
+            "python": [3, 11],
+            "system": "linux",
+            "machine": "x86_64",
+            "bits": 64,
+            "macos": "",
+            "libc": ["glibc", "2.39"],
+            "free_threaded": False,
+            **other,
+        }
+    )
 
 
 @pytest.mark.parametrize("name", locks.names())
@@ -76,24 +86,34 @@ def test_where_the_files_of_a_wheel_come_to_lie():
     )
 
 
-@pytest.mark.parametrize(("about", "name"), [
-    (describe(), "manylinux_x86_64-3.11"), (describe(python=[3, 13]), "manylinux_x86_64-3.13"),
-    (describe(system="win32", machine="amd64", libc=["", ""]), "win_amd64-3.11"),
-    (describe(system="darwin", machine="arm64", macos="15.1", libc=["", ""]), "macosx_arm64-3.11")])
+@pytest.mark.parametrize(
+    ("about", "name"),
+    [
+        (describe(), "manylinux_x86_64-3.11"),
+        (describe(python=[3, 13]), "manylinux_x86_64-3.13"),
+        (describe(system="win32", machine="amd64", libc=["", ""]), "win_amd64-3.11"),
+        (describe(system="darwin", machine="arm64", macos="15.1", libc=["", ""]), "macosx_arm64-3.11"),
+    ],
+)
 def test_every_machine_that_is_served_has_its_lock(about, name):
     assert locks.lock_name(about) == name and name in locks.names()
 
 
-@pytest.mark.parametrize(("about", "problem"), [
-    (describe(system="darwin", machine="x86_64", macos="15.1"), "Macs with an Intel processor"),
-    (describe(system="darwin", machine="arm64", macos="13.6"), "needs macOS 14 or newer; this is 13.6"),
-    (describe(machine="aarch64"), r"no solver for this processor \(aarch64"),
-    (describe(machine="x86_64", bits=32), "32 bits"),
-    (describe(system="win32", machine="arm64"), "no solver for this processor"),
-    (describe(libc=["glibc", "2.27"]), "glibc 2.28 or newer; this has glibc 2.27"),
-    (describe(libc=["", ""]), "this has another library"),
-    (describe(python=[3, 14]), r"This Python is 3.14; the solver's packages are made for 3.11 and 3.13"),
-    (describe(python=[3, 13], free_threaded=True), "without its global lock"), ("", "does not answer")])
+@pytest.mark.parametrize(
+    ("about", "problem"),
+    [
+        (describe(system="darwin", machine="x86_64", macos="15.1"), "Macs with an Intel processor"),
+        (describe(system="darwin", machine="arm64", macos="13.6"), "needs macOS 14 or newer; this is 13.6"),
+        (describe(machine="aarch64"), r"no solver for this processor \(aarch64"),
+        (describe(machine="x86_64", bits=32), "32 bits"),
+        (describe(system="win32", machine="arm64"), "no solver for this processor"),
+        (describe(libc=["glibc", "2.27"]), "glibc 2.28 or newer; this has glibc 2.27"),
+        (describe(libc=["", ""]), "this has another library"),
+        (describe(python=[3, 14]), r"This Python is 3.14; the solver's packages are made for 3.11 and 3.13"),
+        (describe(python=[3, 13], free_threaded=True), "without its global lock"),
+        ("", "does not answer"),
+    ],
+)
 def test_what_cannot_be_had_is_said_before_anything_is_downloaded(about, problem):
     with pytest.raises(Problem, match=problem) as refusal:
         locks.lock_name(about)
@@ -105,11 +125,17 @@ def test_a_lock_that_is_not_there_is_named():
         locks.read(REQUIREMENTS, "beos-3.11")
 
 
-@pytest.mark.parametrize("name, compute, source, torch", [
-    ("manylinux_x86_64-3.11", "cpu", "pytorch", "cpu"), ("manylinux_x86_64-3.13", "cpu", "pytorch", "cpu"),
-    ("manylinux_x86_64-3.11", "cuda", "pytorch", ""),
-    ("win_amd64-3.13", "cpu", "pytorch", ""), ("win_amd64-3.11", "cuda", "pytorch", "cu130"),
-    ("macosx_arm64-3.13", "apple", "pytorch", "")])
+@pytest.mark.parametrize(
+    "name, compute, source, torch",
+    [
+        ("manylinux_x86_64-3.11", "cpu", "pytorch", "cpu"),
+        ("manylinux_x86_64-3.13", "cpu", "pytorch", "cpu"),
+        ("manylinux_x86_64-3.11", "cuda", "pytorch", ""),
+        ("win_amd64-3.13", "cpu", "pytorch", ""),
+        ("win_amd64-3.11", "cuda", "pytorch", "cu130"),
+        ("macosx_arm64-3.13", "apple", "pytorch", ""),
+    ],
+)
 def test_each_system_gets_the_torch_that_was_chosen(tmp_path, name, compute, source, torch):
     lock = locks.read(REQUIREMENTS, name)
     steps = [step.words for step in pip_steps.plan_steps(REQUIREMENTS, lock, compute, source, tmp_path)]
@@ -138,8 +164,9 @@ def test_where_a_studios_index_lacks_pytorchs_build_its_own_is_taken(tmp_path, n
     rest, torch = pip_steps.plan_steps(REQUIREMENTS, locks.read(REQUIREMENTS, name), compute, "pip", tmp_path)
     assert "--find-links" not in torch.words and not rest.otherwise
     assert len(torch.otherwise) == count and "--require-hashes" in torch.otherwise[0]
-    assert re.fullmatch(r"torch==2.13.0( --hash=sha256:\w{64})+\n",
-                        Path(torch.otherwise[0][-1]).read_text(encoding="utf-8"))
+    assert re.fullmatch(
+        r"torch==2.13.0( --hash=sha256:\w{64})+\n", Path(torch.otherwise[0][-1]).read_text(encoding="utf-8")
+    )
     ran = []
 
     def run(words):
@@ -160,8 +187,12 @@ def test_a_folder_of_wheels_is_the_only_place_that_is_looked_in(tmp_path):
 
 
 def test_what_a_device_needs_here_is_found_out(monkeypatch):
-    for system, driver, computes in (("linux", None, "cpu"), ("linux", "/usr/bin/nvidia-smi", "cuda"),
-                                     ("win32", None, "cpu"), ("darwin", None, "apple")):
+    for system, driver, computes in (
+        ("linux", None, "cpu"),
+        ("linux", "/usr/bin/nvidia-smi", "cuda"),
+        ("win32", None, "cpu"),
+        ("darwin", None, "apple"),
+    ):
         monkeypatch.setattr(sys, "platform", system)
         monkeypatch.setattr(pip_steps.shutil, "which", lambda name, driver=driver: driver)
         assert pip_steps.compute_of("auto") == computes
@@ -218,9 +249,10 @@ def index_page() -> str:
     return page
 
 
-@pytest.mark.parametrize("name",
-                         locks.names() if "WILDCAP_LOCKS" in os.environ
-                         else [locks.names()[time.localtime().tm_yday % len(locks.names())]])
+@pytest.mark.parametrize(
+    "name",
+    locks.names() if "WILDCAP_LOCKS" in os.environ else [locks.names()[time.localtime().tm_yday % len(locks.names())]],
+)
 def test_every_lock_is_what_the_index_has(name):
     """pip finds every wheel of the lock for its platform and Python, with the hash that the lock has, and nothing that
     a package needs is left out.
@@ -247,12 +279,20 @@ def test_the_longest_path_and_the_sizes_are_what_the_wheels_say():
     lock = locks.read(REQUIREMENTS, "win_amd64-3.13")
     found = lock_resolver.ask(lock.name, [], "--require-hashes", "-r", str(REQUIREMENTS / "locks" / f"{lock.name}.txt"))
     files = {f"{wheel.name}=={wheel.version}": lock_resolver.wheel_files(wheel.url) for wheel in found.values()}
-    assert max(len(path) for _, listed in files.values() for file, _ in listed
-               for path in maker.installed_paths(file, lock.name)) == lock.longest
+    assert (
+        max(
+            len(path)
+            for _, listed in files.values()
+            for file, _ in listed
+            for path in maker.installed_paths(file, lock.name)
+        )
+        == lock.longest
+    )
     assert {pinned: maker.sizes(*known) for pinned, known in files.items()} == lock.sizes
 
 
 def test_the_table_has_a_line_for_every_lock():
-    printed = subprocess.run([sys.executable, "-m", "benchmarks.locks", "--table"], cwd=REQUIREMENTS.parent,
-                             capture_output=True, text=True).stdout
+    printed = subprocess.run(
+        [sys.executable, "-m", "benchmarks.locks", "--table"], cwd=REQUIREMENTS.parent, capture_output=True, text=True
+    ).stdout
     assert all(f"| `{name}` | " in printed for name in locks.names())

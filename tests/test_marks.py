@@ -93,8 +93,14 @@ def test_views_confirm_what_they_all_show(tmp_path, monkeypatch):
     rotation = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     views = []
     for i, x in enumerate((-0.1, 0.0, 0.1)):
-        view = View(f"{i}.jpg", capture.frames / f"{i}.jpg", camera, rotation,
-                    -rotation @ np.array([x, there[0, 1] - 0.5, there[0, 2]]), True)
+        view = View(
+            f"{i}.jpg",
+            capture.frames / f"{i}.jpg",
+            camera,
+            rotation,
+            -rotation @ np.array([x, there[0, 1] - 0.5, there[0, 2]]),
+            True,
+        )
         picture = np.full((400, 400, 3), 0.5, np.float32)
         pixels, _ = view.project(there)
         for pixel in pixels[: 2 if i == 0 else 1]:
@@ -113,8 +119,9 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     texels too large and beside it."""
     prior, capture = load(), Capture(tmp_path)
     covered = torch.from_numpy(template.mask("skin", SIZE).copy())
-    albedo = (initial.tint_face(prior.mean_face, torch.from_numpy(TONE), covered)[0, :3].permute(1, 2, 0).numpy()
-              + 1) / 2
+    albedo = (
+        initial.tint_face(prior.mean_face, torch.from_numpy(TONE), covered)[0, :3].permute(1, 2, 0).numpy() + 1
+    ) / 2
     row, column = round(0.56 * SIZE), round(0.655 * SIZE)
     albedo = albedo * skin(0.04) / TONE * np.exp(-spot(row, column, 8) * MELANIN)
     distance = distance_to(row, column) - 90

@@ -58,8 +58,11 @@ def paint(capture: Capture, *where: tuple[slice, slice]) -> None:
 def solve_part(capture: Capture, **options) -> list[str]:
     """Solves the edited part, or the whole where it must; what was logged."""
     said = []
-    solve.run(capture, settings(edited_part=True, **options),
-              Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+    solve.run(
+        capture,
+        settings(edited_part=True, **options),
+        Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))),
+    )
     return said
 
 
@@ -116,18 +119,26 @@ def cut_off(capture: Capture) -> None:
     capture.solved.write_bytes(capture.solved.read_bytes()[:20000])
 
 
-@pytest.mark.parametrize(("spoil", "options", "reason"), [
-    (spoil_texture, {}, "Texture.exr changed"), (propose_anew, {}, "Shadow_mask_auto.png changed"),
-    (lambda capture: None, {"seed": 5}, "The solver's settings changed"),
-    (lambda capture: capture.solved.unlink(), {}, "No solve has left its state"), (cut_off, {}, "is damaged"),
-    (lambda capture: paint(capture, (slice(0, 128), slice(0, 128))), {}, "of the map"),
-])
+@pytest.mark.parametrize(
+    ("spoil", "options", "reason"),
+    [
+        (spoil_texture, {}, "Texture.exr changed"),
+        (propose_anew, {}, "Shadow_mask_auto.png changed"),
+        (lambda capture: None, {"seed": 5}, "The solver's settings changed"),
+        (lambda capture: capture.solved.unlink(), {}, "No solve has left its state"),
+        (cut_off, {}, "is damaged"),
+        (lambda capture: paint(capture, (slice(0, 128), slice(0, 128))), {}, "of the map"),
+    ],
+)
 def test_what_cannot_be_solved_in_part_is_solved_whole_and_says_why(capture, spoil, options, reason):
     paint(capture, EDIT)
     spoil(capture)
     said = []
-    whole = Reporter("solve", lambda message: said.append(getattr(message, "text", "")),
-                     lambda: any("whole map" in line for line in said))
+    whole = Reporter(
+        "solve",
+        lambda message: said.append(getattr(message, "text", "")),
+        lambda: any("whole map" in line for line in said),
+    )
     with pytest.raises(CancelledError):  # the test has heard enough once that solve begins
         solve.run(capture, settings(edited_part=True, **options), whole)
     assert any(line.startswith("The whole map is solved.") and reason in line for line in said), said

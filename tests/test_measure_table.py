@@ -9,12 +9,26 @@ import pytest
 from benchmarks import figures
 from benchmarks.measures.table import Column, format_table, standard_error, summarise, to_record
 
-COLUMNS = {"psnr": Column("PSNR, dB"), "flip": Column("FLIP", 3, -1), "step": Column("step", 2, 0),
-           "unknown": Column("never measured")}
-SCORES = {"old": {"a": {"psnr": 20.0, "flip": 0.2, "step": 0.1}, "b": {"psnr": 30.0, "flip": 0.1}, "c": {"psnr": 40.0},
-                  "d": {"psnr": 50.0}},
-          "new": {"a": {"psnr": 21.0, "flip": 0.1, "step": None}, "b": {"psnr": 31.1}, "c": {"psnr": 41.0},
-                  "d": {"psnr": 50.9, "flip": math.nan}}}
+COLUMNS = {
+    "psnr": Column("PSNR, dB"),
+    "flip": Column("FLIP", 3, -1),
+    "step": Column("step", 2, 0),
+    "unknown": Column("never measured"),
+}
+SCORES = {
+    "old": {
+        "a": {"psnr": 20.0, "flip": 0.2, "step": 0.1},
+        "b": {"psnr": 30.0, "flip": 0.1},
+        "c": {"psnr": 40.0},
+        "d": {"psnr": 50.0},
+    },
+    "new": {
+        "a": {"psnr": 21.0, "flip": 0.1, "step": None},
+        "b": {"psnr": 31.1},
+        "c": {"psnr": 41.0},
+        "d": {"psnr": 50.9, "flip": math.nan},
+    },
+}
 
 
 def test_means_spreads_and_paired_differences():
@@ -49,7 +63,8 @@ def test_nothing_has_no_sign():
 
 
 def test_a_record_holds_the_people_behind_the_cells(tmp_path):
-    figures.write_record(tmp_path / "table.json", "state", "command",
-                         to_record(summarise(SCORES, COLUMNS, "old"), SCORES))
+    figures.write_record(
+        tmp_path / "table.json", "state", "command", to_record(summarise(SCORES, COLUMNS, "old"), SCORES)
+    )
     read = figures.read_record("table", tmp_path)["figures"]
     assert read["summary"]["new"]["psnr"]["difference"] == 1.0 and read["people"]["new"]["d"] == {"psnr": 50.9}

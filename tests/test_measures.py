@@ -28,8 +28,9 @@ def unit(n: int = N) -> np.ndarray:
 
 
 def skin(n: int = N) -> np.ndarray:
-    return (np.float64([0.45, 0.28, 0.2])
-            * np.exp(0.15 * RNG.normal(size=(n, 1)) + 0.03 * RNG.normal(size=(n, 3)))).clip(0.01, 0.9)
+    return (
+        np.float64([0.45, 0.28, 0.2]) * np.exp(0.15 * RNG.normal(size=(n, 1)) + 0.03 * RNG.normal(size=(n, 3)))
+    ).clip(0.01, 0.9)
 
 
 NORMALS, TRUE, LIGHT = unit(), skin(), 0.1 * RNG.normal(size=9)
@@ -53,8 +54,10 @@ def test_what_differs_between_captures_stays_an_error():
     assert together.deviation < 1e-3
     lit = psnr_after_gain(answers[0], TRUE)
     assert psnr_after_gain(without_light(answers[0], NORMALS, together), TRUE) == pytest.approx(lit, abs=0.05)
-    assert all(psnr_after_gain(without_light(a, NORMALS, light), TRUE) == BEST_PSNR
-               for a, light in zip(answers, alone, strict=True))
+    assert all(
+        psnr_after_gain(without_light(a, NORMALS, light), TRUE) == BEST_PSNR
+        for a, light in zip(answers, alone, strict=True)
+    )
 
 
 def test_a_capture_of_few_texels_has_the_same_say_as_one_of_many():
@@ -87,8 +90,9 @@ def test_answers_that_are_one_but_for_a_gain_agree_and_a_step_of_a_tenth_is_twen
 def test_parts_share_the_gain_of_the_face():
     brows = np.arange(N) < 500
     answer = np.where(brows[:, None], TRUE * 1.5, TRUE)
-    found = score_parts(to_tone(answer, TRUE.mean(0) * 3), TRUE,
-                        {"brows": brows, "skin": ~brows, "lips": np.arange(N) < 5})
+    found = score_parts(
+        to_tone(answer, TRUE.mean(0) * 3), TRUE, {"brows": brows, "skin": ~brows, "lips": np.arange(N) < 5}
+    )
     assert set(found) == {"brows", "skin"} and found["brows"].texels == 500
     assert (
         found["brows"].bias - found["skin"].bias == pytest.approx(np.log(1.5), abs=1e-3)

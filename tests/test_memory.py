@@ -21,10 +21,14 @@ from .painted_skin import make, settings
 from .recorded import changed, record
 from .test_sampler import SmoothPrior, observation, shadow_problem, start
 
-REFUSALS = [MemoryError(), torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB"),
-            RuntimeError("[enforce fail at alloc_cpu.cpp:117] DefaultCPUAllocator: can't allocate memory: you tried to "
-                         "allocate 99 bytes"),
-            RuntimeError("DefaultCPUAllocator: not enough memory: you tried to allocate 99 bytes.")]
+REFUSALS = [
+    MemoryError(),
+    torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB"),
+    RuntimeError(
+        "[enforce fail at alloc_cpu.cpp:117] DefaultCPUAllocator: can't allocate memory: you tried to allocate 99 bytes"
+    ),
+    RuntimeError("DefaultCPUAllocator: not enough memory: you tried to allocate 99 bytes."),
+]
 
 
 class Refusing:
@@ -70,8 +74,13 @@ def unbroken():
 def test_a_step_that_did_not_fit_is_done_again_to_the_same_bytes(unbroken, at, backward):
     priors, seen, recipe = problem()
     prior, said, steps = Refusing(priors, at, REFUSALS[at % len(REFUSALS)], backward), [], []
-    out = sample_within_memory(Sampler(prior, recipe, seed_noise(1)), seen, start(-0.2),
-                               lambda state, of: steps.append(state.step), said.append)
+    out = sample_within_memory(
+        Sampler(prior, recipe, seed_noise(1)),
+        seen,
+        start(-0.2),
+        lambda state, of: steps.append(state.step),
+        said.append,
+    )
     assert torch.equal(out.denoised, unbroken.denoised) and torch.equal(out.x, unbroken.x)
     assert all(torch.equal(a, b) for a, b in zip(out.lights.parameters(), unbroken.lights.parameters(), strict=True))
     assert prior.network.low_memory and len(said) == 1 and f"step {at} of 6" in said[0]
@@ -121,6 +130,7 @@ def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, mo
     found = []
     for sparing in (True, False):
         if not sparing:
+
             def plain(norm, convolution, x, mapped):
                 return convolution(torch.nn.functional.gelu(norm(x, mapped)))
 
@@ -161,15 +171,17 @@ def test_the_stage_falls_back_and_its_maps_are_the_same(tmp_path, monkeypatch):
         said = solved(capture, **options, low_memory=low)
         assert any("step 3 of 4" in line and "low-memory" in line for line in said) == fails
         assert modes[0] == low and modes[-1]
-        assert {name: (capture.maps / name).read_bytes() == (plain.maps / name).read_bytes()
-                for name in MAPS} == dict.fromkeys(MAPS, True)
+        assert {
+            name: (capture.maps / name).read_bytes() == (plain.maps / name).read_bytes() for name in MAPS
+        } == dict.fromkeys(MAPS, True)
 
 
 def solved(capture, **options):
     """Runs the stage; what it said."""
     said = []
-    solve.run(capture, settings(**options),
-              Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+    solve.run(
+        capture, settings(**options), Reporter("solve", emit=lambda message: said.append(getattr(message, "text", "")))
+    )
     return said
 
 

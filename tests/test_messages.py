@@ -19,10 +19,15 @@ from core.contract.messages import (
     to_line,
 )
 
-EVERY = (Progress("scan", 3.0, 24.0, "Paar 3 é 顔\n", 12.5), Log("line\u2028 \0"),
-         Preview("solve", "preview/albedo.png"),
-         StageDone("frames", 4.2, False, {"share": 0.9, "names": ["a", None]}), Done(3.5), Cancelled("solve"),
-         Failed("frames", "No video.", "Choose one."))
+EVERY = (
+    Progress("scan", 3.0, 24.0, "Paar 3 é 顔\n", 12.5),
+    Log("line\u2028 \0"),
+    Preview("solve", "preview/albedo.png"),
+    StageDone("frames", 4.2, False, {"share": 0.9, "names": ["a", None]}),
+    Done(3.5),
+    Cancelled("solve"),
+    Failed("frames", "No video.", "Choose one."),
+)
 
 
 def test_every_kind_survives_the_pipe():
@@ -32,9 +37,19 @@ def test_every_kind_survives_the_pipe():
         assert from_line(line) == message and "\n" not in line and line.isascii()
 
 
-@pytest.mark.parametrize("line",
-                         ["", "hello", "3", "{}", '{"kind": "Party"}', '{"kind": "Done"}',
-                          '{"kind": "Done", "seconds": 1, "more": 2}', '["Done"]'])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "",
+        "hello",
+        "3",
+        "{}",
+        '{"kind": "Party"}',
+        '{"kind": "Done"}',
+        '{"kind": "Done", "seconds": 1, "more": 2}',
+        '["Done"]',
+    ],
+)
 def test_what_is_no_message_is_refused(line):
     with pytest.raises(ValueError):
         from_line(line)
@@ -49,8 +64,11 @@ def test_the_time_left_is_what_the_pace_since_the_first_finished_unit_says():
     report.progress(4, 10, "fusing")
     now[0] = 164.0
     report.progress(6, 10, "fusing")
-    assert sent == [Progress("scan", 0.0, 10.0, "", None), Progress("scan", 4.0, 10.0, "fusing", None),
-                    Progress("scan", 6.0, 10.0, "fusing", 8.0)]
+    assert sent == [
+        Progress("scan", 0.0, 10.0, "", None),
+        Progress("scan", 4.0, 10.0, "fusing", None),
+        Progress("scan", 6.0, 10.0, "fusing", 8.0),
+    ]
 
 
 def test_each_part_of_a_stage_has_a_pace_of_its_own():

@@ -47,8 +47,9 @@ def test_what_other_processes_reached_counts(tmp_path, monkeypatch):
 
 
 def test_a_sentence_is_noted_at_its_own_line():
-    call = next(call for call in message_sites.sentences("core/contract/settings.py")
-                if "no quality" in ast.unparse(call))
+    call = next(
+        call for call in message_sites.sentences("core/contract/settings.py") if "no quality" in ast.unparse(call)
+    )
     message_sites._reached -= {("core/contract/settings.py", line) for line in range(call.lineno, call.end_lineno + 1)}
     assert any("no quality" in sentence for sentence in message_sites.unreached())
     with pytest.raises(Problem):

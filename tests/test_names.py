@@ -8,8 +8,9 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = sorted(path for folder in ("core", "benchmarks", "wildcap_addon", "tests")
-               for path in (ROOT / folder).rglob("*.py"))
+FILES = sorted(
+    path for folder in ("core", "benchmarks", "wildcap_addon", "tests") for path in (ROOT / folder).rglob("*.py")
+)
 
 
 def missing_names(path: Path, text: str) -> list[str]:
@@ -45,8 +46,11 @@ def missing_names(path: Path, text: str) -> list[str]:
 def base_of(path: Path, node: ast.ImportFrom) -> Path | None:
     """The folder or file, without its ending, that `from ... import` names, where that is in the repository."""
     if node.level:
-        return (path.parents[node.level - 1].joinpath(*(node.module or "").split(".")) if node.module
-                else path.parents[node.level - 1])
+        return (
+            path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            if node.module
+            else path.parents[node.level - 1]
+        )
     base = ROOT.joinpath(*node.module.split("."))
     return base if module_at(base) is not None or base.is_dir() and base.parent == ROOT else None
 
@@ -68,21 +72,27 @@ def names_of(path: Path) -> frozenset[str]:
         elif isinstance(node, ast.Import | ast.ImportFrom):
             found |= {(alias.asname or alias.name).split(".")[0] for alias in node.names}
         else:
-            found |= {name.id for name in ast.walk(node) if isinstance(name, ast.Name)
-                      and isinstance(name.ctx, ast.Store)}
-            pending += [child for child in ast.iter_child_nodes(node)
-                        if isinstance(child, ast.stmt | ast.ExceptHandler)]
+            found |= {
+                name.id for name in ast.walk(node) if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store)
+            }
+            pending += [
+                child for child in ast.iter_child_nodes(node) if isinstance(child, ast.stmt | ast.ExceptHandler)
+            ]
     return frozenset(found)
 
 
 def test_what_a_file_takes_of_another_is_there():
-    missing = [f"{path.relative_to(ROOT)}:{name}" for path in FILES
-               for name in missing_names(path, path.read_text(encoding="utf-8"))]
+    missing = [
+        f"{path.relative_to(ROOT)}:{name}"
+        for path in FILES
+        for name in missing_names(path, path.read_text(encoding="utf-8"))
+    ]
     assert not missing, "\n".join(missing)
 
 
 def test_a_name_that_moved_is_seen():
-    text = ("from ..geometry import meshes\nfrom ..geometry.meshes import Mesh, "
-            "together\nmeshes.joined\nmeshes.together\n")
+    text = (
+        "from ..geometry import meshes\nfrom ..geometry.meshes import Mesh, together\nmeshes.joined\nmeshes.together\n"
+    )
     found = missing_names(ROOT / "core" / "synthetic" / "beside.py", text)
     assert found == ["2: together of core/geometry/meshes.py", "4: meshes.together"]

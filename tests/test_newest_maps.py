@@ -103,8 +103,10 @@ def test_a_copied_capture_wears_its_maps_at_4k_in_blender(addon, enlarged):
 
     def shown() -> set[str]:
         nodes = head.data.materials[0].node_tree.nodes
-        return {bpy.path.native_pathsep(nodes[name].image.filepath).split(os.sep)[-2] for name in
-                ("WildCap Albedo", "WildCap Specular", "WildCap Normal")}
+        return {
+            bpy.path.native_pathsep(nodes[name].image.filepath).split(os.sep)[-2]
+            for name in ("WildCap Albedo", "WildCap Specular", "WildCap Normal")
+        }
 
     assert shown() == {"maps_4k"}
     addon("status")._known.clear()

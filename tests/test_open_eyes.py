@@ -71,15 +71,17 @@ def seen_share(opened: lids.OpenHead, side: int, view: View, slip: float = 0.0) 
     ball, over = opened.balls[side], 3
     caster = raster.RayCaster(meshes.joined([opened.skin, ball.mesh]))
     move = eye_reader.to_eye_crop(view.project(opened.skin.vertices[list(lids.corners()[side])])[0], side == 0)
-    y, x = (np.mgrid[0:eye_reader.SIDE_PX * over, 0:eye_reader.SIDE_PX * over] + 0.5) / over
+    y, x = (np.mgrid[0 : eye_reader.SIDE_PX * over, 0 : eye_reader.SIDE_PX * over] + 0.5) / over
     pixels = (np.stack([x.ravel(), y.ravel()], 1) - move[:, 2]) @ np.linalg.inv(move[:, :2]).T
     origins = np.repeat((view.centre - slip * view.rotation[0])[None], len(pixels), 0)
     face, bary, _ = caster.first_hits(origins, view.rays(pixels))
     on_ball = face >= len(opened.skin.faces)
     hit = raster.interpolate(caster.mesh.vertices, caster.mesh.faces, np.maximum(face, 0), bary)
     inside = on_ball & (np.linalg.norm(np.cross(hit - ball.centre, ball.gaze), axis=-1) < IRIS_M)
-    white, iris = (share.reshape(eye_reader.SIDE_PX, over, eye_reader.SIDE_PX, over).mean((1, 3), dtype=np.float32)
-                   for share in (on_ball, inside))
+    white, iris = (
+        share.reshape(eye_reader.SIDE_PX, over, eye_reader.SIDE_PX, over).mean((1, 3), dtype=np.float32)
+        for share in (on_ball, inside)
+    )
     return eye_looks.EyeLook(view, eye_reader.EyeShares(white, iris, move))
 
 
@@ -90,8 +92,9 @@ def seen_eye(rims: lid_marks.LidMarks, view: View) -> Eye:
 
 
 def off_curve(points: np.ndarray, curve: np.ndarray) -> np.ndarray:
-    fine = np.concatenate([a + (b - a) * np.linspace(0, 1, 20)[:, None]
-                           for a, b in zip(curve, curve[1:], strict=False)])
+    fine = np.concatenate(
+        [a + (b - a) * np.linspace(0, 1, 20)[:, None] for a, b in zip(curve, curve[1:], strict=False)]
+    )
     return np.linalg.norm(points[:, None] - fine[None], axis=2).min(1)
 
 
@@ -108,8 +111,12 @@ def begun_beside(head) -> lids.OpenHead:
 
 
 def off_edges(found: lid_marks.LidMarks, opened: lids.OpenHead) -> np.ndarray:
-    return np.concatenate([off_curve(marks[1:-1], edge) for marks, edge in
-                           zip((found.upper, found.lower), lids.edges(opened.skin.vertices, 0), strict=True)])
+    return np.concatenate(
+        [
+            off_curve(marks[1:-1], edge)
+            for marks, edge in zip((found.upper, found.lower), lids.edges(opened.skin.vertices, 0), strict=True)
+        ]
+    )
 
 
 def test_the_edges_and_the_iris_that_all_views_show_are_found(person, marked):
@@ -183,8 +190,9 @@ def test_the_eyes_of_another_face_are_not_read(person, monkeypatch):
 def test_what_a_single_view_shows_is_lifted_as_deep_as_it_is_large(person, degrees):
     """The same picture in a world of 50 mm between the pupils and in one of 63."""
     pixels = view_from(degrees).project(template.landmark_points(person[0]))[0]
-    usual, small = (landmarks.lift_alone(view_from(degrees, distance), pixels).points
-                    for distance in (0.5, 0.5 * 50 / 63))
+    usual, small = (
+        landmarks.lift_alone(view_from(degrees, distance), pixels).points for distance in (0.5, 0.5 * 50 / 63)
+    )
     assert np.abs(63 / 50 * small - usual).max() < 0.0005
     assert np.linalg.norm(usual - template.landmark_points(person[0]), axis=1).mean() < 0.005
 
@@ -200,10 +208,16 @@ def test_lids_meet_the_edges_that_were_seen_and_balls_lie_behind_them(person, fi
         assert np.degrees(np.arccos(np.clip(ball.gaze @ true.gaze, -1, 1))) < 5
         for rim in (0, 1):
             points = found.opened.skin.vertices[found.opened.rims[side][rim]]
-            off = off_curve(points,
-                            np.concatenate([opened.skin.vertices[lids.corners()[side][1]][None],
-                                            opened.skin.vertices[opened.rims[side][rim]],
-                                            opened.skin.vertices[lids.corners()[side][0]][None]]))
+            off = off_curve(
+                points,
+                np.concatenate(
+                    [
+                        opened.skin.vertices[lids.corners()[side][1]][None],
+                        opened.skin.vertices[opened.rims[side][rim]],
+                        opened.skin.vertices[lids.corners()[side][0]][None],
+                    ]
+                ),
+            )
             assert off.mean() < 0.0003 and off.max() < 0.001
             clear = np.linalg.norm(points - ball.centre, axis=1) - ball.radius
             assert clear.min() > 0.9 * lids.CLEAR_M
@@ -268,8 +282,13 @@ def test_the_record_of_the_eyes_comes_back_and_a_damaged_one_is_refused(capture)
     write_eyes(capture, left, replace(left, centre=(-0.03, 0.01, 0.0), views=0))
     assert read_eyes(capture) == (left, replace(left, centre=(-0.03, 0.01, 0.0), views=0))
     told = json.loads(capture.eyes.read_text())
-    damage = (("left", "radius", 0), ("right", "gaze", [0, 0, 0]), ("left", "centre", [0, 0]),
-              ("left", "centre", [0, "a", 0]), ("right", "views", None))
+    damage = (
+        ("left", "radius", 0),
+        ("right", "gaze", [0, 0, 0]),
+        ("left", "centre", [0, 0]),
+        ("left", "centre", [0, "a", 0]),
+        ("right", "views", None),
+    )
     for side, name, value in damage:
         broken = {**told, side: {**told[side], name: value}}
         capture.eyes.write_text(json.dumps(broken))

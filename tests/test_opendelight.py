@@ -114,7 +114,7 @@ def test_what_was_made_of_the_face_lands_on_the_face():
     half = images.linear_to_srgb(0.5 * images.srgb_to_linear(crop))
     back = images.srgb_to_linear(put_face_back(srgb, crop, half, mask, to_crop)) / images.srgb_to_linear(srgb)
     x, y = np.round(face.landmarks[[33, 263, 61, 291], :2].mean(0)).astype(int)
-    assert back[y - 10:y + 10, x - 10:x + 10].mean() == pytest.approx(0.5, abs=0.03)
+    assert back[y - 10 : y + 10, x - 10 : x + 10].mean() == pytest.approx(0.5, abs=0.03)
     assert (back[:40] == 1).all() and (back[:, -40:] == 1).all()
     assert np.abs(np.diff(back.mean(-1), axis=0)).max() < 0.25, "no step where the face ends"
 
@@ -134,9 +134,11 @@ def frames(monkeypatch, folder, pictures):
 
 
 def run(folder, checkpoint, report):
-    return list(room.opendelight(Capture(folder),
-                                 from_json({"delight": {"delighter": "opendelight", "checkpoint": str(checkpoint)}}),
-                                 report))
+    return list(
+        room.opendelight(
+            Capture(folder), from_json({"delight": {"delighter": "opendelight", "checkpoint": str(checkpoint)}}), report
+        )
+    )
 
 
 def test_frames_with_a_face_are_delit_and_others_left_out(tmp_path, monkeypatch, checkpoint, portrait):
@@ -148,7 +150,7 @@ def test_frames_with_a_face_are_delit_and_others_left_out(tmp_path, monkeypatch,
     changed = np.abs(results[0].image - portrait).max(-1) > 0.02
     rows, columns = (np.flatnonzero(changed.any(axis)) for axis in (1, 0))
     assert results[0].shadow is None and results[0].image.shape == portrait.shape and 0.05 < changed.mean() < 0.5
-    assert changed[rows[0]:rows[-1], columns[0]:columns[-1]].mean() > 0.6, "a face's worth in one place"
+    assert changed[rows[0] : rows[-1], columns[0] : columns[-1]].mean() > 0.6, "a face's worth in one place"
 
 
 def test_no_face_in_any_frame_is_a_problem(tmp_path, monkeypatch, checkpoint, portrait):
@@ -177,21 +179,37 @@ def test_without_the_second_file_the_detail_is_not_enhanced(tmp_path, checkpoint
     assert load(str(tmp_path / BASE)).enhancer is None
 
 
-@pytest.mark.parametrize(("make", "what"), [
-    (lambda folder, state: torch.save({n: t for n, t in state.items() if n != "decoder.cls_conv.bias"}, folder / BASE),
-     "decoder.cls_conv.bias is missing"),
-    (lambda folder, state: torch.save({**state, "encoder.mask_token": torch.zeros(1)}, folder / BASE),
-     "encoder.mask_token is not part of it"),
-    (lambda folder, state: torch.save({**state, "encoder.norm.bias": torch.zeros(7)}, folder / BASE),
-     "encoder.norm.bias is 7, not 64"),
-    (lambda folder, state: torch.save({"epoch": 3}, folder / BASE), "encoder.patch_embed.proj.weight is missing"),
-    (lambda folder, state: torch.save([1, 2], folder / BASE), "its first tensors"),
-    (lambda folder, state: torch.save({n: t for n, t in state.items() if "deconv_layers.9" not in n}, folder / BASE),
-     "do not undo patches"),
-    (lambda folder, state: (folder / BASE).write_bytes(b"no checkpoint"), "cannot be read as weights"),
-    (lambda folder, state: torch.save({"run": print}, folder / BASE), "cannot be read as weights"),
-    (lambda folder, state: None, "There is no OpenDelight checkpoint"),
-], ids=["missing", "unknown", "shape", "no network", "no dictionary", "depth", "no file of torch", "code", "no file"])
+@pytest.mark.parametrize(
+    ("make", "what"),
+    [
+        (
+            lambda folder, state: torch.save(
+                {n: t for n, t in state.items() if n != "decoder.cls_conv.bias"}, folder / BASE
+            ),
+            "decoder.cls_conv.bias is missing",
+        ),
+        (
+            lambda folder, state: torch.save({**state, "encoder.mask_token": torch.zeros(1)}, folder / BASE),
+            "encoder.mask_token is not part of it",
+        ),
+        (
+            lambda folder, state: torch.save({**state, "encoder.norm.bias": torch.zeros(7)}, folder / BASE),
+            "encoder.norm.bias is 7, not 64",
+        ),
+        (lambda folder, state: torch.save({"epoch": 3}, folder / BASE), "encoder.patch_embed.proj.weight is missing"),
+        (lambda folder, state: torch.save([1, 2], folder / BASE), "its first tensors"),
+        (
+            lambda folder, state: torch.save(
+                {n: t for n, t in state.items() if "deconv_layers.9" not in n}, folder / BASE
+            ),
+            "do not undo patches",
+        ),
+        (lambda folder, state: (folder / BASE).write_bytes(b"no checkpoint"), "cannot be read as weights"),
+        (lambda folder, state: torch.save({"run": print}, folder / BASE), "cannot be read as weights"),
+        (lambda folder, state: None, "There is no OpenDelight checkpoint"),
+    ],
+    ids=["missing", "unknown", "shape", "no network", "no dictionary", "depth", "no file of torch", "code", "no file"],
+)
 def test_what_is_no_checkpoint_is_refused(tmp_path, checkpoint, make, what):
     make(tmp_path, torch.load(checkpoint / BASE, weights_only=True))
     with pytest.raises(Problem, match=what) as refused:
@@ -213,7 +231,14 @@ def test_a_width_that_has_no_heads_is_refused(tmp_path):
 def test_the_terminal_names_the_checkpoint(tmp_path, monkeypatch):
     monkeypatch.setattr(terminal.terminal, "follow", lambda *_: 0)
     (tmp_path / "film.mp4").write_bytes(b"film")
-    command = ["run", str(tmp_path / "film.mp4"), str(tmp_path / "c.wildcap"), "--delighter", "opendelight",
-               "--checkpoint", str(tmp_path)]
+    command = [
+        "run",
+        str(tmp_path / "film.mp4"),
+        str(tmp_path / "c.wildcap"),
+        "--delighter",
+        "opendelight",
+        "--checkpoint",
+        str(tmp_path),
+    ]
     assert terminal.main(command) == 0
     assert read_job(Capture(tmp_path / "c.wildcap").job).settings.delight.checkpoint == str(tmp_path)

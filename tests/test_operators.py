@@ -10,8 +10,12 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-ASKS = {"choose_video": {"filepath": "/none.mp4"}, "open_capture": {"directory": "/none"},
-        "open_batch": {"directory": "/none"}, "use_python": {"filepath": "/none"}}
+ASKS = {
+    "choose_video": {"filepath": "/none.mp4"},
+    "open_capture": {"directory": "/none"},
+    "open_batch": {"directory": "/none"},
+    "use_python": {"filepath": "/none"},
+}
 
 
 @pytest.fixture

@@ -33,8 +33,12 @@ def coarse(folder: Path) -> tuple[Path, np.ndarray]:
     of = of.ravel()
     mean = np.stack([np.bincount(of, mesh.vertices[:, i]) for i in range(3)], 1) / np.bincount(of)[:, None]
     distance = np.linalg.norm(mesh.vertices - mean[of], axis=1)
-    chosen = np.array([members[distance[members].argmin()]
-                       for members in np.split(np.argsort(of, kind="stable"), np.cumsum(np.bincount(of))[:-1])])
+    chosen = np.array(
+        [
+            members[distance[members].argmin()]
+            for members in np.split(np.argsort(of, kind="stable"), np.cumsum(np.bincount(of))[:-1])
+        ]
+    )
     faces = of[mesh.faces]
     faces = faces[(faces != np.roll(faces, 1, 1)).all(1)]
     faces = faces[np.sort(np.unique(np.sort(faces, 1), axis=0, return_index=True)[1])]
@@ -60,11 +64,15 @@ def coarse(folder: Path) -> tuple[Path, np.ndarray]:
         else:
             polygons.append(list(faces[f]))
     count = len(chosen)
-    lines = ["o Head", *(f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in points),
-             *(f"vt {u:.6f} {v:.6f}" for u, v in uv[chosen])]
+    lines = [
+        "o Head",
+        *(f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in points),
+        *(f"vt {u:.6f} {v:.6f}" for u, v in uv[chosen]),
+    ]
     lines += ["f " + " ".join(f"{v + 1}/{v + 1}" for v in polygon) for polygon in polygons] + ["g Eyes"]
-    lines += [f"f {a}/1 {b}/1 {c}/1" for offset in (count, count + len(ball.vertices))
-              for a, b, c in ball.faces + offset + 1]
+    lines += [
+        f"f {a}/1 {b}/1 {c}/1" for offset in (count, count + len(ball.vertices)) for a, b, c in ball.faces + offset + 1
+    ]
     (folder / "coarse head.obj").write_text("\n".join(lines) + "\n")
     return folder / "coarse head.obj", chosen
 
@@ -74,14 +82,14 @@ def test_a_made_mesh_goes_where_its_vertices_belong(tmp_path):
     path, chosen = coarse(tmp_path)
     capture, report = lay_over(path, tmp_path / "face.wildcap", (8, own_template.COVER_ITERATIONS), new_atlas=True)
     mesh, neutral = meshes.read_obj(capture.own_head), template.load().vertices
-    error = np.linalg.norm(mesh.vertices[:len(chosen)] - truth.vertices[chosen], axis=1)
+    error = np.linalg.norm(mesh.vertices[: len(chosen)] - truth.vertices[chosen], axis=1)
     face = registration.weights_of(registration.load_model())[0][chosen] > 0.5
     by_scale = alignment.similarity(neutral, truth.vertices, np.ones(len(neutral))).apply(neutral)
     apart = np.linalg.norm(by_scale - truth.vertices, axis=1)[chosen][face]
     assert np.median(apart) > 0.002, "the person differs from the neutral head"
     assert np.median(error[face]) < 0.001 and np.percentile(error[face], 95) < 0.002
     assert report.figures["own_to_head_median_mm"] < 0.15 and report.figures["own_flipped_triangles"] <= 5
-    for eye, middle in zip(np.split(mesh.vertices[len(chosen):], 2), EYES, strict=True):
+    for eye, middle in zip(np.split(mesh.vertices[len(chosen) :], 2), EYES, strict=True):
         radius = np.linalg.norm(eye - eye.mean(0), axis=1)
         nearest = truth.vertices[np.linalg.norm(template.load().vertices - middle - [0, -0.012, 0], axis=1).argmin()]
         assert np.ptp(radius) < 2e-4 and 0.010 < radius.mean() < 0.0135, "a ball stays a ball"
@@ -130,15 +138,20 @@ def test_parts_without_a_counterpart_follow_the_skin_around_them():
     label = np.repeat([0, 1], [len(skin.vertices), len(ball.vertices)])
     moved = skin.vertices * 1.1 + [0.01, 0, 0]
     final = carried.carry_along(start, label, np.arange(len(skin.vertices)), moved, Reporter("x"))
-    assert np.allclose(final[:len(moved)], moved)
-    assert np.linalg.norm(final[len(moved):].mean(0) - [0.01, 0, 0.0935]) < 0.001
-    assert np.ptp(np.linalg.norm(final[len(moved):] - final[len(moved):].mean(0), axis=1)) < 1e-6
+    assert np.allclose(final[: len(moved)], moved)
+    assert np.linalg.norm(final[len(moved) :].mean(0) - [0.01, 0, 0.0935]) < 0.001
+    assert np.ptp(np.linalg.norm(final[len(moved) :] - final[len(moved) :].mean(0), axis=1)) < 1e-6
 
 
-@pytest.mark.parametrize(("content", "match"), [
-    ("v 0 0 0\n", "no faces"), ("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n", "3 vertices"),
-    ("v 0 0 nan\nv 1 0 0\nv 0 1 1\nf 1 2 3\n", "no numbers"), ("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 9\n", "not in it"),
-])
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        ("v 0 0 0\n", "no faces"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n", "3 vertices"),
+        ("v 0 0 nan\nv 1 0 0\nv 0 1 1\nf 1 2 3\n", "no numbers"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 9\n", "not in it"),
+    ],
+)
 def test_what_is_no_head_mesh_is_refused(tmp_path, content, match):
     (tmp_path / "a.obj").write_text(content)
     with pytest.raises(Problem, match=match):

@@ -73,8 +73,11 @@ def test_every_file_of_a_capture_has_the_users_mode(capture):
         os.close(os.open(folder / "b.bin", os.O_CREAT | os.O_WRONLY, 0o600))
     (capture.root.parent / "theirs").write_text("")
     usual = (capture.root.parent / "theirs").stat().st_mode
-    assert {(capture.root / "a.bin").stat().st_mode, (capture.frames / "b.bin").stat().st_mode,
-            capture.json.stat().st_mode} == {usual}
+    assert {
+        (capture.root / "a.bin").stat().st_mode,
+        (capture.frames / "b.bin").stat().st_mode,
+        capture.json.stat().st_mode,
+    } == {usual}
 
 
 # -- folders
@@ -117,8 +120,9 @@ def test_a_changed_file_in_a_folder_of_ours_is_kept_aside_whether_there_is_a_new
         (capture.frames / name).write_text(f"retouched {name}")
     make_frames(capture, "00000.jpg", text="new")
     assert contents(capture.frames) == {"00000.jpg": b"new"}
-    assert contents(capture.root / "kept") == {f"frames/{name}": f"retouched {name}".encode()
-                                               for name in ("00000.jpg", "00001.jpg")}
+    assert contents(capture.root / "kept") == {
+        f"frames/{name}": f"retouched {name}".encode() for name in ("00000.jpg", "00001.jpg")
+    }
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a link needs a privilege there")
@@ -181,8 +185,10 @@ def test_killed_at_any_rename_nothing_is_lost_and_the_next_run_clears_up(capture
     with capture.locked():
         assert not [path for path in capture.root.rglob(".*")], "what the killed one left is gone"
     found = contents(capture.root)
-    assert {found[name] for name in found if name.startswith("frames/holiday")
-            or name.startswith("frames/z")} == {b"holiday.jpg", b"z.jpg"}
+    assert {found[name] for name in found if name.startswith("frames/holiday") or name.startswith("frames/z")} == {
+        b"holiday.jpg",
+        b"z.jpg",
+    }
     assert found["frames/00000.jpg"] in (b"frame", b"new")
     assert b"retouched" in found.values()
 
@@ -192,8 +198,12 @@ def test_killed_while_it_writes_the_captures_own_books_leaves_nothing_either(tmp
     """capture.json when the folder becomes a capture (at 0: its first rename), and job.json."""
     root = tmp_path / "anna.wildcap"
     code = KILLED
-    for old, new in (("with replacing_folder", "Capture({capture!r}).claim()\nwith replacing"), (".frames)", ".job)"),
-                     ('(folder / "00000.jpg")', "folder"), ("import replacing_folder", "import replacing")):
+    for old, new in (
+        ("with replacing_folder", "Capture({capture!r}).claim()\nwith replacing"),
+        (".frames)", ".job)"),
+        ('(folder / "00000.jpg")', "folder"),
+        ("import replacing_folder", "import replacing"),
+    ):
         code = code.replace(old, new)
     subprocess.run([sys.executable, "-c", code.format(root=str(ROOT), at=at, capture=str(root))], check=False)
     assert len(list(root.glob(".*.tmp.json"))) == 1

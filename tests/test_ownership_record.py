@@ -23,27 +23,42 @@ def capture(tmp_path) -> Capture:
 def test_a_capture_of_0_1_0_gets_a_record_of_what_it_wrote_and_of_nothing_else(tmp_path):
     root = tmp_path / "old.wildcap"
     (root / "frames").mkdir(parents=True)
-    for name, text in (("frames/00000.jpg", "frame"), ("frames/frames.json", "{}"),
-                       ("frames/2026 holiday.jpg", "a picture"), ("head.obj", "head"),
-                       ("notes.txt", "mine"), (".scan.99999999.tmp.ply", "half"),
-                       ("frames/.00001.99999999.tmp.jpg", "half"),
-                       ("frames/.mine.1.tmp.jpg", "mine"), (".notes.old", "mine")):
+    for name, text in (
+        ("frames/00000.jpg", "frame"),
+        ("frames/frames.json", "{}"),
+        ("frames/2026 holiday.jpg", "a picture"),
+        ("head.obj", "head"),
+        ("notes.txt", "mine"),
+        (".scan.99999999.tmp.ply", "half"),
+        ("frames/.00001.99999999.tmp.jpg", "half"),
+        ("frames/.mine.1.tmp.jpg", "mine"),
+        (".notes.old", "mine"),
+    ):
         (root / name).write_text(text)
     (root / ".maps.99999999.tmp").mkdir()
     (root / "capture.json").write_text(json.dumps({"format": 1, "source": "", "stages": {"frames": {}}}))
     capture = Capture(root)
     with capture.locked():
         pass
-    assert not any((root / name).exists()
-                   for name in (".scan.99999999.tmp.ply", "frames/.00001.99999999.tmp.jpg", ".maps.99999999.tmp"))
+    assert not any(
+        (root / name).exists()
+        for name in (".scan.99999999.tmp.ply", "frames/.00001.99999999.tmp.jpg", ".maps.99999999.tmp")
+    )
     assert (root / "frames" / ".mine.1.tmp.jpg").read_text() == (root / ".notes.old").read_text() == "mine", (
         "such names are not 0.1.0's alone"
     )
     make_frames(capture, "00000.jpg", text="new")
     with replacing(capture.head) as temporary:
         temporary.write_text("new")
-    assert contents(root).keys() == {"capture.json", "frames/00000.jpg", "frames/2026 holiday.jpg", "head.obj",
-                                     "notes.txt", ".notes.old", "frames/.mine.1.tmp.jpg"}
+    assert contents(root).keys() == {
+        "capture.json",
+        "frames/00000.jpg",
+        "frames/2026 holiday.jpg",
+        "head.obj",
+        "notes.txt",
+        ".notes.old",
+        "frames/.mine.1.tmp.jpg",
+    }
 
 
 def test_the_first_thing_written_into_a_capture_of_0_1_0_does_not_hide_what_it_wrote(tmp_path):
@@ -79,8 +94,9 @@ def test_a_record_with_a_line_cut_off_is_read_and_a_lost_one_loses_no_file(captu
         file.write(b'{"path": "frames/000')
     make_frames(capture, "00000.jpg", text="new")
     make_frames(capture, "00000.jpg", text="newer")
-    assert contents(capture.root).keys() == {"capture.json",
-                                             "frames/00000.jpg"}, "the line after it is a line of its own"
+    assert contents(capture.root).keys() == {"capture.json", "frames/00000.jpg"}, (
+        "the line after it is a line of its own"
+    )
     with open(record, "ab") as file:
         file.write(b'{"path": "frames/000')
     (capture.root / "a.txt").write_text("ours")
@@ -105,8 +121,7 @@ def test_a_long_record_is_shortened_to_what_is_there(capture, monkeypatch):
     assert [line["path"] for line in lines] == ["frames/00000.jpg", "shadow_mask.png"], "what was changed is not ours"
     make_frames(capture, "00000.jpg", text="new")
     kept = contents(capture.root / "kept")
-    assert (kept == {"frames/00001.jpg": b"retouched"}
-            or (capture.frames / "00001.jpg").read_text() == "retouched")
+    assert kept == {"frames/00001.jpg": b"retouched"} or (capture.frames / "00001.jpg").read_text() == "retouched"
 
 
 def test_a_copy_of_a_capture_knows_what_is_ours_by_content(capture, tmp_path):

@@ -54,8 +54,10 @@ def test_painting_sets_everything_up_and_leaving_puts_it_back(addon, capture, on
     for mode in ('TEXTURE_PAINT', 'OBJECT'):  # Blender gives the mode its first brush
         bpy.ops.object.mode_set(mode=mode)
     paint = bpy.context.scene.tool_settings.image_paint
-    before = {name: getattr(paint, name)
-              for name in ("mode", "canvas", "use_stencil_layer", "stencil_image", "invert_stencil", "brush")}
+    before = {
+        name: getattr(paint, name)
+        for name in ("mode", "canvas", "use_stencil_layer", "stencil_image", "invert_stencil", "brush")
+    }
     objects = {o.name for o in bpy.data.objects}
     bpy.ops.wildcap.paint_mask(on=on)
     assert bpy.context.mode == 'PAINT_TEXTURE'

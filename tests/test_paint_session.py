@@ -23,8 +23,9 @@ def state(thing, without=()) -> dict:
         if prop.type == 'POINTER':
             found[prop.identifier] = getattr(value, "name", None)
         else:
-            found[prop.identifier] = (tuple(value) if getattr(prop, "is_array", False) and not isinstance(value, str)
-                                      else value)
+            found[prop.identifier] = (
+                tuple(value) if getattr(prop, "is_array", False) and not isinstance(value, str) else value
+            )
     return found
 
 
@@ -36,21 +37,34 @@ def everything() -> dict:
     unified = getattr(context.scene.tool_settings, "unified_paint_settings", None) or paint.unified_paint_settings
     active = context.view_layer.objects.active
     return {
-        "mode": context.mode, "active": active.name if active else None,
+        "mode": context.mode,
+        "active": active.name if active else None,
         "selected": [o.name for o in context.view_layer.objects if o.select_get()],
         "hidden": [o.name for o in context.view_layer.objects if o.hide_get()],
         "objects": sorted(o.name for o in bpy.data.objects),
         "brushes": sorted(b.name for b in bpy.data.brushes if b.library is None),
-        "paint": state(paint, ("tool_slots",)), "unified": state(unified),
+        "paint": state(paint, ("tool_slots",)),
+        "unified": state(unified),
         "brush": state(paint.brush) if paint.brush else None,
-        "shading": [state(s.shading) for s in spaces], "overlay": [state(s.overlay) for s in spaces],
+        "shading": [state(s.shading) for s in spaces],
+        "overlay": [state(s.overlay) for s in spaces],
         "canvas": state(paint.canvas, ("is_dirty", "bindcode")) if paint.canvas else None,
     }
 
 
-@pytest.mark.parametrize(("mode", "shading"), [
-    ('OBJECT', 'SOLID'), ('EDIT', 'SOLID'), ('SCULPT', 'SOLID'), ('WEIGHT_PAINT', 'SOLID'), ('TEXTURE_PAINT', 'SOLID'),
-    ('OBJECT', 'MATERIAL'), ('OBJECT', 'RENDERED'), ('OBJECT', 'WIREFRAME')])
+@pytest.mark.parametrize(
+    ("mode", "shading"),
+    [
+        ('OBJECT', 'SOLID'),
+        ('EDIT', 'SOLID'),
+        ('SCULPT', 'SOLID'),
+        ('WEIGHT_PAINT', 'SOLID'),
+        ('TEXTURE_PAINT', 'SOLID'),
+        ('OBJECT', 'MATERIAL'),
+        ('OBJECT', 'RENDERED'),
+        ('OBJECT', 'WIREFRAME'),
+    ],
+)
 def test_leaving_gives_back_what_the_artist_had(addon, capture, mode, shading):
     bpy.ops.wildcap.bring_in_head()
     for entered in ('TEXTURE_PAINT', 'OBJECT'):  # Blender gives the mode its first brush
@@ -138,8 +152,11 @@ def test_a_brush_that_blenders_mask_tool_links_goes_and_others_of_a_library_stay
     with bpy.data.libraries.load(str(library), link=True) as (there, wanted):
         wanted.brushes = there.brushes
     bpy.ops.wildcap.finish_mask()
-    assert [b.name for b in bpy.data.brushes if b.library is not None
-            and bpy.path.abspath(b.library.filepath) == str(library)] == ["Fill"]
+    assert [
+        b.name
+        for b in bpy.data.brushes
+        if b.library is not None and bpy.path.abspath(b.library.filepath) == str(library)
+    ] == ["Fill"]
 
 
 def test_mirrored_strokes_go_with_the_artist_to_the_sheet_and_back_and_stay_with_the_painting(addon, capture):
@@ -175,7 +192,7 @@ def test_the_tint_is_the_artists_own_and_stays_so(addon, capture):
 
 def spot(image, row: int) -> np.ndarray:
     mask = np.zeros((image.size[1], image.size[0]), np.float32)
-    mask[row:row + 4, 20:24] = 1
+    mask[row : row + 4, 20:24] = 1
     return mask
 
 

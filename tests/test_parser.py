@@ -37,8 +37,10 @@ def work(tmp_path_factory):
         for view in range(VIEWS):
             rng = np.random.default_rng([seed, view])
             (folder / f"figure_{seed}").mkdir(exist_ok=True)
-            unlit.save(folder / f"figure_{seed}" / f"{view}.npz",
-                       unlit.trace_unlit(scene, unlit.random_view(scene.figure, rng), rng))
+            unlit.save(
+                folder / f"figure_{seed}" / f"{view}.npz",
+                unlit.trace_unlit(scene, unlit.random_view(scene.figure, rng), rng),
+            )
     return folder
 
 
@@ -67,7 +69,7 @@ def randomly(network: ParseNet) -> ParseNet:
 def test_a_crop_is_upright_and_maps_back_to_its_pixels(turn):
     points = landmarks(turn)
     move = to_crop(points)
-    chin, bridge = (points[[CHIN, BRIDGE], :2] @ move[:, :2].T + move[:, 2])
+    chin, bridge = points[[CHIN, BRIDGE], :2] @ move[:, :2].T + move[:, 2]
     assert chin[0] == pytest.approx(bridge[0], abs=1e-3) and chin[1] > bridge[1]
     y, x = np.mgrid[0:240, 0:300] + 0.5
     smooth = np.stack([x, y], -1).astype(np.float32)  # a picture of where each pixel is
@@ -101,8 +103,9 @@ def test_shares_add_up_to_one_and_beyond_the_crop_is_background():
     assert whole.shape == (240, 300, len(PARTS)) and whole.dtype == np.float32 and whole.min() >= 0
     assert np.abs(whole.sum(-1) - 1).max() < 1e-4 and found.crop[..., 0].std() > 0.01
     assert (whole[0, 0] == np.eye(len(PARTS))[PARTS.index("background")]).all()
-    assert np.allclose(found.of("hair", "beard"), whole[..., PARTS.index("hair")] + whole[..., PARTS.index("beard")],
-                       atol=1e-5)
+    assert np.allclose(
+        found.of("hair", "beard"), whole[..., PARTS.index("hair")] + whole[..., PARTS.index("beard")], atol=1e-5
+    )
 
 
 def test_a_mirrored_picture_has_mirrored_parts():
@@ -133,7 +136,7 @@ def test_a_sight_knows_what_grows_where(sight):
     points = np.floor(sight.landmarks).astype(int)
     named = {name: shares[..., PARTS.index(name)] for name in PARTS}
     x, y = points[CHIN]
-    assert named["beard"][y - 4:y, x - 2:x + 3].mean() > 0.5, "a full beard covers the chin, roots and all"
+    assert named["beard"][y - 4 : y, x - 2 : x + 3].mean() > 0.5, "a full beard covers the chin, roots and all"
     assert named["background"][:, 0][:60].mean() > 0.9 and named["hair"].max() > 0.9
     assert sight.reach.max() == 255 and 40 < np.median(sight.free[named["skin"] > 0.9]) <= 255
 
@@ -187,9 +190,16 @@ def test_a_little_training_beats_the_constant_answer(work):
     batch = snapshots.Snapshots([1000], VIEWS, work, None).draw(2, 1, np.random.default_rng(0))[0]
     torch.manual_seed(0)
     network = ParseNet(**TINY)
-    weight = batch.known * (1 + training.NEAR * torch.nn.functional.max_pool2d(
-        batch.shares[:, [PARTS.index(n) for n in training.SMALL]].sum(1, keepdim=True), 2 * training.REACH + 1, 1,
-        training.REACH))
+    weight = batch.known * (
+        1
+        + training.NEAR
+        * torch.nn.functional.max_pool2d(
+            batch.shares[:, [PARTS.index(n) for n in training.SMALL]].sum(1, keepdim=True),
+            2 * training.REACH + 1,
+            1,
+            training.REACH,
+        )
+    )
     usual = (batch.shares * weight).sum((0, 2, 3)) / weight.sum()
     constant = -float((usual * usual.clamp_min(1e-9).log()).sum())
     optimiser = torch.optim.AdamW(network.parameters(), lr=1e-2)
@@ -229,8 +239,9 @@ def test_a_killed_training_goes_on_to_the_same_weights(work, tmp_path, monkeypat
                 with pytest.raises(KeyboardInterrupt):
                     training.train_parser("cpu", folder / "parser.safetensors", QUIET, TrainingRun(12, folder))
             card = training.train_parser("cpu", folder / "parser.safetensors", QUIET, TrainingRun(12, folder))
-        weights.append({name: value.clone()
-                        for name, value in parser.load(folder / "parser.safetensors").state_dict().items()})
+        weights.append(
+            {name: value.clone() for name, value in parser.load(folder / "parser.safetensors").state_dict().items()}
+        )
     assert card["steps"] == 18 and card["prepared"] == 1 and set(PARTS) < set(card["held_out"]), card
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
     with pytest.raises(Problem, match="other data"):
@@ -240,8 +251,9 @@ def test_a_killed_training_goes_on_to_the_same_weights(work, tmp_path, monkeypat
 
 def test_growing_needs_figures(tmp_path):
     with pytest.raises(Problem, match="There are no figures"):
-        training.train_parser("cpu", tmp_path / "parser.safetensors", QUIET,
-                              TrainingRun(1, tmp_path / "work", growing=True))
+        training.train_parser(
+            "cpu", tmp_path / "parser.safetensors", QUIET, TrainingRun(1, tmp_path / "work", growing=True)
+        )
 
 
 def test_the_figures_of_a_row_are_those_counted_by_hand():

@@ -34,8 +34,9 @@ def ready(someone):
 
 
 def view(scale):
-    return sample.view_of(scene.looking(np.array([[0.05, -0.5, 0.0]]), np.array([[0.0, 0.0, -0.03]]), np.zeros(1))[0],
-                          scale)
+    return sample.view_of(
+        scene.looking(np.array([[0.05, -0.5, 0.0]]), np.array([[0.0, 0.0, -0.03]]), np.zeros(1))[0], scale
+    )
 
 
 @pytest.fixture(scope="module")
@@ -57,8 +58,9 @@ def test_the_identity_basis_leaves_two_millimetres_of_a_person():
 
 def test_a_person_is_not_symmetric_and_not_a_caricature():
     rest, moved = template.load(), shape.person_mesh(4)
-    mirror = np.linalg.norm(rest.vertices[:, None, [0, 2]][::400] * [-1, 1] - rest.vertices[None][..., [0, 2]],
-                            axis=-1).argmin(1)
+    mirror = np.linalg.norm(
+        rest.vertices[:, None, [0, 2]][::400] * [-1, 1] - rest.vertices[None][..., [0, 2]], axis=-1
+    ).argmin(1)
     left, right = moved.vertices[::400] - rest.vertices[::400], moved.vertices[mirror] - rest.vertices[mirror]
     assert 0.0002 < np.abs(left[:, 1] - right[:, 1]).mean() < 0.006
     assert shape.root_mean_square(moved.vertices - rest.vertices) < 0.012
@@ -80,7 +82,7 @@ def test_ict_facekit_changes_the_shape_where_it_is_given():
 def test_lids_that_are_shut_leave_the_head_as_it_was_and_open_ones_clear_the_ball():
     head = shape.person_mesh(SEED)
     shut, wide = (lids.open_lids(head, openness, np.zeros(2)) for openness in (0.0, 0.9))
-    assert np.abs(shut.skin.vertices[:len(head.vertices)] - head.vertices).max() < 1e-9
+    assert np.abs(shut.skin.vertices[: len(head.vertices)] - head.vertices).max() < 1e-9
     for side in (0, 1):
         rims = [[opened.skin.vertices[rim] for rim in opened.rims[side]] for opened in (shut, wide)]
         gaps = [np.linalg.norm(upper - lower, axis=1).max() for upper, lower in rims]
@@ -137,22 +139,33 @@ def test_each_growth_is_where_its_part_of_the_map_is(someone):
 
 
 def test_prisms_have_the_hairs_radius_and_their_order():
-    straight = strands.Strands(np.linspace([0, 0, 0], [0, 0, 0.01], 5, dtype=np.float32)[None]
-                               + np.float32([[[0, 0, 0]], [[0.1, 0, 0]]]),
-                               np.full(2, 1e-4, np.float32), np.zeros((2, 3), np.float32), "hair")
+    straight = strands.Strands(
+        np.linspace([0, 0, 0], [0, 0, 0.01], 5, dtype=np.float32)[None] + np.float32([[[0, 0, 0]], [[0.1, 0, 0]]]),
+        np.full(2, 1e-4, np.float32),
+        np.zeros((2, 3), np.float32),
+        "hair",
+    )
     mesh = strands.prisms(straight)
     assert len(mesh.faces) == 2 * 6 * 4
     reach = np.linalg.norm(mesh.vertices[:3, :2], axis=1), np.linalg.norm(mesh.vertices[12:15, :2], axis=1)
     assert reach[0] == pytest.approx(1e-4, rel=1e-3) and reach[1] == pytest.approx(1e-4 / 3, rel=1e-3)
-    assert (mesh.vertices[mesh.faces[len(mesh.faces) // 2:]][..., 0] > 0.05).all()
+    assert (mesh.vertices[mesh.faces[len(mesh.faces) // 2 :]][..., 0] > 0.05).all()
 
 
 def test_parts_cover_what_is_seen_once(seen):
     assert np.allclose(seen.parts.sum(-1), seen.alpha, atol=1e-5)
     shares = dict(zip(figure.PARTS, seen.parts.sum((0, 1)) / seen.alpha.sum(), strict=True))
-    assert all(shares[part] > least
-               for part, least in (("skin", 0.1), ("brows", 5e-4), ("beard", 5e-3), ("hair", 0.02), ("eyes", 5e-4),
-                                   ("clothes", 0.1)))
+    assert all(
+        shares[part] > least
+        for part, least in (
+            ("skin", 0.1),
+            ("brows", 5e-4),
+            ("beard", 5e-3),
+            ("hair", 0.02),
+            ("eyes", 5e-4),
+            ("clothes", 0.1),
+        )
+    )
 
 
 def test_no_hair_hangs_before_the_face_or_flies():
@@ -175,8 +188,9 @@ def test_a_shirt_ends_above_the_cut_of_the_neck_and_around_it():
         cloth = clothes.shirt(replace(person.sample_person(seed), collar=collar), head)
         edge = cloth.vertices.reshape(clothes.ROWS, clothes.AROUND, 3)[:12]
         top = edge[np.argmax(edge[..., 2], 0), np.arange(clothes.AROUND)]
-        pairs, count = np.unique(np.sort(head.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1), axis=0,
-                                 return_counts=True)
+        pairs, count = np.unique(
+            np.sort(head.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1), axis=0, return_counts=True
+        )
         cut = head.vertices[np.unique(pairs[count == 1])]
         near = strands.cKDTree(top[:, :2]).query(cut[:, :2])[1]
         assert (top[near, 2] > cut[:, 2] + 0.003).all(), "no hole"
@@ -202,8 +216,10 @@ def test_a_sun_behind_the_head_reaches_no_face(ready):
 def test_the_shadow_of_what_stands_still_moves_over_a_head_that_sways(someone):
     """A plate before half of the face, its edge at x = 0 in the world: a head that is 10 mm to the side has that edge
     10 mm from its own middle, and one that is turned with all that is about it where it was."""
-    plate = Mesh(np.array([[0, -0.4, -0.3], [0.3, -0.4, -0.3], [0.3, -0.4, 0.3], [0, -0.4, 0.3]]),
-                 np.array([[0, 1, 2], [0, 2, 3]]))
+    plate = Mesh(
+        np.array([[0, -0.4, -0.3], [0.3, -0.4, -0.3], [0.3, -0.4, 0.3], [0, -0.4, 0.3]]),
+        np.array([[0, 1, 2], [0, 2, 3]]),
+    )
     shaven, sun, shift = replace(someone, strands=()), np.array([0, -1.0, 0]), np.eye(4)
     shift[0, 3] = 0.01
 
@@ -224,10 +240,12 @@ def test_a_seed_is_one_person(someone):
     assert person.sample_person(SEED) == someone.person != person.sample_person(SEED + 1)
     assert np.array_equal(shape.person_mesh(SEED).vertices, someone.head.vertices)
     assert np.array_equal(figure.paint(someone.person, SIZE)[1], someone.seen)
-    shaven = figure.grow_hair(replace(someone.person, beard="none", hair="none"), someone.head, someone.opened,
-                              someone.shirt)
-    assert all(np.array_equal(a.points, b.points)
-               for a, b in zip(shaven, someone.strands, strict=False)), "each growth has a stream of its own"
+    shaven = figure.grow_hair(
+        replace(someone.person, beard="none", hair="none"), someone.head, someone.opened, someone.shirt
+    )
+    assert all(np.array_equal(a.points, b.points) for a, b in zip(shaven, someone.strands, strict=False)), (
+        "each growth has a stream of its own"
+    )
 
 
 def test_training_never_draws_a_person_who_is_filmed():
@@ -242,9 +260,12 @@ def test_training_never_draws_a_person_who_is_filmed():
 def test_the_people_are_the_first_who_are_as_their_names_say():
     from benchmarks import likenesses
 
-    rule = {"bearded": lambda p: p.openness > 0 and (p.hair, p.beard) == ("cropped", "full"),
-            "closed": lambda p: p.openness == 0, "fringed": lambda p: p.openness > 0 and p.hair == "long" and p.fringe,
-            "stubbled": lambda p: p.openness > 0 and (p.hair, p.beard) == ("short", "stubble")}
+    rule = {
+        "bearded": lambda p: p.openness > 0 and (p.hair, p.beard) == ("cropped", "full"),
+        "closed": lambda p: p.openness == 0,
+        "fringed": lambda p: p.openness > 0 and p.hair == "long" and p.fringe,
+        "stubbled": lambda p: p.openness > 0 and (p.hair, p.beard) == ("short", "stubble"),
+    }
     for first, group in ((910001, likenesses.LIKENESSES), (920001, likenesses.HELD_BACK)):
         for each in group:
             asked = rule[each.name.removesuffix("_2")]

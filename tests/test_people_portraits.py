@@ -25,8 +25,11 @@ BEARDED = 1010
 @pytest.fixture(scope="module")
 def stage():
     sitter = relightable.Sitter(make_figure(BEARDED, 256), np.random.default_rng(0))
-    return next(s for s in (sitter.stage(np.random.default_rng(seed)) for seed in range(9))
-                if share(s, "beard").sum() > 150 and share(s, "brows").sum() > 100)
+    return next(
+        s
+        for s in (sitter.stage(np.random.default_rng(seed)) for seed in range(9))
+        if share(s, "beard").sum() > 150 and share(s, "brows").sum() > 100
+    )
 
 
 def share(stage: relightable.RelightableView, name: str) -> np.ndarray:
@@ -43,10 +46,14 @@ def contrast(picture: np.ndarray, stage: relightable.RelightableView) -> float:
 def test_a_sight_comes_back_as_it_was_kept(stage, tmp_path):
     relightable.save(tmp_path / "0.npz", stage)
     back = relightable.load(tmp_path / "0.npz")
-    assert all(np.array_equal(getattr(stage, f.name), getattr(back, f.name))
-               for f in fields(relightable.RelightableView) if f.name != "unlit")
-    assert all(np.array_equal(getattr(stage.unlit, f.name), getattr(back.unlit, f.name))
-               for f in fields(relightable.Unlit))
+    assert all(
+        np.array_equal(getattr(stage, f.name), getattr(back, f.name))
+        for f in fields(relightable.RelightableView)
+        if f.name != "unlit"
+    )
+    assert all(
+        np.array_equal(getattr(stage.unlit, f.name), getattr(back.unlit, f.name)) for f in fields(relightable.Unlit)
+    )
 
 
 def test_light_does_not_know_the_pigment(stage):
@@ -57,8 +64,10 @@ def test_light_does_not_know_the_pigment(stage):
     plain = portraits.Colours(np.full((*stage.here.shape, 3), 0.4, np.float32), shares)
     dark = plain.albedo * np.exp(-2 * (share(stage, "beard") + share(stage, "brows")))[..., None]
     dark[100:130, 100:130] *= np.float32([0.6, 0.4, 0.4])
-    made = [portraits.portray(stage, portraits.Colours(albedo, shares), np.random.default_rng(4))
-            for albedo in (plain.albedo, dark)]
+    made = [
+        portraits.portray(stage, portraits.Colours(albedo, shares), np.random.default_rng(4))
+        for albedo in (plain.albedo, dark)
+    ]
     pictures = [images.srgb_to_linear(portrait.srgb) for portrait in made]
     assert contrast(pictures[1], stage) - contrast(pictures[0], stage) > 0.8
     known = (made[0].skin > 0.99) & (made[1].skin > 0.99) & (made[0].even.min(-1) > 0.02)
@@ -90,8 +99,9 @@ def test_a_lamp_that_is_blocked_everywhere_lights_nothing(stage):
 
 def test_batches_show_each_sight_under_two_lights_and_depend_on_the_seed_alone(tmp_path):
     people.prepare_people([BEARDED], 1, tmp_path, QUIET, processes=1)
-    drawn = [people.People([BEARDED, BEARDED + 1], 1, tmp_path, None).draw(1, np.random.default_rng(3))
-             for _ in range(2)]
+    drawn = [
+        people.People([BEARDED, BEARDED + 1], 1, tmp_path, None).draw(1, np.random.default_rng(3)) for _ in range(2)
+    ]
     assert all(np.array_equal(getattr(drawn[0], f.name), getattr(drawn[1], f.name)) for f in fields(drawn[0]))
     batch = drawn[0]
     assert batch.layers.shape[0] == 2 and not np.allclose(batch.shading[0], batch.shading[1], atol=0.1)
@@ -107,25 +117,42 @@ def test_a_face_that_is_painted_over_keeps_its_light():
     """Two lights on one albedo, half of it skin; the fitted light is the true one."""
     side, rng = 64, np.random.default_rng(0)
     albedo = np.full((side, side, 3), [0.35, 0.25, 0.2], np.float32)
-    lights = [np.linspace(0.3, 1.0, side, dtype=np.float32)[:, None, None] * np.ones((side, side, 3), np.float32) * tint
-              for tint in (1.0, 0.8)]
+    lights = [
+        np.linspace(0.3, 1.0, side, dtype=np.float32)[:, None, None] * np.ones((side, side, 3), np.float32) * tint
+        for tint in (1.0, 0.8)
+    ]
     skin = np.zeros((1, side // 2, side // 2), np.float32)
     skin[..., : side // 4] = 1
-    told = [network_input(images.linear_to_srgb(albedo * light), 0.3 * light, 0.3 * light,
-                          np.ones((side, side, 3), np.float32), np.ones((side, side), np.float32)) for light in lights]
-    shading = [np.log(light[::2, ::2]).transpose(2, 0, 1) - middle
-               for light, (_, middle) in zip(lights, told, strict=True)]
+    told = [
+        network_input(
+            images.linear_to_srgb(albedo * light),
+            0.3 * light,
+            0.3 * light,
+            np.ones((side, side, 3), np.float32),
+            np.ones((side, side), np.float32),
+        )
+        for light in lights
+    ]
+    shading = [
+        np.log(light[::2, ::2]).transpose(2, 0, 1) - middle for light, (_, middle) in zip(lights, told, strict=True)
+    ]
     weight = np.stack([LEAST_WEIGHT + (1 - LEAST_WEIGHT) * skin] * 2)
-    batch = PortraitBatch(*(torch.from_numpy(np.stack(maps).astype(np.float32)) for maps in (
-        [layers for layers, _ in told], shading, weight, 0 * weight, 0 * weight)))
+    batch = PortraitBatch(
+        *(
+            torch.from_numpy(np.stack(maps).astype(np.float32))
+            for maps in ([layers for layers, _ in told], shading, weight, 0 * weight, 0 * weight)
+        )
+    )
     moved = 0.0
     for _ in range(6):
         painted = repainted(batch, rng)
-        linear, before = (images.srgb_to_linear((maps.layers[:, :3].numpy().transpose(0, 2, 3, 1) + 1) / 2)
-                          for maps in (painted, batch))
+        linear, before = (
+            images.srgb_to_linear((maps.layers[:, :3].numpy().transpose(0, 2, 3, 1) + 1) / 2)
+            for maps in (painted, batch)
+        )
         paint = np.log(linear / before)
         assert np.allclose(paint[0], paint[1], atol=2e-3)  # one albedo under both lights
-        assert np.allclose(paint[:, :, side // 2 + 2:], 0, atol=1e-4)  # nothing off the skin
+        assert np.allclose(paint[:, :, side // 2 + 2 :], 0, atol=1e-4)  # nothing off the skin
         middles = [network_input(images.linear_to_srgb(picture))[1] for picture in linear]
         for k, light in enumerate(lights):
             there = painted.shading[k].numpy().transpose(1, 2, 0) + middles[k]

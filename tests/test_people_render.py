@@ -26,8 +26,20 @@ EVEN = scene.SceneLight((1.0, 1.0, 1.0))
 def pictured(tmp_path_factory):
     """A bald man in a green shirt with stubble, blue eyes and black brows: two linear frames under an even light of
     radiance 1, and their truth."""
-    asked = replace(person.sample_person(5), male=True, hair="none", beard="stubble", beard_length=0.002, openness=0.95,
-                    gaze=(0.0, 0.0), iris=IRIS, brow=1.0, brow_colour=tuple(person.BROWS[0]), clothes=SHIRT, shade=0.0)
+    asked = replace(
+        person.sample_person(5),
+        male=True,
+        hair="none",
+        beard="stubble",
+        beard_length=0.002,
+        openness=0.95,
+        gaze=(0.0, 0.0),
+        iris=IRIS,
+        brow=1.0,
+        brow_colour=tuple(person.BROWS[0]),
+        clothes=SHIRT,
+        shade=0.0,
+    )
     someone = figure.make_figure(asked, 512)
     camera = scene.looking(np.array([[0.0, -0.42, 0.0]]), np.array([[0.0, 0.0, -0.03]]), np.zeros(1))
     poses = np.tile(np.eye(4), (2, 1, 1))
@@ -84,7 +96,7 @@ def test_eyes_are_blue_and_black_in_the_middle_and_white_beside(pictured):
     white, blue = (eyes & (found.seen.min(-1) > 0.3), eyes & (found.seen[..., 2] > 2 * found.seen[..., 0]))
     assert white.sum() > 8 and blue.sum() > 8
     assert frame[white].mean() > 2 * frame[blue].mean() and (frame[blue].mean(0)[2] > 1.15 * frame[blue].mean(0)[0])
-    for side in (frame.shape[1] // 2 * np.array([[0, 1], [1, 2]])):
+    for side in frame.shape[1] // 2 * np.array([[0, 1], [1, 2]]):
         assert eyes[:, slice(*side)].sum() > 0.35 * eyes.sum(), "one on either side"
 
 

@@ -13,15 +13,32 @@ from core.imaging import images  # noqa: E402
 from core.synthetic import sample, scene  # noqa: E402
 from core.synthetic.people import motion, phone  # noqa: E402
 
-PLAIN = phone.Phone(shot=0, read=0, reduction=0, contrast=0, shoulder=0.8, local=0, local_radius=0.05, sharpening=0,
-                    sharpening_px=1, crf=18, readout=0, shutter=0, sway_mm=0, sway_degrees=0)
+PLAIN = phone.Phone(
+    shot=0,
+    read=0,
+    reduction=0,
+    contrast=0,
+    shoulder=0.8,
+    local=0,
+    local_radius=0.05,
+    sharpening=0,
+    sharpening_px=1,
+    crf=18,
+    readout=0,
+    shutter=0,
+    sway_mm=0,
+    sway_degrees=0,
+)
 STEP = np.where(np.arange(64)[None, :, None] < 32, 0.3, 0.5) * np.ones((48, 64, 3))
 
 
 def test_a_plain_phone_shows_srgb():
     linear = np.random.default_rng(0).uniform(0, 0.5, (8, 8, 3)).astype(np.float32)
-    assert np.allclose(phone.develop(linear, PLAIN, np.array([1.0, 1, 1]), np.random.default_rng(0)),
-                       images.linear_to_srgb(linear), atol=1e-4)
+    assert np.allclose(
+        phone.develop(linear, PLAIN, np.array([1.0, 1, 1]), np.random.default_rng(0)),
+        images.linear_to_srgb(linear),
+        atol=1e-4,
+    )
 
 
 def test_exposure_is_a_gain_of_the_light():

@@ -28,8 +28,9 @@ OF_BROW = float(images.srgb_to_linear(np.float32(DARK)) / images.srgb_to_linear(
 
 
 def face_at(pixels: np.ndarray) -> Face:
-    return Face((*pixels.min(0), *pixels.max(0)), np.concatenate([pixels, np.zeros((468, 1))], 1).astype(np.float32),
-                1.0)
+    return Face(
+        (*pixels.min(0), *pixels.max(0)), np.concatenate([pixels, np.zeros((468, 1))], 1).astype(np.float32), 1.0
+    )
 
 
 def parts_of(**shares: np.ndarray) -> SimpleNamespace:
@@ -71,6 +72,7 @@ def test_the_light_of_a_photograph_leaves_the_better_for_the_head_that_is_fitted
 
     def refuse(*_):
         raise Problem("The selected frames show no bare skin of the face.", "")
+
     monkeypatch.setattr(photograph, "fit_lit_head", refuse)
     alone = spread(photograph.delight_photograph(srgb, None)[0])
     assert ours < 0.85 * alone and ours < 0.15 * spread(srgb)
@@ -97,6 +99,7 @@ def test_a_brow_stays_where_the_parser_sees_one_and_where_only_landmarks_tell_of
         box = photograph.square_around(points)
         log = np.log(images.srgb_to_linear(photograph.crop(srgb, box, 128)))
         return ShadingEstimate(box, log, 0 * log[..., 0], log)
+
     monkeypatch.setattr(photograph, "_ask", ask)
     albedo = images.srgb_to_linear(photograph.delight_photograph(picture, None)[0])
     skin = albedo[130, 100].mean()

@@ -28,8 +28,12 @@ def test_photographs_are_kept_larger_for_the_features_cameras_are_found_by(captu
     for name in names[1:]:
         full = images.read_srgb(capture.frames / "full" / name)
         assert full.shape == (2000, 2000, 3)
-        assert np.abs(cv2.resize(full, (320, 320), interpolation=cv2.INTER_AREA)
-                      - images.read_srgb(capture.frames / name)).mean() < 0.02
+        assert (
+            np.abs(
+                cv2.resize(full, (320, 320), interpolation=cv2.INTER_AREA) - images.read_srgb(capture.frames / name)
+            ).mean()
+            < 0.02
+        )
 
 
 def test_a_telephones_heic_is_read_upright_with_its_focal_length_and_colours(capture, tmp_path):  # noqa: F811
@@ -37,8 +41,11 @@ def test_a_telephones_heic_is_read_upright_with_its_focal_length_and_colours(cap
     folder = tmp_path / "photos"
     folder.mkdir()
     rationals = 26 + 2 + 3 * 12 + 4  # behind the two folders of tags
-    tags = (struct.pack(">HHII", 0x920A, 5, 1, rationals) + struct.pack(">HHII", 0xA20E, 5, 1, rationals + 8)
-            + struct.pack(">HHIHH", 0xA210, 3, 1, 3, 0))
+    tags = (
+        struct.pack(">HHII", 0x920A, 5, 1, rationals)
+        + struct.pack(">HHII", 0xA20E, 5, 1, rationals + 8)
+        + struct.pack(">HHIHH", 0xA210, 3, 1, 3, 0)
+    )
     header = b"Exif\0\0MM\0*" + struct.pack(">IHHHIII", 8, 1, 0x8769, 4, 1, 26, 0)
     exif = header + struct.pack(">H", 3) + tags + bytes(4)
     # a lens of 6.8 mm, and 300 pixels a centimetre: a sensor of SIZE pixels is 8 mm wide
@@ -74,8 +81,18 @@ def give_profile(path, name: str) -> None:
     """As iPhones and cameras write it: the profile is in the JPEG's second application segment."""
     text = name.encode() + b"\0"
     tag = b"desc" + bytes(4) + struct.pack(">I", len(text)) + text + bytes(78 + -(90 + len(text)) % 4)
-    head = struct.pack(">I4xI4s4s4s12x4s28x3I48x", 144 + len(tag), 0x02100000, b"mntr", b"RGB ", b"XYZ ", b"acsp",
-                       0xF6D6, 0x10000, 0xD32D)
+    head = struct.pack(
+        ">I4xI4s4s4s12x4s28x3I48x",
+        144 + len(tag),
+        0x02100000,
+        b"mntr",
+        b"RGB ",
+        b"XYZ ",
+        b"acsp",
+        0xF6D6,
+        0x10000,
+        0xD32D,
+    )
     profile = b"ICC_PROFILE\0\1\1" + head + struct.pack(">I4s2I", 1, b"desc", 144, len(tag)) + tag
     data = path.read_bytes()
     path.write_bytes(data[:2] + b"\xff\xe2" + struct.pack(">H", len(profile) + 2) + profile + data[2:])
@@ -113,8 +130,12 @@ def test_adobe_rgb_is_brought_to_srgb_and_other_profiles_are_named(capture, tmp_
     stored = photographed(tmp_path / "photos", ("Adobe RGB (1998)", "ProPhoto RGB", "sRGB IEC61966-2.1"))
     record, report = take(capture, tmp_path / "photos")
     adobe, other, plain = (images.read_srgb(capture.frames / frame["name"]) for frame in record["frames"])
-    linear = stored[0] ** 2.2 @ np.linalg.solve(to_xyz(((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))),
-                                                to_xyz(((0.64, 0.33), (0.21, 0.71), (0.15, 0.06)))).T
+    linear = (
+        stored[0] ** 2.2
+        @ np.linalg.solve(
+            to_xyz(((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))), to_xyz(((0.64, 0.33), (0.21, 0.71), (0.15, 0.06)))
+        ).T
+    )
     coarse = [images.resize(each, 24, 24) for each in (adobe, images.linear_to_srgb(linear), stored[0])]
     off, untouched = (np.abs(coarse[i] - coarse[1]) for i in (0, 2))
     assert off.mean() < 0.003 and untouched.mean() > 0.008, "of what a JPEG keeps"

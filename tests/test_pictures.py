@@ -37,8 +37,11 @@ def test_every_picture_is_named_by_the_one_benchmark_whose_command_makes_it():
 
 def test_every_picture_is_shown_and_no_page_shows_another():
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
-    shown = Counter(name for page in pages
-                    for name in re.findall(r"\]\((?:\.\./|docs/)*pictures/(\w+)\.jpg\)", page.read_text("utf-8")))
+    shown = Counter(
+        name
+        for page in pages
+        for name in re.findall(r"\]\((?:\.\./|docs/)*pictures/(\w+)\.jpg\)", page.read_text("utf-8"))
+    )
     assert sorted(shown) == sorted(THERE)
 
 

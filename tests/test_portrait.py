@@ -45,8 +45,12 @@ def test_a_floor_takes_half_the_light_of_a_wall():
 
 def test_a_mirror_image_of_an_even_environment_is_even():
     stage = olat.light_stage(ball())
-    back = olat.mirror_environment(stage, np.flatnonzero(stage.normals[:, 1] < -0.8),
-                                   2 * np.ones((olat.LIGHTS, 3), np.float32), np.array([0, -1.0, 0]))
+    back = olat.mirror_environment(
+        stage,
+        np.flatnonzero(stage.normals[:, 1] < -0.8),
+        2 * np.ones((olat.LIGHTS, 3), np.float32),
+        np.array([0, -1.0, 0]),
+    )
     assert back == pytest.approx(2, rel=0.05)
 
 
@@ -56,8 +60,7 @@ def test_a_lamp_half_hidden_by_an_edge_gives_half_its_light():
     wall = Mesh(np.array([[0, -1, 1.0], [-2, -1, 1.0], [-2, 1, 1.0], [0, 1, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]]))
     points, normals = np.array([[0, 0, 0], [0.5, 0, 0], [-0.5, 0, 0]]), np.repeat([[0, 0, 1.0]], 3, 0)
     points, normals = np.repeat(points, 200, 0), np.repeat(normals, 200, 0)
-    share = olat.trace_sun(RayCaster(wall), points, normals, np.array([0, 0, 1.0]), 0.1, 16,
-                           np.random.default_rng(0))
+    share = olat.trace_sun(RayCaster(wall), points, normals, np.array([0, 0, 1.0]), 0.1, 16, np.random.default_rng(0))
     assert share.reshape(3, 200).mean(1) == pytest.approx([0.5, 1, 0], abs=0.03)
 
 
@@ -72,9 +75,10 @@ def test_the_sun_of_a_panorama_is_taken_out_with_all_its_light():
     assert made.lamp[2] == pytest.approx(towards[2], abs=1e-3)  # it was turned about the vertical only
     whole = (panorama.mean(-1) * solid).sum() / (4 * np.pi)
     left = 25 * whole  # radiance that stays
-    assert made.colour == pytest.approx((9000 - left) * solid[40, 100] / np.pi
-                                        / ((whole * 4 * np.pi - (9000 - left) * solid[40, 100]) / (4 * np.pi)),
-                                        rel=0.05)
+    assert made.colour == pytest.approx(
+        (9000 - left) * solid[40, 100] / np.pi / ((whole * 4 * np.pi - (9000 - left) * solid[40, 100]) / (4 * np.pi)),
+        rel=0.05,
+    )
 
 
 def test_a_picture_is_its_albedo_times_its_shading(seen):
@@ -97,8 +101,9 @@ def test_two_lights_show_one_albedo(seen):
 def test_what_turns_away_from_the_only_lamp_is_in_its_shadow(seen):
     _, view = seen
     lamp = np.array([1.0, 0, 0])
-    lost, strong = portrait._shadow(view, [lamp], [np.full(3, 4.0)], [np.ones(len(view.pixel), np.float32)],
-                                    np.ones((len(view.pixel), 3)))
+    lost, strong = portrait._shadow(
+        view, [lamp], [np.full(3, 4.0)], [np.ones(len(view.pixel), np.float32)], np.ones((len(view.pixel), 3))
+    )
     assert strong == pytest.approx(0.8)
     assert lost[view.smooth @ lamp < -0.1] == pytest.approx(1) and lost[view.smooth @ lamp > 0.1] == pytest.approx(0)
 

@@ -32,8 +32,15 @@ from .painted_skin import SIZE, TONE, as_setting, make
 from .recorded import changed, record
 from .test_released_prior import weights_of, write
 
-MODEL = {"depths": [1, 1], "channels": [32, 32], "self_attn_depths": [False, False], "mapping_out": 16,
-         "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}
+MODEL = {
+    "depths": [1, 1],
+    "channels": [32, 32],
+    "self_attn_depths": [False, False],
+    "mapping_out": 16,
+    "sigma_data": 0.5,
+    "sigma_min": 0.01,
+    "sigma_max": 80,
+}
 
 
 def front() -> meshes.Mesh:
@@ -61,8 +68,9 @@ def put_own_head(capture: Capture, own: meshes.Mesh, skin: np.ndarray | None = N
     """As the registration leaves it; skin bool [F] marks the triangles to paint, all by default."""
     meshes.write_obj(capture.own_head, own)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.ones(len(own.faces), bool) if skin is None else skin, [0]])))
-    capture.own_head_skin.write_text(json.dumps({"template": "other.obj",
-                                                 "skin_triangles": edges.reshape(-1, 2).tolist()}))
+    capture.own_head_skin.write_text(
+        json.dumps({"template": "other.obj", "skin_triangles": edges.reshape(-1, 2).tolist()})
+    )
 
 
 @pytest.fixture
@@ -84,8 +92,18 @@ def authors(tmp_path):
 
 
 def settings(prior, **options):
-    return from_json({"solve": {"size": SIZE, "steps": 10, "guidance": "proximal", "skin_tone": as_setting(TONE),
-                                "prior": str(prior), **options}})
+    return from_json(
+        {
+            "solve": {
+                "size": SIZE,
+                "steps": 10,
+                "guidance": "proximal",
+                "skin_tone": as_setting(TONE),
+                "prior": str(prior),
+                **options,
+            }
+        }
+    )
 
 
 def seen_layouts(monkeypatch) -> list[layout.Layout]:
@@ -115,18 +133,32 @@ def carried():
 def round_trip(there: layout.Layout, albedo: np.ndarray, normal: np.ndarray) -> Maps:
     """Maps of the built-in UVs taken to the window's and returned."""
     size, other = len(albedo), there.there.covered.shape
-    gone = {name: there._there(torch.from_numpy(m.transpose(2, 0, 1).copy())).permute(1, 2, 0).numpy()
-            for name, m in (("diffuse", albedo),)}
+    gone = {
+        name: there._there(torch.from_numpy(m.transpose(2, 0, 1).copy())).permute(1, 2, 0).numpy()
+        for name, m in (("diffuse", albedo),)
+    }
     flat = np.ones(other, np.float32)
-    solved = Maps(gone["diffuse"], flat, layout.baking.bake_normals(normal, there.there),
-                  np.repeat(flat[..., None], 3, 2), flat, torch.ones(3))
+    solved = Maps(
+        gone["diffuse"],
+        flat,
+        layout.baking.bake_normals(normal, there.there),
+        np.repeat(flat[..., None], 3, 2),
+        flat,
+        torch.ones(3),
+    )
     ones = torch.ones(size, size)
     up = torch.zeros(3, size, size)
     up[2] = 1
-    e = layout.Evidence(torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, ones, 0 * ones,
-                        0 * ones, ones)
-    return there.returned(solved, e, Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)), 1.0,
-                          SkinTone.from_linear(TONE, GIVEN))
+    e = layout.Evidence(
+        torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, ones, 0 * ones, 0 * ones, ones
+    )
+    return there.returned(
+        solved,
+        e,
+        Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)),
+        1.0,
+        SkinTone.from_linear(TONE, GIVEN),
+    )
 
 
 def test_a_smooth_map_survives_both_ways(carried):

@@ -34,8 +34,12 @@ def leaves(value, way=()):
 def test_no_text_of_a_record_becomes_part_of_the_report_s_page(tmp_path):
     capture = recorded.make(tmp_path / "a.wildcap")
     whole = capture.read()
-    whole["stopped"] = {"stage": "scan", "problem": "p", "remedy": "r",
-                        "findings": [{"problem": "p", "remedy": "r", "frames": ["1"]}]}
+    whole["stopped"] = {
+        "stage": "scan",
+        "problem": "p",
+        "remedy": "r",
+        "findings": [{"problem": "p", "remedy": "r", "frames": ["1"]}],
+    }
     written = 0
     for way in leaves(whole):
         told = json.loads(json.dumps(whole))
@@ -69,12 +73,14 @@ def test_the_key_goes_to_workers_that_send_and_to_nobody_else(key, tmp_path, mon
     for delighter in ("network", "switchlight"):
         capture = Capture(tmp_path / f"{delighter}.wildcap")
         with pytest.raises(SystemExit):
-            terminal.follow(tmp_path, capture, write_job(capture, settings={"delight": {"delighter": delighter}}),
-                            {"A": "B"})
+            terminal.follow(
+                tmp_path, capture, write_job(capture, settings={"delight": {"delighter": delighter}}), {"A": "B"}
+            )
     assert given == [{"A": "B"}, {"A": "B", switchlight_api.KEY_VARIABLE: KEY}]
     heard = []
-    task = BackgroundTask("try",
-                          lambda task: task.run([sys.executable, "-c", "import os; print(os.environ)"], heard.append))
+    task = BackgroundTask(
+        "try", lambda task: task.run([sys.executable, "-c", "import os; print(os.environ)"], heard.append)
+    )
     task.start()
     task._thread.join()
     assert heard and KEY not in "".join(heard)

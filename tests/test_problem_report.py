@@ -34,11 +34,18 @@ def capture(tmp_path, monkeypatch) -> Capture:
 SECRETS = ("Zoë", "Zoe\u0308", "Müller", "zoeann", "MacBook", "Erna", "Urlaub", "Sommer", "geheim", KEY, "film.mp4")
 LINES = (
     'File "/home/zoeann/Sommer Urlaub/geheim.py", line 3, in run',
-    "could not open /Users/zoeann/Sommer Urlaub (1).mov: No such file", "~/Sommer/Urlaub.mp4",
-    r"C:\Users\Zoë Müller\Videos\Urlaub.mp4 is missing", r'{"path": "C:\\Users\\zoeann\\geheim"}',
-    r"\\server\geheim\Urlaub.mp4", "file:///home/zoeann/geheim.jpg",
-    "D:/Urlaub/geheim.png", "the frame of film.mp4 shows Tante Erna", "'/Volumes/Zoe\u0308s Disk/Urlaub.mov' [Errno 2]",
-    f"x-api-key: {KEY}", "ZOEANN@Zoes-MacBook:~$")
+    "could not open /Users/zoeann/Sommer Urlaub (1).mov: No such file",
+    "~/Sommer/Urlaub.mp4",
+    r"C:\Users\Zoë Müller\Videos\Urlaub.mp4 is missing",
+    r'{"path": "C:\\Users\\zoeann\\geheim"}',
+    r"\\server\geheim\Urlaub.mp4",
+    "file:///home/zoeann/geheim.jpg",
+    "D:/Urlaub/geheim.png",
+    "the frame of film.mp4 shows Tante Erna",
+    "'/Volumes/Zoe\u0308s Disk/Urlaub.mov' [Errno 2]",
+    f"x-api-key: {KEY}",
+    "ZOEANN@Zoes-MacBook:~$",
+)
 
 
 def test_nothing_of_the_user_s_is_left_whatever_a_log_says(capture):
@@ -53,8 +60,14 @@ def test_no_name_of_what_the_settings_name_elsewhere_is_left(capture, tmp_path):
     (tmp_path / "lights" / "Jane Doe evening.wildcap").mkdir(parents=True)
     (tmp_path / "lights" / "Jane Doe evening.wildcap" / "capture.json").write_text("{}")
     chosen = from_json({"registration": {"template": str(tmp_path / "heads" / "jane_doe_bust.obj")}})
-    capture.finish(stages.by_name("registration"), {"inputs": {}, "code": ""}, 1.0, chosen,
-                   {"own_template": "jane_doe_bust"}, "0.2.0")
+    capture.finish(
+        stages.by_name("registration"),
+        {"inputs": {}, "code": ""},
+        1.0,
+        chosen,
+        {"own_template": "jane_doe_bust"},
+        "0.2.0",
+    )
     write_job(capture, settings={"solve": {"together": str(tmp_path / "lights")}})
     scrub = Scrubber(ROOT, None, capture)
     assert scrub("the head jane_doe_bust.obj") == f"the head {REMOVED}"
@@ -65,8 +78,10 @@ def test_no_name_of_what_the_settings_name_elsewhere_is_left(capture, tmp_path):
 
 def test_what_helps_stays(capture):
     scrub = Scrubber(ROOT, Path("/opt/solver/bin/python"), capture)
-    trace = (f'  File "{ROOT}/core/scan/stereo.py", line 31, in match\n    depth = 3/4 * focal  # '
-             'and/or\nZeroDivisionError: division by zero')
+    trace = (
+        f'  File "{ROOT}/core/scan/stereo.py", line 31, in match\n    depth = 3/4 * focal  # '
+        'and/or\nZeroDivisionError: division by zero'
+    )
     assert scrub(trace) == trace.replace(str(ROOT), "<WildCap>")
     assert scrub(f"{capture.root}/frames/00001.jpg cannot be read") == "<capture>/frames/00001.jpg cannot be read"
     assert (
@@ -85,8 +100,11 @@ def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture,
     (capture.logs / "scan.log").write_text("\n".join(LINES), encoding="utf-8")
     (capture.logs / "mine.log").write_text("somebody else's")
     settings = {"registration": {"template": "/home/zoeann/geheim.obj"}, "solve": {"steps": 31}}
-    (capture.root / "job.json").write_text(json.dumps({"capture": ".", "source": "", "from": None, "until": None,
-                                                       "quality": "standard", "settings": settings}))
+    (capture.root / "job.json").write_text(
+        json.dumps(
+            {"capture": ".", "source": "", "from": None, "until": None, "quality": "standard", "settings": settings}
+        )
+    )
     try:
         raise ValueError("/home/zoeann/geheim")
     except ValueError as error:

@@ -29,11 +29,15 @@ def test_a_process_whose_beginning_is_not_told_is_neither_gone_nor_known_to_be_a
     assert not processes.is_gone(other) and not processes.is_at_work(other)
 
 
-@pytest.mark.parametrize(("handle", "error", "code", "told"), [
-    (7, 0, processes.STILL_ACTIVE, ("3:4", True)),
-    (7, 0, 1, ("3:4", False)),  # killed, and whoever started it still holds it
-    (0, processes.ACCESS_DENIED, 0, ("", True)),  # another user's
-    (0, 87, 0, ("", False))])  # nobody's number
+@pytest.mark.parametrize(
+    ("handle", "error", "code", "told"),
+    [
+        (7, 0, processes.STILL_ACTIVE, ("3:4", True)),
+        (7, 0, 1, ("3:4", False)),  # killed, and whoever started it still holds it
+        (0, processes.ACCESS_DENIED, 0, ("", True)),  # another user's
+        (0, 87, 0, ("", False)),
+    ],
+)  # nobody's number
 def test_windows_is_asked_whether_a_process_has_ended(monkeypatch, handle, error, code, told):
     closed = []
 
@@ -49,8 +53,12 @@ def test_windows_is_asked_whether_a_process_has_ended(monkeypatch, handle, error
         assert (access, pid) == (processes.QUERY_LIMITED_INFORMATION, 4711)
         return handle
 
-    kernel = SimpleNamespace(OpenProcess=open_process, GetProcessTimes=times, GetExitCodeProcess=exit_code,
-                             CloseHandle=lambda handle: closed.append(handle.value))
+    kernel = SimpleNamespace(
+        OpenProcess=open_process,
+        GetProcessTimes=times,
+        GetExitCodeProcess=exit_code,
+        CloseHandle=lambda handle: closed.append(handle.value),
+    )
     monkeypatch.setattr(ctypes, "WinDLL", lambda name, use_last_error: kernel, raising=False)
     monkeypatch.setattr(ctypes, "get_last_error", lambda: error, raising=False)
     assert processes._ask_windows(4711) == told and closed == ([handle] if handle else [])

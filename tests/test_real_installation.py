@@ -15,9 +15,9 @@ SOURCE = os.environ.get("WILDCAP_REAL_INSTALLATION", "")
 
 WHEELS = SOURCE if SOURCE and SOURCE not in ("pip", "pytorch") else ""
 
-pytestmark = pytest.mark.skipif(not SOURCE,
-                                reason="installs gigabytes: WILDCAP_REAL_INSTALLATION=pip, =pytorch or "
-                                       "=FOLDER_OF_WHEELS runs it")
+pytestmark = pytest.mark.skipif(
+    not SOURCE, reason="installs gigabytes: WILDCAP_REAL_INSTALLATION=pip, =pytorch or =FOLDER_OF_WHEELS runs it"
+)
 
 
 @pytest.fixture
@@ -100,8 +100,10 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
     remove_s = follow(jobs)
     assert not solver.exists() and addon("preferences").python() is None and problems.of("") is None
     print(*told, *freed, sep="\n")
-    print(f"told {plan.disk / 1e9:.2f} GB on disk, found {size / 1e9:.2f} GB; {len(plan.packages)} packages; asked in "
-          f"{asking_s:.0f} s, cancelled in "
-          f"{cancel_s:.1f} s, installed and verified in {install_s:.0f} s, a draft solved in {solve_s:.0f} s, removed "
-          f"in {remove_s:.0f} s")
+    print(
+        f"told {plan.disk / 1e9:.2f} GB on disk, found {size / 1e9:.2f} GB; {len(plan.packages)} packages; asked in "
+        f"{asking_s:.0f} s, cancelled in "
+        f"{cancel_s:.1f} s, installed and verified in {install_s:.0f} s, a draft solved in {solve_s:.0f} s, removed "
+        f"in {remove_s:.0f} s"
+    )
     assert size == pytest.approx(plan.disk, rel=0.2)

@@ -26,9 +26,9 @@ def test_the_contact_sheet_shows_each_preset_as_it_is_alone(addon, capture):
     names = [name for name, *_ in addon("properties").LIGHTS if name != "hdri"]
     for i, name in enumerate(names):
         top = (i // 3) * (32 + 8)
-        cell = found[::-1][top:top + 32, 32 * (i % 3):32 * (i % 3) + 32]
+        cell = found[::-1][top : top + 32, 32 * (i % 3) : 32 * (i % 3) + 32]
         assert np.abs(cell - pixels(capture / "renders" / f"{name}.png")[::-1]).max() < 1.5 / 255
-        assert found[::-1][top + 32:top + 40, 32 * (i % 3):32 * (i % 3) + 32].max() > 0.3, "its caption"
+        assert found[::-1][top + 32 : top + 40, 32 * (i % 3) : 32 * (i % 3) + 32].max() > 0.3, "its caption"
         assert (capture / "renders" / f"{name}.exr").is_file()
     shown = {name: pixels(capture / "renders" / f"{name}.exr") for name in ("window", "rim")}
     headless.render_relit(capture, shown, resolution=32, samples=2)
@@ -60,8 +60,11 @@ def test_a_head_that_is_animated_is_in_each_light_as_it_is_now(addon, capture, m
     for i, name in enumerate(names):
         shown.frame_set(first + i)
         depsgraph = shown.view_layers[0].depsgraph
-        lamps = {o.name.split(".")[0] for o in shown.objects
-                 if o.type == 'LIGHT' and not o.evaluated_get(depsgraph).hide_render}
+        lamps = {
+            o.name.split(".")[0]
+            for o in shown.objects
+            if o.type == 'LIGHT' and not o.evaluated_get(depsgraph).hide_render
+        }
         assert lamps == {f"WildCap {lamp.name}" for lamp in addon("relight.lights").preset(name).lamps}
         off = head.evaluated_get(depsgraph).matrix_world.translation.x - here
         assert 0 <= off <= 0.1 * 0.2, "a fifth of a frame's drift at most, and never what was before now"
@@ -145,8 +148,12 @@ def test_a_film_replaces_the_frames_and_one_that_is_stopped_leaves_the_last(addo
 
 def test_the_command_line_renders_and_says_what_is_wrong(addon, capture, capsys):
     execute = addon("terminal").execute
-    assert execute(["turntable", str(capture), "--frames", "2", "--turns", "light", "--resolution", "16", "--samples",
-                    "1"]) == 0
+    assert (
+        execute(
+            ["turntable", str(capture), "--frames", "2", "--turns", "light", "--resolution", "16", "--samples", "1"]
+        )
+        == 0
+    )
     assert str(capture / "renders" / "turntable") in capsys.readouterr().out
     assert execute(["relight", str(capture), "moon"]) == 1
     assert "no light named moon" in capsys.readouterr().err
@@ -176,19 +183,26 @@ def test_the_buttons_render_what_the_panel_says_and_wait_for_each_other(addon, c
             getattr(bpy.ops.wildcap, name)()
 
 
-@pytest.mark.parametrize("film, turns, light, resolution, said", [
-    (True, 'HEAD', "sun", 17, "resolution that is even"), (False, 'LIGHT', "overcast", 16, "same from every side")])
-def test_a_turntable_that_cannot_be_is_refused_before_it_is_rendered(addon, capture, film, turns, light, resolution,
-                                                                     said):
+@pytest.mark.parametrize(
+    "film, turns, light, resolution, said",
+    [(True, 'HEAD', "sun", 17, "resolution that is even"), (False, 'LIGHT', "overcast", 16, "same from every side")],
+)
+def test_a_turntable_that_cannot_be_is_refused_before_it_is_rendered(
+    addon, capture, film, turns, light, resolution, said
+):
     headless = addon("relight.headless")
     with pytest.raises(headless.Problem, match=said):
         headless.render_turntable(capture, light, turns, 2, film, resolution=resolution, samples=1)
     assert not (capture / "renders").exists()
 
 
-@pytest.mark.parametrize("error, said", [
-    (PermissionError(errno.EACCES, "in use", "/renders/sun.png"), "sun.png cannot be written"),
-    (ValueError("no picture"), "An error inside WildCap stopped Render")])
+@pytest.mark.parametrize(
+    "error, said",
+    [
+        (PermissionError(errno.EACCES, "in use", "/renders/sun.png"), "sun.png cannot be written"),
+        (ValueError("no picture"), "An error inside WildCap stopped Render"),
+    ],
+)
 def test_a_render_that_cannot_be_put_in_place_is_told_and_frees_its_memory(addon, capture, monkeypatch, error, said):
     output, problems = addon("relight.output"), addon("problems")
     bpy.ops.wildcap.bring_in_head()

@@ -28,12 +28,17 @@ def session(addon):
     module.forget()
 
 
-@pytest.mark.parametrize(("lost", "click", "words"), [
-    ("texture.png", "paint_mask", "no texture to paint over"),
-    ("shadow_mask_auto.png", "paint_mask", "no shadow mask yet"),
-    ("maps/normal.png", "assemble_material", "has no normal.png yet"),
-    ("landmarks.json", "show_landmarks", "no landmarks"),
-    ("scan.ply", "bring_in_scan", "no scan yet"), ("delit", "compare_delit", "No frame has been delit")])
+@pytest.mark.parametrize(
+    ("lost", "click", "words"),
+    [
+        ("texture.png", "paint_mask", "no texture to paint over"),
+        ("shadow_mask_auto.png", "paint_mask", "no shadow mask yet"),
+        ("maps/normal.png", "assemble_material", "has no normal.png yet"),
+        ("landmarks.json", "show_landmarks", "no landmarks"),
+        ("scan.ply", "bring_in_scan", "no scan yet"),
+        ("delit", "compare_delit", "No frame has been delit"),
+    ],
+)
 def test_a_part_of_the_capture_that_is_missing(addon, capture, session, lost, click, words):
     bpy.ops.wildcap.bring_in_head()
     (capture / lost).unlink(missing_ok=True)
@@ -41,12 +46,16 @@ def test_a_part_of_the_capture_that_is_missing(addon, capture, session, lost, cl
     assert not session.active() and bpy.context.mode == 'OBJECT'
 
 
-@pytest.mark.parametrize(("damaged", "content", "click", "words"), [
-    ("head.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "bring_in_head", "not one mesh with UVs"),
-    ("shadow_mask.png", "no picture", "paint_mask", "not a picture that can be read"),
-    ("landmarks.json", "{", "show_landmarks", "landmarks.json cannot be read"),
-    ("landmarks.json", "[1]", "show_landmarks", "landmarks.json cannot be read"),
-    ("scan.ply", "no mesh", "bring_in_scan", "scan.ply cannot be read")])
+@pytest.mark.parametrize(
+    ("damaged", "content", "click", "words"),
+    [
+        ("head.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "bring_in_head", "not one mesh with UVs"),
+        ("shadow_mask.png", "no picture", "paint_mask", "not a picture that can be read"),
+        ("landmarks.json", "{", "show_landmarks", "landmarks.json cannot be read"),
+        ("landmarks.json", "[1]", "show_landmarks", "landmarks.json cannot be read"),
+        ("scan.ply", "no mesh", "bring_in_scan", "scan.ply cannot be read"),
+    ],
+)
 def test_a_part_of_the_capture_that_is_damaged(capture, session, damaged, content, click, words):
     standin.add_evidence(capture)
     if damaged != "head.obj":
@@ -74,14 +83,24 @@ def test_what_is_painted_may_be_lost_on_the_way(addon, capture, session):
     image.source = 'FILE'
     image.filepath_raw = str(capture / "none.png")
     image.reload()
-    refuses("being painted is gone", mask_image.refresh, image,
-            addon("captures").folder(addon("captures").active(bpy.context)), 'SHADOW')
+    refuses(
+        "being painted is gone",
+        mask_image.refresh,
+        image,
+        addon("captures").folder(addon("captures").active(bpy.context)),
+        'SHADOW',
+    )
     bpy.data.images.remove(image)
     refuses("mask is not in this file", bpy.ops.wildcap.edit_mask, kind='INVERT')
     bpy.ops.object.mode_set(mode='OBJECT')
     bpy.data.objects.remove(addon("captures").head(bpy.context, addon("captures").active(bpy.context)))
-    refuses("head is not in this scene any more", session.begin_painting, bpy.context,
-            bpy.context.scene.wildcap.captures[0], True)
+    refuses(
+        "head is not in this scene any more",
+        session.begin_painting,
+        bpy.context,
+        bpy.context.scene.wildcap.captures[0],
+        True,
+    )
 
 
 def test_the_set_up_keeps_its_buttons_while_it_works(addon):

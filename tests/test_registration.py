@@ -118,8 +118,9 @@ def test_the_stage_writes_a_head_of_the_frozen_topology(tmp_path, monkeypatch, k
 
 def test_a_scan_of_something_else_is_a_problem(tmp_path, monkeypatch, known):
     model, truth, points, _ = known
-    capture = _capture(tmp_path / "other", truth, model, points, monkeypatch,
-                       lambda mesh: mesh.moved(mesh.vertices + [0, 0.3, 0]))
+    capture = _capture(
+        tmp_path / "other", truth, model, points, monkeypatch, lambda mesh: mesh.moved(mesh.vertices + [0, 0.3, 0])
+    )
     with pytest.raises(Problem, match="could not be laid over the scan"):
         registration.run(capture, from_json({"registration": {"iterations": 3}}), Reporter("registration"))
     assert not capture.head.exists()
@@ -142,8 +143,10 @@ def _views(root, middle):
     capture = Capture(root)
     capture.frames.mkdir(parents=True)
     names = [f"{i:05d}.jpg" for i in range(len(AZIMUTHS))]
-    frames = [{"name": name, "video_frame": i, "time_s": i / 24, "sharpness": 1.0, "selected": True}
-              for i, name in enumerate(names)]
+    frames = [
+        {"name": name, "video_frame": i, "time_s": i / 24, "sharpness": 1.0, "selected": True}
+        for i, name in enumerate(names)
+    ]
     capture.frames_json.write_text(json.dumps({"frames": frames}))
     write_cameras(capture.cameras, names, AZIMUTHS, height=float(middle[2]))
     for name in names:

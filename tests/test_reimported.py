@@ -20,8 +20,9 @@ EYE_OPENING_M = 0.005
 def test_a_file_that_blender_imports_looks_as_the_head_did(addon, tmp_path):
     """The same light and noise: 29 dB in so small a picture, 30 in a larger one (docs/results/reimported.md);
     scattering is what is lost."""
-    deliveries = tuple(tuple(name.rsplit("_", 1)) for name in KEPT if name != "blender_usd"
-                       or bpy.app.build_options.usd)
+    deliveries = tuple(
+        tuple(name.rsplit("_", 1)) for name in KEPT if name != "blender_usd" or bpy.app.build_options.usd
+    )
     _, _, returned = reimported.compare_deliveries(tmp_path, deliveries, resolution=128, samples=32)
     for key, back in returned.items():
         assert back.psnr_db > 29 and back.flat_psnr_db > 33, key
@@ -40,7 +41,7 @@ def test_a_metahuman_gets_what_its_documentation_asks_for(addon, tmp_path):
     bpy.ops.wildcap.add_face_units()
     folder = reimported.deliver(item, "metahuman", "fbx")
     assert {path.suffix for path in folder.iterdir()} == {".fbx", ".json", ""}
-    head, = reimported.bring_back(folder)
+    (head,) = reimported.bring_back(folder)
     assert (
         head.data.shape_keys is None
         and not head.vertex_groups
@@ -61,8 +62,9 @@ def test_a_metahuman_gets_what_its_documentation_asks_for(addon, tmp_path):
     assert min(gaps) > EYE_OPENING_M and min(whites) > 10, (
         "both eyes are open, and an eyeball is behind every lid's gap"
     )
-    picture = next(node for node in head.material_slots[eyes[0]].material.node_tree.nodes
-                   if node.type == 'TEX_IMAGE').image
+    picture = next(
+        node for node in head.material_slots[eyes[0]].material.node_tree.nodes if node.type == 'TEX_IMAGE'
+    ).image
     colours = np.array(picture.pixels[:]).reshape(-1, 4)[:, :3]
     assert (colours.min(1) > 0.6).mean() > 0.2, "the white of the eye is in its texture"
 
@@ -72,8 +74,9 @@ def seen_eye(head, material: int, side: int) -> dict[float, float]:
     the eye and nothing else before it, metres."""
     place = np.array(head.matrix_world)
     points = reimported.points_of(head)
-    eye = np.unique([v for polygon in head.data.polygons if polygon.material_index == material
-                     for v in polygon.vertices])
+    eye = np.unique(
+        [v for polygon in head.data.polygons if polygon.material_index == material for v in polygon.vertices]
+    )
     middle = points[eye][np.sign(points[eye][:, 0]) == side].mean(0)
     back, seen = np.linalg.inv(place), {}
     along = back[:3, :3] @ np.array([0.0, 1.0, 0.0])

@@ -19,15 +19,40 @@ from core.solve.network import Condition, denoise
 
 CONFIGS = {
     "posenc, patches of 2, attention, variance": (
-        {"depths": [1, 2, 3], "channels": [32, 64, 96], "self_attn_depths": [False, True, True], "patch_size": 2,
-         "mapping_out": 24, "sigma_data": 0.5, "has_variance": True}, {"type": "posenc", "pos_enc_freq": 4}),
+        {
+            "depths": [1, 2, 3],
+            "channels": [32, 64, 96],
+            "self_attn_depths": [False, True, True],
+            "patch_size": 2,
+            "mapping_out": 24,
+            "sigma_data": 0.5,
+            "has_variance": True,
+        },
+        {"type": "posenc", "pos_enc_freq": 4},
+    ),
     "four levels, the first left out, defaults": (
-        {"depths": [1, 1, 2, 1], "channels": [32, 32, 64, 64], "self_attn_depths": [True, False, True, False],
-         "skip_stages": 1, "mapping_out": 16},
-        {"type": "coord"}),
+        {
+            "depths": [1, 1, 2, 1],
+            "channels": [32, 32, 64, 64],
+            "self_attn_depths": [True, False, True, False],
+            "skip_stages": 1,
+            "mapping_out": 16,
+        },
+        {"type": "coord"},
+    ),
     "noise, patches of 4, no wrapper, own mapping": (
-        {"depths": [2], "channels": [32], "self_attn_depths": [False], "patch_size": 4, "mapping_out": 16,
-         "augment_wrapper": False, "mapping_cond_dim": 5, "sigma_data": 1.0}, {"type": "noise"}),
+        {
+            "depths": [2],
+            "channels": [32],
+            "self_attn_depths": [False],
+            "patch_size": 4,
+            "mapping_out": 16,
+            "augment_wrapper": False,
+            "mapping_cond_dim": 5,
+            "sigma_data": 1.0,
+        },
+        {"type": "noise"},
+    ),
 }
 COND_CHANNELS = {"coord": 2, "posenc": 18, "noise": 3}
 
@@ -72,8 +97,9 @@ def weights_of(model: dict, cond_channels: int, wrapped: bool) -> dict[str, torc
     for level, (depth, width, attention) in enumerate(shapes):
         above, up = widths[max(0, level - 1)], f"u_net.u_blocks.{levels - 1 - level}"
         put_blocks(f"u_net.d_blocks.{level}", 1, [above] + [width] * (depth - 1), width, width, attention)
-        put_blocks(up, 0, [width if level == levels - 1 else 2 * width] + [width] * (depth - 1), width, above,
-                   attention)
+        put_blocks(
+            up, 0, [width if level == levels - 1 else 2 * width] + [width] * (depth - 1), width, above, attention
+        )
         if level > skip:
             kernel = torch.tensor([[1.0, 3.0, 3.0, 1.0]]) / 8
             state[f"u_net.d_blocks.{level}.0.kernel"] = kernel.T @ kernel
@@ -120,8 +146,9 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
 
     def halved(value, kernel):
         count = value.shape[1]
-        return functional.conv2d(functional.pad(value, (1, 1, 1, 1), mode="reflect"), kernel.expand(count, 1, 4, 4),
-                                 stride=2, groups=count)
+        return functional.conv2d(
+            functional.pad(value, (1, 1, 1, 1), mode="reflect"), kernel.expand(count, 1, 4, 4), stride=2, groups=count
+        )
 
     def doubled(value, kernel):
         count = value.shape[1]
@@ -151,7 +178,7 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
         x = block(name, depth, 0, attends, x)
         if level > skip:
             x = doubled(x, s[f"{name}.{depth * (2 if attends else 1)}.kernel"])
-    x = conv("proj_out", x)[:, :7 * patch**2]
+    x = conv("proj_out", x)[:, : 7 * patch**2]
     return x.reshape(n, 7, patch, patch, h // patch, w // patch).permute(0, 1, 4, 2, 5, 3).reshape(n, 7, h, w)
 
 
@@ -172,8 +199,10 @@ def test_a_checkpoint_of_another_kind_gives_what_its_formulas_give(tmp_path, nam
     network = prior.load(tmp_path, dtype=torch.float32).network
     rng = torch.Generator().manual_seed(1)
     x, condition = torch.randn(2, 7, 16, 32, generator=rng), torch.randn(2, channels, 16, 32, generator=rng)
-    sigma, extra = (torch.tensor([0.05, 4.0]),
-                    torch.randn(2, model["mapping_cond_dim"], generator=rng) if "mapping_cond_dim" in model else None)
+    sigma, extra = (
+        torch.tensor([0.05, 4.0]),
+        torch.randn(2, model["mapping_cond_dim"], generator=rng) if "mapping_cond_dim" in model else None,
+    )
     s, data = sigma[:, None, None, None], model.get("sigma_data", 1.0)
     inner = forward(state, model, torch.cat([x, condition], 1) / (s**2 + data**2).sqrt(), sigma, extra)
     wanted = s * data / (s**2 + data**2).sqrt() * inner + data**2 / (s**2 + data**2) * x
@@ -192,8 +221,9 @@ def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_p
     np.save(tmp_path / released.NOISE_FILE, noise)
     loaded = prior.load(tmp_path, dtype=torch.float32)
     window = torch.from_numpy(noise[None, :, 8:24, 32:48])
-    assert (loaded.of_tone()(x, 1.0, coords)
-            - denoise(loaded.network, x, torch.tensor([1.0]), Condition(window))).abs().max() < 1e-6
+    assert (
+        loaded.of_tone()(x, 1.0, coords) - denoise(loaded.network, x, torch.tensor([1.0]), Condition(window))
+    ).abs().max() < 1e-6
     for wrong in (noise[:2], noise[:, :8], noise.astype(np.int32), np.where(noise > 2, np.nan, noise)):
         np.save(tmp_path / released.NOISE_FILE, wrong)
         with pytest.raises(Problem, match="of shape"):
@@ -207,8 +237,9 @@ def test_a_noise_map_that_is_damaged_or_promises_more_than_it_holds_is_refused(t
     with pytest.raises(Problem, match="noise.npy cannot be read"):
         released.read_noise(tmp_path)
     header = io.BytesIO()
-    np.lib.format.write_array_header_1_0(header,
-                                         {"descr": "<f4", "fortran_order": False, "shape": (3, 1 << 20, 1 << 20)})
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "<f4", "fortran_order": False, "shape": (3, 1 << 20, 1 << 20)}
+    )
     path.write_bytes(header.getvalue())
     with pytest.raises(Problem, match="noise.npy cannot be read"):
         released.read_noise(tmp_path)
@@ -228,11 +259,18 @@ def good(tmp_path):
     return tmp_path / "prior"
 
 
-@pytest.mark.parametrize(("entry", "value", "match"), [
-    ("type", "image_transformer_v2", "image_transformer_v2"), ("input_channels", 3, "models 3 channels"),
-    ("channels", [32, 32, 64, 96], "does not fit"),
-    ("depths", [1, 1], "one length"), ("mapping_out", "many", "no positive numbers"),
-    ("cross_cond_dim", 8, "cross attention"), ("patch_size", 2, "does not fit")])
+@pytest.mark.parametrize(
+    ("entry", "value", "match"),
+    [
+        ("type", "image_transformer_v2", "image_transformer_v2"),
+        ("input_channels", 3, "models 3 channels"),
+        ("channels", [32, 32, 64, 96], "does not fit"),
+        ("depths", [1, 1], "one length"),
+        ("mapping_out", "many", "no positive numbers"),
+        ("cross_cond_dim", 8, "cross attention"),
+        ("patch_size", 2, "does not fit"),
+    ],
+)
 def test_other_models_are_told_apart(good, entry, value, match):
     config = json.loads((good / "config.json").read_text())
     config["model"] |= {entry: value, "cross_attn_depths": [True] * 4}
@@ -243,7 +281,7 @@ def test_other_models_are_told_apart(good, entry, value, match):
 
 def test_damaged_files_are_problems(good):
     whole = (good / "ckpt.pth").read_bytes()
-    for content in (whole[:len(whole) // 2], b"", b"no checkpoint", pickle.dumps({"model_ema": print}, 2)):
+    for content in (whole[: len(whole) // 2], b"", b"no checkpoint", pickle.dumps({"model_ema": print}, 2)):
         (good / "ckpt.pth").write_bytes(content)
         with pytest.raises(Problem, match="cannot be read as weights"):
             prior.load(good)

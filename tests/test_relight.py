@@ -21,8 +21,12 @@ def test_assembling_again_keeps_the_artists_values_and_makes_nothing_new(addon, 
         len(bpy.data.node_groups),
     )
     bpy.ops.wildcap.assemble_material()
-    assert (node_text.lines(material.node_tree), len(bpy.data.images), len(bpy.data.materials),
-            len(bpy.data.node_groups)) == before
+    assert (
+        node_text.lines(material.node_tree),
+        len(bpy.data.images),
+        len(bpy.data.materials),
+        len(bpy.data.node_groups),
+    ) == before
     assert material.node_tree.nodes["WildCap Skin"].inputs["Roughness"].default_value == pytest.approx(0.3)
 
 
@@ -84,8 +88,13 @@ def test_a_render_is_written_and_the_scene_is_untouched(addon, capture):
         means.append(pixels[24:40, 24:40, :3].mean())
     assert all(0.1 < mean < 0.95 for mean in means), means
     assert [p.name for p in (capture / "renders").iterdir() if p.name.startswith(".")] == []
-    assert (scene.camera, scene.world, scene.render.engine, scene.render.filepath,
-            {o.name for o in scene.objects}) == before
+    assert (
+        scene.camera,
+        scene.world,
+        scene.render.engine,
+        scene.render.filepath,
+        {o.name for o in scene.objects},
+    ) == before
 
 
 def test_a_head_that_was_rendered_can_be_deleted_from_the_file(addon, capture, tmp_path):

@@ -27,9 +27,11 @@ SIZE = 16
 @pytest.fixture
 def maps():
     """What a solver found and the truth, each map of another value throughout."""
+
     def worn(albedo, tilt, gloss):
         normal = np.broadcast_to(np.float32([tilt, 0, np.sqrt(1 - tilt**2)]), (SIZE, SIZE, 3))
         return Worn(np.full((SIZE, SIZE, 3), albedo, np.float32), normal, np.full((SIZE, SIZE), gloss, np.float32))
+
     return worn(0.3, 0.2, 0.4), worn(0.4, 0.6, 0.3)
 
 
@@ -37,8 +39,9 @@ def test_the_people_are_six_tones_that_no_training_may_take():
     assert {p.seed for p in people.PEOPLE} <= reserved_seeds()
     for person in people.PEOPLE:
         p = sample_parameters(person.seed)
-        colour = pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope,
-                                     p.chroma)[0]
+        colour = pigment.reflectance(
+            np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope, p.chroma
+        )[0]
         assert tone_group(images.linear_to_srgb(colour)).replace(" ", "_") == person.name
     assert len({p.name for p in people.PEOPLE}) == len(TONES)
     assert {p.light for p in people.PEOPLE} == set(people_lights.KINDS)
@@ -79,14 +82,27 @@ def test_exposure_takes_the_lights_colour_out_and_brings_the_face_to_its_level()
 def test_each_swapped_row_takes_one_true_map_and_no_other(maps):
     solved, true = maps
     skin = np.ones((SIZE, SIZE))
-    rows = make_rows(np.full((SIZE, SIZE, 3), 0.1, np.float32), np.full((SIZE, SIZE, 3), 0.2, np.float32), solved, true,
-                     skin)
+    rows = make_rows(
+        np.full((SIZE, SIZE, 3), 0.1, np.float32), np.full((SIZE, SIZE, 3), 0.2, np.float32), solved, true, skin
+    )
     assert set(rows) == {"truth", *relit.ROWS}
-    taken = {name: [name for name in ("albedo", "normal", "specular") if getattr(row, name) is getattr(true, name)]
-             for name, row in rows.items()}
-    assert taken == {"truth": ["albedo", "normal", "specular"], "floor": ["albedo", "normal", "specular"], "raw": [],
-                     "delit": [], "solved": [], "plain": [], "no_relief": [], "even_gloss": [],
-                     "true_albedo": ["albedo"], "true_normal": ["normal"], "true_specular": ["specular"]}
+    taken = {
+        name: [name for name in ("albedo", "normal", "specular") if getattr(row, name) is getattr(true, name)]
+        for name, row in rows.items()
+    }
+    assert taken == {
+        "truth": ["albedo", "normal", "specular"],
+        "floor": ["albedo", "normal", "specular"],
+        "raw": [],
+        "delit": [],
+        "solved": [],
+        "plain": [],
+        "no_relief": [],
+        "even_gloss": [],
+        "true_albedo": ["albedo"],
+        "true_normal": ["normal"],
+        "true_specular": ["specular"],
+    }
     for name in ("raw", "delit"):  # other albedos of the true tone, the solver's other maps
         np.testing.assert_allclose(rows[name].albedo, 0.4, rtol=1e-5)
         assert rows[name].normal is solved.normal and rows[name].specular is solved.specular
@@ -176,6 +192,7 @@ def test_a_render_is_made_again_once_a_map_is_newer(tmp_path):
 def test_the_table_gives_the_mean_over_people_and_leaves_the_sample_out():
     def rows(psnr):
         return {row: {"psnr": psnr, "ssim": 0.5, "flip": 0.1} for row in relit.ROWS}
+
     lines = relit.table({"sample": rows(90.0), "dark": rows(20.0), "light": rows(30.0)}).splitlines()
     assert lines[0] == "| row | sample | dark | light | mean of 2 |" and len(lines) == 2 + len(relit.ROWS)
     assert "| 25.00 dB, 0.500, 0.100 |" in lines[2]
@@ -204,7 +221,7 @@ def test_a_gallery_row_is_two_lines_and_small_enough(tmp_path):
     noise = np.random.default_rng(0).random((gallery.TILE, gallery.TILE, 3), np.float32)
     row = gallery.sheet([noise] * 14)
     assert row.shape == (2 * gallery.TILE, 7 * gallery.TILE, 3)
-    np.testing.assert_array_equal(row[gallery.TILE:, -gallery.TILE:], noise)
+    np.testing.assert_array_equal(row[gallery.TILE :, -gallery.TILE :], noise)
     gallery.write_small(tmp_path / "plain.jpg", gallery.sheet([np.full((8, 8, 3), 0.5, np.float32)] * 13))
     assert (tmp_path / "plain.jpg").stat().st_size < gallery.MOST_BYTES
-    assert not gallery.sheet([noise] * 13)[gallery.TILE:, -gallery.TILE:].any()  # what is missing is black
+    assert not gallery.sheet([noise] * 13)[gallery.TILE :, -gallery.TILE :].any()  # what is missing is black

@@ -51,8 +51,12 @@ def capture(tmp_path) -> Capture:
         (capture.root / name).mkdir()
         (capture.root / name / "a").write_bytes(b"1")
         stage = stages.by_name(name)
-        figures = {"registered_share": 0.96875, "lens": ["a", 1.5, None], "text": "<script>alert(1)</script>",
-                   "by_view": {"0001": True}}
+        figures = {
+            "registered_share": 0.96875,
+            "lens": ["a", 1.5, None],
+            "text": "<script>alert(1)</script>",
+            "by_view": {"0001": True},
+        }
         capture.finish(stage, capture.conditions(stage, settings), 75.0, settings, figures, "0.1.0")
     grey = np.full((8, 8, 3), 0.5, np.float32)
     images.write_srgb(capture.picture("cameras", "around_the_head"), grey)
@@ -67,9 +71,16 @@ def test_the_page_shows_every_stage_with_state_pictures_and_figures(capture):
     states = ["done", "stale"] + ["to-do"] * (len(stages.STAGES) - 2)
     shown = [a["class"] for a in page.attributes("small")]
     assert shown == states, "features is auto again, so cameras are out of date"
-    assert {"0.9688", "registered share", "a, 1.5, -", "0001: yes", "1 min 15 s, ", "skin", "around the head",
-            "three lights"} <= {
-        text if not text.startswith("1 min") else text[:12] for text in page.texts}
+    assert {
+        "0.9688",
+        "registered share",
+        "a, 1.5, -",
+        "0001: yes",
+        "1 min 15 s, ",
+        "skin",
+        "around the head",
+        "three lights",
+    } <= {text if not text.startswith("1 min") else text[:12] for text in page.texts}
     assert "<script>alert(1)</script>" in page.texts, "escaped, and read back as text"
     assert [image["src"].split(";")[0] for image in page.attributes("img")] == ["data:image/jpeg", "data:image/png"]
 
@@ -95,8 +106,11 @@ def test_findings_of_all_stages_and_what_stopped_it_come_first(capture):
     reporter.finding("The light <changed>.", "Lock the exposure.", [f"{i:05d}.jpg" for i in range(14)])
     scan = stages.by_name("scan")
     capture.finish(scan, capture.conditions(scan, Settings()), 1.0, Settings(), {}, "0.1.0", reporter.findings)
-    capture.stop("cameras", Problem("The frames do not fit together.", "Film again."),
-                 [{"problem": "Too few.", "remedy": "Take more.", "frames": []}])
+    capture.stop(
+        "cameras",
+        Problem("The frames do not fit together.", "Film again."),
+        [{"problem": "Too few.", "remedy": "Take more.", "frames": []}],
+    )
     problems = [f["problem"] for f in report.findings(capture.read())]
     assert problems == ["The frames do not fit together.", "Too few.", "The light <changed>."]
     text = _page_text(capture)

@@ -34,8 +34,9 @@ PERSON = template_landmarks().shape(IDENTITY)
 def seen(view, noise_px: float, rng) -> Face:
     pixels, _ = view.project(PERSON + rng.normal(0, 0.0005, PERSON.shape))
     pixels = pixels + rng.normal(0, noise_px, pixels.shape)
-    return Face((*pixels.min(0), *pixels.max(0)), np.concatenate([pixels, np.zeros((468, 1))], 1).astype(np.float32),
-                1.0)
+    return Face(
+        (*pixels.min(0), *pixels.max(0)), np.concatenate([pixels, np.zeros((468, 1))], 1).astype(np.float32), 1.0
+    )
 
 
 def matched(views: dict, rng, count: int = 400) -> Matches:
@@ -45,7 +46,7 @@ def matched(views: dict, rng, count: int = 400) -> Matches:
     keypoints = {name: view.project(points)[0] + rng.normal(0, 0.3, (count, 2)) for name, view in views.items()}
     pairs = {}
     for i, first in enumerate(views):
-        for second in list(views)[i + 1:]:
+        for second in list(views)[i + 1 :]:
             index = np.stack([np.arange(count)] * 2, 1)
             index[::3, 1] = rng.permutation(index[::3, 1])
             pairs[first, second] = index
@@ -57,12 +58,17 @@ def off(result, views: dict) -> tuple[np.ndarray, np.ndarray]:
     the centres."""
     found = sorted(result.model.images.values(), key=lambda image: image.name)
     true = [views[image.name] for image in found]
-    scale, rotation, shift = similarity(np.array([image.projection_center() for image in found]),
-                                        np.array([view.centre for view in true]))
-    centres = [np.linalg.norm(scale * rotation @ image.projection_center() + shift - view.centre) / 0.55
-               for image, view in zip(found, true, strict=True)]
-    cosines = [(np.trace(view.rotation @ rotation @ image.cam_from_world().rotation.matrix().T) - 1) / 2
-               for image, view in zip(found, true, strict=True)]
+    scale, rotation, shift = similarity(
+        np.array([image.projection_center() for image in found]), np.array([view.centre for view in true])
+    )
+    centres = [
+        np.linalg.norm(scale * rotation @ image.projection_center() + shift - view.centre) / 0.55
+        for image, view in zip(found, true, strict=True)
+    ]
+    cosines = [
+        (np.trace(view.rotation @ rotation @ image.cam_from_world().rotation.matrix().T) - 1) / 2
+        for image, view in zip(found, true, strict=True)
+    ]
     return np.array(centres), np.degrees(np.arccos(np.clip(cosines, -1, 1)))
 
 
@@ -110,8 +116,12 @@ def test_wrong_matches_do_not_count_as_refinement(scene):
     rng, views, found = scene
     keypoints = {name: rng.uniform(0, WIDTH, (300, 2)) for name in views}
     index = np.stack([np.arange(300)] * 2, 1)
-    result = resect(group(views), found, Matches(keypoints, {(a, b): index for a in views for b in views if a < b}),
-                    Reporter("cameras"))
+    result = resect(
+        group(views),
+        found,
+        Matches(keypoints, {(a, b): index for a in views for b in views if a < b}),
+        Reporter("cameras"),
+    )
     assert not result.refined
 
 
@@ -123,8 +133,11 @@ def test_fewer_than_two_faces_give_nothing(scene):
 def model_of(views: dict, focal: float, rng, off_m: float) -> pycolmap.Reconstruction:
     """The true cameras, moved by about so much, with a lens of this focal length."""
     model = pycolmap.Reconstruction()
-    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="SIMPLE_RADIAL", width=WIDTH, height=HEIGHT,
-                                                      params=[focal, WIDTH / 2, HEIGHT / 2, 0]))
+    model.add_camera_with_trivial_rig(
+        pycolmap.Camera(
+            camera_id=1, model="SIMPLE_RADIAL", width=WIDTH, height=HEIGHT, params=[focal, WIDTH / 2, HEIGHT / 2, 0]
+        )
+    )
     for number, (name, view) in enumerate(views.items(), 1):
         shift = (view.translation + rng.normal(0, off_m, 3)) * [1, 1, focal / FOCAL]
         pose = pycolmap.Rigid3d(np.concatenate([view.rotation, shift[:, None]], 1))
@@ -155,8 +168,15 @@ def two_lenses(views: dict, starts: dict[str, float]) -> pycolmap.Reconstruction
     """The true poses; the first lens has taken all frames but the last two."""
     model = pycolmap.Reconstruction()
     for number, focal in enumerate(starts, 1):
-        model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=number, model="SIMPLE_RADIAL", width=WIDTH,
-                                                          height=HEIGHT, params=[focal, WIDTH / 2, HEIGHT / 2, 0]))
+        model.add_camera_with_trivial_rig(
+            pycolmap.Camera(
+                camera_id=number,
+                model="SIMPLE_RADIAL",
+                width=WIDTH,
+                height=HEIGHT,
+                params=[focal, WIDTH / 2, HEIGHT / 2, 0],
+            )
+        )
     for number, (name, view) in enumerate(views.items(), 1):
         pose = pycolmap.Rigid3d(np.concatenate([view.rotation, view.translation[:, None]], 1))
         lens = 1 if number <= len(views) - 2 else 2
@@ -184,14 +204,21 @@ def test_a_late_frame_gets_the_lens_that_was_told_of_it(scene):
     model = two_lenses(views, (FOCAL, 1.7 * FOCAL))
     told = dict.fromkeys(list(views)[:-2], FOCAL) | dict.fromkeys(list(views)[-2:], 1.7 * FOCAL)
     middle, zoomed = [WIDTH / 2, HEIGHT / 2], list(views)[-2:]
-    faces = {name: replace(face, landmarks=np.concatenate(
-        [middle + 1.7 * (face.landmarks[:, :2] - middle), face.landmarks[:, 2:]], 1)) if name in zoomed else face
-        for name, face in found.items()}
+    faces = {
+        name: replace(
+            face, landmarks=np.concatenate([middle + 1.7 * (face.landmarks[:, :2] - middle), face.landmarks[:, 2:]], 1)
+        )
+        if name in zoomed
+        else face
+        for name, face in found.items()
+    }
     matches = matched(views | late, rng)
     for name in zoomed:
         matches.keypoints[name] = middle + 1.7 * (matches.keypoints[name] - middle)
-    missing = [{"names": ["8.jpg"], "width": WIDTH, "height": HEIGHT, "focal_px": FOCAL},
-               {"names": ["9.jpg"], "width": WIDTH, "height": HEIGHT, "focal_px": 2.5 * FOCAL}]
+    missing = [
+        {"names": ["8.jpg"], "width": WIDTH, "height": HEIGHT, "focal_px": FOCAL},
+        {"names": ["9.jpg"], "width": WIDTH, "height": HEIGHT, "focal_px": 2.5 * FOCAL},
+    ]
     refined = refine(model, faces, matches, told, Reporter("cameras"), missing)
     lens_of = {image.name: image.camera_id for image in refined.images.values()}
     assert lens_of["8.jpg"] == 1 and "9.jpg" not in lens_of, "of that zoom nothing is known"
@@ -208,22 +235,37 @@ def test_of_two_ways_the_one_that_places_more_frames_wins_unless_nothing_but_the
     def solved(way: str, frames: int, refined: bool = True) -> Solved:
         return Solved(SimpleNamespace(num_reg_images=lambda: frames), way, None, {}, refined=refined)
 
-    worths = [worth(solved("face", 5)), worth(solved("skin", 3)), worth(solved("face", 3)),
-              worth(solved("face", 5, refined=False))]
+    worths = [
+        worth(solved("face", 5)),
+        worth(solved("skin", 3)),
+        worth(solved("face", 3)),
+        worth(solved("face", 5, refined=False)),
+    ]
     assert all(better > worse for better, worse in zip(worths, worths[1:], strict=False))
 
 
-@pytest.mark.parametrize(("time_s", "blurred", "problem", "remedy"), [
-    (None, False, "1 of 4 photographs did not fit", "Take more between"),
-    (None, True, "1 of them are blurred", "Take those again"),
-    (0.5, False, "1 of 4 frames did not fit", "Move the camera slower past"),
-    (0.5, True, "1 of them are blurred", "or add light"),
-])
+@pytest.mark.parametrize(
+    ("time_s", "blurred", "problem", "remedy"),
+    [
+        (None, False, "1 of 4 photographs did not fit", "Take more between"),
+        (None, True, "1 of them are blurred", "Take those again"),
+        (0.5, False, "1 of 4 frames did not fit", "Move the camera slower past"),
+        (0.5, True, "1 of them are blurred", "or add light"),
+    ],
+)
 def test_what_did_not_fit_is_told_in_the_words_of_its_source(scene, time_s, blurred, problem, remedy):
     _, views, _ = scene
     model = model_of(dict(list(views.items())[:3]), FOCAL, np.random.default_rng(0), 0.0)
-    records = [FrameRecord(name=f"{i}.jpg", source=f"IMG {i}.jpg", time_s=time_s, selected=True,
-                           sharpness=0.1 if blurred and i == 3 else 1.0) for i in range(4)]
+    records = [
+        FrameRecord(
+            name=f"{i}.jpg",
+            source=f"IMG {i}.jpg",
+            time_s=time_s,
+            selected=True,
+            sharpness=0.1 if blurred and i == 3 else 1.0,
+        )
+        for i in range(4)
+    ]
     report = Reporter("cameras")
     _left_out(Solved(model, "plain", None, {}), records, {each.name: each.shown for each in records}, report)
     told = report.findings[0]
@@ -242,8 +284,11 @@ def test_a_mirrored_photograph_is_told_by_its_own_name(scene, monkeypatch):
 
 def test_tracks_hang_together_and_ambiguous_ones_go():
     pixels = {name: np.zeros((5, 2)) for name in "abc"}
-    pairs = {("a", "b"): np.array([[0, 0], [1, 1]]), ("b", "c"): np.array([[0, 3], [1, 2]]),
-             ("a", "c"): np.array([[4, 2]])}
+    pairs = {
+        ("a", "b"): np.array([[0, 0], [1, 1]]),
+        ("b", "c"): np.array([[0, 3], [1, 2]]),
+        ("a", "c"): np.array([[4, 2]]),
+    }
     # a1-b1-c2-a4 meets a twice
     assert sorted(map(sorted, tracks(Matches(pixels, pairs)))) == [[("a", 0), ("b", 0), ("c", 3)]]
 

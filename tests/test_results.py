@@ -48,7 +48,7 @@ def test_any_figure_of_the_readme_that_is_edited_is_found_and_mended():
     for phrase in TEXTS["README.md"]:
         place = re.search(r"\s+".join(map(re.escape, phrase.split())), text)
         digit = place.start() + re.search(r"\d", place[0]).start()
-        doctored = text[:digit] + str((int(text[digit]) + 1) % 10) + text[digit + 1:]
+        doctored = text[:digit] + str((int(text[digit]) + 1) % 10) + text[digit + 1 :]
         assert told.corrected(doctored, phrase, "README.md") == text, phrase
 
 
@@ -64,15 +64,18 @@ def test_the_index_counts_who_loses_and_who_is_synthetic():
     gains = {"scan_lamps": -2.0, "scan_below": 0.1, "bearded_below": -0.2, "very_light": -0.1, "light_overcast": 0.3}
     assert index.worse_in_the_picture(gains) == (
         "3 of 5 captures become worse in the picture, among them 1 of the 2 of the one real scan, whose own map holds "
-        "light.")
+        "light."
+    )
     assert index.worse_in_the_picture({"tan": -1.0}) == "1 of 1 captures become worse in the picture."
-    solved, delit = ({name: {"psnr": psnr} for name, psnr in zip(("tan", "dark", "scan_below", "bearded"), row,
-                                                                 strict=True)}
-                     for row in ((32.0, 34.0, 24.0, 26.0), (30.0, 30.0, 25.0, 25.0)))
+    solved, delit = (
+        {name: {"psnr": psnr} for name, psnr in zip(("tan", "dark", "scan_below", "bearded"), row, strict=True)}
+        for row in ((32.0, 34.0, 24.0, 26.0), (30.0, 30.0, 25.0, 25.0))
+    )
     people = figures.Figures({"solved": solved, "delit texture": delit})
     assert "adds +3.00 ± 1.00 dB, to the others +0.00 ± 1.00 dB" in index.gains_by_kind(people)
     assert index.the_synthetic(["bearded_below", "light", "scan_below", "very_light"]) == (
-        "The others are synthetic: 1 with strands, eyes and a phone's pipeline, 2 bald, by true cameras.")
+        "The others are synthetic: 1 with strands, eyes and a phone's pipeline, 2 bald, by true cameras."
+    )
 
 
 def test_the_comparison_tells_person_by_person_who_is_ahead_and_names_its_best_rival():
@@ -81,16 +84,19 @@ def test_the_comparison_tells_person_by_person_who_is_ahead_and_names_its_best_r
     text = " ".join(results.page("comparison").split())
     scan = figures.read_record("comparison")["figures"]["scan"]["raw"]
     rival = max((name for name in scan if name != "wildcap"), key=lambda name: scan[name]["PSNR"])
-    assert (f"On the head scan ours has {scan['wildcap']['PSNR']:.1f} dB, the best of the others, *{rival}*, "
-            f"{scan[rival]['PSNR']:.1f} dB") in text
+    assert (
+        f"On the head scan ours has {scan['wildcap']['PSNR']:.1f} dB, the best of the others, *{rival}*, "
+        f"{scan[rival]['PSNR']:.1f} dB"
+    ) in text
 
 
 def test_what_a_page_calls_the_worst_or_free_is_so_in_its_record():
     def told_by(page, *records):
         return " ".join(" ".join(body for _, body in page.sections(*map(figures.Figures.of, records))).split())
 
-    chain, scan, measured = (figures.read_record(name)["figures"]
-                             for name in ("whole_chain", "scan_albedo", "geometry"))
+    chain, scan, measured = (
+        figures.read_record(name)["figures"] for name in ("whole_chain", "scan_albedo", "geometry")
+    )
     chain["rows"]["scan, network"] |= {"true_mask": {"psnr": 31.5, "ssim": 0.9}, "solved": {"psnr": 30.0, "ssim": 0.9}}
     assert "costs 1.50 dB on the scan" in told_by(scan_page, scan, chain, measured)
     scale = figures.read_record("head_scale")["figures"]
@@ -113,8 +119,9 @@ def test_the_page_of_the_state_says_whom_the_fitted_lights_weight_was_chosen_on(
 def test_what_survives_the_solve_is_told_of_captures_that_both_records_hold():
     def record(**psnrs):
         rows = {name: {"psnr": psnr} for name, psnr in psnrs.items()}
-        return figures.Figures.of({"captures": {name: {"delit texture": row, "solved": row}
-                                                for name, row in rows.items()}})
+        return figures.Figures.of(
+            {"captures": {name: {"delit texture": row, "solved": row} for name, row in rows.items()}}
+        )
 
     before = record(tan=20.0, tan_below=22.0, scan_below=25.0, scan_leaves=26.0)
     now = record(tan=24.0, tan_below=21.0, scan_leaves=27.0, brown=30.0)
@@ -127,20 +134,26 @@ def test_what_survives_the_solve_is_told_of_captures_that_both_records_hold():
 
 
 def test_the_page_of_hair_says_where_it_falls_short_and_what_strokes_are_worth():
-    rows = {"bearded": {"brows": {"iou": 0.9, "degrees": 11.0, "usual_degrees": 14.0},
-                        "beard": {"iou": 0.4, "degrees": 31.0, "usual_degrees": 13.0}},
-            "bald": {"brows": {"iou": 0.8}}}
+    rows = {
+        "bearded": {
+            "brows": {"iou": 0.9, "degrees": 11.0, "usual_degrees": 14.0},
+            "beard": {"iou": 0.4, "degrees": 31.0, "usual_degrees": 13.0},
+        },
+        "bald": {"brows": {"iou": 0.8}},
+    }
     assert groomed.shortfalls(rows) == (
         "Below the IoU that is wanted: the bearded person's beard (0.40); farther off: the bearded person's beard (31 "
         "degrees). Hair that follows the strokes lies nearer to the true one than the usual directions alone in 1 of 2 "
-        "rows.")
+        "rows."
+    )
     assert "wanted: nothing; farther off: nothing" in groomed.shortfalls({"bald": rows["bald"]})
 
 
 def test_the_page_of_eyes_says_who_is_in_no_mean():
     measured, missed = ({column: value for column in open_eyes.COLUMNS} for value in (0.5, None))
-    everybody = {f"{name}, {side}": measured
-                 for name in ("bearded", "fringed", "stubbled") for side in ("left", "right")}
+    everybody = {
+        f"{name}, {side}": measured for name in ("bearded", "fringed", "stubbled") for side in ("left", "right")
+    }
     assert eyes.left_out(everybody) == "", "the fourth person's lids are closed"
     rows = {**everybody, "fringed, left": missed, "fringed, right": missed}
     assert eyes.left_out(rows) == "Taken for closed, and in no mean: fringed."
@@ -180,14 +193,17 @@ def test_a_page_tells_what_its_records_know(tmp_path):
 
 
 def test_prose_is_laid_out_and_tables_are_left_as_they_are():
-    body = pages.prose("""
+    body = pages.prose(
+        """
         Words that
         go on.
 
         - one
           item
         - another
-        """, "| a |\n| --- |")
+        """,
+        "| a |\n| --- |",
+    )
     laid_out = "\n\n".join(map(pages.reflow, body.split("\n\n")))
     assert laid_out == "Words that go on.\n\n- one item\n- another\n\n| a |\n| --- |"
     assert max(map(len, pages.reflow("- " + "word " * 60).splitlines())) <= pages.WIDTH
@@ -206,12 +222,18 @@ def test_pictures_are_made_of_solved_captures_that_the_pages_show(tmp_path):
         (tmp_path / f"{name}.wildcap" / "maps" / "normal.png").touch()
     (tmp_path / "tan.wildcap").mkdir()
     (tmp_path / "dark" / "maps").mkdir(parents=True)
-    made = {(command[0], *(part for part in command if part.endswith(("jpg", "maps"))))
-            for command in results.pictures(tmp_path)}
-    teaser, sample, dark = (str(ROOT / "docs" / "pictures" / f"{name}.jpg")
-                            for name in ("teaser", "gallery_sample", "gallery_dark"))
-    assert made == {("benchmarks.teaser", teaser), ("benchmarks.gallery", sample),
-                    ("benchmarks.gallery", dark, str(tmp_path / "dark" / "maps"))}
+    made = {
+        (command[0], *(part for part in command if part.endswith(("jpg", "maps"))))
+        for command in results.pictures(tmp_path)
+    }
+    teaser, sample, dark = (
+        str(ROOT / "docs" / "pictures" / f"{name}.jpg") for name in ("teaser", "gallery_sample", "gallery_dark")
+    )
+    assert made == {
+        ("benchmarks.teaser", teaser),
+        ("benchmarks.gallery", sample),
+        ("benchmarks.gallery", dark, str(tmp_path / "dark" / "maps")),
+    }
 
 
 def test_the_command_writes_pages_and_texts_and_then_finds_nothing(tmp_path, monkeypatch, capsys):

@@ -32,9 +32,15 @@ def make(root, name: str, findings: int = 0, **figures) -> BatchFace:
     for measure in review.MEASURES:
         if measure.label in figures or measure.label == review.FINDINGS:
             stage = stages.by_name(measure.stage or "frames")
-            face.capture.finish(stage, face.capture.conditions(stage, Settings()), 60.0, Settings(),
-                                {measure.figure: figures.get(measure.label)}, "0.2.0",
-                                [FINDING] * findings if stage.name == "frames" else [])
+            face.capture.finish(
+                stage,
+                face.capture.conditions(stage, Settings()),
+                60.0,
+                Settings(),
+                {measure.figure: figures.get(measure.label)},
+                "0.2.0",
+                [FINDING] * findings if stage.name == "frames" else [],
+            )
     return face
 
 
@@ -48,20 +54,24 @@ def batch(tmp_path) -> Batch:
     root = tmp_path / "R&D <batch> 100%"
     root.mkdir()
     (root / "film.mp4").write_bytes(b"film")
-    faces = (make(root, "good", Mask=1.0, Landmarks=0.2, Seen=90.0),
-             make(root, "bad chin", Mask=2.0, Landmarks=9.0, Seen=89.0),
-             make(root, "half", Mask=50.0, Landmarks=0.9, Seen=70.0),
-             make(root, "told", findings=2, Mask=1.5, Landmarks=0.3, Seen=88.0))
+    faces = (
+        make(root, "good", Mask=1.0, Landmarks=0.2, Seen=90.0),
+        make(root, "bad chin", Mask=2.0, Landmarks=9.0, Seen=89.0),
+        make(root, "half", Mask=50.0, Landmarks=0.9, Seen=70.0),
+        make(root, "told", findings=2, Mask=1.5, Landmarks=0.3, Seen=88.0),
+    )
     write_batch(Batch(root, faces))
     return Batch(root, faces)
 
 
 def test_a_measure_is_ranked_by_the_share_of_the_others_that_are_better(batch):
-    ranks = review.rank([{"Mask": 10.0, "Seen": 90.0}, {"Mask": 10.0, "Seen": 80.0}, {"Mask": 30.0},
-                         {"Mask": 20.0, "Seen": 70.0}])
+    ranks = review.rank(
+        [{"Mask": 10.0, "Seen": 90.0}, {"Mask": 10.0, "Seen": 80.0}, {"Mask": 30.0}, {"Mask": 20.0, "Seen": 70.0}]
+    )
     assert [own["Mask"] for own in ranks] == [0, 0, 1, pytest.approx(2 / 3)]
-    assert [own.get("Seen") for own in ranks] == [0, 0.5, None,
-                                                  1], "of what is seen, less is riskier; who has none is not compared"
+    assert [own.get("Seen") for own in ranks] == [0, 0.5, None, 1], (
+        "of what is seen, less is riskier; who has none is not compared"
+    )
     assert review.rank([{"Mask": 10.0}]) == [{"Mask": 0.0}]
 
 
@@ -75,14 +85,18 @@ def test_the_worst_measure_decides_and_where_that_is_equal_their_mean(batch):
 
 
 def test_stopped_faces_come_first_then_those_that_wait(batch, monkeypatch):
-    states = {"good": FaceState(STOPPED, review.GROUPS[0], "It <broke>.", "Mend it."),
-              "told": FaceState(WAITING, review.GROUPS[2]), "half": FaceState(DONE),
-              "bad chin": FaceState(TO_DO, review.GROUPS[1])}
+    states = {
+        "good": FaceState(STOPPED, review.GROUPS[0], "It <broke>.", "Mend it."),
+        "told": FaceState(WAITING, review.GROUPS[2]),
+        "half": FaceState(DONE),
+        "bad chin": FaceState(TO_DO, review.GROUPS[1]),
+    }
     monkeypatch.setattr(review, "derive_state", lambda batch, face: states[face.name])
     assert order(batch) == ["good", "told", "half", "bad chin"]
     page = Page((batch.root / review.NAME).read_text(encoding="utf-8"))
     assert {"It <broke>.", "Mend it.", "1 min of work; still to do: head, mask, solve, deliver", "3 min of work"} <= {
-        text.replace("4 min", "1 min") if "head" in text else text.replace("4 min", "3 min") for text in page.texts}
+        text.replace("4 min", "1 min") if "head" in text else text.replace("4 min", "3 min") for text in page.texts
+    }
     assert [text for text in page.texts if text in review.HEADINGS.values()] == list(review.HEADINGS.values())
 
 

@@ -59,8 +59,12 @@ def observation(texture, alpha=None, cells=(4, 4), weight=None):
 
 
 def start(value=0.0, size=SIZE, light=1.0, cells=(4, 4)):
-    return State(0, None, torch.full((1, 7, size, size), value),
-                 Lights(constant_light(torch.full((3,), light)), torch.zeros(1, 9, *cells), torch.ones(3)))
+    return State(
+        0,
+        None,
+        torch.full((1, 7, size, size), value),
+        Lights(constant_light(torch.full((3,), light)), torch.zeros(1, 9, *cells), torch.ones(3)),
+    )
 
 
 def test_schedule_walks_the_last_part_of_karras_sequence():
@@ -76,8 +80,9 @@ def test_schedule_walks_the_last_part_of_karras_sequence():
 
 def test_without_observation_the_sampler_draws_from_the_prior():
     o = observation(torch.zeros(3, SIZE, SIZE), weight=torch.zeros(SIZE, SIZE))
-    drawn = torch.cat([Sampler(gaussian_prior, EVEN, seed_noise(seed)).sample({1: o}, start()).denoised
-                       for seed in range(3)])
+    drawn = torch.cat(
+        [Sampler(gaussian_prior, EVEN, seed_noise(seed)).sample({1: o}, start()).denoised for seed in range(3)]
+    )
     assert abs(drawn.mean().item() - MEAN) < 0.02
     assert abs(drawn.std().item() - SPREAD) < 0.03
 
@@ -91,13 +96,17 @@ def test_posterior_mean_under_a_gaussian_prior(guidance):
     light = 1.2
     texture = light * (truth[0, :3] + 1) / 2
     weight = torch.ones(SIZE, SIZE)
-    weight[:, SIZE // 2:] = 0.0  # the right half is unseen: its posterior is the prior
+    weight[:, SIZE // 2 :] = 0.0  # the right half is unseen: its posterior is the prior
     recipe = Recipe(steps=75, coarse=(), guidance=guidance, rate=0.0)
     o = {1: observation(texture, weight=weight)}
-    drawn = torch.stack([Sampler(gaussian_prior, recipe, seed_noise(seed)).sample(o, start(light=light)).denoised[0]
-                         for seed in range(12)])
-    seen, unseen = drawn[:, :3, :, :SIZE // 2], drawn[:, :3, :, SIZE // 2:]
-    assert (seen.mean(0) - truth[0, :3, :, :SIZE // 2]).abs().mean() < 0.02
+    drawn = torch.stack(
+        [
+            Sampler(gaussian_prior, recipe, seed_noise(seed)).sample(o, start(light=light)).denoised[0]
+            for seed in range(12)
+        ]
+    )
+    seen, unseen = drawn[:, :3, :, : SIZE // 2], drawn[:, :3, :, SIZE // 2 :]
+    assert (seen.mean(0) - truth[0, :3, :, : SIZE // 2]).abs().mean() < 0.02
     assert seen.std(0).mean() < 0.04
     assert abs(unseen.mean().item() - MEAN) < 0.02
     assert abs(unseen.std().item() - SPREAD) < 0.03
@@ -119,8 +128,9 @@ def test_a_known_soft_shadow_is_removed_and_only_with_the_grid():
     recipe = Recipe(steps=60, coarse=())
     errors = {}
     for name, alpha in (("grid", mask), ("no grid", torch.zeros_like(mask))):
-        out = Sampler(prior, recipe, seed_noise(0)).sample({1: observation(texture, alpha, (8, 8))},
-                                                           start(-0.2, 64, cells=(8, 8)))
+        out = Sampler(prior, recipe, seed_noise(0)).sample(
+            {1: observation(texture, alpha, (8, 8))}, start(-0.2, 64, cells=(8, 8))
+        )
         error = ((out.denoised - truth)[0, :3] / 2) ** 2
         errors[name] = error[:, shadow].mean().sqrt().item(), error[:, mask == 0].mean().sqrt().item()
     assert errors["grid"][0] < 0.6 * errors["no grid"][0]
@@ -148,11 +158,22 @@ def test_the_lights_move_as_far_on_a_finer_map_as_on_a_coarse_one():
     found = []
     for coarse in ((), ((2, 1.0),)):
         seen = {factor: observation(torch.full((3, SIZE // factor, SIZE // factor), 0.2)) for factor in (1, 2)}
-        seen = {factor: replace(o, shader=Shader(torch.tensor([0.0, 0, 1])[:, None, None].expand(3, *o.weight.shape),
-                                                 0 * o.weight, (4, 4))) for factor, o in seen.items()}
+        seen = {
+            factor: replace(
+                o,
+                shader=Shader(
+                    torch.tensor([0.0, 0, 1])[:, None, None].expand(3, *o.weight.shape), 0 * o.weight, (4, 4)
+                ),
+            )
+            for factor, o in seen.items()
+        }
         recipe = Recipe(steps=20, coarse=coarse, phases=(("main", 0.0, 1.0),), updates=60)
-        sampler = Sampler(lambda x, sigma, coords: torch.zeros_like(x), replace(recipe, guidance="proximal"),
-                          seed_noise(0), fit=lambda state, denoised, *rest: update_lights(state, 0 * denoised, *rest))
+        sampler = Sampler(
+            lambda x, sigma, coords: torch.zeros_like(x),
+            replace(recipe, guidance="proximal"),
+            seed_noise(0),
+            fit=lambda state, denoised, *rest: update_lights(state, 0 * denoised, *rest),
+        )
         found.append(sampler.sample(seen, start()).lights.glob)
     assert (found[0] - start().lights.glob).abs().max() > 0.1
     assert torch.allclose(found[0], found[1], atol=1e-4), (found[0] - found[1]).abs().max()
@@ -175,8 +196,10 @@ def test_the_paper_s_total_variation_is_of_all_gamma_and_counts_the_mask_s_borde
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
     prior, _, texture, mask, _ = shadow_problem(32)
     o = {1: observation(texture, mask)}
-    a, b, c = (Sampler(prior, Recipe(steps=12, coarse=()), seed_noise(seed)).sample(o, start(-0.2)).denoised
-               for seed in (5, 5, 6))
+    a, b, c = (
+        Sampler(prior, Recipe(steps=12, coarse=()), seed_noise(seed)).sample(o, start(-0.2)).denoised
+        for seed in (5, 5, 6)
+    )
     assert torch.equal(a, b) and not torch.equal(a, c)
 
 

@@ -66,8 +66,10 @@ def test_a_timer_that_fails_tells_it_and_goes_on(addon, monkeypatch):
     problems.clear("")
     monkeypatch.undo()
     monkeypatch.setattr(addon("incoming"), "waits", lambda: True)
-    for failure, said in ((ZeroDivisionError(), "An error inside WildCap stopped"),
-                          (jobs.Problem("The head is damaged.", "Run it again."), "is damaged")):
+    for failure, said in (
+        (ZeroDivisionError(), "An error inside WildCap stopped"),
+        (jobs.Problem("The head is damaged.", "Run it again."), "is damaged"),
+    ):
         monkeypatch.setattr(addon("incoming"), "bring_in", Mock(side_effect=failure))
         assert jobs._tick() == jobs.INTERVAL_S and said in problems.of("").problem
 
@@ -76,16 +78,24 @@ def cameras(folder, name: bytes = b"00000.jpg", focal: float = 900.0, width: int
     folder.mkdir(exist_ok=True)
     camera = struct.pack("<iiQQ3d", 1, 0, width, 960, focal, 360, 480)
     (folder / "cameras.bin").write_bytes(struct.pack("<Q", count) + camera)
-    (folder / "images.bin").write_bytes(struct.pack("<Qi7dI", count, 1, 1, 0, 0, 0, 0, 0, 1, 1) + name + b"\0"
-                                        + struct.pack("<Q", 0))
+    (folder / "images.bin").write_bytes(
+        struct.pack("<Qi7dI", count, 1, 1, 0, 0, 0, 0, 0, 1, 1) + name + b"\0" + struct.pack("<Q", 0)
+    )
 
 
 def test_cameras_that_are_damaged_or_a_stranger_s_are_refused(addon, tmp_path):
     colmap_cameras = addon("reconstruct.colmap_cameras")
     cameras(tmp_path)
     assert [camera.name for camera in colmap_cameras.read(tmp_path)] == ["00000.jpg"]
-    for spoiled in ({"name": b"../../private/x.jpg"}, {"focal": float("nan")}, {"focal": 0.0}, {"width": 2**40},
-                    {"width": 0}, {"count": 2**60}, {"name": b"\xff.jpg"}):
+    for spoiled in (
+        {"name": b"../../private/x.jpg"},
+        {"focal": float("nan")},
+        {"focal": 0.0},
+        {"width": 2**40},
+        {"width": 0},
+        {"count": 2**60},
+        {"name": b"\xff.jpg"},
+    ):
         cameras(tmp_path, **spoiled)
         with pytest.raises(Exception, match="cannot be read") as refusal:
             colmap_cameras.read(tmp_path)

@@ -39,15 +39,17 @@ def paint(points: np.ndarray) -> np.ndarray:
     rng = np.random.default_rng(0)
     waves = rng.normal(0, 1, (60, 3))
     waves *= (2 * np.pi / rng.uniform(0.004, 0.03, 60) / np.linalg.norm(waves, axis=1))[:, None]
-    return np.clip(0.5 + 0.12 * np.cos(points @ waves.T + rng.uniform(0, 6, 60)) @ rng.normal(0, 0.6, (60, 3)), 0.1,
-                   0.9)
+    return np.clip(
+        0.5 + 0.12 * np.cos(points @ waves.T + rng.uniform(0, 6, 60)) @ rng.normal(0, 0.6, (60, 3)), 0.1, 0.9
+    )
 
 
 def photograph(capture: Capture, centres: np.ndarray, radial: float = 0.0) -> None:
     """Writes frames/ and cameras/ of the egg seen from `centres` [N, 3]."""
     model = pycolmap.Reconstruction()
-    camera = pycolmap.Camera(model="SIMPLE_RADIAL", width=WIDTH, height=HEIGHT,
-                             params=[FOCAL, WIDTH / 2, HEIGHT / 2, radial], camera_id=1)
+    camera = pycolmap.Camera(
+        model="SIMPLE_RADIAL", width=WIDTH, height=HEIGHT, params=[FOCAL, WIDTH / 2, HEIGHT / 2, radial], camera_id=1
+    )
     model.add_camera_with_trivial_rig(camera)
     records = []
     for i, centre in enumerate(centres):
@@ -74,8 +76,13 @@ def photograph(capture: Capture, centres: np.ndarray, radial: float = 0.0) -> No
 
 def around(yaws, heights=(0.0,)) -> np.ndarray:
     """Cameras 0.45 m from the egg, at angles in degrees from straight ahead."""
-    return np.array([CENTRE + 0.45 * np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
-                     for e in np.radians(heights) for a in np.radians(yaws)])
+    return np.array(
+        [
+            CENTRE + 0.45 * np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
+            for e in np.radians(heights)
+            for a in np.radians(yaws)
+        ]
+    )
 
 
 def off_the_egg_mm(points: np.ndarray) -> np.ndarray:
@@ -88,14 +95,17 @@ def off_the_egg_mm(points: np.ndarray) -> np.ndarray:
 @pytest.fixture
 def capture(tmp_path, monkeypatch) -> Capture:
     # an egg is no person
-    monkeypatch.setattr(scan.rounds.faces, "segment_person",
-                        lambda srgb: (np.abs(srgb - 0.2).max(-1) > 0.04).astype(np.float32))
+    monkeypatch.setattr(
+        scan.rounds.faces, "segment_person", lambda srgb: (np.abs(srgb - 0.2).max(-1) > 0.04).astype(np.float32)
+    )
     return Capture(tmp_path / "œuf peint.wildcap")
 
 
-@pytest.mark.parametrize(("centres", "radial"),
-                         [(around(np.arange(-32, 33, 8)), -0.08), (around([0], np.arange(-24, 25, 8)), 0.0)],
-                         ids=["horizontal path, bent lens", "vertical path"])
+@pytest.mark.parametrize(
+    ("centres", "radial"),
+    [(around(np.arange(-32, 33, 8)), -0.08), (around([0], np.arange(-24, 25, 8)), 0.0)],
+    ids=["horizontal path, bent lens", "vertical path"],
+)
 def test_known_surface_comes_back(capture, centres, radial):
     photograph(capture, centres, radial)
     report = Reporter("scan")
@@ -104,8 +114,9 @@ def test_known_surface_comes_back(capture, centres, radial):
     off = off_the_egg_mm(mesh.vertices)
     assert np.median(np.abs(off)) < 0.4 and np.percentile(np.abs(off), 95) < 1.5
     assert abs(np.median(off)) < 0.25  # neither swollen nor shrunk
-    front = raster.RayCaster(mesh).blocked(np.repeat(centres[len(centres) // 2][None], 200, 0),
-                                           _towards_front(centres[len(centres) // 2]))
+    front = raster.RayCaster(mesh).blocked(
+        np.repeat(centres[len(centres) // 2][None], 200, 0), _towards_front(centres[len(centres) // 2])
+    )
     assert front.mean() > 0.97  # hardly a hole where all cameras look
     outward = (meshes.face_normals(mesh) * (mesh.vertices[mesh.faces].mean(1) - CENTRE)).sum(1) > 0
     assert outward.mean() > 0.98
@@ -130,8 +141,9 @@ def test_what_floats_and_what_the_maps_disagree_about_is_left_out():
         depth = np.full((100, 100), 0.40, np.float32)
         depth[10:14, 10:14] = 0.34  # a hair in front of everything
         depth[50:80, 50:80] += rng.choice([-0.008, 0.009], (30, 30))  # a curl that no two frames show alike
-        maps.append(DepthMap(np.eye(3), np.zeros(3), 250.0, np.array([-50.0, -50.0]), cv2.blur(depth, (3, 3)), 0.05,
-                             0.0))
+        maps.append(
+            DepthMap(np.eye(3), np.zeros(3), 250.0, np.array([-50.0, -50.0]), cv2.blur(depth, (3, 3)), 0.05, 0.0)
+        )
     fused = fuse(maps, np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]]), 0.002)
     assert fused.floating > 0 and abs(fused.mesh.vertices[:, 2] - 0.40).max() < 0.012
     still = fuse(maps[:1] * 8, np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]]), 0.002)
@@ -174,8 +186,17 @@ def test_a_map_counts_by_the_angle_it_measures_under():
     maps = []
     for depth, off in [(0.40, 0.0), (0.80, 0.004)] * 3:
         seen = np.full((200, 200), depth + off, np.float32)
-        maps.append(DepthMap(np.eye(3), np.array([0, 0, 0.40 - depth]), 500.0 * depth, np.array([-100.0, -100.0]), seen,
-                             0.05 * depth / 0.40, 0.0))
+        maps.append(
+            DepthMap(
+                np.eye(3),
+                np.array([0, 0, 0.40 - depth]),
+                500.0 * depth,
+                np.array([-100.0, -100.0]),
+                seen,
+                0.05 * depth / 0.40,
+                0.0,
+            )
+        )
     fused = fuse(maps, np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]]), 0.002)
     assert np.median(fused.mesh.vertices[:, 2]) == pytest.approx(0.402, abs=0.0003)
 

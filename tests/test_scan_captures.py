@@ -19,8 +19,12 @@ DATA = ROOT.parent / "shared" / "data"
 
 
 def test_without_the_scan_it_says_what_is_missing(tmp_path):
-    done = subprocess.run([sys.executable, "-m", "benchmarks.scan_captures", str(tmp_path), str(tmp_path / "out")],
-                          cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.scan_captures", str(tmp_path), str(tmp_path / "out")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 1 and "Traceback" not in done.stderr
     assert "holds no head scan" in done.stderr and "LeePerrySmith.glb" in done.stderr
 

@@ -16,7 +16,7 @@ def test_no_outline_of_a_shadow_stays_on_skin_and_its_pores_and_a_brow_do():
     rng = np.random.default_rng(0)
     pores = 0.05 * rng.standard_normal((256, 256)).astype(np.float32)
     y, x = np.mgrid[0:256, 0:256]
-    line = -0.3 * np.exp(-((x - 130.5) / 4.0) ** 2).astype(np.float32)
+    line = -0.3 * np.exp(-(((x - 130.5) / 4.0) ** 2)).astype(np.float32)
     brow = np.zeros((256, 256), np.float32)
     brow[60:80, 90:170] = -1.2
     share = (x < 131).astype(np.float32)

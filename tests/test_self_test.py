@@ -33,10 +33,12 @@ def run(capture: Capture) -> tuple:
 
 def solved(noise: float):
     """Stands for a solve: the shipped albedo with noise of this deviation, sRGB, at the draft's size."""
+
     def solve(capture, settings, report):
         shipped = images.resize(images.read_srgb(sample_head.SHIPPED / "maps" / "diffuse_albedo.png"), 512, 512)
         drawn = np.random.default_rng(0).normal(0, noise, shipped.shape).astype(np.float32)
         images.write_srgb(capture.maps / "diffuse_albedo.png", shipped + drawn, bits=16)
+
     return solve
 
 
@@ -62,7 +64,7 @@ def test_the_command_solves_a_copy_and_takes_it_away(monkeypatch):
 
     monkeypatch.setattr(terminal, "follow", follow)
     assert main(["self-test", "--device", "cpu"]) == 0
-    (folder, job), = seen
+    ((folder, job),) = seen
     assert job.tool.name == "self_test" and job.settings.device == "cpu" and not folder.exists()
 
 
@@ -136,9 +138,12 @@ class TestInBlender:
             def poll(self):
                 self.running = False
                 messages = addon("jobs").messages
-                return [messages.StageDone("self_test", 41.0, False,
-                                           {"score_db": 33.21, "expected_db": 32.5, "seconds": 40.7}),
-                        messages.Done(42.0)]
+                return [
+                    messages.StageDone(
+                        "self_test", 41.0, False, {"score_db": 33.21, "expected_db": 32.5, "seconds": 40.7}
+                    ),
+                    messages.Done(42.0),
+                ]
 
         monkeypatch.setattr(module, "Worker", Ended)
         bpy.ops.wildcap.self_test()

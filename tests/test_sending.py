@@ -87,8 +87,13 @@ def test_nothing_leaves_before_the_artist_agreed_to_these_frames(addon, item, ca
     assert "2 frames would go to Beeble for 2 credits" in words(addon) and not addon("status").of(item).agreed
     operator = addon("reconstruct.sending").WILDCAP_OT_allow_sending
     told = " ".join(operator.tell(type("Dialog", (), {})()))
-    for part in ("2 frames", "a person's face", "Beeble, a company, at sdk.beeble.ai", "2 credits",
-                 "not be used to train"):
+    for part in (
+        "2 frames",
+        "a person's face",
+        "Beeble, a company, at sdk.beeble.ai",
+        "2 credits",
+        "not be used to train",
+    ):
         assert part in told
     bpy.ops.wildcap.allow_sending()
     assert "You agreed: 2 frames go to Beeble for 2 credits." in words(addon) and addon("status").of(item).agreed
@@ -149,8 +154,10 @@ def test_what_cannot_or_need_not_be_agreed_to_is_refused(addon, item, capture):
 
 def test_the_large_button_asks_for_the_consent_where_the_chain_stopped_for_it(addon):
     next_step, status = addon("next_step"), addon("status")
-    before = {name: "done" if name in ("frames", "cameras", "scan", "registration") else "to do"
-              for name in next_step.BEFORE_MASK}
+    before = {
+        name: "done" if name in ("frames", "cameras", "scan", "registration") else "to do"
+        for name in next_step.BEFORE_MASK
+    }
     plan = status.consent.Sending("sdk.beeble.ai", {"00000.jpg": "a"}, 0, False)
 
     def step(**known):
@@ -177,8 +184,9 @@ def test_the_key_is_told_to_the_worker_of_that_delighter_alone(addon, item, capt
     assert started[-1][4] == {service.KEY_VARIABLE: KEY, **offline}
     monkeypatch.setenv(service.KEY_VARIABLE, "the machine's own")
     jobs.start(item, "reconstruct")
-    assert started[-1][4] == {service.KEY_VARIABLE: "the machine's own",
-                              **offline}, "what the machine is set up with comes first"
+    assert started[-1][4] == {service.KEY_VARIABLE: "the machine's own", **offline}, (
+        "what the machine is set up with comes first"
+    )
     found: list = []
     preferences.draw_key(Layout(found), "Key")
     assert "WILDCAP_SWITCHLIGHT_KEY" in found[0][0]

@@ -14,12 +14,21 @@ def check(stage: str, **values) -> None:
     check_paths(from_json({stage: values}), NAMES)
 
 
-@pytest.mark.parametrize("stage, values", [
-    ("cameras", {"import_from": "gone"}), ("registration", {"template": "gone.obj"}),
-    ("delight", {"delighter": "folder", "folder": "gone"}), ("delight", {"delighter": "folder"}),
-    ("delight", {"delighter": "opendelight"}), ("delight", {"delighter": "opendelight", "checkpoint": "gone"}),
-    ("texture", {"perceptual": 10, "perceptual_network": "gone"}), ("shadow_mask", {"softened": "gone"}),
-    ("solve", {"prior": "gone"}), ("solve", {"together": "gone"})])
+@pytest.mark.parametrize(
+    "stage, values",
+    [
+        ("cameras", {"import_from": "gone"}),
+        ("registration", {"template": "gone.obj"}),
+        ("delight", {"delighter": "folder", "folder": "gone"}),
+        ("delight", {"delighter": "folder"}),
+        ("delight", {"delighter": "opendelight"}),
+        ("delight", {"delighter": "opendelight", "checkpoint": "gone"}),
+        ("texture", {"perceptual": 10, "perceptual_network": "gone"}),
+        ("shadow_mask", {"softened": "gone"}),
+        ("solve", {"prior": "gone"}),
+        ("solve", {"together": "gone"}),
+    ],
+)
 def test_what_is_needed_and_missing_is_named(stage, values):
     with pytest.raises(Problem, match=f"{stage}.{list(values)[-1] if 'gone' in values.values() else ''}"):
         check(stage, **values)

@@ -29,8 +29,23 @@ from .recorded import changed, record
 
 EVERY = [(stage, field) for stage, kind in STAGE_KINDS.items() for field in fields(kind)]
 PATHS = [name for name, field in known_settings().items() if "path" in field.metadata]
-METADATA = {"min", "max", "unit", "choices", "titles", "path", "when", "required", "holds", "form", "parse", "label",
-            "flag", "per_face", "affects_result"}
+METADATA = {
+    "min",
+    "max",
+    "unit",
+    "choices",
+    "titles",
+    "path",
+    "when",
+    "required",
+    "holds",
+    "form",
+    "parse",
+    "label",
+    "flag",
+    "per_face",
+    "affects_result",
+}
 
 
 def test_every_stage_has_settings():
@@ -50,8 +65,11 @@ def test_metadata_says_what_a_setting_may_be(name):
 
 
 def test_no_two_settings_of_a_command_have_one_flag():
-    flags = [(name.startswith("deliver."), field.metadata["flag"]) for name, field in known_settings().items()
-             if "flag" in field.metadata]
+    flags = [
+        (name.startswith("deliver."), field.metadata["flag"])
+        for name, field in known_settings().items()
+        if "flag" in field.metadata
+    ]
     assert len(flags) > 20 and len(set(flags)) == len(flags) and all(flag.startswith("--") for _, flag in flags)
 
 
@@ -82,9 +100,17 @@ def test_a_place_in_the_home_folder_is_found(monkeypatch, tmp_path):
 
 def test_a_quality_leaves_alone_what_is_about_the_face():
     left = {f"{stage}.{field.name}" for stage, field in EVERY if field.name not in quality_settings(STAGE_KINDS[stage])}
-    assert left == {*PATHS, "frames.mirrored", "frames.no_glasses", "cameras.interpupillary_mm",
-                    "registration.new_atlas", "delight.delighter",
-                    "delight.switchlight_preview", "solve.skin_tone", "solve.white_point"}
+    assert left == {
+        *PATHS,
+        "frames.mirrored",
+        "frames.no_glasses",
+        "cameras.interpupillary_mm",
+        "registration.new_atlas",
+        "delight.delighter",
+        "delight.switchlight_preview",
+        "solve.skin_tone",
+        "solve.white_point",
+    }
 
 
 @pytest.mark.parametrize("quality", QUALITIES)
@@ -119,26 +145,45 @@ def test_every_setting_has_a_tooltip_a_valid_default_and_limits_that_hold(stage,
         from_json({stage: {field.name: [1]}})
 
 
-@pytest.mark.parametrize(("values", "words"), [
-    ({"moon": {}}, "no setting named 'moon'"), ({"solve": {"moon": 1}}, "no setting named 'solve.moon'"),
-    ({"solve": {"steps": True}}, "True, which is not a int"),
-    ({"solve": {"steps": "5"}}, "'5', which is not a int"), ({"seed": "5"}, "not a int"),
-    ({"seed": -1}, "0 to 2147483647"),
-    ({"device": 0}, "not a str"), ({"device": "abacus"}, "auto, cpu, cuda, mps"), ({"__doc__": "x"}, "no setting"),
-    ({"solve.steps": 5}, "no key 'solve.steps'"), ([1], "object, not \\[1\\]"),
-    ("seed", "object, not 'seed'"), ({"solve": 5}, "settings of the stage solve have to be an object, not 5"),
-    ({"solve": None}, "object, not None"),
-    ({"scan": {"voxel_mm": float("nan")}}, "0.3 to 5 mm"), ({"scan": {"voxel_mm": float("inf")}}, "0.3 to 5 mm"),
-    ({"scan": {"voxel_mm": 10**400}}, "0.3 to 5 mm")])
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"moon": {}}, "no setting named 'moon'"),
+        ({"solve": {"moon": 1}}, "no setting named 'solve.moon'"),
+        ({"solve": {"steps": True}}, "True, which is not a int"),
+        ({"solve": {"steps": "5"}}, "'5', which is not a int"),
+        ({"seed": "5"}, "not a int"),
+        ({"seed": -1}, "0 to 2147483647"),
+        ({"device": 0}, "not a str"),
+        ({"device": "abacus"}, "auto, cpu, cuda, mps"),
+        ({"__doc__": "x"}, "no setting"),
+        ({"solve.steps": 5}, "no key 'solve.steps'"),
+        ([1], "object, not \\[1\\]"),
+        ("seed", "object, not 'seed'"),
+        ({"solve": 5}, "settings of the stage solve have to be an object, not 5"),
+        ({"solve": None}, "object, not None"),
+        ({"scan": {"voxel_mm": float("nan")}}, "0.3 to 5 mm"),
+        ({"scan": {"voxel_mm": float("inf")}}, "0.3 to 5 mm"),
+        ({"scan": {"voxel_mm": 10**400}}, "0.3 to 5 mm"),
+    ],
+)
 def test_what_is_no_setting_is_refused(values, words):
     with pytest.raises(Problem, match=words) as refusal:
         from_json(values)
     assert refusal.value.remedy.endswith(".")
 
 
-@pytest.mark.parametrize(("wrong", "right"), [
-    ("slove", "solve"), ("solve.step", "solve.steps"), ("slove.steps", "solve.steps"), ("skin_tone", "solve.skin_tone"),
-    ("sede", "seed"), ("delight.delight", "delight.delighter")])
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("slove", "solve"),
+        ("solve.step", "solve.steps"),
+        ("slove.steps", "solve.steps"),
+        ("skin_tone", "solve.skin_tone"),
+        ("sede", "seed"),
+        ("delight.delight", "delight.delighter"),
+    ],
+)
 def test_the_nearest_setting_is_named(wrong, right):
     with pytest.raises(Problem, match=f"Did you mean {right}\\?"):
         find_setting(wrong)

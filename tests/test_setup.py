@@ -42,8 +42,9 @@ def wait(checking, limit_s: float = 60):
 
 def plan_of(addon, disk: int = 1_600_000_000):
     index = addon("setup.install").index
-    return index.InstallationPlan({"torch": "2.13.0", "numpy": "1.26.4", "av": "15.1.0"}, ("files.pythonhosted.org",),
-                                  430_000_000, disk)
+    return index.InstallationPlan(
+        {"torch": "2.13.0", "numpy": "1.26.4", "av": "15.1.0"}, ("files.pythonhosted.org",), 430_000_000, disk
+    )
 
 
 def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypatch, tmp_path):
@@ -61,8 +62,13 @@ def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypat
     assert opened == plan_of(setup), "from now on the dialog opens at once"
     assert "the CPU" in install.WILDCAP_OT_install_solver.tell()[0] and jobs.of("") is None
     lines = install.describe_plan(plan_of(setup), "cpu", tmp_path / "Löser", 23_400_000_000)
-    for words in ("PyTorch 2.13.0 for the CPU and 2 more packages", "0.4 GB to download from files.pythonhosted.org",
-                  "1.6 GB on disk", "Löser", "23.4 GB are free"):
+    for words in (
+        "PyTorch 2.13.0 for the CPU and 2 more packages",
+        "0.4 GB to download from files.pythonhosted.org",
+        "1.6 GB on disk",
+        "Löser",
+        "23.4 GB are free",
+    ):
         assert any(words in line for line in lines), words
 
 

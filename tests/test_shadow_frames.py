@@ -47,8 +47,9 @@ def head() -> Unfolded:
 
 @cache
 def views() -> tuple[View, ...]:
-    return tuple(replace(place_camera(azimuth, scale=0.6), name=f"{i:05d}.jpg")
-                 for i, azimuth in enumerate((-25, 0, 30, 45)))
+    return tuple(
+        replace(place_camera(azimuth, scale=0.6), name=f"{i:05d}.jpg") for i, azimuth in enumerate((-25, 0, 30, 45))
+    )
 
 
 def seen(view: View, texture: np.ndarray) -> np.ndarray:
@@ -74,9 +75,15 @@ def capture(tmp_path) -> Capture:
         model.add_image_with_trivial_frame(pycolmap.Image(name=view.name, camera_id=1, image_id=i + 1), pose)
     capture.cameras.mkdir()
     model.write_binary(str(capture.cameras))
-    write_json(capture.frames_json,
-               {"frames": [{"name": view.name, "video_frame": 3 * i, "time_s": i, "sharpness": 1.0, "selected": True}
-                           for i, view in enumerate(views())]})
+    write_json(
+        capture.frames_json,
+        {
+            "frames": [
+                {"name": view.name, "video_frame": 3 * i, "time_s": i, "sharpness": 1.0, "selected": True}
+                for i, view in enumerate(views())
+            ]
+        },
+    )
     images.write_linear(capture.texture, np.broadcast_to(SKIN, (SIZE, SIZE, 3)))
     images.write_data(capture.texture_confidence, np.ones((SIZE, SIZE), np.float32))
     return capture
@@ -128,12 +135,13 @@ def test_what_softening_lightens_becomes_the_proposal(capture, tmp_path):
     """The softened pictures are brighter as a whole, named by the video's frame numbers, and half the size: any tool
     may have made them."""
     for i, view in enumerate(views()):
-        soft = images.resize(images.linear_to_srgb(np.clip(1.15 * seen(view, lit(0.25)), 0, 1)), view.width // 2,
-                             view.height // 2)
+        soft = images.resize(
+            images.linear_to_srgb(np.clip(1.15 * seen(view, lit(0.25)), 0, 1)), view.width // 2, view.height // 2
+        )
         images.write_srgb(tmp_path / "soft" / f"{3 * i:04d}.png", soft)
     mask = proposal(capture, dilate_px=0, softened=str(tmp_path / "soft"))
     assert overlap(mask) > 0.75
-    columns = mask[:, SIZE // 2:].sum(), mask[:, :SIZE // 2].sum()  # the person's left is at u > 0.5
+    columns = mask[:, SIZE // 2 :].sum(), mask[:, : SIZE // 2].sum()  # the person's left is at u > 0.5
     assert columns[0] > 20 * columns[1]
 
 
@@ -159,19 +167,23 @@ def test_the_command_line_takes_the_folder(capture, tmp_path, monkeypatch):
 def test_a_folder_without_softened_frames_is_told(capture, tmp_path):
     (tmp_path / "soft").mkdir()
     images.write_srgb(tmp_path / "soft" / "holiday.png", np.zeros((8, 8, 3)))
-    for folder, complaint in ((tmp_path / "soft", "belongs to a registered frame"),
-                              (tmp_path / "gone", "no folder .* with softened pictures")):
+    for folder, complaint in (
+        (tmp_path / "soft", "belongs to a registered frame"),
+        (tmp_path / "gone", "no folder .* with softened pictures"),
+    ):
         with pytest.raises(Problem, match=complaint):
             proposal(capture, softened=str(folder))
 
 
 def test_one_view_does_not_outvote_the_others():
     """The one from the front takes everything for shadow; two others see the left side as well."""
-    masks = [(view, np.ones((view.height, view.width), np.float32) if i == 1 else seen(view, SHADOWED))
-             for i, view in enumerate(views())]
+    masks = [
+        (view, np.ones((view.height, view.width), np.float32) if i == 1 else seen(view, SHADOWED))
+        for i, view in enumerate(views())
+    ]
     share = lift_shadows(head(), len(masks), masks, Reporter("shadow_mask"))
     share = np.where(template.mask("face", SIZE) > 0.5, share, 0)
-    share[:, :int(0.55 * SIZE)] = 0
+    share[:, : int(0.55 * SIZE)] = 0
     assert overlap(share) > 0.7
 
 
@@ -210,17 +222,19 @@ def test_the_sun_s_shadow_is_told_by_the_filmed_texture_alone(monkeypatch):
     normals = small.spread(small.normals)
     lit = images.resize(SHADOWED.astype(np.float32), SMALL, SMALL) < 0.5
     reached = small.spread(sunless._sees(small, np.arange(len(small.points)), sun)) * lit
-    sky = np.maximum(at
-                     @ (0.9 * sh_basis(np.array([0.0, -0.5, 0.87]))[:, None] * [0.8, 0.9, 1.0] + 1.2
-                        * np.eye(9)[:, :1]), 0.01)
+    sky = np.maximum(
+        at @ (0.9 * sh_basis(np.array([0.0, -0.5, 0.87]))[:, None] * [0.8, 0.9, 1.0] + 1.2 * np.eye(9)[:, :1]), 0.01
+    )
     filmed = (SKIN * (sky + (reached * np.maximum(normals @ sun, 0))[..., None] * [1.6, 1.4, 1.1])).astype(np.float32)
     face = small.covered & (template.mask("face", SMALL) > 0.5)
-    found = sunless.out_of_sun(filmed, transfer, small, face, template.mask("skin", SMALL) > 0.5, 0.5,
-                               Reporter("shadow_mask"))
+    found = sunless.out_of_sun(
+        filmed, transfer, small, face, template.mask("skin", SMALL) > 0.5, 0.5, Reporter("shadow_mask")
+    )
     true = (reached < 0.5) & face
     assert (found & true).sum() / (found | true).sum() > 0.7
-    assert not sunless.out_of_sun((SKIN * sky).astype(np.float32), transfer, small, face, face, 0.5,
-                                  Reporter("shadow_mask")).any()
+    assert not sunless.out_of_sun(
+        (SKIN * sky).astype(np.float32), transfer, small, face, face, 0.5, Reporter("shadow_mask")
+    ).any()
 
 
 def test_occlusion_is_masked_gently_where_shape_and_texture_agree():

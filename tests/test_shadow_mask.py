@@ -95,10 +95,12 @@ def test_even_skin_of_every_tone_gives_an_almost_empty_mask(capture):
 
 
 def test_shadow_on_the_left_cheek_is_masked_on_the_left_cheek(capture):
-    masks = {side: proposed(capture, skin_texture() * (1 - painted_blob(cheek(side), 0.11)[..., None] * (1 - SHADOW)))
-             for side in (-1, 1)}
+    masks = {
+        side: proposed(capture, skin_texture() * (1 - painted_blob(cheek(side), 0.11)[..., None] * (1 - SHADOW)))
+        for side in (-1, 1)
+    }
     for side, mask in masks.items():
-        columns = mask[:, SIZE // 2:].sum(), mask[:, :SIZE // 2].sum()  # the person's left is at u > 0.5
+        columns = mask[:, SIZE // 2 :].sum(), mask[:, : SIZE // 2].sum()  # the person's left is at u > 0.5
         assert columns[0 if side > 0 else 1] > 20 * columns[1 if side > 0 else 0]
 
 

@@ -24,8 +24,11 @@ network = importlib.import_module("core.delight.network")  # the room has a func
 def core(tmp_path, monkeypatch) -> Path:
     """A copy of the shipped files, in the place of ours."""
     for folder in manifest.FOLDERS:
-        shutil.copytree(shipped_files.CORE / folder, tmp_path / "core" / folder,
-                        ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+        shutil.copytree(
+            shipped_files.CORE / folder,
+            tmp_path / "core" / folder,
+            ignore=shutil.ignore_patterns("*.py", "__pycache__"),
+        )
     monkeypatch.setattr(shipped_files, "CORE", tmp_path / "core")
     return tmp_path / "core"
 
@@ -39,9 +42,9 @@ def test_every_shipped_file_that_is_cut_changed_or_gone_is_named(core):
     assert shipped_files.find_faults(core) == []
     for name in shipped_files.read_manifest()["core"]:
         path, whole = core / name, (core / name).read_bytes()
-        for damaged in (whole[:len(whole) // 2], whole[:-1] + bytes([whole[-1] ^ 1]), None):
+        for damaged in (whole[: len(whole) // 2], whole[:-1] + bytes([whole[-1] ^ 1]), None):
             path.unlink() if damaged is None else path.write_bytes(damaged)
-            fault, = shipped_files.find_faults(core)
+            (fault,) = shipped_files.find_faults(core)
             assert str(path) in fault and ("missing" if damaged is None else "damaged") in fault
             with pytest.raises(Problem, match="Install the extension again") as refusal:
                 shipped_files.require_whole(path)
@@ -57,9 +60,15 @@ def test_line_ends_of_a_checkout_are_no_damage(core):
     assert shipped_files.find_faults(core) == []
 
 
-@pytest.mark.parametrize(("module", "name", "load"), [
-    (network, "delighter", lambda path: network.load_network("cpu")), (enlarge, "upscaler", enlarge.load_network),
-    (prior, "prior", prior._load_ours), (whole_head, "prior", lambda path: whole_head.usual_skin(8))])
+@pytest.mark.parametrize(
+    ("module", "name", "load"),
+    [
+        (network, "delighter", lambda path: network.load_network("cpu")),
+        (enlarge, "upscaler", enlarge.load_network),
+        (prior, "prior", prior._load_ours),
+        (whole_head, "prior", lambda path: whole_head.usual_skin(8)),
+    ],
+)
 def test_damaged_weights_are_named_by_what_needs_them(core, monkeypatch, module, name, load):
     path = core / "weights" / f"{name}.safetensors"
     path.write_bytes(path.read_bytes()[:100_000])
@@ -80,7 +89,7 @@ def test_a_damaged_head_is_named(core, monkeypatch):
 def test_damaged_face_nets_are_named(core):
     path = core / faces.DATA_FILES[1]
     path.write_bytes(path.read_bytes()[:-1])
-    fault, = shipped_files.find_faults(core)
+    (fault,) = shipped_files.find_faults(core)
     assert str(path) in fault and "damaged" in fault
     with pytest.raises(Problem, match="is damaged") as refusal:
         faces._net.__wrapped__(path)

@@ -47,8 +47,9 @@ def sources(tmp_path_factory) -> Path:
 def publish(sources: Path, site: Path, version: str) -> None:
     """As `make site`, for the sources called a version."""
     manifest = sources / "blender_manifest.toml"
-    manifest.write_text(re.sub(r'(?m)^version = ".*"', f'version = "{version}"', manifest.read_text(encoding="utf-8")),
-                        encoding="utf-8")
+    manifest.write_text(
+        re.sub(r'(?m)^version = ".*"', f'version = "{version}"', manifest.read_text(encoding="utf-8")), encoding="utf-8"
+    )
     shutil.rmtree(site, ignore_errors=True)
     site.mkdir()
     run("build", "--source-dir", str(sources), "--output-dir", str(site))
@@ -78,7 +79,7 @@ def test_an_older_installation_is_updated_from_our_repository(sources, tmp_path)
 def test_the_listing_and_the_page_name_the_zip(sources, tmp_path):
     site = tmp_path / "site"
     publish(sources, site, MANIFEST["version"])
-    entry, = json.loads((site / "index.json").read_text(encoding="utf-8"))["data"]
+    (entry,) = json.loads((site / "index.json").read_text(encoding="utf-8"))["data"]
     archive = site / f"wildcap-{MANIFEST['version']}.zip"
     assert (
         entry["id"] == "wildcap" and entry["version"] == MANIFEST["version"] and entry["license"] == MANIFEST["license"]
@@ -105,8 +106,11 @@ def test_the_manifest_names_every_licence_and_holder_of_what_ships():
 
 def test_links_are_shown_once_they_are_set(addon, monkeypatch):
     preferences = addon("preferences")
-    for website, reports, shown in (("", "", []), ("https://wildcap.example", "", ["Website"]),
-                                    ("", "https://wildcap.example/new", ["Report a Problem"])):
+    for website, reports, shown in (
+        ("", "", []),
+        ("https://wildcap.example", "", ["Website"]),
+        ("", "https://wildcap.example/new", ["Report a Problem"]),
+    ):
         monkeypatch.setattr(preferences.links, "WEBSITE", website)
         monkeypatch.setattr(preferences.links, "REPORTS", reports)
         found: list = []

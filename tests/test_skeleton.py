@@ -23,7 +23,7 @@ def test_the_sharpest_frame_of_each_part_is_chosen_in_order():
     chosen = skeleton.choose(frames, 10)
     assert len(chosen) == 10 and chosen == sorted(chosen)
     for part, name in enumerate(chosen):
-        there = frames[10 * part:10 * part + 10]
+        there = frames[10 * part : 10 * part + 10]
         assert name == max(there, key=lambda frame: frame[1])[0]
     assert skeleton.choose(frames, 100) == [name for name, _, _ in frames]
     assert skeleton.size(frames[:40]) == 40 and skeleton.size(frames) == skeleton.CARRYING_FRAMES
@@ -52,8 +52,10 @@ def test_a_film_that_comes_back_closes_its_loop():
     names = [name for name, _, _ in frames]
     pairs = set(skeleton.pairs_within(frames, names))
     assert (names[5], names[54]) in pairs  # the same side, 49 frames later
-    apart = [abs(frames[names.index(a)][2] - frames[names.index(b)][2])
-             for a, b in pairs - set(skeleton.pairs_within(film([None] * 60), names))]
+    apart = [
+        abs(frames[names.index(a)][2] - frames[names.index(b)][2])
+        for a, b in pairs - set(skeleton.pairs_within(film([None] * 60), names))
+    ]
     assert apart and max(apart) < skeleton.SAME_SIDE_DEG
 
 
@@ -94,8 +96,13 @@ def test_frames_that_are_placed_by_the_others_lie_where_they_were(synthesized):
             seen = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image.image_id, keypoints=pixels)
             kept.add_image_with_trivial_frame(seen, true.images[image.image_id].cam_from_world())
     for point in true.points3D.values():
-        track = pycolmap.Track([pycolmap.TrackElement(e.image_id, e.point2D_idx) for e in point.track.elements
-                                if e.image_id in kept.images])
+        track = pycolmap.Track(
+            [
+                pycolmap.TrackElement(e.image_id, e.point2D_idx)
+                for e in point.track.elements
+                if e.image_id in kept.images
+            ]
+        )
         if track.length() > 1:
             kept.add_point3D(point.xyz, track, point.color)
     before, said = kept.num_reg_images(), []
@@ -124,8 +131,9 @@ def filmed(tmp_path_factory):
     """Eleven pictures of a person before a wall, five degrees from one to the next."""
     folder = tmp_path_factory.mktemp("filmed")
     for i in range(11):
-        images.write_srgb(folder / f"{i:05d}.jpg", photograph(place_camera(5 * i - 25, 0.05 * np.sin(i), scale=2)),
-                          quality=95)
+        images.write_srgb(
+            folder / f"{i:05d}.jpg", photograph(place_camera(5 * i - 25, 0.05 * np.sin(i), scale=2)), quality=95
+        )
     return folder
 
 
@@ -134,10 +142,18 @@ def solved(folder, work, sharpest_first=True):
     frames in it."""
     work.mkdir()
     names = sorted(path.name for path in folder.iterdir())
-    job = {"images": str(folder), "groups": [{"names": names, "width": 600, "height": 800, "focal_px": None}],
-           "skin": False, "photographs": False,
-           "film": [(name, float(-i if sharpest_first else i), None) for i, name in enumerate(names)], "finer": True,
-           "masks": None, "seed": 0, "database": str(work / "database.db"), "output": str(work / "model")}
+    job = {
+        "images": str(folder),
+        "groups": [{"names": names, "width": 600, "height": 800, "focal_px": None}],
+        "skin": False,
+        "photographs": False,
+        "film": [(name, float(-i if sharpest_first else i), None) for i, name in enumerate(names)],
+        "finer": True,
+        "masks": None,
+        "seed": 0,
+        "database": str(work / "database.db"),
+        "output": str(work / "model"),
+    }
     assert colmap.reconstruct(job)
     model = pycolmap.Reconstruction(job["output"])
     files = {path.name: path.read_bytes() for path in (work / "model").iterdir()}
@@ -184,7 +200,14 @@ def test_a_second_model_may_take_every_frame_that_the_first_has(tmp_path, monkey
     given = []
     monkeypatch.setattr(pycolmap, "incremental_mapping", lambda *arguments, **more: given.append(arguments[3]) or {})
     names = [f"{i:05d}.jpg" for i in range(40)]
-    job = {"database": "", "images": "", "output": str(tmp_path / "model"), "groups": [{"names": names}], "skin": False,
-           "photographs": False, "seed": 0}
+    job = {
+        "database": "",
+        "images": "",
+        "output": str(tmp_path / "model"),
+        "groups": [{"names": names}],
+        "skin": False,
+        "photographs": False,
+        "seed": 0,
+    }
     colmap._map(job, names)
     assert given[0].max_model_overlap >= len(names) and given[0].image_names == names

@@ -37,8 +37,10 @@ def test_a_lamp_is_no_part_of_a_sky():
 
 def test_skies_count_as_turned_by_any_angle():
     basis = sh_basis(DIRECTIONS)
-    sky = [harmonic_shares(grey(1 + 0.5 * basis[..., 2] + basis[..., [1, 3]] @ (np.cos(a), np.sin(a)) * 0.3))
-           for a in np.arange(8) * np.pi / 4]
+    sky = [
+        harmonic_shares(grey(1 + 0.5 * basis[..., 2] + basis[..., [1, 3]] @ (np.cos(a), np.sin(a)) * 0.3))
+        for a in np.arange(8) * np.pi / 4
+    ]
     mean, deviation = summarise_skies(np.array(sky[:1]))
     around, spread = summarise_skies(np.array(sky))
     assert np.allclose(mean, around, atol=1e-3) and np.allclose(deviation, spread, atol=1e-3)
@@ -57,8 +59,9 @@ def test_the_fit_expects_the_sky_above():
     upside_down = np.eye(9)[0] - sunlight.SKY_MEAN
     precision = sunlight._SKY_PRECISION
     assert expected @ precision @ expected == pytest.approx(0, abs=1e-9)
-    assert upside_down @ precision @ upside_down * sunlight.UNIFORM ** 2 == pytest.approx(
-        (2 * 0.41 / 0.29) ** 2 + (2 * 0.11 / 0.40) ** 2)
+    assert upside_down @ precision @ upside_down * sunlight.UNIFORM**2 == pytest.approx(
+        (2 * 0.41 / 0.29) ** 2 + (2 * 0.11 / 0.40) ** 2
+    )
 
 
 @pytest.mark.parametrize("above", [0.3, 0.6])
@@ -72,8 +75,9 @@ def test_an_overcast_sky_is_found_on_uneven_skin_and_no_sun_in_its_place(above):
     sky[0], sky[2] = sunlight.UNIFORM, above * sunlight.UNIFORM
     true = transfer @ sky
     uneven = np.exp(0.1 * np.random.default_rng(0).normal(size=(600, 1)))
-    light, reached, _ = sunlight.fit_light(0.4 * true * uneven, normals, transfer,
-                                           lambda direction: (normals @ direction > 0).astype(float), np.ones(600))
+    light, reached, _ = sunlight.fit_light(
+        0.4 * true * uneven, normals, transfer, lambda direction: (normals @ direction > 0).astype(float), np.ones(600)
+    )
     fitted = light.ambient(transfer) + reached[:, None] * light.direct(normals)
     off = np.log(fitted / true)
     assert (off - off.mean(0)).std() < 0.02

@@ -102,8 +102,11 @@ def test_pores_brows_and_creases_act_on_all_maps(plain):
 def test_the_paint_does_not_know_where_the_uvs_are_cut(plain):
     mesh, on = template.load(), canvas(SIZE)
     right = mesh.uvs[mesh.face_uvs][..., 0].mean(1) > 0.5
-    cut = replace(mesh, uvs=np.concatenate([mesh.uvs + [0.5, 0], mesh.uvs - [0.5, 0]]),
-                  face_uvs=mesh.face_uvs + right[:, None] * len(mesh.uvs))
+    cut = replace(
+        mesh,
+        uvs=np.concatenate([mesh.uvs + [0.5, 0], mesh.uvs - [0.5, 0]]),
+        face_uvs=mesh.face_uvs + right[:, None] * len(mesh.uvs),
+    )
     moved = make_canvas(cut, SIZE, on.landmarks / 1000, lambda name: np.roll(template.mask(name, SIZE), SIZE // 2, 1))
     other = paint_skin(PLAIN, moved, canvas(GROUND))
     known = on.covered & np.roll(moved.covered, SIZE // 2, 1)

@@ -114,8 +114,9 @@ def test_a_file_of_version_1_is_rebuilt_inside_and_keeps_what_the_artist_did(pat
     for name, value in (("Specular Amount", 1.44), ("Roughness", 0.31), ("Subsurface Scale", 0.01)):
         skin.inputs[name].default_value = value
     assert assembled() == material and sockets(material) == skin.inputs
-    values = [skin.inputs[name].default_value
-              for name in ("Specular Amount", "Roughness", "Subsurface Scale", "Region")]
+    values = [
+        skin.inputs[name].default_value for name in ("Specular Amount", "Roughness", "Subsurface Scale", "Region")
+    ]
     assert values == pytest.approx([1.25, 0.31, 0.01, 0.0]), (
         "what was version 1's own is this capture's now, what was not is the artist's"
     )
@@ -124,14 +125,20 @@ def test_a_file_of_version_1_is_rebuilt_inside_and_keeps_what_the_artist_did(pat
     principled = group.nodes["WildCap Principled"]
     assert principled.inputs["Base Color"].links[0].from_node == inside
     assert principled.inputs["Coat Weight"].default_value == pytest.approx(0.2)
-    without = [line for line in node_text.lines(group) if "HueSat" not in line and "Hue/" not in line
-               and "Principled BSDF" not in line]
-    inside_expected = [line.split("WildCap Skin / ", 1)[1] for line in EXPECTED.splitlines()
-                       if line.startswith("WildCap Skin / ")]
-    replaced = {"WildCap Given Back.Result -> WildCap Principled.Base Color",
-                "ShaderNodeBsdfPrincipled WildCap Principled: subsurface_method=RANDOM_WALK_SKIN, Subsurface Radius=1 "
-                "0.37 0.19, Coat Roughness=0.3, Coat IOR=1.47",
-                "WildCap Coat.Value -> WildCap Principled.Coat Weight"}
+    without = [
+        line
+        for line in node_text.lines(group)
+        if "HueSat" not in line and "Hue/" not in line and "Principled BSDF" not in line
+    ]
+    inside_expected = [
+        line.split("WildCap Skin / ", 1)[1] for line in EXPECTED.splitlines() if line.startswith("WildCap Skin / ")
+    ]
+    replaced = {
+        "WildCap Given Back.Result -> WildCap Principled.Base Color",
+        "ShaderNodeBsdfPrincipled WildCap Principled: subsurface_method=RANDOM_WALK_SKIN, Subsurface Radius=1 "
+        "0.37 0.19, Coat Roughness=0.3, Coat IOR=1.47",
+        "WildCap Coat.Value -> WildCap Principled.Coat Weight",
+    }
     assert set(inside_expected) - set(without) <= replaced
     skin.inputs["Specular Amount"].default_value = 2.0
     assembled()
@@ -141,22 +148,32 @@ def test_a_file_of_version_1_is_rebuilt_inside_and_keeps_what_the_artist_did(pat
 def version_1():
     """The group WildCap Skin as version 1 of the extension made it."""
     group = bpy.data.node_groups.new("WildCap Skin", 'ShaderNodeTree')
-    for name, kind in (("Albedo", 'NodeSocketColor'), ("Specular", 'NodeSocketFloat'), ("Normal", 'NodeSocketVector'),
-                       ("Specular Amount", 'NodeSocketFloat'),
-                       ("Roughness", 'NodeSocketFloat'), ("IOR", 'NodeSocketFloat'), ("Subsurface", 'NodeSocketFloat'),
-                       ("Subsurface Scale", 'NodeSocketFloat')):
+    for name, kind in (
+        ("Albedo", 'NodeSocketColor'),
+        ("Specular", 'NodeSocketFloat'),
+        ("Normal", 'NodeSocketVector'),
+        ("Specular Amount", 'NodeSocketFloat'),
+        ("Roughness", 'NodeSocketFloat'),
+        ("IOR", 'NodeSocketFloat'),
+        ("Subsurface", 'NodeSocketFloat'),
+        ("Subsurface Scale", 'NodeSocketFloat'),
+    ):
         group.interface.new_socket(name, in_out='INPUT', socket_type=kind)
     group.interface.new_socket("BSDF", in_out='OUTPUT', socket_type='NodeSocketShader')
-    source, amount, shader, result = (group.nodes.new(kind) for kind in (
-        'NodeGroupInput', 'ShaderNodeMath', 'ShaderNodeBsdfPrincipled', 'NodeGroupOutput'))
+    source, amount, shader, result = (
+        group.nodes.new(kind)
+        for kind in ('NodeGroupInput', 'ShaderNodeMath', 'ShaderNodeBsdfPrincipled', 'NodeGroupOutput')
+    )
     amount.operation, amount.use_clamp, shader.subsurface_method = 'MULTIPLY', True, 'RANDOM_WALK'
     shader.inputs["Subsurface Radius"].default_value = (1.0, 0.37, 0.19)
-    for output, target in ((source.outputs["Specular"], amount.inputs[0]),
-                           (source.outputs["Specular Amount"], amount.inputs[1]),
-                           (amount.outputs[0], shader.inputs["Specular IOR Level"]),
-                           (shader.outputs["BSDF"], result.inputs["BSDF"]),
-                           (source.outputs["Normal"], shader.inputs["Normal"]),
-                           (source.outputs["Roughness"], shader.inputs["Roughness"])):
+    for output, target in (
+        (source.outputs["Specular"], amount.inputs[0]),
+        (source.outputs["Specular Amount"], amount.inputs[1]),
+        (amount.outputs[0], shader.inputs["Specular IOR Level"]),
+        (shader.outputs["BSDF"], result.inputs["BSDF"]),
+        (source.outputs["Normal"], shader.inputs["Normal"]),
+        (source.outputs["Roughness"], shader.inputs["Roughness"]),
+    ):
         group.links.new(output, target)
     group["wildcap_version"] = 1
     return group
@@ -168,8 +185,11 @@ def test_saved_moved_and_opened_again_it_gives_the_same_pixels(patch, tmp_path):
     patch.rename(folder / "patch.wildcap")
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.ops.wildcap.open_capture(directory=str(folder / "patch.wildcap"))
-    paint(folder / "patch.wildcap", "diffuse_albedo.png",
-          [[(0.8, 0.5, 0.3), (0.2, 0.3, 0.4)], [(0.5, 0.5, 0.5), (0.9, 0.1, 0.2)]])
+    paint(
+        folder / "patch.wildcap",
+        "diffuse_albedo.png",
+        [[(0.8, 0.5, 0.3), (0.2, 0.3, 0.4)], [(0.5, 0.5, 0.5), (0.9, 0.1, 0.2)]],
+    )
     sockets(assembled())["Roughness"].default_value = 0.33
     white_world()
     before = seen(tmp_path / "shot.exr")
@@ -179,8 +199,11 @@ def test_saved_moved_and_opened_again_it_gives_the_same_pixels(patch, tmp_path):
     material = bpy.data.objects["patch"].active_material
     images = {node.name: node.image for node in material.node_tree.nodes if node.bl_idname == 'ShaderNodeTexImage'}
     assert all(bpy.path.abspath(image.filepath).startswith(str(tmp_path / "after")) for image in images.values())
-    assert [images[f"WildCap {name}"].colorspace_settings.name
-            for name in ("Albedo", "Specular", "Normal")] == ["sRGB", "Non-Color", "Non-Color"]
+    assert [images[f"WildCap {name}"].colorspace_settings.name for name in ("Albedo", "Specular", "Normal")] == [
+        "sRGB",
+        "Non-Color",
+        "Non-Color",
+    ]
     assert np.array_equal(seen(tmp_path / "shot.exr"), before) and before.std() > 0.01
 
 

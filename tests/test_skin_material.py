@@ -13,9 +13,15 @@ from . import flat_patch  # noqa: E402
 from .flat_patch import assembled, height_map, lamp, paint, seen, sockets, white_world  # noqa: E402
 
 F0 = (0.4 / 2.4) ** 2  # of IOR 1.4: 2.8 percent
-FACE = {"cheek": (0.0401, -0.013, -0.0479), "forehead": (0.0, -0.0228, 0.048), "nose": (-0.0001, -0.0431, -0.0415),
-        "lips": (0.0, -0.034, -0.0825),
-        "lid": (0.0324, -0.0192, 0.0003), "crown": (0.0, 0.08, 0.1175), "nostril": (0.0075, -0.031, -0.0515)}
+FACE = {
+    "cheek": (0.0401, -0.013, -0.0479),
+    "forehead": (0.0, -0.0228, 0.048),
+    "nose": (-0.0001, -0.0431, -0.0415),
+    "lips": (0.0, -0.034, -0.0825),
+    "lid": (0.0324, -0.0192, 0.0003),
+    "crown": (0.0, 0.08, 0.1175),
+    "nostril": (0.0075, -0.031, -0.0515),
+}
 """Places on the built-in head, metres"""
 
 
@@ -36,8 +42,11 @@ def fresnel(degrees: float, ior: float) -> float:
 def test_a_smooth_black_patch_reflects_as_fresnel_says(patch, tmp_path):
     """The capture's mean of the specular map is 0.4: a texel of 0.4 is skin, one of 0.2 half as bright, and 0.9 is
     clamped at a level of one."""
-    for name, pixels in (("diffuse_albedo.png", [[(0, 0, 0)] * 4] * 4), ("normal.png", [[(0.5, 0.5, 1)] * 4] * 4),
-                         ("specular_albedo.png", [[(0.4,)] * 4] * 4)):
+    for name, pixels in (
+        ("diffuse_albedo.png", [[(0, 0, 0)] * 4] * 4),
+        ("normal.png", [[(0.5, 0.5, 1)] * 4] * 4),
+        ("specular_albedo.png", [[(0.4,)] * 4] * 4),
+    ):
         paint(patch, name, pixels)
     skin = sockets(assembled())
     assert skin["Specular Amount"].default_value == pytest.approx(0.5 / 0.4)
@@ -155,14 +164,20 @@ def test_oil_lies_where_skin_is_smoother_than_the_cheeks_and_reflects_as_its_fil
 def test_the_regions_are_rougher_or_smoother_than_the_cheeks(addon):
     """On the built-in head, at the vertices nearest to a few places."""
     regions = addon("relight.regions")
-    bpy.ops.wm.obj_import(filepath=str(regions.MASKS.parent / "head.obj"), forward_axis='Y', up_axis='Z',
-                          validate_meshes=False)
+    bpy.ops.wm.obj_import(
+        filepath=str(regions.MASKS.parent / "head.obj"), forward_axis='Y', up_axis='Z', validate_meshes=False
+    )
     head = bpy.context.scene.objects[0]
     regions.write(head.data)
     value = {name: near(head, place) for name, place in FACE.items()}
     assert value["cheek"] == pytest.approx(0.0, abs=0.02)
-    for name, share in (("forehead", "forehead"), ("nose", "nose"), ("lips", "lips"), ("lid", "eyes"),
-                        ("crown", "scalp")):
+    for name, share in (
+        ("forehead", "forehead"),
+        ("nose", "nose"),
+        ("lips", "lips"),
+        ("lid", "eyes"),
+        ("crown", "scalp"),
+    ):
         assert value[name] == pytest.approx(regions.SHARES[share], abs=0.04), value
 
 
@@ -189,6 +204,8 @@ def test_light_from_behind_does_not_come_through_lids_and_nostrils(patch, addon,
     for name in ("cheek", "lid", "nostril", "nose", "lips", "forehead"):
         x, y, z = FACE[name]
         column, row = (int((v / 0.32 + 0.5) * 96) for v in (x, y * math.sin(angle) + z * math.cos(angle)))
-        there = {light: picture[row - 1:row + 2, column - 1:column + 2].mean() for light, picture in radiance.items()}
+        there = {
+            light: picture[row - 1 : row + 2, column - 1 : column + 2].mean() for light, picture in radiance.items()
+        }
         assert there["behind"] < 0.005 * radiance["front"].max(), (name, there)
     assert there["front"] > 0.1 and radiance["behind"].max() > 0.1, "both suns shine"

@@ -100,8 +100,14 @@ def test_the_population_is_of_measured_people():
 def test_groups_by_their_angle():
     from core.solve.population import from_lab, name_group
 
-    for angle, name in ((60, "very light"), (48, "light"), (35, "intermediate"), (20, "tan"), (-10, "brown"),
-                        (-50, "dark")):
+    for angle, name in (
+        (60, "very light"),
+        (48, "light"),
+        (35, "intermediate"),
+        (20, "tan"),
+        (-10, "brown"),
+        (-50, "dark"),
+    ):
         lightness = 50 + 16 * np.tan(np.radians(angle))
         assert name_group(from_lab(np.array([lightness, 12.0, 16.0]))) == name
 
@@ -117,17 +123,32 @@ def test_a_tone_is_written_in_shares_in_bytes_or_in_hexadecimal():
     assert parse_skin_tone("176,138,118") == parse_skin_tone("#B08A76") == parse_skin_tone(" b08a76 ")
     assert parse_skin_tone("#B08A76") == pytest.approx((176 / 255, 138 / 255, 118 / 255), abs=5e-5)
     assert parse_skin_tone("1,0.5,0.4") == (1, 0.5, 0.4) and parse_skin_tone("auto") is None
-    for wrong in ("pink", "0.5,0.4", "0.5,0.4,0", "0.5,0.4,1.1", "nan,0.4,0.3", "inf,4,3", "", "256,138,118",
-                  "176,138,-118", "176.5,138,118", "#B08A7", "#B08A76FF", "0.00001,0.4,0.3"):
+    for wrong in (
+        "pink",
+        "0.5,0.4",
+        "0.5,0.4,0",
+        "0.5,0.4,1.1",
+        "nan,0.4,0.3",
+        "inf,4,3",
+        "",
+        "256,138,118",
+        "176,138,-118",
+        "176.5,138,118",
+        "#B08A7",
+        "#B08A76FF",
+        "0.00001,0.4,0.3",
+    ):
         with pytest.raises(Problem, match="not a colour"):
             parse_skin_tone(wrong)
 
 
 def test_who_types_the_tone_that_is_reported_gives_the_solve_the_same():
     skin, white = np.array([0.41, 0.27, 0.2]), np.array([0.8, 0.77, 0.7])
-    for found, source in ((population.estimate_from_scene(skin, SCENE), SCENE),
-                          (population.estimate_from_white(skin, white), WHITE_POINT),
-                          (SkinTone.from_linear([0.312345, 0.2, 0.1], TEXTURE), TEXTURE)):
+    for found, source in (
+        (population.estimate_from_scene(skin, SCENE), SCENE),
+        (population.estimate_from_white(skin, white), WHITE_POINT),
+        (SkinTone.from_linear([0.312345, 0.2, 0.1], TEXTURE), TEXTURE),
+    ):
         report = Reporter("solve")
         tone.tell_skin_tone(found, from_json({}), report)
         typed = ",".join(map(str, report.figures["skin_tone_srgb"]))
@@ -135,9 +156,14 @@ def test_who_types_the_tone_that_is_reported_gives_the_solve_the_same():
 
 
 def test_a_tone_that_only_the_pictures_tell_is_said_to_be_a_guess():
-    for source, settings, count in ((SCENE, {}, 1), (TEXTURE, {}, 1), (WHITE_POINT, {"white_point": "1,1,1"}, 0),
-                                    (GIVEN, {"skin_tone": "0.5,0.4,0.3"}, 0), (EARLIER, {}, 1),
-                                    (EARLIER, {"skin_tone": "0.5,0.4,0.3"}, 0)):
+    for source, settings, count in (
+        (SCENE, {}, 1),
+        (TEXTURE, {}, 1),
+        (WHITE_POINT, {"white_point": "1,1,1"}, 0),
+        (GIVEN, {"skin_tone": "0.5,0.4,0.3"}, 0),
+        (EARLIER, {}, 1),
+        (EARLIER, {"skin_tone": "0.5,0.4,0.3"}, 0),
+    ):
         report = Reporter("solve")
         tone.tell_skin_tone(SkinTone.from_srgb([0.5, 0.4, 0.3], source), from_json({"solve": settings}), report)
         assert len(report.findings) == count, source

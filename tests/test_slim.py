@@ -20,8 +20,18 @@ from . import finished_face, kept_capture
 from .finished_face import pictures, states
 from .tiny_chain import follow, start
 
-KEPT = ("cameras/a.txt", "scan.ply", "head.obj", "landmarks.json", "texture.png", "shadow_mask_auto.png",
-        "maps/normal.png", "maps_4k/normal.png", "delivery/a.txt", "report.html")
+KEPT = (
+    "cameras/a.txt",
+    "scan.ply",
+    "head.obj",
+    "landmarks.json",
+    "texture.png",
+    "shadow_mask_auto.png",
+    "maps/normal.png",
+    "maps_4k/normal.png",
+    "delivery/a.txt",
+    "report.html",
+)
 
 
 @pytest.fixture(scope="module")
@@ -89,10 +99,21 @@ def test_a_stage_begun_anew_forgets_what_it_had_lost(root, capture):
 def test_it_comes_back_with_the_settings_that_it_was_made_with(root, capture, monkeypatch):
     chosen = {}
     slimming.slim(capture, Settings())
-    monkeypatch.setattr(runner, "_room",
-                        lambda step: type("Room", (),
-                                          {"run": staticmethod(lambda capture, settings, report: chosen.update(
-        {step.name: settings}) or write_pictures(capture, step))}))
+    monkeypatch.setattr(
+        runner,
+        "_room",
+        lambda step: type(
+            "Room",
+            (),
+            {
+                "run": staticmethod(
+                    lambda capture, settings, report: (
+                        chosen.update({step.name: settings}) or write_pictures(capture, step)
+                    )
+                )
+            },
+        ),
+    )
     path = write_job(capture, first="solve", last="solve", settings={"frames": {"views": 5}, "seed": 3})
     runner.run_job(path)
     assert chosen["frames"].frames.views == Settings().frames.views and chosen["delight"].seed == Settings().seed
@@ -109,12 +130,17 @@ def write_pictures(capture: Capture, step: stages.Stage) -> None:
 def test_where_something_else_comes_back_it_is_said_and_what_was_made_of_it_is_out_of_date(capture, monkeypatch):
     slimming.slim(capture, Settings())
     said = []
-    monkeypatch.setattr(runner, "_room",
-                        lambda step: type("Room", (),
-                                          {"run": staticmethod(lambda capture, *_: write_pictures(capture, step))}))
+    monkeypatch.setattr(
+        runner,
+        "_room",
+        lambda step: type("Room", (), {"run": staticmethod(lambda capture, *_: write_pictures(capture, step))}),
+    )
     assert isinstance(runner.run_job(write_job(capture, first="texture", last="texture"), said.append), Done)
-    assert [m.text for m in said if isinstance(m, Log) and "not what they were before" in m.text
-            and m.text.startswith("Frames")]
+    assert [
+        m.text
+        for m in said
+        if isinstance(m, Log) and "not what they were before" in m.text and m.text.startswith("Frames")
+    ]
     assert capture.verdict(stages.by_name("cameras"), Settings()).reason() == "frames/ changed"
     assert slimmed.hashes_of(capture.read()) == {} and capture.state(stages.by_name("frames"), Settings()) == "done"
 
@@ -206,16 +232,19 @@ def test_what_could_not_come_back_as_it_is_stays_and_is_named(capture, monkeypat
     write_json(capture.json, record)
     found = slimming.slim(capture, Settings())
     assert found.going == {}
-    assert found.notes == ("frames/ stays: frames/a.txt is not as WildCap wrote it.",
-                           "delit/ stays: delit/notes.txt is not as WildCap wrote it.")
+    assert found.notes == (
+        "frames/ stays: frames/a.txt is not as WildCap wrote it.",
+        "delit/ stays: delit/notes.txt is not as WildCap wrote it.",
+    )
     assert (capture.frames / "a.txt").read_text() == "retouched" and "slimmed" not in capture.json.read_text()
 
 
 @pytest.mark.parametrize(("delighter", "why"), [("switchlight", "paid for"), ("folder", "outside of the capture")])
 def test_delit_frames_that_came_from_elsewhere_stay(capture, tmp_path, delighter, why):
     (tmp_path / "pictures").mkdir()
-    settings = from_json({"delight": {"delighter": delighter,
-                                      "folder": str(tmp_path / "pictures") if delighter == "folder" else ""}})
+    settings = from_json(
+        {"delight": {"delighter": delighter, "folder": str(tmp_path / "pictures") if delighter == "folder" else ""}}
+    )
     delight = stages.by_name("delight")
     capture.finish(delight, capture.conditions(delight, settings), 1.0, settings, {}, "0.2.0")
     found = slimming.slim(capture, settings)

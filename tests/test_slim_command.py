@@ -65,9 +65,11 @@ def test_the_terminal_lists_removes_and_brings_back(root, capture, capsys):
 
 def test_of_a_batch_the_faces_that_are_done_are_slimmed_and_the_others_left_and_said(root, capture, capsys):
     folder = capture.root.parent
-    write_batch(Batch(folder,
-                      tuple(BatchFace(name, folder / "film.mp4", folder / f"{name}.wildcap")
-                            for name in ("zoë", "new"))))
+    write_batch(
+        Batch(
+            folder, tuple(BatchFace(name, folder / "film.mp4", folder / f"{name}.wildcap") for name in ("zoë", "new"))
+        )
+    )
     said = command(root, "slim", folder)
     assert (
         "zoë" in said
@@ -87,8 +89,9 @@ def test_of_a_batch_the_faces_that_are_done_are_slimmed_and_the_others_left_and_
 
 def command(root: Path, *words) -> str:
     """What a command line of the tiny chain says."""
-    done = subprocess.run([sys.executable, "-m", "core", *map(str, words)], cwd=root, capture_output=True, text=True,
-                          timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-m", "core", *map(str, words)], cwd=root, capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -103,8 +106,9 @@ def test_the_real_stage_takes_the_same_frames_again(tmp_path):
     assert len(before) == 7
     capture.keep_hashes({"frames": {"frames/": slimmed.hash_tree(capture.frames)}})
     shutil.rmtree(capture.frames)
-    assert isinstance(runner.run_job(write_job(capture, tool="white_point"), lambda message: None),
-                      Failed), "no card is on it"
+    assert isinstance(runner.run_job(write_job(capture, tool="white_point"), lambda message: None), Failed), (
+        "no card is on it"
+    )
     assert pictures(capture) == before and slimmed.hashes_of(capture.read()) == {}
     capture.delit.mkdir()
     counted = Reporter("bring_back")

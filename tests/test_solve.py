@@ -65,9 +65,14 @@ def test_what_the_solve_is_compared_with_has_the_albedos_exposure(capture, brief
     images.write_srgb(capture.texture_filmed, images.linear_to_srgb(0.5 * texture))
     solve.run(capture, settings(steps=4), Reporter("solve"))
     skin = template.mask("skin", SIZE) * (1 - template.mask("eyes", SIZE))
-    luminance = {name: images.read_linear(path) @ np.float32([0.2126, 0.7152, 0.0722]) for name, path in (
-        ("albedo", capture.maps / "diffuse_albedo.exr"), ("delit", capture.comparison / "delit.png"),
-        ("filmed", capture.comparison / "filmed.png"))}
+    luminance = {
+        name: images.read_linear(path) @ np.float32([0.2126, 0.7152, 0.0722])
+        for name, path in (
+            ("albedo", capture.maps / "diffuse_albedo.exr"),
+            ("delit", capture.comparison / "delit.png"),
+            ("filmed", capture.comparison / "filmed.png"),
+        )
+    }
     means = {name: float(np.average(values, weights=skin)) for name, values in luminance.items()}
     assert abs(means["delit"] / means["albedo"] - 1) < 0.03 and abs(means["filmed"] / means["albedo"] - 1) < 0.03, means
     assert np.corrcoef(luminance["filmed"].ravel(), texture.mean(-1).ravel())[0, 1] > 0.99
@@ -88,8 +93,11 @@ def test_cancel_then_run_again_gives_the_same_bytes(capture, brief_light):  # no
     solve.run(capture, options, Reporter("solve"))
     unbroken = maps_of(capture)
     steps = []
-    report = Reporter("solve", emit=lambda message: steps.append(message),
-                      cancelled=lambda: any("step 3 of" in getattr(m, "text", "") for m in steps))
+    report = Reporter(
+        "solve",
+        emit=lambda message: steps.append(message),
+        cancelled=lambda: any("step 3 of" in getattr(m, "text", "") for m in steps),
+    )
     with pytest.raises(CancelledError):
         solve.run(capture, options, report)
     assert (capture.checkpoints / "solve.safetensors").is_file()
@@ -115,8 +123,11 @@ def test_a_checkpoint_of_another_run_is_not_gone_on_from(capture, brief_light, c
     logged = []
     for options in (settings(steps=5), None):
         said = []
-        report = Reporter("solve", emit=lambda message, said=said: said.append(getattr(message, "text", "")),
-                          cancelled=lambda said=said: any("step 3 of" in text for text in said))
+        report = Reporter(
+            "solve",
+            emit=lambda message, said=said: said.append(getattr(message, "text", "")),
+            cancelled=lambda said=said: any("step 3 of" in text for text in said),
+        )
         with pytest.raises(CancelledError):
             solve.run(capture, options or (change(capture) if change else settings(steps=5)), report)
         logged.append("Going on after step 2 of 5." in said)
@@ -125,6 +136,7 @@ def test_a_checkpoint_of_another_run_is_not_gone_on_from(capture, brief_light, c
 
 def test_the_artists_masks_win(capture):
     """The painted mask replaces the proposal, and what is protected is no shadow."""
+
     def albedo_under(**pictures):
         for name, value in pictures.items():
             images.write_data(getattr(capture, name), value)

@@ -40,12 +40,15 @@ def photograph(yaw: float, pitch: float) -> tuple[splats.UndistortedFrame, np.nd
     rotation = np.stack([x, np.cross(z, x), z])
     rows, columns = np.mgrid[0:SIDE, 0:SIDE]
     origin = np.array([-SIDE / 2, -SIDE / 2])
-    rays = np.stack([(columns.ravel() + 0.5 + origin[0]) / FOCAL, (rows.ravel() + 0.5 + origin[1]) / FOCAL,
-                     np.ones(SIDE * SIDE)], -1)
+    rays = np.stack(
+        [(columns.ravel() + 0.5 + origin[0]) / FOCAL, (rows.ravel() + 0.5 + origin[1]) / FOCAL, np.ones(SIDE * SIDE)],
+        -1,
+    )
     length = np.linalg.norm(rays, axis=1)
     mesh = patch(RADIUS, 100, 0.07)
-    face, bary, distance = RayCaster(mesh).first_hits(np.repeat(centre[None], len(rays), 0),
-                                                      rays / length[:, None] @ rotation)
+    face, bary, distance = RayCaster(mesh).first_hits(
+        np.repeat(centre[None], len(rays), 0), rays / length[:, None] @ rotation
+    )
     points = interpolate(mesh.vertices, mesh.faces, face, bary)
     hit = (face >= 0).reshape(SIDE, SIDE)
     colour = 0.5 + 0.22 * np.stack([np.sin(points @ w) for w in ([330, 0, 150], [-150, 0, 300], [200, 0, -280])], -1)

@@ -38,9 +38,9 @@ def face():
     normal = raster.bleed(raster.interpolate(vertex_normals(mesh), mesh.faces, index, bary), index >= 0)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     skin = [template.mask(name, 512)[::1] for name in ("skin", "face")]
-    small = raster.sample(skin[0] * skin[1],
-                          np.stack(np.meshgrid(np.arange(SIZE), np.arange(SIZE)), -1).reshape(-1, 2) * 512 / SIZE
-                          + 1).reshape(SIZE, SIZE)
+    small = raster.sample(
+        skin[0] * skin[1], np.stack(np.meshgrid(np.arange(SIZE), np.arange(SIZE)), -1).reshape(-1, 2) * 512 / SIZE + 1
+    ).reshape(SIZE, SIZE)
     inside = torch.from_numpy((small > 0.9).astype(np.float32))
     return torch.from_numpy(normal.transpose(2, 0, 1).astype(np.float32)), inside
 
@@ -88,8 +88,10 @@ def test_a_lamp_on_even_skin_is_light_in_strength_and_shape():
 
 def test_traits_alone_are_mostly_left_to_the_skin():
     scales = Scales(0.2, 0.08, 0.08, 0.07)
-    taken = [deviation(split_captures([shapes(traits)]).light(face()[0]).log()) / deviation(traits)
-             for traits in (drawn(seed, scales) for seed in range(3))]
+    taken = [
+        deviation(split_captures([shapes(traits)]).light(face()[0]).log()) / deviation(traits)
+        for traits in (drawn(seed, scales) for seed in range(3))
+    ]
     assert np.mean(taken) < 0.4, taken
 
 
@@ -138,8 +140,10 @@ def test_of_two_captures_what_differs_is_light_and_what_agrees_is_skin():
     first, second = shapes(traits + lights[0] + local), shapes(traits + lights[1])
     alone, both = split_captures([first]), split_captures([first, second])
     alone_left = deviation(lights[0] + local - alone.light(normal).log())
-    assert deviation(lights[0] + local - both.light(normal).log()
-                     - enlarge_field(torch.from_numpy(both.local), SIZE)) < 0.7 * alone_left
+    assert (
+        deviation(lights[0] + local - both.light(normal).log() - enlarge_field(torch.from_numpy(both.local), SIZE))
+        < 0.7 * alone_left
+    )
     told = enlarge_field(torch.from_numpy(both.local), SIZE).mean(0)[skin > 0]
     assert np.corrcoef(told.numpy(), local.mean(0)[skin > 0].numpy())[0, 1] > 0.75
 

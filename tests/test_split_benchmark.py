@@ -25,12 +25,17 @@ def test_the_correlation_of_a_known_field_falls_as_it_was_made():
 
 
 def test_a_record_holds_plain_figures_and_the_tables_their_numbers():
-    scores = {method: {"somebody": dict.fromkeys(split.COLUMNS, value)}
-              for method, value in ((split.DELIT, 20.0), (split.SOLVED, 21.5))}
+    scores = {
+        method: {"somebody": dict.fromkeys(split.COLUMNS, value)}
+        for method, value in ((split.DELIT, 20.0), (split.SOLVED, 21.5))
+    }
     scales = {"somebody": {"traits": 0.1, "light": 0.2, "local": 0.3, "noise": 0.4}}
     captures = {"somebody": {split.DELIT: 20.0, split.SOLVED: 21.5}}
-    record = {**to_record(summarise(scores, split.COLUMNS, split.DELIT), scores), "captures": captures,
-              "scales": scales}
+    record = {
+        **to_record(summarise(scores, split.COLUMNS, split.DELIT), scores),
+        "captures": captures,
+        "scales": scales,
+    }
     assert figures.plain(record)["captures"]["somebody"][split.SOLVED] == pytest.approx(21.5)
     assert "+1.50" in split.capture_table(
         captures
@@ -61,6 +66,10 @@ def test_scores_of_skins_that_follow_the_model_have_a_deviation_of_one_in_each_r
     z = traits.measure(laid_in(1))["z"]
     assert z["all"] == pytest.approx(1, abs=0.1) and z["most"] < 1.5
     assert all(0.7 < value < 1.4 for value in z["regions"].values()), z
-    text = "\n".join(body for _, body in traits.sections({traits.PAINTED: traits.measure(laid_in(1)),
-                                                           traits.UNLIT: traits.measure(laid_in(2))}))
+    text = "\n".join(
+        body
+        for _, body in traits.sections(
+            {traits.PAINTED: traits.measure(laid_in(1)), traits.UNLIT: traits.measure(laid_in(2))}
+        )
+    )
     assert "| light taken out |" in text and "around the eyes" in text

@@ -49,9 +49,16 @@ def person(tmp_path_factory):
     truth = np.where(template.mask("brows", SIZE)[..., None] > 0.5, 0.4 * truth, truth).astype(np.float32)
     basis = sh_basis(normals)
     light, shared = (np.exp(basis @ (scale * np.eye(9)[k]))[..., None] for scale, k in ((0.8, 3), (0.5, 2)))
-    maps = [{NOTHING: truth * lit, FLAT: np.broadcast_to(SKIN, truth.shape), TRUE: truth, DELIT: truth * lit**0.1,
-             SOLVED: truth * shared}
-            for lit in (light, 1 / light)]
+    maps = [
+        {
+            NOTHING: truth * lit,
+            FLAT: np.broadcast_to(SKIN, truth.shape),
+            TRUE: truth,
+            DELIT: truth * lit**0.1,
+            SOLVED: truth * shared,
+        }
+        for lit in (light, 1 / light)
+    ]
     captures = [Drawn(name, where, normals, Capture(tmp_path_factory.mktemp(name))) for name in ("one", "two")]
     return captures, [{name: np.asarray(value, np.float32) for name, value in each.items()} for each in maps]
 
@@ -202,8 +209,9 @@ def test_figures_in_pictures_are_kept_until_something_changes(tmp_path, monkeypa
 def test_people_measured_before_by_the_same_code_stay_in_the_record():
     code, row = {"solve": "a", "measures": "b"}, {"psnr": 30.0}
     record = {"people": {DELIT: {"anna": row}}, "captures": {"anna": {DELIT: row}}, "code": code}
-    scores, by_capture = state.merge_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}},
-                                             code)
+    scores, by_capture = state.merge_earlier(
+        record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}}, code
+    )
     assert scores == {DELIT: {"anna": row, "ben": row}, SOLVED: {"ben": row}}
     assert list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
     assert state.merge_earlier(record, {}, {}, {**code, "solve": "c"}) == ({}, {})
@@ -237,9 +245,17 @@ def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
     captures = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
     before = state.code_of(captures)
     record = captures[0].capture.read()
-    record["stages"]["solve"] = {"finished": "2026-11-22T00:00:00", "seconds": 1.0, "settings": {}, "seed": 0,
-                                 "device": "cpu", "figures": {}, "inputs": {},
-                                 "code": "1234567890abcdef", "version": "0.2.0"}
+    record["stages"]["solve"] = {
+        "finished": "2026-11-22T00:00:00",
+        "seconds": 1.0,
+        "settings": {},
+        "seed": 0,
+        "device": "cpu",
+        "figures": {},
+        "inputs": {},
+        "code": "1234567890abcdef",
+        "version": "0.2.0",
+    }
     captures[0].capture.json.write_text(json.dumps(record))
     after = state.code_of(captures)
     assert before["solve"] == "" and after["solve"] == "1234567890ab" and after["delight"] == ""
@@ -257,8 +273,9 @@ def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path,
 
 def test_the_page_says_what_the_solve_adds():
     row = {"psnr": 30.0, "psnr_shared": 31.0}
-    text = state.by_capture_table({"anna": {DELIT: row, SOLVED: {"psnr": 30.5, "psnr_shared": 30.75}},
-                                   "ben": {DELIT: row}})
+    text = state.by_capture_table(
+        {"anna": {DELIT: row, SOLVED: {"psnr": 30.5, "psnr_shared": 30.75}}, "ben": {DELIT: row}}
+    )
     assert "| anna | - | - | - | - | 30.00 | 30.50 | +0.50 | 31.00 | 30.75 | -0.25 |" in text
     assert "| ben | - | - | - | - | 30.00 | - | - | 31.00 | - | - |" in text
     scores = {DELIT: {"anna": row, "ben": row}, SOLVED: {"anna": {"psnr": 30.5}, "ben": {"psnr": 31.0}}}
@@ -275,9 +292,13 @@ def test_what_the_truth_shows_before_the_neck_is_no_facial_skin_of_the_head():
     side = 128
     face = template.mask("face", side) > 0.5
     y, x = (np.mgrid[0:side, 0:side] + 0.5) / side
-    look = HeadInView(AlbedoTruth(0, np.broadcast_to(images.linear_to_srgb(SKIN), (side, side, 3)),
-                                  np.ones((side, side), bool), None),
-                      np.ones((side, side), bool), np.stack([x.ravel(), 1 - y.ravel()], 1))
+    look = HeadInView(
+        AlbedoTruth(
+            0, np.broadcast_to(images.linear_to_srgb(SKIN), (side, side, 3)), np.ones((side, side), bool), None
+        ),
+        np.ones((side, side), bool),
+        np.stack([x.ravel(), 1 - y.ravel()], 1),
+    )
     rows, columns = np.mgrid[0:side, 0:side]
     tinted = SKIN * np.where((rows + columns)[..., None] % 2, 1.0, 0.8)
     beside = np.where(face[..., None], SKIN, tinted).astype(np.float32)

@@ -29,8 +29,9 @@ def test_a_look_at_a_capture_holds_nobody_up(addon, capture, monkeypatch):
     assert len(threads) == 1, "nothing changed, nothing is looked at"
 
 
-def test_only_what_the_tab_is_about_is_looked_at_again_and_never_in_blenders_own_thread(addon, capture, tmp_path,
-                                                                                        monkeypatch):
+def test_only_what_the_tab_is_about_is_looked_at_again_and_never_in_blenders_own_thread(
+    addon, capture, tmp_path, monkeypatch
+):
     status, strip, captures = addon("status"), addon("capture.strip"), addon("captures")
     if not bpy.context.window_manager.windows:
         pytest.skip("no window in this Blender: the flows in a window hold it")
@@ -39,8 +40,11 @@ def test_only_what_the_tab_is_about_is_looked_at_again_and_never_in_blenders_own
     items = bpy.context.scene.wildcap.captures
     stamped, in_strip = [], []
     stamp, look = status._stamp, strip.look
-    monkeypatch.setattr(status, "_stamp", lambda capture, told: stamped.append(
-        (capture.root.stem, threading.current_thread())) or stamp(capture, told))
+    monkeypatch.setattr(
+        status,
+        "_stamp",
+        lambda capture, told: stamped.append((capture.root.stem, threading.current_thread())) or stamp(capture, told),
+    )
     monkeypatch.setattr(strip, "look", lambda root: in_strip.append(root) or look(root))
     strip._wanted.clear()  # of other tests
     for item in items:

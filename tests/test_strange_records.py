@@ -17,9 +17,9 @@ def capture(tmp_path) -> Capture:
     return make(tmp_path / "anna.wildcap")
 
 
-@pytest.mark.parametrize("name",
-                         ["../precious", "../../precious", "link/.precious", "precious", "/precious", "..\\precious",
-                          ".."])
+@pytest.mark.parametrize(
+    "name", ["../precious", "../../precious", "link/.precious", "precious", "/precious", "..\\precious", ".."]
+)
 def test_a_strangers_record_cannot_have_anything_outside_of_its_capture_removed(capture, tmp_path, name):
     outside = tmp_path / "outside"
     for folder in (tmp_path / "precious", outside / ".precious", capture.root / "precious"):
@@ -28,8 +28,14 @@ def test_a_strangers_record_cannot_have_anything_outside_of_its_capture_removed(
     (capture.root / "link").symlink_to(outside)
     before = contents(tmp_path)
     gone = {**processes.identify_process(), "pid": 2**22 + 1}
-    for line in ({"temporary": name, "by": gone}, {"temporary": name, "by": {}}, {"temporary": ".x", "by": [1]},
-                 {"temporary": 3, "by": gone}, [], 1):
+    for line in (
+        {"temporary": name, "by": gone},
+        {"temporary": name, "by": {}},
+        {"temporary": ".x", "by": [1]},
+        {"temporary": 3, "by": gone},
+        [],
+        1,
+    ):
         with open(capture.root / ownership.RECORD, "a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
     with capture.locked():

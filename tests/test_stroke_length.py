@@ -81,8 +81,14 @@ def beard(light: np.ndarray) -> np.ndarray:
     mask = 0.5 * chin()[0].mask.astype(np.float32)
     skin = np.broadcast_to(SKIN, (SIZE, SIZE, 3)).astype(np.float32)
     none, one = np.zeros((SIZE, SIZE), np.float32), np.ones((SIZE, SIZE), np.float32)
-    maps = HeadMaps((skin * np.exp(light)[..., None]).astype(np.float32), one[..., None] * [0, 0, 1], one, one,
-                    np.repeat(one[..., None], 3, 2), one)
+    maps = HeadMaps(
+        (skin * np.exp(light)[..., None]).astype(np.float32),
+        one[..., None] * [0, 0, 1],
+        one,
+        one,
+        np.repeat(one[..., None], 3, 2),
+        one,
+    )
     points = grooming.groom(maps, Hair(none, none, mask, none), skin, surface())["beard"].points
     return 1000 * np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)
 
@@ -93,7 +99,8 @@ def test_stubble_is_grown_as_short_and_as_sparse_as_it_is():
     assert len(lengths) < 0.8 * (surface().texel[chin()[0].mask] ** 2).sum()
 
 
-@pytest.mark.parametrize(("length_mm", "shade"), [(5.0, 0.0), (1.2, -0.6)],
-                         ids=["long strokes", "darker than stubble's shade"])
+@pytest.mark.parametrize(
+    ("length_mm", "shade"), [(5.0, 0.0), (1.2, -0.6)], ids=["long strokes", "darker than stubble's shade"]
+)
 def test_a_beard_is_grown_as_long_as_beards_are(length_mm, shade):
     assert beard(painted(length_mm) + np.float32(shade)).mean() == pytest.approx(grooming.KINDS[1].length[0], rel=0.2)

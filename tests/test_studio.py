@@ -29,8 +29,9 @@ def calibration(views: list) -> str:
         matrix[:3, :3], matrix[:3, 3] = view.rotation.T @ np.diag([1, -1, -1]), view.centre
         entries.append({"name": f"cam_{i:02d}", "matrix_world": matrix.tolist()})
     camera = views[0].camera
-    return json.dumps({"width": camera.width, "height": camera.height, "focal_px": camera.mean_focal_length(),
-                       "cameras": entries})
+    return json.dumps(
+        {"width": camera.width, "height": camera.height, "focal_px": camera.mean_focal_length(), "cameras": entries}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +44,9 @@ def studio(tmp_path_factory):
     capture = Capture(root / "face.wildcap")
     capture.root.mkdir()
     capture.set_source(root / "photos")
-    settings = from_json({"cameras": {"import_from": str(root / "rig.json")}, "delight": {"delighter": "none"},
-                          "texture": {"size": 256}})
+    settings = from_json(
+        {"cameras": {"import_from": str(root / "rig.json")}, "delight": {"delighter": "none"}, "texture": {"size": 256}}
+    )
     frames.run(capture, settings, Reporter("frames"))
     report = Reporter("cameras")
     cameras.run(capture, settings, report)
@@ -55,23 +57,27 @@ def test_the_rigs_cameras_stand_in_the_heads_world(studio):
     capture, _, report, true = studio
     found = read_views(capture)
     assert report.figures["frames_registered"] == 16 and report.figures["features"] == "imported"
-    scale, rotation, shift = similarity(np.array([view.centre for view in found]),
-                                        np.array([view.centre for view in true]))
-    assert np.allclose([scale * rotation @ view.centre + shift for view in found], [view.centre for view in true],
-                       atol=1e-9)
+    scale, rotation, shift = similarity(
+        np.array([view.centre for view in found]), np.array([view.centre for view in true])
+    )
+    assert np.allclose(
+        [scale * rotation @ view.centre + shift for view in found], [view.centre for view in true], atol=1e-9
+    )
     # a person's pupils are not 63 mm apart
     assert scale == pytest.approx(1, abs=0.06) and rotation[2, 2] > np.cos(np.radians(8))
     assert report.figures["pupils_apart_in_imported_units"] == pytest.approx(0.062, abs=0.003)
-    assert not [finding for finding in report.findings if "fit" in finding["problem"]
-                or "expression" in finding["problem"]]
+    assert not [
+        finding for finding in report.findings if "fit" in finding["problem"] or "expression" in finding["problem"]
+    ]
 
 
 def test_even_light_ends_with_an_empty_mask(studio):
     """On the true head, so that registration has no part in it."""
     capture, settings, _, true = studio
     found = read_views(capture)
-    scale, rotation, shift = similarity(np.array([view.centre for view in true]),
-                                        np.array([view.centre for view in found]))
+    scale, rotation, shift = similarity(
+        np.array([view.centre for view in true]), np.array([view.centre for view in found])
+    )
     head = painted_head.person()[0].mesh
     meshes.write_obj(capture.head, head.moved(scale * head.vertices @ rotation.T + shift))
     for stage, name in ((delight, "delight"), (texture, "texture"), (shadow_mask, "shadow_mask")):
@@ -89,8 +95,10 @@ def test_another_rigs_calibration_is_refused(studio, tmp_path):
 
 def test_cameras_that_are_some_pixels_off_are_refined_and_not_refused(tmp_path):
     rng = np.random.default_rng(1)
-    true = [painted_head.place_camera(azimuth, 0.04 * (i % 3), 1.0, scale=1.5)
-            for i, azimuth in enumerate(np.linspace(-48, 48, 8))]
+    true = [
+        painted_head.place_camera(azimuth, 0.04 * (i % 3), 1.0, scale=1.5)
+        for i, azimuth in enumerate(np.linspace(-48, 48, 8))
+    ]
     off = []
     for i, view in enumerate(true):
         images.write_srgb(tmp_path / "photos" / f"cam_{i:02d}.png", painted_head.photograph(view))

@@ -30,14 +30,27 @@ def film(folder, pictures) -> dict[str, faces.Face]:
     return found
 
 
-@pytest.mark.parametrize(("pictures", "stays"), [
-    pytest.param(lambda: [photograph(place_camera(0, 0.03), turned_deg=turn) for turn in TURNS], True,
-                 id="the head turns"),
-    pytest.param(lambda: [photograph(place_camera(turn, 0.03)) for turn in TURNS], False, id="the camera goes round"),
-    pytest.param(lambda: [photograph(place_camera(turn, 0.03), wall=False) for turn in TURNS], False,
-                 id="a bare wall, which does not tell"),
-    pytest.param(lambda: [photograph(place_camera(0, 0.03), turned_deg=turn) for turn in (-3, 0, 3)], False,
-                 id="nobody turns")])
+@pytest.mark.parametrize(
+    ("pictures", "stays"),
+    [
+        pytest.param(
+            lambda: [photograph(place_camera(0, 0.03), turned_deg=turn) for turn in TURNS], True, id="the head turns"
+        ),
+        pytest.param(
+            lambda: [photograph(place_camera(turn, 0.03)) for turn in TURNS], False, id="the camera goes round"
+        ),
+        pytest.param(
+            lambda: [photograph(place_camera(turn, 0.03), wall=False) for turn in TURNS],
+            False,
+            id="a bare wall, which does not tell",
+        ),
+        pytest.param(
+            lambda: [photograph(place_camera(0, 0.03), turned_deg=turn) for turn in (-3, 0, 3)],
+            False,
+            id="nobody turns",
+        ),
+    ],
+)
 def test_a_camera_that_stood_still_is_seen_in_a_few_pictures(tmp_path, pictures, stays):
     found = film(tmp_path, pictures())
     assert all(face is not None for face in found.values())
@@ -45,8 +58,10 @@ def test_a_camera_that_stood_still_is_seen_in_a_few_pictures(tmp_path, pictures,
 
 
 def records(count: int) -> list[FrameRecord]:
-    return [FrameRecord(name=f"{i:05d}.jpg", sharpness=1.0, selected=i % 31 == 7, yaw_deg=float(i % 40))
-            for i in range(count)]
+    return [
+        FrameRecord(name=f"{i:05d}.jpg", sharpness=1.0, selected=i % 31 == 7, yaw_deg=float(i % 40))
+        for i in range(count)
+    ]
 
 
 def test_the_frames_asked_are_spread_over_the_film_and_hold_those_of_the_texture():
@@ -58,9 +73,14 @@ def test_the_frames_asked_are_spread_over_the_film_and_hold_those_of_the_texture
     assert spread_over(records(30)) == tuple(records(30))
 
 
-@pytest.mark.parametrize(("kind", "count", "stays", "asked", "alone"), [
-    (VIDEO, 400, True, None, [True, True]), (VIDEO, 400, False, 400, [False, False]),
-    (PHOTOGRAPHS, 400, True, 400, [False, False])])
+@pytest.mark.parametrize(
+    ("kind", "count", "stays", "asked", "alone"),
+    [
+        (VIDEO, 400, True, None, [True, True]),
+        (VIDEO, 400, False, 400, [False, False]),
+        (PHOTOGRAPHS, 400, True, 400, [False, False]),
+    ],
+)
 def test_then_only_the_head_is_matched_and_in_fewer_frames(tmp_path, monkeypatch, kind, count, stays, asked, alone):
     """Where neither kind of features gives cameras, nor the face: the words stay those of a head that turned."""
     tried = []

@@ -46,7 +46,7 @@ def filmed(sway_m: float, sway_deg: float, count: int = 700, ragged: float = 0.0
         name = f"{i:02d}.jpg"
         pixels = np.concatenate([view.project(head @ turn.T + shift)[0], view.project(room)[0]])
         keypoints[name] = pixels + rng.normal(0, NOISE_PX, pixels.shape)
-        keypoints[name][:round(ragged * count)] += rng.normal(0, RAGGED_PX, (round(ragged * count), 2))
+        keypoints[name][: round(ragged * count)] += rng.normal(0, RAGGED_PX, (round(ragged * count), 2))
         image = pycolmap.Image(name=name, camera_id=1, image_id=i + 1, keypoints=np.zeros((0, 2)))
         model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(np.c_[view.rotation, view.translation]))
     pairs = {}
@@ -66,8 +66,9 @@ def missed_px(model, true, turns, shifts) -> np.ndarray:
     points = points[(points[:, 1] < -0.03) & (points[:, 2] > -0.09)][::20]
     found = {image.name: image for image in model.images.values()}
     aims, poses = [], []
-    for image, turn, shift in zip(sorted(true.images.values(), key=lambda image: image.name), turns, shifts,
-                                  strict=True):
+    for image, turn, shift in zip(
+        sorted(true.images.values(), key=lambda image: image.name), turns, shifts, strict=True
+    ):
         poses.append(pose_of(found[image.name]))
         local = (points @ turn.T + shift) @ pose_of(image).rotation.matrix().T + pose_of(image).translation
         aims.append(np.asarray(true.cameras[1].img_from_cam(local)))

@@ -84,8 +84,9 @@ def test_the_selected_frames_go_out_and_come_back_at_their_size(capture, serve):
         report = Reporter("delight", lambda message: said.append((len(server.calls), getattr(message, "text", ""))))
         run(capture, SETTINGS, report)
         assert report.figures["switchlight_calls"] == 3 and report.figures["switchlight_credits"] == 3.0
-        assert any(calls == 0 and "3 credits" in text and "3 frames" not in text
-                   for calls, text in said), "what it costs is said before the first call"
+        assert any(calls == 0 and "3 credits" in text and "3 frames" not in text for calls, text in said), (
+            "what it costs is said before the first call"
+        )
         written = sorted(path.name for path in capture.delit.iterdir())
         assert written == ["00000.png", "00001.png", "00002.png"], "and nothing about shadows"
         assert images.size(capture.delit / "00001.png") == SIZE
@@ -150,14 +151,20 @@ def test_a_broken_answer_is_none_and_is_asked_for_again(capture, serve, monkeypa
             assert path.read_bytes() == server.answer
 
 
-@pytest.mark.parametrize(("refusal", "words"), [
-    ((402, {}, {"message": "Payment required"}), "no credits left"),
-    ((200, {}, {"message": "No Credit. Please purchase credit."}), "no credits left"),
-    ((401, {}, {"message": f"Unauthorized key {KEY}."}),
-     r"does not accept the key \(401: Unauthorized key \(the key\)\)"),
-    ((413, {}, {"detail": [{"msg": "too large"}]}), "413: .*too large"), ((400, {}, []), r"not as documented \(400\)"),
-    ((429, {"Retry-After": "86400"}, {}), "asks you to wait 1440 minutes"),
-])
+@pytest.mark.parametrize(
+    ("refusal", "words"),
+    [
+        ((402, {}, {"message": "Payment required"}), "no credits left"),
+        ((200, {}, {"message": "No Credit. Please purchase credit."}), "no credits left"),
+        (
+            (401, {}, {"message": f"Unauthorized key {KEY}."}),
+            r"does not accept the key \(401: Unauthorized key \(the key\)\)",
+        ),
+        ((413, {}, {"detail": [{"msg": "too large"}]}), "413: .*too large"),
+        ((400, {}, []), r"not as documented \(400\)"),
+        ((429, {"Retry-After": "86400"}, {}), "asks you to wait 1440 minutes"),
+    ],
+)
 def test_a_refusal_is_said_and_not_repeated(capture, serve, refusal, words):
     with serve(refusal, refusal, refusal) as server:
         agree(capture)
@@ -169,9 +176,11 @@ def test_a_refusal_is_said_and_not_repeated(capture, serve, refusal, words):
 def test_what_came_is_kept_when_the_service_stays_busy(capture, serve):
     with serve("fine", *[BUSY] * 40) as server:
         agree(capture)
-        with pytest.raises(Problem,
-                           match=r"did not serve the frame 0000.\.png: it is busy \(503\), after 4 tries.*the 1 of 3 "
-                                 r"answers"):
+        with pytest.raises(
+            Problem,
+            match=r"did not serve the frame 0000.\.png: it is busy \(503\), after 4 tries.*the 1 of 3 "
+            r"answers",
+        ):
             delight(capture)
         server.plan.clear()
         assert len(delight(capture)) == 3 and sorted(server.charged.values()) == [1, 1, 1]
@@ -188,8 +197,9 @@ def test_an_answer_that_comes_broken_may_have_been_charged_and_is_not_risked_for
 def test_credits_are_counted_before_the_first_frame_leaves(capture, serve):
     with serve(credits=2.0) as server:
         agree(capture)
-        with pytest.raises(Problem,
-                           match="3 credits are needed, and your SwitchLight account has 2 credits: nothing was sent"):
+        with pytest.raises(
+            Problem, match="3 credits are needed, and your SwitchLight account has 2 credits: nothing was sent"
+        ):
             delight(capture)
         assert server.calls == []
         server.credits = None
@@ -203,8 +213,9 @@ def test_credits_are_counted_before_the_first_frame_leaves(capture, serve):
 def test_a_service_that_is_not_there_or_does_not_know_the_key_gets_no_picture(capture, serve, monkeypatch):
     with serve() as server:
         agree(capture)
-    with pytest.raises(Problem,
-                       match=r"cannot be used now: it cannot be reached \(Connection refused\)\. Nothing was sent"):
+    with pytest.raises(
+        Problem, match=r"cannot be used now: it cannot be reached \(Connection refused\)\. Nothing was sent"
+    ):
         delight(capture)
     with serve() as server:
         monkeypatch.setenv(switchlight_api.KEY_VARIABLE, "another")

@@ -18,8 +18,9 @@ from .test_switchlight import agree, capture, delight, make, serve  # noqa: F401
 
 def test_nothing_is_sent_without_consent_a_key_or_a_network(capture, serve, monkeypatch):  # noqa: F811
     with serve() as server:
-        with pytest.raises(Problem,
-                           match=r"waits for your consent: 3 frames .* 3 credits.* Nothing was sent.*--send-frames"):
+        with pytest.raises(
+            Problem, match=r"waits for your consent: 3 frames .* 3 credits.* Nothing was sent.*--send-frames"
+        ):
             delight(capture)
         agree(capture)
         monkeypatch.setenv(switchlight_api.OFFLINE_VARIABLE, "1")

@@ -22,8 +22,12 @@ from .test_switchlight import make
 
 ROOT = Path(__file__).resolve().parent.parent
 STAGE = ["--from", "delight", "--until", "delight", "--delighter", "switchlight"]
-JOB = [sys.executable, "-B", "-c",
-       "import sys, pathlib; from core.worker.runner import run_job; print(run_job(pathlib.Path(sys.argv[1]), print))"]
+JOB = [
+    sys.executable,
+    "-B",
+    "-c",
+    "import sys, pathlib; from core.worker.runner import run_job; print(run_job(pathlib.Path(sys.argv[1]), print))",
+]
 """What the worker does, at the priority of a test and without the pipe that would tell it of its starter's end."""
 
 
@@ -37,11 +41,21 @@ def capture(tmp_path):
 
 
 def begin(command: list[str], server: Service, **more) -> subprocess.Popen:
-    environment = {name: value for name, value in os.environ.items()
-                   if name not in (consent.GIVEN_VARIABLE, service.OFFLINE_VARIABLE)}
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in (consent.GIVEN_VARIABLE, service.OFFLINE_VARIABLE)
+    }
     environment |= {service.KEY_VARIABLE: KEY, service.BASE_VARIABLE: server.url, **more}
-    return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                            text=True, encoding="utf-8")
+    return subprocess.Popen(
+        command,
+        cwd=ROOT,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        encoding="utf-8",
+    )
 
 
 def command_lines() -> list[bytes]:

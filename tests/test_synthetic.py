@@ -33,8 +33,10 @@ def frames():
 
 @pytest.fixture(scope="module")
 def cameras():
-    return {c["frame"]: np.array(c["matrix_world"])
-            for c in json.loads((sample.SAMPLE / "cameras.json").read_text(encoding="utf-8"))["cameras"]}
+    return {
+        c["frame"]: np.array(c["matrix_world"])
+        for c in json.loads((sample.SAMPLE / "cameras.json").read_text(encoding="utf-8"))["cameras"]
+    }
 
 
 def test_a_seed_is_one_head_and_another_seed_another():
@@ -78,8 +80,10 @@ def test_a_point_in_the_sun_and_one_behind_the_head():
 
 def test_the_sample_is_complete_and_small(frames, cameras):
     assert len(frames) == len(cameras) >= 60 and frames[0].shape == (960, 720, 3)
-    names = {folder: sorted(p.name for p in (sample.SAMPLE / folder).glob("*.png"))
-             for folder in ("albedo", "face", "shadow")}
+    names = {
+        folder: sorted(p.name for p in (sample.SAMPLE / folder).glob("*.png"))
+        for folder in ("albedo", "face", "shadow")
+    }
     assert names["albedo"] == names["face"] == names["shadow"] and len(names["albedo"]) == 14
     assert sum(p.stat().st_size for p in sample.SAMPLE.rglob("*") if p.is_file()) < 12e6
 

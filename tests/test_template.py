@@ -67,8 +67,9 @@ def test_the_persons_left_is_right_of_the_middle_of_the_map():
 def test_masks_do_not_contradict_each_other():
     skin, lips, brows, face = (template.mask(name, 512) > 0.5 for name in ("skin", "lips", "brows", "face"))
     assert not (skin & (lips | brows)).any() and (lips <= face).all()
-    assert sum((template.mask(name, 512) > 0.5).mean()
-               for name in ("face", "ears", "neck", "scalp")) == pytest.approx(1, abs=0.01)
+    assert sum((template.mask(name, 512) > 0.5).mean() for name in ("face", "ears", "neck", "scalp")) == pytest.approx(
+        1, abs=0.01
+    )
 
 
 def test_identities_differ_by_millimetres_and_stay_symmetric_on_average():

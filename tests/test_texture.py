@@ -51,8 +51,14 @@ def test_the_paint_comes_back_where_it_was_seen(tmp_path, painted):
 
 def test_the_filmed_texture_is_the_delit_one_with_its_light(tmp_path, painted):
     across = np.linspace(0.4, 1.6, SIZE, dtype=np.float32)
-    light = np.stack([np.broadcast_to(across, (SIZE, SIZE)), np.full((SIZE, SIZE), 0.7),
-                      np.broadcast_to(across[:, None], (SIZE, SIZE))], -1)
+    light = np.stack(
+        [
+            np.broadcast_to(across, (SIZE, SIZE)),
+            np.full((SIZE, SIZE), 0.7),
+            np.broadcast_to(across[:, None], (SIZE, SIZE)),
+        ],
+        -1,
+    )
     capture = capture_of(tmp_path / "lit", painted, (-40, 0, 40), light=light.astype(np.float32))
     found, confidence, _ = textured(capture)
     sure = confidence > 0.6
@@ -98,7 +104,7 @@ def test_a_dot_on_the_left_cheek_lands_on_the_left_cheek(tmp_path):
     dark = found.mean(-1) < 0.2
     where = np.argwhere(dark).mean(0)
     assert dark.sum() > 30 and np.abs(where - [row, column]).max() < 1.5
-    mirrored = found[row - 4:row + 5, SIZE - column - 5:SIZE - column + 4]
+    mirrored = found[row - 4 : row + 5, SIZE - column - 5 : SIZE - column + 4]
     assert np.abs(mirrored - 0.4).max() < 0.03
 
 
@@ -118,8 +124,12 @@ def test_views_that_are_off_by_pixels_are_aligned(tmp_path, painted):
     offsets = [(3.2, 0.8), (-2.8, -1.2), (3.0, 1.6), (-3.4, 0.0), (2.4, -2.0), (-3.0, 1.6), (2.6, 0.8)]
 
     def shifted(i, picture):
-        return cv2.warpAffine(picture, np.array([[1, 0, offsets[i][0]], [0, 1, offsets[i][1]]]), picture.shape[1::-1],
-                              flags=cv2.INTER_CUBIC)
+        return cv2.warpAffine(
+            picture,
+            np.array([[1, 0, offsets[i][0]], [0, 1, offsets[i][1]]]),
+            picture.shape[1::-1],
+            flags=cv2.INTER_CUBIC,
+        )
 
     found, confidence, figures = textured(capture_of(tmp_path / "shifted", painted, ROUND, shifted))
     sure = confidence > 0.8

@@ -65,18 +65,35 @@ def test_the_package_is_asked_for_only_when_it_is_used(monkeypatch):
 def test_a_vgg_of_the_users_is_read_and_is_lpips_only_with_its_weights(tmp_path):
     from safetensors.torch import save_file
 
-    sizes = {0: (64, 3), 2: (64, 64), 5: (128, 64), 7: (128, 128), 10: (256, 128), 12: (256, 256), 14: (256, 256),
-             17: (512, 256), 19: (512, 512), 21: (512, 512), 24: (512, 512), 26: (512, 512), 28: (512, 512)}
+    sizes = {
+        0: (64, 3),
+        2: (64, 64),
+        5: (128, 64),
+        7: (128, 128),
+        10: (256, 128),
+        12: (256, 256),
+        14: (256, 256),
+        17: (512, 256),
+        19: (512, 512),
+        21: (512, 512),
+        24: (512, 512),
+        26: (512, 512),
+        28: (512, 512),
+    }
     state = {f"features.{i}.weight": torch.full((*shape, 3, 3), 0.02) for i, shape in sizes.items()}
-    save_file({**state, **{f"features.{i}.bias": torch.zeros(shape[0]) for i, shape in sizes.items()}},
-              tmp_path / "vgg16.safetensors")
+    save_file(
+        {**state, **{f"features.{i}.bias": torch.zeros(shape[0]) for i, shape in sizes.items()}},
+        tmp_path / "vgg16.safetensors",
+    )
     network = features.load_features(str(tmp_path / "vgg16.safetensors"))
     layers = network.layers(torch.rand(1, 3, 32, 32, generator=torch.Generator().manual_seed(0)))
     assert network.name == "VGG16 features" and layers[-1].shape[-1] == 2
     assert [layer.shape[1] for layer in layers] == [64, 128, 256, 512, 512]
     assert float(network.distance(layers, layers)) == 0
-    torch.save({f"lin{i}.model.1.weight": torch.ones(1, n, 1, 1) for i, n in enumerate((64, 128, 256, 512, 512))},
-               tmp_path / "vgg.pth")
+    torch.save(
+        {f"lin{i}.model.1.weight": torch.ones(1, n, 1, 1) for i, n in enumerate((64, 128, 256, 512, 512))},
+        tmp_path / "vgg.pth",
+    )
     assert features.load_features(str(tmp_path)).name == "LPIPS (VGG16)"
 
 
@@ -102,7 +119,7 @@ def test_a_cloth_at_the_neck_is_found_and_skin_is_not(head):
     log[template.mask("lips", SIZE) > 0.5] += np.float32([0.2, -0.5, -0.4])  # not at the rim: the person's own
     assert np.array_equal(foreign.clothes(log, seen, head), bare)
     shirt = np.zeros((SIZE, SIZE), bool)
-    shirt[round(0.96 * SIZE):] = True
+    shirt[round(0.96 * SIZE) :] = True
     log[shirt] = np.log(np.float32([0.2, 0.5, 0.25]))
     found = foreign.clothes(log, seen, head)
     at_neck = shirt & head.covered & (template.mask("neck", SIZE) > 0.5)

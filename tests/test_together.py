@@ -73,8 +73,12 @@ def test_what_cannot_be_solved_together_is_refused(two, tmp_path):
     built_in = template.load()
     meshes.write_obj(other.head, replace(built_in, uvs=built_in.uvs * 0.5))
     second.texture.unlink()
-    for named, problem in ((first.root, "this capture itself"), (tmp_path / "nothing", "no capture"),
-                           (second.root, "no texture"), (other.root, "other UVs")):
+    for named, problem in (
+        (first.root, "this capture itself"),
+        (tmp_path / "nothing", "no capture"),
+        (second.root, "no texture"),
+        (other.root, "other UVs"),
+    ):
         with pytest.raises(Problem, match=problem):
             albedo_of(first, together=str(named))
     assert not first.maps.exists()
@@ -94,11 +98,15 @@ def test_of_another_capture_only_what_is_read_counts(two):
 def test_in_a_light_that_is_too_strong_to_be_told_the_others_are_left_out_and_it_is_said(two, brief_light):  # noqa: F811
     first, second, _ = two
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
-    images.write_linear(first.texture,
-                        images.read_linear(first.texture) * np.exp(3 * (x - 0.5))[..., None].astype(np.float32))
+    images.write_linear(
+        first.texture, images.read_linear(first.texture) * np.exp(3 * (x - 0.5))[..., None].astype(np.float32)
+    )
     said = []
-    solve.run(first, settings(steps=4, together=str(second.root)),
-              Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+    solve.run(
+        first,
+        settings(steps=4, together=str(second.root)),
+        Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))),
+    )
     assert any("The other captures were not used" in text for text in said)
     with_others = images.read_linear(first.maps / "diffuse_albedo.exr")
     assert np.array_equal(albedo_of(first), with_others)

@@ -30,11 +30,13 @@ def smooth(seed: int, channels: int, size: int = skins.SIZE) -> np.ndarray:
 
 def fake_skin(seed: int) -> np.ndarray:
     """Maps [S, S, 7] of one subject: a blotchy skin colour, nearly flat normals, some gloss."""
-    albedo = pigment.reflectance(0.05 * np.exp(0.4 * smooth(seed, 1)[..., 0]),
-                                 0.02 * np.exp(0.3 * smooth(seed + 50, 1)[..., 0]))
+    albedo = pigment.reflectance(
+        0.05 * np.exp(0.4 * smooth(seed, 1)[..., 0]), 0.02 * np.exp(0.3 * smooth(seed + 50, 1)[..., 0])
+    )
     normal = np.dstack([0.03 * smooth(seed + 100, 2), np.ones((skins.SIZE, skins.SIZE))])
-    return np.dstack([2 * albedo - 1, normal / np.linalg.norm(normal, axis=-1, keepdims=True),
-                      0.1 * smooth(seed + 150, 1) - 0.3]).astype(np.float32)
+    return np.dstack(
+        [2 * albedo - 1, normal / np.linalg.norm(normal, axis=-1, keepdims=True), 0.1 * smooth(seed + 150, 1) - 0.3]
+    ).astype(np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +60,7 @@ def carried(tmp_path_factory, cache, seen):
     for name in ("a", "b"):
         images.write_srgb(folder / f"{name}.png", images.linear_to_srgb((fake_skin(ord(name))[..., :3] + 1) / 2))
     known = np.ones((skins.SIZE, skins.SIZE), np.float32)
-    known[:, skins.SIZE // 2:] = 0
+    known[:, skins.SIZE // 2 :] = 0
     images.write_data(folder / "known.png", known)
     (folder / "carried.json").write_text(json.dumps({"from": "others", "notices": ["Theirs."]}), encoding="utf-8")
     return folder
@@ -79,19 +81,24 @@ def test_baked_shading_is_divided_out(seen):
     shading = np.maximum(np.tensordot(sky, skins._sky_basis(), 1), 0.01)
     lit = np.clip(0.25 * face * cv2.resize(shading / shading.mean(), (512, 512)), 0, 1).transpose(1, 2, 0)
     where = (skins._bare(512) > 0.9) & (template.mask("lips", 512) < 0.1)
-    relative = [np.log(image.mean(-1) / face.mean(0))[where]
-                for image in (lit, skins.unshaded(lit.astype(np.float32), mean))]
+    relative = [
+        np.log(image.mean(-1) / face.mean(0))[where] for image in (lit, skins.unshaded(lit.astype(np.float32), mean))
+    ]
     assert relative[0].std() > 0.15 and relative[1].std() < 0.2 * relative[0].std()
 
 
 def test_the_same_photographs_painted_over_are_one_cluster(tmp_path):
     rng = np.random.default_rng(0)
     pores = [cv2.GaussianBlur(rng.normal(size=(512, 512)).astype(np.float32), (0, 0), 2) for _ in range(2)]
-    pictures = {"a": 0.3 + pores[0], "a_painted": 0.2 + 0.8 * pores[0] + 0.2 * rng.normal(0, 0.1, (512, 512)),
-                "b": 0.3 + pores[1]}
+    pictures = {
+        "a": 0.3 + pores[0],
+        "a_painted": 0.2 + 0.8 * pores[0] + 0.2 * rng.normal(0, 0.1, (512, 512)),
+        "b": 0.3 + pores[1],
+    }
     for name, picture in pictures.items():
-        images.write_srgb(tmp_path / f"{name}.png",
-                          np.repeat(np.clip(picture, 0, 1)[..., None], 3, 2).astype(np.float32))
+        images.write_srgb(
+            tmp_path / f"{name}.png", np.repeat(np.clip(picture, 0, 1)[..., None], 3, 2).astype(np.float32)
+        )
     assert skins.clusters(tmp_path, list(pictures)) == [["a", "a_painted"], ["b"]]
 
 
@@ -116,7 +123,9 @@ def test_a_window_knows_where_it_lies_and_mirrors_with_its_normals(seen):
         column, row = (((coords[:, 0, 0] + 1) * skins.SIZE / int(scale) - 1) / 2).round().long().tolist()
         normals = [m[3:6].float() for m in seen.maps[int(scale)]]
         mirrored = [m.flip(2) * torch.tensor([-1.0, 1, 1])[:, None, None] for m in normals]
-        apart = [float((clean[3:6] - m[:, row:row + 32, column:column + 32]).abs().max()) for m in normals + mirrored]
+        apart = [
+            float((clean[3:6] - m[:, row : row + 32, column : column + 32]).abs().max()) for m in normals + mirrored
+        ]
         assert min(apart) == 0
         turned.add(int(np.argmin(apart)) >= len(normals))
     assert turned == {False, True} and set(batch.scale.tolist()) == set(skins.SCALES)
@@ -133,14 +142,17 @@ def test_carried_skins_teach_only_the_diffuse_they_know(carried, cache, seen):
     network = build_network(prior.CONFIGS["cpu"])
     torch.nn.init.normal_(network.proj_out.weight, std=0.05)
     other = torch.where(batch.known > 0, batch.clean, torch.rand_like(batch.clean))
-    losses = [prior._loss(network, statistics, b, np.random.default_rng(0), "cpu")
-              for b in (batch, type(batch)(other, *list(vars(batch).values())[1:]))]
+    losses = [
+        prior._loss(network, statistics, b, np.random.default_rng(0), "cpu")
+        for b in (batch, type(batch)(other, *list(vars(batch).values())[1:]))
+    ]
     assert torch.equal(*losses) and torch.isfinite(losses[0]).all()  # what is not known has no say
 
 
 def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypatch):
-    tiny = prior.CONFIGS["cpu"] | {"model": prior.CONFIGS["cpu"]["model"]
-                                   | {"channels": [8, 8, 8], "depths": [1, 1, 1]}}
+    tiny = prior.CONFIGS["cpu"] | {
+        "model": prior.CONFIGS["cpu"]["model"] | {"channels": [8, 8, 8], "depths": [1, 1, 1]}
+    }
     tiny["training"] = tiny["training"] | {"batch": 4, "patch": 32, "skins": 2, "held_out": 1}
     monkeypatch.setitem(prior.CONFIGS, "cpu", tiny)
     out = tmp_path / "prior.safetensors"
@@ -153,7 +165,10 @@ def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypat
     assert set(second["held_out"]["loss"]) == {"synthetic", "carried"}
     assert not set(second["seeds"]) & set(second["held_out_seeds"])
     conditioned = load(out).of_tone(SkinTone((0.4, 0.3, 0.2), GIVEN))
-    assert conditioned(torch.zeros(1, 7, 32, 32), 1.0,
-                       torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32)).isfinite().all()
+    assert (
+        conditioned(torch.zeros(1, 7, 32, 32), 1.0, torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32))
+        .isfinite()
+        .all()
+    )
     with pytest.raises(Problem, match="other data"):
         prior.train_prior("cpu", out, QUIET, TrainingRun(0.03, cache))

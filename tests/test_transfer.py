@@ -35,8 +35,9 @@ def painted(mesh: Mesh, size: int, values=lambda points, face, bary: colour_at(p
     """values(points, face, bary) at the texels of a mesh's map [size, size, 3], bled."""
     face, bary = raster.rasterize_uv(mesh, size)
     inside, out = face >= 0, np.zeros((size, size, 3), np.float32)
-    out[inside] = values(raster.interpolate(mesh.vertices, mesh.faces, face[inside], bary[inside]), face[inside],
-                         bary[inside])
+    out[inside] = values(
+        raster.interpolate(mesh.vertices, mesh.faces, face[inside], bary[inside]), face[inside], bary[inside]
+    )
     return raster.bleed(out, inside)
 
 
@@ -127,8 +128,10 @@ def test_strips_do_not_show(source, target, monkeypatch):
 def test_a_surface_that_faces_away_is_no_partner():
     outer, inner = egg(48, 32), egg(48, 32)
     inner = inner.moved(inner.vertices * 0.97)
-    shell = Mesh(np.concatenate([outer.vertices, inner.vertices]),
-                 np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]))
+    shell = Mesh(
+        np.concatenate([outer.vertices, inner.vertices]),
+        np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]),
+    )
     points, normals = outer.vertices * 0.98, vertex_normals(outer)
     middle = np.abs(outer.uvs[:, 1] - 0.5) < 0.4  # nearer to the inner sheet, which faces the other way
     face, _ = surfaces.Surface(shell).find_partners(points[middle], normals[middle], 0.02)
@@ -139,8 +142,10 @@ def test_the_reduced_scan_is_a_clean_surface_near_the_scan():
     rng = np.random.default_rng(0)
     fine = surfaces.welded(egg(200, 140))[0]
     speck = Mesh(np.array([[0.2, 0, 0], [0.201, 0, 0], [0.2, 0.001, 0]]), np.array([[0, 1, 2]]))
-    noisy = Mesh(np.concatenate([fine.vertices + rng.normal(0, 3e-4, fine.vertices.shape), speck.vertices]),
-                 np.concatenate([fine.faces, speck.faces + len(fine.vertices)]))
+    noisy = Mesh(
+        np.concatenate([fine.vertices + rng.normal(0, 3e-4, fine.vertices.shape), speck.vertices]),
+        np.concatenate([fine.faces, speck.faces + len(fine.vertices)]),
+    )
     mesh = scan.reduced(noisy, 0.005)
     _, uses = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
     assert uses.max() <= 2 and len(mesh.faces) < len(fine.faces) / 4 and mesh.vertices[:, 0].max() < 0.1
@@ -164,16 +169,19 @@ def finished(tmp_path_factory) -> Capture:
     texture = skin(256)
     capture = capture_of(tmp_path_factory.mktemp("finished") / "é.wildcap", texture, (-30, 0, 30))
     for frame in json.loads(capture.frames_json.read_text())["frames"]:
-        images.write_srgb(capture.frames / frame["name"],
-                          images.read_srgb((capture.delit / frame["name"]).with_suffix(".png")))
+        images.write_srgb(
+            capture.frames / frame["name"], images.read_srgb((capture.delit / frame["name"]).with_suffix(".png"))
+        )
     meshes.write_ply(capture.scan, surfaces.welded(egg())[0])
     images.write_linear(capture.maps / "diffuse_albedo.exr", texture * 1.2)
     for name in stages.MAPS:
         if not (capture.maps / name).is_file():
-            images.write_data(capture.maps / name,
-                              np.full((256, 256, 3), 0.5, np.float32)
-                              if name not in ("specular_albedo.png", "confidence.png")
-                              else np.full((256, 256), 0.6, np.float32))
+            images.write_data(
+                capture.maps / name,
+                np.full((256, 256, 3), 0.5, np.float32)
+                if name not in ("specular_albedo.png", "confidence.png")
+                else np.full((256, 256), 0.6, np.float32),
+            )
     return capture
 
 
@@ -190,7 +198,13 @@ def test_the_scan_is_delivered_with_its_colours(capture):
     report = Reporter("transfer")
     transfer.run(capture, settings_of(), report)
     assert {path.name for path in capture.delivery.iterdir()} == {
-        "delivery.json", "scan.obj", "scan_lit.png", "scan_albedo.png", "scan_albedo_known.png", "displacement.exr"}
+        "delivery.json",
+        "scan.obj",
+        "scan_lit.png",
+        "scan_albedo.png",
+        "scan_albedo_known.png",
+        "displacement.exr",
+    }
     mesh = meshes.read_obj(capture.delivery / "scan.obj")
     assert atlas.overlap_share(mesh, 256) < 0.01
     lit, albedo = (images.read_linear(capture.delivery / f"scan_{name}.png") for name in ("lit", "albedo"))
@@ -211,8 +225,10 @@ def test_tiles_of_the_artists_mesh_are_baked_and_named(capture, target):
     transfer.run(capture, settings_of(scan=False), Reporter("transfer"))
     names = {path.name for path in capture.delivery.iterdir()}
     assert names == {"delivery.json", "own_head.obj"} | {
-        f"own_{kind}.{tile}.png" for kind in ("diffuse_albedo", "specular_albedo", "normal", "confidence")
-        for tile in (1001, 1002)}
+        f"own_{kind}.{tile}.png"
+        for kind in ("diffuse_albedo", "specular_albedo", "normal", "confidence")
+        for tile in (1001, 1002)
+    }
     assert (capture.delivery / "own_head.obj").read_bytes() == capture.own_head.read_bytes()
     assert images.read_mask(capture.delivery / "own_confidence.1002.png").max() > 0.5
 

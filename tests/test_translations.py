@@ -33,8 +33,9 @@ def marked(addon, monkeypatch):
 
 def test_what_is_put_together_is_looked_up_before_names_and_figures_come_in(marked, capture, monkeypatch):
     strip, preferences = marked("capture.strip"), marked("preferences")
-    monkeypatch.setattr(strip, "of",
-                        lambda item: type("Strip", (), {"count": 96, "used": 16, "blurred": 3, "frames": []})())
+    monkeypatch.setattr(
+        strip, "of", lambda item: type("Strip", (), {"count": 96, "used": 16, "blurred": 3, "frames": []})()
+    )
     texts = drawn(marked("capture.panel").WILDCAP_PT_frames)
     assert ("»96 frames, 16 in the texture«», 3 blurred«", False) in texts
     preferences.get().device = "cpu"
@@ -44,8 +45,10 @@ def test_what_is_put_together_is_looked_up_before_names_and_figures_come_in(mark
     assert ("»The solver is ready (CPU)«", False) in found
     item = marked("captures").active(bpy.context)
     item.registration.template = "/heads/mine.obj"
-    assert any("beside" in text and not translate
-               for text, translate in drawn(marked("reconstruct.panel").WILDCAP_PT_head_mesh))
+    assert any(
+        "beside" in text and not translate
+        for text, translate in drawn(marked("reconstruct.panel").WILDCAP_PT_head_mesh)
+    )
     known = marked("status").Status(seconds={"solve": 30.0}, versions={"solve": "0.1.0"})
     assert marked("panel")._words("done", known, "solve") == "»done, 30 s«"
     assert marked("panel")._words("older", known, "solve") == "»made by 0.1.0«"
@@ -54,8 +57,9 @@ def test_what_is_put_together_is_looked_up_before_names_and_figures_come_in(mark
 
 def test_problems_and_reasons_are_looked_up_whole(marked):
     found: list = []
-    marked("problems").draw(Layout(found), type("Problem", (), {"problem": "It is broken.", "remedy": "Mend it."})(),
-                            400)
+    marked("problems").draw(
+        Layout(found), type("Problem", (), {"problem": "It is broken.", "remedy": "Mend it."})(), 400
+    )
     assert found == [("»It is broken.«", False), ("»Mend it.«", False)]
 
 
@@ -72,5 +76,8 @@ def test_no_text_is_drawn_that_has_words_and_figures_mixed():
 def _has_words(text: ast.AST) -> bool:
     """Whether an f-string among the parts of an expression says something in letters of its own."""
     strings = [node for node in ast.walk(text) if isinstance(node, ast.JoinedStr)]
-    return any(isinstance(part, ast.Constant) and any(letter.isalpha() for letter in str(part.value))
-               for string in strings for part in string.values)
+    return any(
+        isinstance(part, ast.Constant) and any(letter.isalpha() for letter in str(part.value))
+        for string in strings
+        for part in string.values
+    )

@@ -36,10 +36,13 @@ def shot(root, azimuths=AZIMUTHS, points: int = 300, rise: float = 0.03) -> Capt
     names = [f"{i:05d}.jpg" for i in range(len(views))]
     params = views[0].camera.params
     pinhole = params if len(params) == 4 else [*params[:1], *params[:3]]
-    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="PINHOLE", width=views[0].width,
-                                                      height=views[0].height, params=pinhole))
-    front = rng.choice(np.flatnonzero((mesh.vertices[:, 1] < 0.02) & (mesh.vertices[:, 2] > -0.11)
-                                      & (mesh.vertices[:, 2] < 0.06)), points)
+    model.add_camera_with_trivial_rig(
+        pycolmap.Camera(camera_id=1, model="PINHOLE", width=views[0].width, height=views[0].height, params=pinhole)
+    )
+    front = rng.choice(
+        np.flatnonzero((mesh.vertices[:, 1] < 0.02) & (mesh.vertices[:, 2] > -0.11) & (mesh.vertices[:, 2] < 0.06)),
+        points,
+    )
     places, members = mesh.vertices[front] + rng.normal(0, 3e-4, (points, 3)), [[] for _ in front]
     for number, (name, view) in enumerate(zip(names, views, strict=True), 1):
         images.write_srgb(capture.frames / name, painted_head.photograph(view))
@@ -164,8 +167,10 @@ def test_where_a_scan_ends_the_outlines_bring_the_jaw_in_and_what_lies_on_the_sc
     shown = registration._shown(capture, views, subject, report)
     found = unscanned.beyond_scan(model, narrow, beside == 0, shown, report, 0, 100)
     normals = meshes.vertex_normals(truth)
-    off = {name: 1e3 * np.abs(((vertices - truth.vertices) * normals).sum(1))
-           for name, vertices in (("before", narrow), ("after", found))}
+    off = {
+        name: 1e3 * np.abs(((vertices - truth.vertices) * normals).sum(1))
+        for name, vertices in (("before", narrow), ("after", found))
+    }
     jaw = (registration.weights_of(model)[0] > 0.5) & (beside == 1)
     assert jaw.sum() > 100 and np.median(off["after"][jaw]) < 0.6 * np.median(off["before"][jaw])
     stayed = off["after"][beside == 0]
@@ -182,8 +187,9 @@ def test_points_behind_the_skin_or_of_its_far_side_do_not_pull():
     assert len(found) == 1 and found.distance[0] == pytest.approx(0.001)
 
 
-@pytest.mark.parametrize(("azimuths", "count"),
-                         [((0, 30, 60, 90), 4), ((0, 10, 20), 1), ((-20, 0, 20), 2), ((-13, 0, 13, 40), 3)])
+@pytest.mark.parametrize(
+    ("azimuths", "count"), [((0, 30, 60, 90), 4), ((0, 10, 20), 1), ((-20, 0, 20), 2), ((-13, 0, 13, 40), 3)]
+)
 def test_views_are_counted_by_how_far_they_lie_apart(azimuths, count):
     head = painted_head.person()[0].mesh
     middle = head.vertices.mean(0)

@@ -32,8 +32,14 @@ from core.worker import command_settings  # noqa: E402
 NAMES = ("plain", "with blanks and (1)", "Zoë – l'été", "顔 📷", 'quo"te\'s', "UPPER.lower.x", "-rf", "%s{0}$HOME")
 SIDE = 48
 BARS = np.broadcast_to(np.arange(SIDE) // 8 % 2, (SIDE, SIDE)).astype(np.uint8) * 255
-PICTURE = np.stack([np.add.outer(np.arange(40) * 5, np.arange(32)), np.add.outer(np.arange(40), np.arange(32) * 7),
-                    np.full((40, 32), 90)], -1).astype(np.uint8)
+PICTURE = np.stack(
+    [
+        np.add.outer(np.arange(40) * 5, np.arange(32)),
+        np.add.outer(np.arange(40), np.arange(32) * 7),
+        np.full((40, 32), 90),
+    ],
+    -1,
+).astype(np.uint8)
 CORNERS = np.array([[0, 0, 0], [1, 0, 0.5], [1, 1, 0], [0, 1, 0.25]])
 UVS = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
 
@@ -43,8 +49,9 @@ def _masks() -> Iterator:
         def make(place: Path):
             path = place / f"{name}{suffix}"
             grey = Image.fromarray(BARS)
-            picture = (Image.fromarray(BARS.astype(np.uint16) * 257) if mode == "I;16"
-                       else grey.convert("RGB").convert(mode))
+            picture = (
+                Image.fromarray(BARS.astype(np.uint16) * 257) if mode == "I;16" else grey.convert("RGB").convert(mode)
+            )
             picture.save(path, **options)
             tolerance = 0.1 if "jp" in suffix.lower() else 0.01
             return f"{path.name} as {mode}", lambda: bool(np.abs(images.read_mask(path) - BARS / 255).max() < tolerance)
@@ -69,20 +76,40 @@ def _masks() -> Iterator:
 
         return "masks", make
 
-    modes = [("L", ".png", {}), ("1", ".png", {}), ("P", ".png", {}), ("RGB", ".png", {}), ("RGBA", ".png", {}),
-             ("LA", ".png", {}), ("I;16", ".png", {}),
-             ("L", ".jpg", {"quality": 95}), ("RGB", ".JPG", {"quality": 95, "progressive": True}),
-             ("RGB", ".jpeg", {"quality": 95, "subsampling": 0}),
-             ("CMYK", ".tif", {}), ("RGB", ".tiff", {"compression": "tiff_lzw"}),
-             ("L", ".TIF", {"compression": "tiff_deflate"}), ("P", ".tif", {}), ("L", ".bmp", {}), ("RGB", ".tga", {})]
+    modes = [
+        ("L", ".png", {}),
+        ("1", ".png", {}),
+        ("P", ".png", {}),
+        ("RGB", ".png", {}),
+        ("RGBA", ".png", {}),
+        ("LA", ".png", {}),
+        ("I;16", ".png", {}),
+        ("L", ".jpg", {"quality": 95}),
+        ("RGB", ".JPG", {"quality": 95, "progressive": True}),
+        ("RGB", ".jpeg", {"quality": 95, "subsampling": 0}),
+        ("CMYK", ".tif", {}),
+        ("RGB", ".tiff", {"compression": "tiff_lzw"}),
+        ("L", ".TIF", {"compression": "tiff_deflate"}),
+        ("P", ".tif", {}),
+        ("L", ".bmp", {}),
+        ("RGB", ".tga", {}),
+    ]
     for (number, (mode, suffix, options)), shift in itertools.product(enumerate(modes), (0, 3, 5)):
         yield saved(mode, suffix, NAMES[(number + shift) % len(NAMES)], **options)
-    kinds = [(".exr", "half", 3, {"compression": "zip"}), (".exr", "float", 3, {"compression": "piz"}),
-             (".exr", "half", 1, {"compression": "none"}),
-             (".exr", "half", 4, {"compression": "zips"}), (".EXR", "float", 1, {"compression": "rle"}),
-             (".exr", "half", 3, {"compression": "dwaa"}),
-             (".png", "uint16", 3, {}), (".png", "uint16", 1, {}), (".tif", "float", 1, {}), (".tif", "uint16", 3, {}),
-             (".tif", "half", 3, {}), (".png", "uint8", 3, {"png_compressionLevel": 0})]
+    kinds = [
+        (".exr", "half", 3, {"compression": "zip"}),
+        (".exr", "float", 3, {"compression": "piz"}),
+        (".exr", "half", 1, {"compression": "none"}),
+        (".exr", "half", 4, {"compression": "zips"}),
+        (".EXR", "float", 1, {"compression": "rle"}),
+        (".exr", "half", 3, {"compression": "dwaa"}),
+        (".png", "uint16", 3, {}),
+        (".png", "uint16", 1, {}),
+        (".tif", "float", 1, {}),
+        (".tif", "uint16", 3, {}),
+        (".tif", "half", 3, {}),
+        (".png", "uint8", 3, {"png_compressionLevel": 0}),
+    ]
     for (number, (suffix, kind, channels, attributes)), shift in itertools.product(enumerate(kinds), (0, 3)):
         yield by_oiio(suffix, NAMES[(number + shift) % len(NAMES)], kind, channels, **attributes)
 
@@ -113,7 +140,8 @@ def _objs() -> Iterator:
     vt = [f"vt {a} {b}" for a, b in UVS.tolist()]
     quad, triangles = ["f 1/1 2/2 3/3 4/4"], ["f 1/1 2/2 3/3", "f 1/1 3/3 4/4"]
     texts = {
-        "CRLF": "\r\n".join([*v, *vt, *quad, ""]), "no newline at the end": "\n".join([*v, *vt, *quad]),
+        "CRLF": "\r\n".join([*v, *vt, *quad, ""]),
+        "no newline at the end": "\n".join([*v, *vt, *quad]),
         "triangles": "\n".join([*v, *vt, *triangles, ""]),
         "negative indices": "\n".join([*v, *vt, "f -4/-4 -3/-3 -2/-2 -1/-1", ""]),
         "comments": "\n".join(["# by hand", *v, "", "#", *vt, *quad, "# end", ""]),
@@ -121,14 +149,16 @@ def _objs() -> Iterator:
         "homogeneous": "\n".join([*(line + " 1.0" for line in v), *vt, *quad, ""]),
         "three texture coordinates": "\n".join([*v, *(line + " 0" for line in vt), *quad, ""]),
         "tabs and blanks": "\n".join([*(line.replace(" ", "\t  ") + "  " for line in v), *vt, *quad, ""]),
-        "groups and materials": "\n".join(["mtllib a b.mtl", "o head", *v, *vt, "g skin face", "usemtl skin", "s 1",
-                                           *quad, ""]),
+        "groups and materials": "\n".join(
+            ["mtllib a b.mtl", "o head", *v, *vt, "g skin face", "usemtl skin", "s 1", *quad, ""]
+        ),
         "normals": "\n".join([*v, *vt, "vn 0 0 1", "f 1/1/1 2/2/1 3/3/1 4/4/1", ""]),
         "exponents": "\n".join([*(f"v {x:e} {y:E} {z:+e}" for x, y, z in CORNERS.tolist()), *vt, *quad, ""]),
         "faces first told apart": "\n".join([*v[:3], *vt[:3], triangles[0], v[3], vt[3], triangles[1], ""]),
         "lines and points": "\n".join([*v, *vt, "l 1 2", "p 1", *quad, ""]),
         "long comments": "\n".join(["#" + "x" * 100_000, *v, *vt, *quad, ""]),
-        "Latin-1 names": "\n".join(["o Zo\xeb", *v, *vt, *quad, ""])}
+        "Latin-1 names": "\n".join(["o Zo\xeb", *v, *vt, *quad, ""]),
+    }
 
     def written(what: str, text: str, name: str):
         def make(place: Path):
@@ -149,30 +179,39 @@ def _is_square(mesh: meshes.Mesh, with_uvs: bool) -> bool:
     same = corners == {tuple(corner) for corner in CORNERS.tolist()} and len(mesh.faces) == 2
     if not with_uvs:
         return same
-    pairs = {(tuple(np.round(mesh.vertices[i], 5).tolist()), tuple(np.round(mesh.uvs[j], 5).tolist()))
-             for face, of_uv in zip(mesh.faces, mesh.face_uvs, strict=True) for i, j in zip(face, of_uv, strict=True)}
+    pairs = {
+        (tuple(np.round(mesh.vertices[i], 5).tolist()), tuple(np.round(mesh.uvs[j], 5).tolist()))
+        for face, of_uv in zip(mesh.faces, mesh.face_uvs, strict=True)
+        for i, j in zip(face, of_uv, strict=True)
+    }
     return same and pairs == {(tuple(a), tuple(b)) for a, b in zip(CORNERS.tolist(), UVS.tolist(), strict=True)}
 
 
 def _plys() -> Iterator:
     forms = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
-    extras = {"nothing else": ("", ""),
-              "colours": ("property uchar red\nproperty uchar green\nproperty uchar blue\n", "BBB"),
-              "normals": ("property float nx\nproperty float ny\nproperty float nz\n", "fff")}
+    extras = {
+        "nothing else": ("", ""),
+        "colours": ("property uchar red\nproperty uchar green\nproperty uchar blue\n", "BBB"),
+        "normals": ("property float nx\nproperty float ny\nproperty float nz\n", "fff"),
+    }
 
     def written(form: str, kind: str, extra: str):
         def make(place: Path):
             order, (lines, more) = forms[form], extras[extra]
-            header = (f"ply\nformat {form} 1.0\ncomment made by hand\nelement vertex 4\nproperty {kind} x\nproperty "
-                      f"{kind} y\nproperty {kind} z\n{lines}"
-                      "element face 2\nproperty list uchar int vertex_indices\nend_header\n").encode()
+            header = (
+                f"ply\nformat {form} 1.0\ncomment made by hand\nelement vertex 4\nproperty {kind} x\nproperty "
+                f"{kind} y\nproperty {kind} z\n{lines}"
+                "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+            ).encode()
             rest = [0] * len(more)
             if order is None:
                 lines = "".join(" ".join(map(str, [*corner, *rest])) + "\n" for corner in CORNERS.tolist())
                 body = lines.encode() + b"3 0 1 2\n3 0 2 3\n"
             else:
-                body = b"".join(struct.pack(order + ("fff" if kind == "float" else "ddd") + more, *corner, *rest)
-                                for corner in CORNERS.tolist())
+                body = b"".join(
+                    struct.pack(order + ("fff" if kind == "float" else "ddd") + more, *corner, *rest)
+                    for corner in CORNERS.tolist()
+                )
                 body += b"".join(struct.pack(order + "B3i", 3, *face) for face in ((0, 1, 2), (0, 2, 3)))
             path = place / "scan.ply"
             path.write_bytes(header + body)
@@ -187,11 +226,13 @@ def _plys() -> Iterator:
 def _jsons() -> Iterator:
     points = {"points": {"152": [0.0, -0.1, -0.1], "1": [0, -1.3e-1, -0.03]}}
     chosen = {"frames": {"views": 5}, "seed": 7}
-    forms = {"a byte order mark": lambda value: b"\xef\xbb\xbf" + json.dumps(value).encode(),
-             "CRLF": lambda value: json.dumps(value, indent=2).replace("\n", "\r\n").encode(),
-             "compact": lambda value: json.dumps(value, separators=(",", ":")).encode(),
-             "escapes": lambda value: json.dumps(value).replace("s", "\\u0073").encode(),
-             "blank lines": lambda value: b"\n\n  " + json.dumps(value, indent="\t").encode() + b"\n\n"}
+    forms = {
+        "a byte order mark": lambda value: b"\xef\xbb\xbf" + json.dumps(value).encode(),
+        "CRLF": lambda value: json.dumps(value, indent=2).replace("\n", "\r\n").encode(),
+        "compact": lambda value: json.dumps(value, separators=(",", ":")).encode(),
+        "escapes": lambda value: json.dumps(value).replace("s", "\\u0073").encode(),
+        "blank lines": lambda value: b"\n\n  " + json.dumps(value, indent="\t").encode() + b"\n\n",
+    }
 
     def written(what: str, encode: Callable, name: str, of_points: bool):
         def make(place: Path):
@@ -216,8 +257,14 @@ def _jsons() -> Iterator:
 
 
 def _videos() -> Iterator:
-    kinds = {".mp4": "libx264", ".MOV": "libx264", ".mkv": "libx264", ".avi": "mpeg4", ".webm": "libvpx-vp9",
-             ".m4v": "mpeg4"}
+    kinds = {
+        ".mp4": "libx264",
+        ".MOV": "libx264",
+        ".mkv": "libx264",
+        ".avi": "mpeg4",
+        ".webm": "libvpx-vp9",
+        ".m4v": "mpeg4",
+    }
 
     def filmed(suffix: str, codec: str, name: str, size: tuple[int, int]):
         def make(place: Path):

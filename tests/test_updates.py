@@ -71,7 +71,8 @@ def test_what_older_code_made_is_shown_as_such_and_can_be_made_again_by_a_click(
 
 
 def test_a_head_that_older_code_made_is_painted_on_assembled_and_rendered_and_no_stage_runs(
-        addon, updated, monkeypatch):
+    addon, updated, monkeypatch
+):
     started: list = []
     monkeypatch.setattr(addon("jobs"), "start", lambda *given, **named: started.append((given, named)))
     before = {path: path.read_bytes() for path in updated.rglob("*") if path.is_file()}

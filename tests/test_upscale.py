@@ -56,11 +56,12 @@ def test_every_map_is_met_at_the_new_size(capture):
     upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}), report)
     assert {path.name for path in capture.maps_4k.iterdir()} == set(stages.MAPS)
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]  # the border has no neighbours to interpolate from
-    linear = np.stack([truth, truth ** 2, truth / 2], 2)
+    linear = np.stack([truth, truth**2, truth / 2], 2)
     for name, read, expected, tolerance in (
         ("diffuse_albedo.exr", images.read_linear, linear, 2e-3),
         ("diffuse_albedo.png", images.read_linear, linear, 2e-3),
-        ("shading.exr", images.read_linear, 3 * linear, 6e-3), ("specular_albedo.png", images.read_mask, truth, 2e-3),
+        ("shading.exr", images.read_linear, 3 * linear, 6e-3),
+        ("specular_albedo.png", images.read_mask, truth, 2e-3),
         ("normal.png", lambda path: images.read_data(path)[..., :3] * 2 - 1, tilted(LARGE), 4e-3),
     ):
         got = read(capture.maps_4k / name)
@@ -79,8 +80,13 @@ def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capt
     assert np.percentile(np.abs(lengths - 1), 99) < 1e-3
     albedo = images.read_linear(capture.maps_4k / "diffuse_albedo.exr")
     assert albedo.min() >= 0 and albedo.max() < 0.701
-    for name, kind in (("diffuse_albedo.png", "uint16"), ("specular_albedo.png", "uint16"), ("normal.png", "uint16"),
-                       ("confidence.png", "uint8"), ("shading.exr", "half")):
+    for name, kind in (
+        ("diffuse_albedo.png", "uint16"),
+        ("specular_albedo.png", "uint16"),
+        ("normal.png", "uint16"),
+        ("confidence.png", "uint8"),
+        ("shading.exr", "half"),
+    ):
         assert str(oiio.ImageBuf(str(capture.maps_4k / name)).spec().format) == kind, name
 
 
@@ -112,18 +118,25 @@ def test_a_cancel_between_maps_leaves_no_folder(capture):
         return left[0] < 0
 
     with pytest.raises(CancelledError):
-        upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}),
-                    Reporter("upscale", cancelled=soon))
+        upscale.run(
+            capture,
+            from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}),
+            Reporter("upscale", cancelled=soon),
+        )
     assert not capture.maps_4k.exists() and not list(capture.root.glob(".*"))
 
 
 def rough_maps(size: int) -> HeadMaps:
     rng = np.random.default_rng(0)
     normal = rng.normal(0, 0.2, (size, size, 3)).astype(np.float32) + np.float32([0, 0, 1])
-    return HeadMaps(rng.random((size, size, 3)).astype(np.float32),
-                    normal / np.linalg.norm(normal, axis=2, keepdims=True),
-                    rng.random((size, size)).astype(np.float32), np.ones((size, size), np.float32),
-                    np.ones((size, size, 3), np.float32), np.ones((size, size), np.float32))
+    return HeadMaps(
+        rng.random((size, size, 3)).astype(np.float32),
+        normal / np.linalg.norm(normal, axis=2, keepdims=True),
+        rng.random((size, size)).astype(np.float32),
+        np.ones((size, size), np.float32),
+        np.ones((size, size, 3), np.float32),
+        np.ones((size, size), np.float32),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -155,8 +168,13 @@ def test_the_body_sees_the_whole_map(busy):
     maps, changed = rough_maps(40), rough_maps(40)
     changed.diffuse[:8, :8] = 1
     far = np.s_[-16:, -16:]
-    assert np.abs(enlarge(maps, lambda share: None, network=busy)[far]
-                  - enlarge(changed, lambda share: None, network=busy)[far]).max() > 1e-5
+    assert (
+        np.abs(
+            enlarge(maps, lambda share: None, network=busy)[far]
+            - enlarge(changed, lambda share: None, network=busy)[far]
+        ).max()
+        > 1e-5
+    )
 
 
 def test_an_untrained_network_resamples(capture):
@@ -164,7 +182,7 @@ def test_an_untrained_network_resamples(capture):
     small = read_maps(capture.maps, capture.texture_confidence)
     large = enlarge(small, lambda share: None, network=network.Rcan(1, 1, 16))
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]
-    linear = np.stack([truth, truth ** 2, truth / 2], 2)
+    linear = np.stack([truth, truth**2, truth / 2], 2)
     assert np.abs(images.srgb_to_linear(large[..., :3]) - linear)[inner].max() < 2e-3
     assert np.abs(large[..., 3:6] - tilted(LARGE))[inner].max() < 4e-3
     assert np.abs(large[..., 6] - truth)[inner].max() < 2e-3
@@ -182,8 +200,10 @@ def test_the_stage_takes_the_network(capture, busy, monkeypatch):
     assert report.figures["method"] == "network"
     linear, coded = (images.read_linear(capture.maps_4k / f"diffuse_albedo.{kind}") for kind in ("exr", "png"))
     assert coded.shape == (LARGE, LARGE, 3) and np.abs(linear - coded).max() < 2e-3
-    assert np.abs(coded
-                  - images.resize(images.read_linear(capture.maps / "diffuse_albedo.exr"), LARGE, LARGE)).max() > 0.02
+    assert (
+        np.abs(coded - images.resize(images.read_linear(capture.maps / "diffuse_albedo.exr"), LARGE, LARGE)).max()
+        > 0.02
+    )
 
 
 @pytest.mark.parametrize("size", [96, 128, 200])
@@ -206,9 +226,10 @@ def test_a_cancel_ends_the_writing_and_leaves_nothing(tmp_path):
 
     with pytest.raises(CancelledError):
         blank = np.zeros((4 * images.ROWS_BETWEEN_CHECKS, 8))
-        upscale._write_together([partial(images.write_data, tmp_path / f"{i}.png", blank, check=cancelled)
-                                 for i in range(3)],
-                                lambda done: None)
+        upscale._write_together(
+            [partial(images.write_data, tmp_path / f"{i}.png", blank, check=cancelled) for i in range(3)],
+            lambda done: None,
+        )
     assert not list(tmp_path.iterdir()) and len(asked) <= 5, "what had not begun did not begin"
 
 

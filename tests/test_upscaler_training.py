@@ -20,16 +20,27 @@ def windows(tmp_path_factory):
     for seed in (1000, 1001, 9000):
         rough = rng.random((7, 24, 24)).astype(np.float32)
         large = np.stack([images.resize(channel, 96, 96) for channel in rough]).clip(0, 1)
-        large[3:6] = (np.float32([0, 0, 1])[:, None, None] + 0.3 * (large[3:6] - 0.5))
+        large[3:6] = np.float32([0, 0, 1])[:, None, None] + 0.3 * (large[3:6] - 0.5)
         large[3:6] /= np.linalg.norm(large[3:6], axis=0)
         np.save(work / f"window_{seed}_0.npy", large.astype(np.float16))
     return work
 
 
 def test_a_training_goes_on_where_it_stopped(windows, tmp_path, monkeypatch):
-    tiny = {"model": {"groups": 1, "blocks": 2, "width": 16},
-            "training": {"patch": 8, "batch": 4, "rate": 5e-3, "minutes": 1, "skins": 2, "views": 1, "held_out": 1,
-                         "seed": 0, "workers": 0}}
+    tiny = {
+        "model": {"groups": 1, "blocks": 2, "width": 16},
+        "training": {
+            "patch": 8,
+            "batch": 4,
+            "rate": 5e-3,
+            "minutes": 1,
+            "skins": 2,
+            "views": 1,
+            "held_out": 1,
+            "seed": 0,
+            "workers": 0,
+        },
+    }
     monkeypatch.setitem(upscaler.CONFIGS, "cpu", tiny)
     out = tmp_path / "upscaler.safetensors"
     first = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.01, windows))
@@ -58,8 +69,11 @@ def test_a_turned_window_is_a_turned_surface(seed):
     """The normals of a turned height field are the turned normals."""
     height = np.random.default_rng(9).normal(0, 0.2, (16, 16)).astype(np.float32)
     turned = fine_windows._turned(_relief(height), np.random.default_rng(seed))
-    candidates = [np.transpose(h) if t else h for h in (height, height[:, ::-1], height[::-1], height[::-1, ::-1])
-                  for t in (False, True)]
+    candidates = [
+        np.transpose(h) if t else h
+        for h in (height, height[:, ::-1], height[::-1], height[::-1, ::-1])
+        for t in (False, True)
+    ]
     assert any(np.allclose(turned, _relief(candidate), atol=1e-5) for candidate in candidates)
 
 

@@ -135,12 +135,23 @@ def test_vectors_miniloop(run):
 
     normal, weight = crop("in_obj_normal"), crop("in_face_mask")[0]
     shader = Shader(normal, v["in_light_support"][0, 0], (8, 8))
-    o = Observation(crop("in_texture_linear_blurred"), weight, torch.ones_like(weight),
-                    prior.make_coordinates(40, rows, columns, centred=False), shader, v["in_tv_ring"][0, 0] > 0.5)
+    o = Observation(
+        crop("in_texture_linear_blurred"),
+        weight,
+        torch.ones_like(weight),
+        prior.make_coordinates(40, rows, columns, centred=False),
+        shader,
+        v["in_tv_ring"][0, 0] > 0.5,
+    )
     reference = torch.cat([2 * crop("in_init_diff") - 1, crop("in_init_normal"), 2 * crop("in_init_spec") - 1])[None]
-    recipe = replace(RECIPES["released"], steps=12, start=0.6, candidates=3,
-                     phases=(("main", 0.0, 5 / 12), ("grid", 5 / 12, 10 / 12)),
-                     zeta=0.0 if run.startswith("pho0") else 1.0)
+    recipe = replace(
+        RECIPES["released"],
+        steps=12,
+        start=0.6,
+        candidates=3,
+        phases=(("main", 0.0, 5 / 12), ("grid", 5 / 12, 10 / 12)),
+        zeta=0.0 if run.startswith("pho0") else 1.0,
+    )
 
     def noise(step):
         drawn = [*([v["init_noise"]] if step == 0 else []), *(v["cand_noise"][step, :, None] if step < 11 else [])]
@@ -162,5 +173,8 @@ def test_vectors_miniloop(run):
         diffuse, skin = torch.zeros(3, 40, 40), v["in_skin_mask"][0, 0]
         diffuse[:, rows, columns] = albedo(last.denoised).clamp_min(0)
         tone = mean_tone(v["in_init_diff"][0] ** (1 / 2.2), skin) ** 2.2
-        close((diffuse * maps._gain(diffuse, skin, tone, "srgb")[:, None, None]) ** (1 / 2.2),
-              v["out_diff_srgb_rescaled"][0], 1e-3)
+        close(
+            (diffuse * maps._gain(diffuse, skin, tone, "srgb")[:, None, None]) ** (1 / 2.2),
+            v["out_diff_srgb_rescaled"][0],
+            1e-3,
+        )

@@ -29,8 +29,10 @@ def planes(signal: np.ndarray, matrix: int, bits: int, full: bool) -> list[np.nd
     step, top = 2 ** (bits - 8), 2**bits - 1
     scale, low, chroma = (top, 0, top) if full else (219 * step, 16 * step, 224 * step)
     kind = np.uint16 if bits > 8 else np.uint8
-    return [np.round(p).astype(kind)
-            for p in (low + scale * y, 128 * step + chroma * cb[::2, ::2], 128 * step + chroma * cr[::2, ::2])]
+    return [
+        np.round(p).astype(kind)
+        for p in (low + scale * y, 128 * step + chroma * cb[::2, ::2], 128 * step + chroma * cr[::2, ::2])
+    ]
 
 
 def signal_of(y: np.ndarray, cb: np.ndarray, cr: np.ndarray, matrix: int, bits: int, full: bool) -> np.ndarray:
@@ -48,14 +50,15 @@ def frame_of(signal: np.ndarray, matrix: int, bits: int, full: bool) -> av.Video
     frame = av.VideoFrame(signal.shape[1], signal.shape[0], f"yuv420p{bits}le" if bits > 8 else "yuv420p")
     for plane, values in zip(frame.planes, planes(signal, matrix, bits, full), strict=True):
         rows = np.zeros((plane.height, plane.line_size // values.itemsize), values.dtype)
-        rows[:, :values.shape[1]] = values
+        rows[:, : values.shape[1]] = values
         plane.update(rows.tobytes())
     frame.colorspace, frame.color_range = matrix, 2 if full else 1
     return frame
 
 
-def write(path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec="libx265", times=None, base=1000,
-          **options):
+def write(
+    path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec="libx265", times=None, base=1000, **options
+):
     """A video of full-range R'G'B' signals; `times` in units of 1/base second."""
     with av.open(str(path), "w") as container:
         options = {"preset": "ultrafast", "crf": "1", "x265-params": "log-level=none", **options}
@@ -100,7 +103,8 @@ HDR = [
     ("grey card", HLG, [0.38] * 3, [0.394] * 3),
     ("grey card", PQ, [0.38] * 3, [0.394] * 3),
     # 0.9 of linear light: the shoulder keeps the last tenth for highlights
-    ("reference white", HLG, [0.75] * 3, [0.955] * 3), ("reference white", PQ, [0.5807] * 3, [0.955] * 3),
+    ("reference white", HLG, [0.75] * 3, [0.955] * 3),
+    ("reference white", PQ, [0.5807] * 3, [0.955] * 3),
     ("1000 nits", HLG, [1.0] * 3, [0.996] * 3),
     ("1000 nits", PQ, [0.7518] * 3, [0.996] * 3),
     ("black", HLG, [0.0] * 3, [0.0] * 3),
@@ -114,13 +118,21 @@ HDR = [
 def test_hdr_of_ten_bits_shows_known_patches_in_known_colours(tmp_path, codec):
     for transfer in (HLG, PQ):
         known = [(signal, srgb) for _, kind, signal, srgb in HDR if kind == transfer]
-        path = write(tmp_path / f"{transfer}.mov", [patches([signal for signal, _ in known])] * 4, transfer, REC2020, 9,
-                     10, codec=codec)
+        path = write(
+            tmp_path / f"{transfer}.mov",
+            [patches([signal for signal, _ in known])] * 4,
+            transfer,
+            REC2020,
+            9,
+            10,
+            codec=codec,
+        )
         assert np.abs(shown(path) - [srgb for _, srgb in known]).max() < 0.015
 
 
-@pytest.mark.parametrize(("size", "transfer", "matrix"), [((1280, 720), 2, 1), ((720, 1280), 2, 1), ((640, 480), 2, 5),
-                                                           ((640, 480), PQ, 9)])
+@pytest.mark.parametrize(
+    ("size", "transfer", "matrix"), [((1280, 720), 2, 1), ((720, 1280), 2, 1), ((640, 480), 2, 5), ((640, 480), PQ, 9)]
+)
 def test_a_video_without_tags_is_read_as_players_read_it(size, transfer, matrix):
     skin = np.array([130, 105, 95]) / 255
     frame = frame_of(np.full((size[1], size[0], 3), skin), matrix, 10, False)
@@ -156,8 +168,10 @@ def test_wide_gamut_without_hdr_is_converted(tmp_path):
 @pytest.mark.parametrize("full", [False, True])
 def test_full_and_narrow_range_are_told_apart(tmp_path, full):
     colours = [[0.2] * 3, [0.8] * 3, [0.7, 0.5, 0.4], [0.1, 0.3, 0.2]]
-    assert np.abs(shown(write(tmp_path / "a.mp4", [patches(colours)] * 3, full=full, codec="libx264"))
-                  - colours).max() < 0.012
+    assert (
+        np.abs(shown(write(tmp_path / "a.mp4", [patches(colours)] * 3, full=full, codec="libx264")) - colours).max()
+        < 0.012
+    )
 
 
 @pytest.mark.parametrize("size", [(320, 180), (160, 90)], ids=["as it is", "shrunk"])
@@ -190,7 +204,7 @@ def test_a_video_is_turned_as_a_player_turns_it_but_never_mirrored(tmp_path, tur
     a, b, d, e = (-c, s, s, c) if mirrored else (c, s, -s, c)  # clockwise by `turn`; then left and right exchanged
     data = bytearray(path.read_bytes())
     at = data.index(b"tkhd") + 44
-    data[at:at + 36] = struct.pack(">9i", a * 65536, b * 65536, 0, d * 65536, e * 65536, 0, 0, 0, 0x40000000)
+    data[at : at + 36] = struct.pack(">9i", a * 65536, b * 65536, 0, d * 65536, e * 65536, 0, 0, 0, 0x40000000)
     path.write_bytes(data)
     report = Reporter("frames")
     picture = read(path, report=report)[0].srgb

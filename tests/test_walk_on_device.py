@@ -24,8 +24,13 @@ CARD = "meta"
 READ = "_local_scalar_dense", "is_nonzero", "nonzero", "equal", "masked_select"
 """Operators of ATen that wait for the device: their result is a number on the processor, or its shape depends on what
 was computed."""
-UNLIKE_OURS = {"wildcap": {}, "proximal": {"guidance": "proximal"}, "refitted": {"refit": 1.0}, "paper": {},
-               "released": {"candidates": 2}}
+UNLIKE_OURS = {
+    "wildcap": {},
+    "proximal": {"guidance": "proximal"},
+    "refitted": {"refit": 1.0},
+    "paper": {},
+    "released": {"candidates": 2},
+}
 
 
 class StaysOn(TorchDispatchMode):
@@ -39,8 +44,11 @@ class StaysOn(TorchDispatchMode):
     def __torch_dispatch__(self, func, types, args=(), kwargs=None):
         assert func.overloadpacket.__name__ not in READ, f"{func} reads a number back from the device"
         result = func(*args, **(kwargs or {}))
-        strange = [t for t in tree_leaves((args, kwargs, result)) if isinstance(t, torch.Tensor)
-                   and t.device.type != self.device]
+        strange = [
+            t
+            for t in tree_leaves((args, kwargs, result))
+            if isinstance(t, torch.Tensor) and t.device.type != self.device
+        ]
         assert not any(t.dim() for t in strange), f"{func} with {[(t.device.type, tuple(t.shape)) for t in strange]}"
         return result
 
@@ -53,8 +61,17 @@ def observed(size: int) -> Observation:
     alpha = (x > 0).float()
     ones = torch.ones(size, size)
     texture = torch.full((3, size, size), 0.3) * (1 - 0.5 * alpha)
-    return Observation(texture, ones, ones, make_coordinates(size, slice(0, size), slice(0, size)),
-                       Shader(normal, alpha, (4, 4)), alpha > 2, 4.0, ones, 0.1 * ones)
+    return Observation(
+        texture,
+        ones,
+        ones,
+        make_coordinates(size, slice(0, size), slice(0, size)),
+        Shader(normal, alpha, (4, 4)),
+        alpha > 2,
+        4.0,
+        ones,
+        0.1 * ones,
+    )
 
 
 def begun(size: int, cells: tuple[int, int] = (4, 4)) -> State:
@@ -73,8 +90,9 @@ def released_prior() -> ConditionedPrior:
 
 def walk(prior: ConditionedPrior, name: str, noise, device: str) -> State:
     """Two steps of a recipe, watched."""
-    recipe = replace(RECIPES["wildcap" if name in ("proximal", "refitted") else name], steps=4, updates=8,
-                     **UNLIKE_OURS[name])
+    recipe = replace(
+        RECIPES["wildcap" if name in ("proximal", "refitted") else name], steps=4, updates=8, **UNLIKE_OURS[name]
+    )
     o, state = observed(SIZE).to(device), begun(SIZE).to(device)
     prior(state.denoised, 1.0, o.coords)  # what the prior is told of a map is laid out once
     for i in range(2):
@@ -100,11 +118,19 @@ def test_a_step_on_a_card_has_nothing_on_the_processor(name, make):
     assert {tensor.device.type for tensor in found} == {CARD} and state.moments
 
 
-@pytest.mark.parametrize("leak",
-                         [lambda t: t.sum().item(), lambda t: bool(t.max() > 1), lambda t: t[t > 0], lambda t: t.cpu(),
-                          lambda t: t * torch.ones(3),
-                          lambda t: t.sum() + torch.zeros(2), lambda t: torch.tensor([1.0, 2.0, 3.0]).to(CARD),
-                          lambda t: torch.eye(3) @ torch.ones(3)])
+@pytest.mark.parametrize(
+    "leak",
+    [
+        lambda t: t.sum().item(),
+        lambda t: bool(t.max() > 1),
+        lambda t: t[t > 0],
+        lambda t: t.cpu(),
+        lambda t: t * torch.ones(3),
+        lambda t: t.sum() + torch.zeros(2),
+        lambda t: torch.tensor([1.0, 2.0, 3.0]).to(CARD),
+        lambda t: torch.eye(3) @ torch.ones(3),
+    ],
+)
 def test_the_watch_sees_a_leak(leak):
     """Each of these waits for a card or needs a copy. Some of them PyTorch refuses itself, as `meta` has no values to
     read."""

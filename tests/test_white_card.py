@@ -40,10 +40,14 @@ def test_a_click_on_a_card_gives_the_white_point_and_the_cross_takes_it_away(add
     assert item.solve.white_point == "auto"
 
 
-@pytest.mark.parametrize(("frame", "uv", "said"),
-                         [("00000.jpg", (0.5, 0.2), "burnt out or black"),
-                          ("00000.jpg", (1.2, 0.2), "outside the frame"),
-                          ("00009.jpg", (0.5, 0.7), "no such frame")])
+@pytest.mark.parametrize(
+    ("frame", "uv", "said"),
+    [
+        ("00000.jpg", (0.5, 0.2), "burnt out or black"),
+        ("00000.jpg", (1.2, 0.2), "outside the frame"),
+        ("00009.jpg", (0.5, 0.7), "no such frame"),
+    ],
+)
 def test_a_click_that_measures_nothing_says_why(item, frame, uv, said):
     with pytest.raises(RuntimeError, match=said):
         bpy.ops.wildcap.pick_white_point(frame=frame, uv=uv)
@@ -67,15 +71,22 @@ def test_the_chart_that_the_solver_finds_reaches_the_settings(addon, item, monke
     assert item.solve.white_point == "0.9000,0.8000,0.6000"
 
 
-@pytest.mark.parametrize("ask, figures, kept", [
-    ("estimate_skin_tone", {"skin_tone_srgb": [0.5, 0.4, 0.3]}, lambda item: item.use_skin_tone),
-    ("find_color_checker", {"white_point": [0.9, 0.8, 0.6]}, lambda item: item.solve.white_point != "auto")])
+@pytest.mark.parametrize(
+    "ask, figures, kept",
+    [
+        ("estimate_skin_tone", {"skin_tone_srgb": [0.5, 0.4, 0.3]}, lambda item: item.use_skin_tone),
+        ("find_color_checker", {"white_point": [0.9, 0.8, 0.6]}, lambda item: item.solve.white_point != "auto"),
+    ],
+)
 def test_undo_of_what_came_after_an_estimate_leaves_the_estimate(addon, item, monkeypatch, ask, figures, kept):
     if not bpy.context.window_manager.windows:
         pytest.skip("no window in this Blender: the flows in a window hold it")
     ended = []
-    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, then: ended.append(then) or type(
-        "Job", (), {"figures": figures}))
+    monkeypatch.setattr(
+        addon("jobs"),
+        "start_tool",
+        lambda item, tool, then: ended.append(then) or type("Job", (), {"figures": figures}),
+    )
     cube = bpy.data.objects.new("Cube", None)
     bpy.context.scene.collection.objects.link(cube)
     bpy.ops.ed.undo_push(message="Cube")
@@ -95,17 +106,33 @@ def test_operators_that_change_the_scene_are_steps_of_undo(addon):
 def test_the_panel_says_where_the_tone_comes_from(addon, capture, item):
     words, set_tone = (lambda item: addon("solve.panel").tone_words(item, None)), addon("solve.operators").set_tone
     root = addon("captures").root(item)
-    set_tone(root,
-             {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 6.4,
-              "skin_tone_source": "scene"})
+    set_tone(
+        root,
+        {
+            "skin_tone_srgb": [0.5, 0.4, 0.3],
+            "skin_tone_group": "tan",
+            "skin_tone_deviation_l": 6.4,
+            "skin_tone_source": "scene",
+        },
+    )
     assert words(item) == "Skin tone: estimated, ±6. Choose it if it looks wrong." and item.use_skin_tone
-    set_tone(root,
-             {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 2.0,
-              "skin_tone_source": "white point"})
+    set_tone(
+        root,
+        {
+            "skin_tone_srgb": [0.5, 0.4, 0.3],
+            "skin_tone_group": "tan",
+            "skin_tone_deviation_l": 2.0,
+            "skin_tone_source": "white point",
+        },
+    )
     assert words(item) == "tan, ± 2 L*, by white point"
     item.use_skin_tone = False
-    finding = {"stage": "solve", "problem": "Skin tone: estimated, ±7.", "remedy": "Choose it if it looks wrong.",
-               "stopped": False}
+    finding = {
+        "stage": "solve",
+        "problem": "Skin tone: estimated, ±7.",
+        "remedy": "Choose it if it looks wrong.",
+        "stopped": False,
+    }
     solved = addon("status").Status(findings=(finding,))
     assert addon("solve.panel").tone_words(item, solved) == "Skin tone: estimated, ±7. Choose it if it looks wrong."
     assert "when the maps are solved" in words(item)

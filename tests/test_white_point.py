@@ -20,24 +20,52 @@ from .recorded import changed, record
 white_point = pytest.importorskip("core.solve.white_point")
 LIGHT = np.array([0.9, 0.8, 0.6])
 QUAD = [[120, 140], [340, 160], [330, 300], [115, 285]]
-CHART = np.array([(115, 82, 68), (194, 150, 130), (98, 122, 157), (87, 108, 67), (133, 128, 177), (103, 189, 170),
-                  (214, 126, 44), (80, 91, 166), (193, 90, 99), (94, 60, 108), (157, 188, 64), (224, 163, 46),
-                  (56, 61, 150), (70, 148, 73), (175, 54, 60), (231, 199, 31), (187, 86, 149), (8, 133, 161),
-                  (243, 243, 242), (200, 200, 200), (160, 160, 160), (122, 122, 121), (85, 85, 85), (52, 52, 52)],
-                 np.float32) / 255
+CHART = (
+    np.array(
+        [
+            (115, 82, 68),
+            (194, 150, 130),
+            (98, 122, 157),
+            (87, 108, 67),
+            (133, 128, 177),
+            (103, 189, 170),
+            (214, 126, 44),
+            (80, 91, 166),
+            (193, 90, 99),
+            (94, 60, 108),
+            (157, 188, 64),
+            (224, 163, 46),
+            (56, 61, 150),
+            (70, 148, 73),
+            (175, 54, 60),
+            (231, 199, 31),
+            (187, 86, 149),
+            (8, 133, 161),
+            (243, 243, 242),
+            (200, 200, 200),
+            (160, 160, 160),
+            (122, 122, 121),
+            (85, 85, 85),
+            (52, 52, 52),
+        ],
+        np.float32,
+    )
+    / 255
+)
 """The published sRGB of a ColorChecker Classic's patches."""
 
 
 def frame(light=None, quad=QUAD, width=480, height=400) -> np.ndarray:
     """A noisy, uneven sRGB frame, with a chart lit by `light` (linear) where one is given."""
     rng = np.random.default_rng(3)
-    picture = cv2.resize(rng.uniform(0.05, 0.4, (6, 7, 3)).astype(np.float32), (width, height),
-                         interpolation=cv2.INTER_CUBIC)
+    picture = cv2.resize(
+        rng.uniform(0.05, 0.4, (6, 7, 3)).astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC
+    )
     if light is not None:
         chart = np.full((200, 296, 3), 0.012, np.float32)
         for k, colour in enumerate(images.srgb_to_linear(CHART)):
             row, column = divmod(k, 6)
-            chart[8 + 48 * row:48 + 48 * row, 8 + 48 * column:48 + 48 * column] = colour
+            chart[8 + 48 * row : 48 + 48 * row, 8 + 48 * column : 48 + 48 * column] = colour
         turn = cv2.getPerspectiveTransform(np.float32([[0, 0], [296, 0], [296, 200], [0, 200]]), np.float32(quad))
         cover = cv2.warpPerspective(np.ones((200, 296), np.float32), turn, (width, height))[..., None]
         picture = picture * (1 - cover) + cover * cv2.warpPerspective(chart * np.float32(light), turn, (width, height))
@@ -88,9 +116,14 @@ def test_a_card_that_is_pointed_at_gives_its_light(tmp_path, capsys, card, refle
     assert np.abs(found / LIGHT - 1).max() < 0.02
 
 
-@pytest.mark.parametrize(("where", "colour", "said"),
-                         [((900, 20), 0.5, "outside of the frame"), ((20, 20), 1.0, "burnt out or black"),
-                          ((20, 20), None, "not of one colour")])
+@pytest.mark.parametrize(
+    ("where", "colour", "said"),
+    [
+        ((900, 20), 0.5, "outside of the frame"),
+        ((20, 20), 1.0, "burnt out or black"),
+        ((20, 20), None, "not of one colour"),
+    ],
+)
 def test_a_place_that_tells_nothing_is_refused(where, colour, said):
     picture = np.full((60, 80, 3), 0.5 if colour is None else colour, np.float32)
     picture[:, 20:] = 0.2 if colour is None else colour
@@ -98,9 +131,10 @@ def test_a_place_that_tells_nothing_is_refused(where, colour, said):
         white_point.measure_card_white(picture, *where, "grey")
 
 
-@pytest.mark.parametrize(("words", "said"),
-                         [(["--frame", "00000.jpg"], "go together"),
-                          (["--frame", "9.jpg", "--at", "1", "1"], "There is no frame")])
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["--frame", "00000.jpg"], "go together"), (["--frame", "9.jpg", "--at", "1", "1"], "There is no frame")],
+)
 def test_the_command_says_what_is_missing(tmp_path, capsys, words, said):
     assert main(["white", str(filmed(tmp_path, frame()).root), *words]) == 2 and said in capsys.readouterr().err
 

@@ -35,10 +35,14 @@ def cut(truth) -> HeadMaps:
     seen = template.mask("face", SIZE)
     hidden = seen < 0.5
     plain = truth.diffuse[template.mask("skin", SIZE) > 0.99].mean(0) * WRONG
-    return replace(truth, confidence=0.7 * seen, seen=seen,
-                   diffuse=np.where(hidden[..., None], plain, truth.diffuse).astype(np.float32),
-                   normal=np.where(hidden[..., None], np.float32([0, 0, 1]), truth.normal),
-                   specular=np.where(hidden, np.float32(0.2), truth.specular))
+    return replace(
+        truth,
+        confidence=0.7 * seen,
+        seen=seen,
+        diffuse=np.where(hidden[..., None], plain, truth.diffuse).astype(np.float32),
+        normal=np.where(hidden[..., None], np.float32([0, 0, 1]), truth.normal),
+        specular=np.where(hidden, np.float32(0.2), truth.specular),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -92,10 +96,12 @@ def test_the_border_of_the_seen_part_is_no_step(cut, done):
     signed = template.mask("face", SIZE)
     soft = grain.blurred(signed[..., None], np.ones_like(signed), 12.0)[..., 0]
     inner, outer = (soft > 0.60) & (soft < 0.75), (soft > 0.25) & (soft < 0.40)
-    step = [np.abs(np.log(maps.diffuse[inner]).mean(0) - np.log(maps.diffuse[outer]).mean(0)).max()
-            for maps in (cut, done)]
-    within = np.abs(np.log(done.diffuse[(soft > 0.75) & (soft < 0.9)]).mean(0)
-                    - np.log(done.diffuse[inner]).mean(0)).max()
+    step = [
+        np.abs(np.log(maps.diffuse[inner]).mean(0) - np.log(maps.diffuse[outer]).mean(0)).max() for maps in (cut, done)
+    ]
+    within = np.abs(
+        np.log(done.diffuse[(soft > 0.75) & (soft < 0.9)]).mean(0) - np.log(done.diffuse[inner]).mean(0)
+    ).max()
     assert step[1] < within + 0.05 and step[1] < 0.5 * step[0]
 
 
@@ -136,9 +142,12 @@ def test_a_patch_of_scalp_among_unseen_is_no_stain_and_a_scalp_seen_all_around_k
 
     def seen_within(radius_mm: float) -> tuple[HeadMaps, HeadMaps]:
         patch = (distance < radius_mm) & scalp
-        told = replace(cut, confidence=np.where(patch, np.float32(0.7), cut.confidence),
-                       seen=np.where(patch, np.float32(1), cut.seen),
-                       diffuse=np.where(patch[..., None], 0.5 * cut.diffuse, cut.diffuse))
+        told = replace(
+            cut,
+            confidence=np.where(patch, np.float32(0.7), cut.confidence),
+            seen=np.where(patch, np.float32(1), cut.seen),
+            diffuse=np.where(patch[..., None], 0.5 * cut.diffuse, cut.diffuse),
+        )
         return told, complete(told, surface(), Reporter("upscale"))
 
     def contrast(maps: HeadMaps) -> float:
@@ -156,18 +165,23 @@ def test_a_stray_patch_that_was_seen_at_a_glance_goes_and_a_mark_that_was_seen_w
     and a mark on the cheek as dark."""
     position, texel = surface().position, surface().texel
     below = np.argwhere((template.mask("neck", SIZE) > 0.9) & (texel < 1.5 * np.median(texel)))
-    sides = [tuple(below[np.argsort(position[tuple(below.T)][:, 0])[k]])
-             for k in (len(below) // 5, 4 * len(below) // 5)]
+    sides = [
+        tuple(below[np.argsort(position[tuple(below.T)][:, 0])[k]]) for k in (len(below) // 5, 4 * len(below) // 5)
+    ]
     stray, plain = (np.linalg.norm(position - position[at], axis=2) < 14 for at in sides)
     well = (template.mask("face", SIZE) > 0.99) & (seen_well(cut.seen, surface()) >= 1)
     cheek = tuple(np.argwhere(well & (template.mask("skin", SIZE) > 0.99))[5000])
     mark = (np.linalg.norm(position - position[cheek], axis=2) < 3) & well
-    confidence, seen = (np.where(stray | plain, np.float32(half), each)
-                        for half, each in ((0.35, cut.confidence), (0.5, cut.seen)))
+    confidence, seen = (
+        np.where(stray | plain, np.float32(half), each) for half, each in ((0.35, cut.confidence), (0.5, cut.seen))
+    )
     diffuse = np.where((stray | plain)[..., None], truth.diffuse, cut.diffuse)
     diffuse[stray], diffuse[mark] = np.minimum(3 * diffuse[stray], 1), diffuse[mark] / 3
-    told = complete(replace(cut, confidence=confidence, seen=seen, diffuse=diffuse.astype(np.float32)), surface(),
-                    Reporter("upscale"))
+    told = complete(
+        replace(cut, confidence=confidence, seen=seen, diffuse=diffuse.astype(np.float32)),
+        surface(),
+        Reporter("upscale"),
+    )
     inner = [np.linalg.norm(position - position[at], axis=2) < 4 for at in sides]
     off = [float(np.abs(np.log(told.diffuse[at] / truth.diffuse[at])).mean()) for at in inner]
     assert off[0] < 0.3 and off[1] < 0.2, off  # the stray one was off by 1.1
@@ -179,8 +193,11 @@ def test_a_beard_that_was_seen_well_keeps_its_bytes(truth, cut, darker):
     """With the confidence that the solver itself gives a beard."""
     jaw = beard.zone(template.landmark_points(surface().mesh), surface().position)[..., None]
     diffuse = (cut.diffuse * (1 - jaw * (1 - darker))).astype(np.float32)
-    evidence = plain_evidence(SIZE, weight=torch.from_numpy(np.clip(cut.seen / FULL_CONFIDENCE, 0, 1)),
-                              trust=torch.from_numpy((1 - (1 - BEARD_TRUST) * jaw[..., 0]).astype(np.float32)))
+    evidence = plain_evidence(
+        SIZE,
+        weight=torch.from_numpy(np.clip(cut.seen / FULL_CONFIDENCE, 0, 1)),
+        trust=torch.from_numpy((1 - (1 - BEARD_TRUST) * jaw[..., 0]).astype(np.float32)),
+    )
     confidence = estimate_confidence(evidence, diffuse)
     bearded = (jaw[..., 0] > 0.99) & (seen_well(cut.seen, surface()) >= 1)
     assert bearded.sum() > 100 and np.median(confidence[bearded]) < 0.7

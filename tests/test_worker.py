@@ -124,15 +124,18 @@ def test_the_worker_ends_when_its_starter_is_gone(root, capture, video):
     assert worker._process.wait(timeout=5) == 3
 
 
-@pytest.mark.parametrize(("mood", "problem"), [
-    ("finding", "The face is not there."),
-    ("bug", "An error inside WildCap stopped the stage scan (WC-"),
-    ("memory", "There was not enough memory for the stage scan."),
-    ("full", "The disk is full"),
-    ("module", "The solver's Python has no module named a_module_that_is_not_there"),
-    ("nothing", "An error inside WildCap stopped the stage scan (WC-"),
-    ("die", "The worker ended unexpectedly during the stage scan (exit code 9)."),
-])
+@pytest.mark.parametrize(
+    ("mood", "problem"),
+    [
+        ("finding", "The face is not there."),
+        ("bug", "An error inside WildCap stopped the stage scan (WC-"),
+        ("memory", "There was not enough memory for the stage scan."),
+        ("full", "The disk is full"),
+        ("module", "The solver's Python has no module named a_module_that_is_not_there"),
+        ("nothing", "An error inside WildCap stopped the stage scan (WC-"),
+        ("die", "The worker ended unexpectedly during the stage scan (exit code 9)."),
+    ],
+)
 def test_every_way_to_fail_is_a_problem_with_a_remedy(root, capture, video, mood, problem):
     final = follow(start(root, capture, {"scan": mood}, source=video))[-1]
     assert isinstance(final, Failed) and final.stage == "scan" and final.problem.startswith(problem)
@@ -237,8 +240,14 @@ def test_only_protocol_lines_leave_by_stdout(root, capture, video):
     (capture.root / "mood.json").write_text('{"frames": "print"}')
     job = tiny_chain.write_job(capture, source=video, last="frames")
     command = [sys.executable, "-E", "-s", "-B", "-m", "core.worker", str(job)]
-    with subprocess.Popen(command, cwd=root, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                          # it steps back with its whole session, which shall not be this one
-                          start_new_session=True) as process:
+    with subprocess.Popen(
+        command,
+        cwd=root,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        # it steps back with its whole session, which shall not be this one
+        start_new_session=True,
+    ) as process:
         lines = process.stdout.read().splitlines()
     assert [json.loads(line)["kind"] for line in lines][-2:] == ["StageDone", "Done"]

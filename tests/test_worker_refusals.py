@@ -66,29 +66,44 @@ def test_job_files_that_make_no_sense(capture, tmp_path):
         read_job(tmp_path / "job.json")
 
 
-@pytest.mark.parametrize(("error", "words"), [
-    (MemoryError(), "not enough memory for the stage solve"),
-    (ModuleNotFoundError("No module named 'x'", name="x"), "has no module named x"),
-    (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero)."),
-    (OSError(errno.ENOSPC, "No space left on device", "/disk/x.exr"), "The disk is full"),
-    (OSError(errno.EROFS, "Read-only file system", "/disk/x.exr"), "the folder is read-only"),
-    (OSError(errno.EIO, "Input/output error", "/disk/x.exr"), "could not be written (Input/output error)")])
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (MemoryError(), "not enough memory for the stage solve"),
+        (ModuleNotFoundError("No module named 'x'", name="x"), "has no module named x"),
+        (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero)."),
+        (OSError(errno.ENOSPC, "No space left on device", "/disk/x.exr"), "The disk is full"),
+        (OSError(errno.EROFS, "Read-only file system", "/disk/x.exr"), "the folder is read-only"),
+        (OSError(errno.EIO, "Input/output error", "/disk/x.exr"), "could not be written (Input/output error)"),
+    ],
+)
 def test_what_stops_a_stage_is_explained(tmp_path, error, words):
     problem = explained(error, "solve", tmp_path / "solve.log")
     assert words in problem.problem and problem.remedy.endswith(".")
 
 
 def test_a_write_is_named_by_the_file_it_was_for():
-    assert "maps" in storage_problem(OSError(errno.EACCES, "Permission denied"),
-                                     Path("/face.wildcap/.maps.123.tmp/normal.png")).problem
+    assert (
+        "maps"
+        in storage_problem(
+            OSError(errno.EACCES, "Permission denied"), Path("/face.wildcap/.maps.123.tmp/normal.png")
+        ).problem
+    )
 
 
-@pytest.mark.parametrize(("said", "words"), [
-    ("ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device", "The disk that holds"),
-    ("ERROR: Connection reset by peer", "could not be downloaded"),
-    ("ERROR: It is Tuesday.", "The installation stopped (It is Tuesday)."),
-    ("ERROR: THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE.", "its hash is another"),
-    ("Killed", "The installation stopped (no message).")])
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        (
+            "ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device",
+            "The disk that holds",
+        ),
+        ("ERROR: Connection reset by peer", "could not be downloaded"),
+        ("ERROR: It is Tuesday.", "The installation stopped (It is Tuesday)."),
+        ("ERROR: THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE.", "its hash is another"),
+        ("Killed", "The installation stopped (no message)."),
+    ],
+)
 def test_an_installation_that_stops_says_why(tmp_path, monkeypatch, said, words):
     monkeypatch.setattr(installation, "lock_of", lambda *_: Lock("manylinux_x86_64-3.11", {}))
     monkeypatch.setattr(installation.bare_environment, "make", lambda *_, **__: None)
@@ -99,8 +114,9 @@ def test_an_installation_that_stops_says_why(tmp_path, monkeypatch, said, words)
         return 1, said if "ERROR" in said else ""
 
     monkeypatch.setattr(installation.BackgroundTask, "run", run)
-    task = installation.installation(tmp_path / "env", REQUIREMENTS, tmp_path / "env.log", Path(sys.executable),
-                                     installation.PackageSource())
+    task = installation.installation(
+        tmp_path / "env", REQUIREMENTS, tmp_path / "env.log", Path(sys.executable), installation.PackageSource()
+    )
     assert words in finish(task).problem and said in (tmp_path / "env.log").read_text()
 
 

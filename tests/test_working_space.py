@@ -49,9 +49,13 @@ def test_the_others_hold_in_acescg(tmp_path):
         assert f"  {role}: {usual}\n" in text
         text = text.replace(f"  {role}: {usual}\n", f"  {role}: ACEScg\n")
     configuration.write_text(text, encoding="utf-8")
-    result = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(Path(__file__))],
-                            env={**os.environ, "OCIO": str(configuration)}, cwd=ROOT, capture_output=True,
-                            text=True)
+    result = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(Path(__file__))],
+        env={**os.environ, "OCIO": str(configuration)},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
     ran = re.search(r"(\d+) passed", result.stdout)
     assert result.returncode == 0 and ran and int(ran[1]) >= 4, result.stdout[-3000:]
 
@@ -98,8 +102,9 @@ def test_what_an_exporter_writes(addon, tmp_path, suffix):
     material.diffuse_color = (*working(red), 1)
     plan = SimpleNamespace(format=SimpleNamespace(suffix=suffix))
     named = suffix == ".usdc" and bpy.app.version >= (5, 2, 0)
-    assert base_colour(addon("deliver.stand")._plain(material, plan)) == pytest.approx(working(red) if named else red,
-                                                                                       NEAR)
+    assert base_colour(addon("deliver.stand")._plain(material, plan)) == pytest.approx(
+        working(red) if named else red, NEAR
+    )
 
 
 def test_the_eyedropper_reads_srgb_from_a_map_of_16_bits(addon, tmp_path):

@@ -40,14 +40,20 @@ def build(folder: Path) -> Path:
 
 def core(code: Path, *words) -> subprocess.CompletedProcess:
     """`python -m core` with these words, by the tiny rooms."""
-    return subprocess.run([sys.executable, "-B", "-m", "core", *map(str, words)], cwd=code, capture_output=True,
-                          text=True, timeout=120)
+    return subprocess.run(
+        [sys.executable, "-B", "-m", "core", *map(str, words)], cwd=code, capture_output=True, text=True, timeout=120
+    )
 
 
 def start(code: Path, *words) -> subprocess.Popen:
     """The same, not waited for."""
-    return subprocess.Popen([sys.executable, "-B", "-m", "core", *map(str, words)], cwd=code, stdout=subprocess.PIPE,
-                            stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        [sys.executable, "-B", "-m", "core", *map(str, words)],
+        cwd=code,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
 
 
 def make(code: Path, folder: Path, names: str = "abc", moods: dict | None = None, *options) -> Batch:
@@ -78,5 +84,9 @@ def states(batch: Batch) -> dict[str, str]:
 
 def finished(batch: Batch) -> dict[str, dict]:
     """When each stage of each face ended, and the bytes that it wrote: the same twice where nothing was done twice."""
-    return {face.name: {name: (stage["finished"], stage["seconds"])
-                        for name, stage in face.capture.read()["stages"].items()} for face in batch.faces}
+    return {
+        face.name: {
+            name: (stage["finished"], stage["seconds"]) for name, stage in face.capture.read()["stages"].items()
+        }
+        for face in batch.faces
+    }

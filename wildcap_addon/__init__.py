@@ -29,9 +29,29 @@ from . import (
     timings,
 )
 
-ROOMS = (frame_icons, preferences, properties, panel, setup, capture, reconstruct, paint, solve, relight, make, acting,
-         groom, deliver, links, status, timings, jobs, batches, batch, terminal)
-
+ROOMS = (
+    frame_icons,
+    preferences,
+    properties,
+    panel,
+    setup,
+    capture,
+    reconstruct,
+    paint,
+    solve,
+    relight,
+    make,
+    acting,
+    groom,
+    deliver,
+    links,
+    status,
+    timings,
+    jobs,
+    batches,
+    batch,
+    terminal,
+)
 
 
 def register():

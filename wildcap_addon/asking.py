@@ -22,8 +22,9 @@ def forget(key: tuple) -> None:
     _answers.pop(key, None)
 
 
-def find_answer(key: tuple, work: Callable[[BackgroundTask], object], operator: str,
-                meant: Callable[[], bool] = lambda: True) -> None:
+def find_answer(
+    key: tuple, work: Callable[[BackgroundTask], object], operator: str, meant: Callable[[], bool] = lambda: True
+) -> None:
     """Runs a job that the tab shows and that finds an answer; then the operator's dialog opens as if it were clicked
     again.
 

@@ -41,8 +41,10 @@ class BaseOperator:
 
     @classmethod
     def with_capture(cls, context) -> bool:
-        return cls.allowed(captures.active(context) is not None,
-                           "There is no face to work on yet: choose a video, or open the sample head")
+        return cls.allowed(
+            captures.active(context) is not None,
+            "There is no face to work on yet: choose a video, or open the sample head",
+        )
 
     def execute(self, context):
         root = captures.root(captures.active(context))
@@ -118,8 +120,9 @@ class Dialog(BaseOperator):
         if self.lines is None:
             return {'CANCELLED'}
         title = f"{iface_(self.bl_label, 'Operator')}?"
-        return context.window_manager.invoke_props_dialog(self, width=WIDTH_PX, title=title,
-                                                          confirm_text=self.bl_label.partition(" ")[0])
+        return context.window_manager.invoke_props_dialog(
+            self, width=WIDTH_PX, title=title, confirm_text=self.bl_label.partition(" ")[0]
+        )
 
     def draw(self, context):
         for line in self.lines:

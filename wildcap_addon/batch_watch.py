@@ -139,8 +139,16 @@ class Watch(threading.Thread):
 def _stamp(face: BatchFace) -> tuple:
     """What a face's state depends on, as far as one look at its folder tells."""
     capture = face.capture
-    watched = (capture.json, capture.root / gate.NAME, capture.shadow_mask_auto, capture.shadow_mask,
-               capture.protect_mask, capture.texture, capture.solved, capture.renders / state.SHEET)
+    watched = (
+        capture.json,
+        capture.root / gate.NAME,
+        capture.shadow_mask_auto,
+        capture.shadow_mask,
+        capture.protect_mask,
+        capture.texture,
+        capture.solved,
+        capture.renders / state.SHEET,
+    )
     return (os.path.lexists(capture.lock), *(_changed(path) for path in watched))
 
 
@@ -149,8 +157,12 @@ def _ask(batch: Batch, face: BatchFace) -> FaceState:
     try:
         return state.derive_state(batch, face)
     except OSError as error:
-        return FaceState(STOPPED, None, f"The capture folder {face.root} cannot be read ({error.strerror or error}).",
-                         "See that its disk or server is connected.")
+        return FaceState(
+            STOPPED,
+            None,
+            f"The capture folder {face.root} cannot be read ({error.strerror or error}).",
+            "See that its disk or server is connected.",
+        )
 
 
 def _changed(path: Path) -> int:
@@ -173,8 +185,11 @@ def _read_progress(root: Path) -> dict:
     """progress.json, as far as it makes sense; {} for none."""
     try:
         told = read_json(root / local.PROGRESS)
-        working = {str(name): {"stage": str(each["stage"]), "share": each["share"]}
-                   for name, each in told["working"].items() if is_number(each["share"])}
+        working = {
+            str(name): {"stage": str(each["stage"]), "share": each["share"]}
+            for name, each in told["working"].items()
+            if is_number(each["share"])
+        }
         ended, of, left = told["ended"], told["of"], told["left_s"]
         sound = is_number(ended, 0) and is_number(of, 0) and (left is None or is_number(left, 0))
         return {"ended": ended, "of": of, "left_s": left, "working": working} if sound else {}

@@ -67,22 +67,28 @@ def state_of(root: str) -> FaceState | None:
 def works_on(root: str) -> bool:
     """Whether the batch has a capture in hand, or somebody else has one of its."""
     face, face_state = view().face(root), state_of(root)
-    return face is not None and (face.name in view().progress.get("working", {}) or face_state is not None
-                                 and face_state.state == WORKING)
+    return face is not None and (
+        face.name in view().progress.get("working", {}) or face_state is not None and face_state.state == WORKING
+    )
 
 
 def waiting() -> list[BatchFace]:
     """The faces whose masks wait to be looked at, in the batch's order."""
     known = view()
-    return ([face for face in known.batch.faces if (status := state_of(str(face.root))) and status.state == WAITING]
-            if known.batch else [])
+    return (
+        [face for face in known.batch.faces if (status := state_of(str(face.root))) and status.state == WAITING]
+        if known.batch
+        else []
+    )
 
 
 def ready() -> int:
     """How many faces are to be solved with a mask that was looked at."""
     face_states = [state_of(str(face.root)) for face in view().batch.faces] if view().batch else []
-    return sum(each is not None and each.state == TO_DO and each.group is not None and each.group.name == GATE
-               for each in face_states)
+    return sum(
+        each is not None and each.state == TO_DO and each.group is not None and each.group.name == GATE
+        for each in face_states
+    )
 
 
 def accept(face: BatchFace) -> None:
@@ -105,16 +111,20 @@ def poll() -> bool:
         face = known.face(root)
         if face is None or face.name in known.states and known.states[face.name].state != WAITING:
             _accepted.discard(root)
-    before, _shown = _shown, (current(), known.states, known.runner, bool(known.problem), line(known), share(known),
-                              frozenset(_accepted))
+    before, _shown = (
+        _shown,
+        (current(), known.states, known.runner, bool(known.problem), line(known), share(known), frozenset(_accepted)),
+    )
     return before != _shown
 
 
 def line(view: BatchView) -> str:
     """What is being done, and how long all of it takes: 'Anna: Cameras 40 %, about 20 min left'; '' where nothing is
     told."""
-    words = [iface_("{}: {} {}").format(name, iface_(each["stage"]), f"{each['share']:.0%}")
-             for name, each in view.progress.get("working", {}).items()][:3]
+    words = [
+        iface_("{}: {} {}").format(name, iface_(each["stage"]), f"{each['share']:.0%}")
+        for name, each in view.progress.get("working", {}).items()
+    ][:3]
     if view.progress.get("left_s") is not None:
         words.append(iface_("about {} min left").format(max(1, round(view.progress["left_s"] / 60))))
     return ", ".join(words)

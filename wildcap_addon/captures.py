@@ -140,13 +140,16 @@ def head(context, item) -> bpy.types.Object | None:
 def require_head(context, item) -> bpy.types.Object:
     head_object = head(context, item)
     if head_object is None:
-        raise Problem("The head is not in this scene.",
-                      "Click Bring In Head; if it was never reconstructed, click Reconstruct.")
+        raise Problem(
+            "The head is not in this scene.", "Click Bring In Head; if it was never reconstructed, click Reconstruct."
+        )
     return head_object
 
 
 def require_shown(context, obj: bpy.types.Object) -> None:
     """Raises Problem where the head is in the scene, but not in the view layer, where alone an object can be active."""
     if obj.name not in context.view_layer.objects:
-        raise Problem("The head is in a collection that is excluded from this view layer.",
-                      "Tick that collection in the Outliner.")
+        raise Problem(
+            "The head is in a collection that is excluded from this view layer.",
+            "Tick that collection in the Outliner.",
+        )

@@ -13,8 +13,15 @@ import bpy
 import numpy as np
 from mathutils import Color
 
-SRGB = ("sRGB", "sRGB - Texture", "Utility - sRGB - Texture", "Input - Generic - sRGB - Texture", "srgb_texture",
-        "srgb_tx", "sRGB Encoded Rec.709 (sRGB)")
+SRGB = (
+    "sRGB",
+    "sRGB - Texture",
+    "Utility - sRGB - Texture",
+    "Input - Generic - sRGB - Texture",
+    "srgb_texture",
+    "srgb_tx",
+    "sRGB Encoded Rec.709 (sRGB)",
+)
 """Of Blender, ACES 1.3 and newer, ACES 1.0 to 1.2, the same by its family, their short forms, and the Color Interop
 Forum's (2024)."""
 VIEWS = ("Standard", "Un-tone-mapped", "Raw")
@@ -70,9 +77,11 @@ def of_pictures() -> str:
 def missing(image: bpy.types.Image) -> str:
     """What the artist is to know about how a picture is read; '' where it is read as sRGB."""
     name = image.colorspace_settings.name
-    return ("" if name in SRGB
-            else f"This OCIO configuration has no sRGB by a known name: pictures are read as {name}, its space for 8 "
-                 "bits.")
+    return (
+        ""
+        if name in SRGB
+        else f"This OCIO configuration has no sRGB by a known name: pictures are read as {name}, its space for 8 bits."
+    )
 
 
 def missing_view(scene: bpy.types.Scene) -> str:
@@ -80,8 +89,11 @@ def missing_view(scene: bpy.types.Scene) -> str:
     settings = scene.view_settings
     now, look = settings.view_transform, settings.look  # Blender drops a look that another view does not have
     try:
-        return ("" if _choose(settings, "view_transform", VIEWS)
-                else f"This OCIO configuration has no view without a look: the render is shown by {now}.")
+        return (
+            ""
+            if _choose(settings, "view_transform", VIEWS)
+            else f"This OCIO configuration has no view without a look: the render is shown by {now}."
+        )
     finally:
         settings.view_transform = now
         settings.look = look

@@ -26,8 +26,10 @@ class Hdri:
 def items(self, context):
     """The worlds that Blender knows, its own eight (CC0) and the artist's, for an EnumProperty."""
     # a file keeps the number: by the place in the list it would mean another world in another Blender
-    choices = [(light.name, Path(light.name).stem.replace("_", " ").title(), "", 0,
-                crc32(light.name.encode()) & 0x7FFFFFFF) for light in _worlds()]
+    choices = [
+        (light.name, Path(light.name).stem.replace("_", " ").title(), "", 0, crc32(light.name.encode()) & 0x7FFFFFFF)
+        for light in _worlds()
+    ]
     _items[:] = choices or [('NONE', "None", "This Blender came without any", 0, 0)]
     return _items
 
@@ -43,19 +45,25 @@ def named(name: str) -> Hdri:
     for world in _worlds():
         if name in (world.name, Path(world.name).stem):
             return Hdri(Path(world.path))
-    raise Problem(f"There is no light named {name}.",
-                  f"Blender's worlds here are {', '.join(sorted(Path(world.name).stem for world in _worlds()))}.")
+    raise Problem(
+        f"There is no light named {name}.",
+        f"Blender's worlds here are {', '.join(sorted(Path(world.name).stem for world in _worlds()))}.",
+    )
 
 
 def chosen_hdri(props) -> Hdri:
     """What the scene's settings ask for. Raises Problem where there is no such picture."""
-    path = (Path(bpy.path.abspath(props.hdri_file)) if props.hdri_file
-            else next((Path(light.path) for light in _worlds() if props.hdri in (light.name, "")), None))
+    path = (
+        Path(bpy.path.abspath(props.hdri_file))
+        if props.hdri_file
+        else next((Path(light.path) for light in _worlds() if props.hdri in (light.name, "")), None)
+    )
     if path is None:
         raise Problem("This Blender came without pictures of surroundings.", "Choose an HDRI file of your own.")
     if not path.is_file():
-        raise Problem(f"There is no picture at {path}.",
-                      "Choose another HDRI file, or empty the field for one of Blender's.")
+        raise Problem(
+            f"There is no picture at {path}.", "Choose another HDRI file, or empty the field for one of Blender's."
+        )
     return Hdri(path, props.hdri_strength)
 
 
@@ -63,8 +71,9 @@ def light_with(world: bpy.types.World, hdri: Hdri, turned: float) -> None:
     """Makes the picture the world's background, turned about +Z by `turned` radians, counter-clockwise from above."""
     nodes, links = world.node_tree.nodes, world.node_tree.links
     background = next(n for n in nodes if n.type == 'BACKGROUND')
-    coordinates, mapping, picture = (nodes.new(kind) for kind in (
-        'ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeTexEnvironment'))
+    coordinates, mapping, picture = (
+        nodes.new(kind) for kind in ('ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeTexEnvironment')
+    )
     for node, x in ((coordinates, -900), (mapping, -700), (picture, -450)):
         node.location = (x, 0)
     # Turning what is looked up one way turns the surroundings the other way.

@@ -125,8 +125,9 @@ def read_mesh(context, capture: Capture) -> bpy.types.Mesh:
 def read_mesh_file(context, path: Path) -> bpy.types.Mesh:
     """As `read_mesh`, of any of a capture's OBJ files."""
     before = set(context.scene.objects)
-    bpy.ops.wm.obj_import(filepath=str(path), forward_axis='Y', up_axis='Z', import_vertex_groups=False,
-                          validate_meshes=False)
+    bpy.ops.wm.obj_import(
+        filepath=str(path), forward_axis='Y', up_axis='Z', import_vertex_groups=False, validate_meshes=False
+    )
     new = [o for o in context.scene.objects if o not in before]
     if len(new) != 1 or new[0].type != 'MESH' or not new[0].data.uv_layers:
         for o in new:
@@ -147,10 +148,16 @@ def load_image(path, data: bool = False) -> bpy.types.Image:
     """The image of a file, read anew if Blender has it already: a picture in sRGB, or data. One of that file that was
     painted on, or is packed in the .blend as another one than the file is now, stays as it is, and stays in the
     .blend."""
-    known = [image for image in bpy.data.images if image.source == 'FILE' and image.filepath
-             and Path(bpy.path.abspath(image.filepath, library=image.library)) == Path(path)]
-    touched = [image for image in known
-               if image.is_dirty or image.packed_file is not None and not _is_packed(image, path)]
+    known = [
+        image
+        for image in bpy.data.images
+        if image.source == 'FILE'
+        and image.filepath
+        and Path(bpy.path.abspath(image.filepath, library=image.library)) == Path(path)
+    ]
+    touched = [
+        image for image in known if image.is_dirty or image.packed_file is not None and not _is_packed(image, path)
+    ]
     for image in touched:
         image.use_fake_user = True
     image = next((image for image in known if image not in touched and image.library is None), None)

@@ -73,15 +73,26 @@ def can_start(operator, context) -> bool:
     """Whether there is a capture that no job and no batch works on; says in the tooltip of a greyed-out button why
     not."""
     root = captures.root(captures.active(context))
-    return (operator.with_capture(context)
-            and operator.allowed(of(root) is None, "This capture is being worked on: wait for it, or click Cancel")
-            and operator.allowed(not batches.works_on(root),
-                                 "This capture is being worked on by a batch or another Blender: wait for it, or "
-                                 "cancel it there"))
+    return (
+        operator.with_capture(context)
+        and operator.allowed(of(root) is None, "This capture is being worked on: wait for it, or click Cancel")
+        and operator.allowed(
+            not batches.works_on(root),
+            "This capture is being worked on by a batch or another Blender: wait for it, or cancel it there",
+        )
+    )
 
 
-def start(item, goal: str, *, first: str | None = None, last: str | None = None, then: Callable[[], None] | None = None,
-          on_stage: Callable[[str], object] | None = None, **shared) -> Job:
+def start(
+    item,
+    goal: str,
+    *,
+    first: str | None = None,
+    last: str | None = None,
+    then: Callable[[], None] | None = None,
+    on_stage: Callable[[str], object] | None = None,
+    **shared,
+) -> Job:
     """Starts stages at a capture. Raises Problem when it cannot.
 
     Parameters
@@ -92,17 +103,30 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     shared : settings for this once
     """
     capture = captures.folder(item)
-    job = _launch(item, goal, capture, then,
-                  lambda: write_job(capture, first=first, last=last,
-                                    settings={**properties.job_settings(item), **shared}))
+    job = _launch(
+        item,
+        goal,
+        capture,
+        then,
+        lambda: write_job(capture, first=first, last=last, settings={**properties.job_settings(item), **shared}),
+    )
     job.on_stage = on_stage
-    job.planned = stages.NAMES[stages.NAMES.index(first or stages.NAMES[0]):stages.NAMES.index(last or stages.NAMES[-1])
-                               + 1]
+    job.planned = stages.NAMES[
+        stages.NAMES.index(first or stages.NAMES[0]) : stages.NAMES.index(last or stages.NAMES[-1]) + 1
+    ]
     return job
 
 
-def start_tool(item, tool: str, goal: str = "tool", *, then: Callable[[], None] | None = None,
-               ended: Callable[[], None] | None = None, at: Capture | None = None, **shared) -> Job:
+def start_tool(
+    item,
+    tool: str,
+    goal: str = "tool",
+    *,
+    then: Callable[[], None] | None = None,
+    ended: Callable[[], None] | None = None,
+    at: Capture | None = None,
+    **shared,
+) -> Job:
     """Starts one of core.contract.stages.TOOLS at a capture. Raises Problem when it cannot.
 
     Parameters
@@ -114,8 +138,13 @@ def start_tool(item, tool: str, goal: str = "tool", *, then: Callable[[], None] 
     shared : settings for this once
     """
     capture = at or captures.folder(item)
-    job = _launch(item, goal, capture, then,
-                  lambda: write_job(capture, tool=tool, settings={**properties.job_settings(item), **shared}))
+    job = _launch(
+        item,
+        goal,
+        capture,
+        then,
+        lambda: write_job(capture, tool=tool, settings={**properties.job_settings(item), **shared}),
+    )
     job.ended = ended
     return job
 
@@ -130,9 +159,14 @@ def _launch(item, goal: str, capture: Capture, then: Callable[[], None] | None, 
         prepare()
     path = write()
     settings = read_job(path).settings
-    job = start_worker(root, goal,
-                       Worker(python, ROOT, path, capture.logs / "worker.log",
-                              preferences.worker_environment(settings.delight.delighter)), then)
+    job = start_worker(
+        root,
+        goal,
+        Worker(
+            python, ROOT, path, capture.logs / "worker.log", preferences.worker_environment(settings.delight.delighter)
+        ),
+        then,
+    )
     job.settings = settings
     return job
 
@@ -268,19 +302,30 @@ def eta(job: Job) -> str:
     """What is left of the stage, and of the whole where the next ones' times are known from before, in words; '' when
     unknown."""
     seconds = job.progress.eta_s if job.progress else None
-    words = ("" if seconds is None else iface_("{} s left").format(f"{seconds:.0f}") if seconds < 90
-             else iface_("{} min left").format(f"{seconds / 60:.0f}"))
-    later = job.planned[job.planned.index(job.stage) + 1:] if job.stage in job.planned else ()
+    words = (
+        ""
+        if seconds is None
+        else iface_("{} s left").format(f"{seconds:.0f}")
+        if seconds < 90
+        else iface_("{} min left").format(f"{seconds / 60:.0f}")
+    )
+    later = job.planned[job.planned.index(job.stage) + 1 :] if job.stage in job.planned else ()
     ahead = timings.of_stages(later) if later and seconds is not None else None
-    return (words if ahead is None
-            else iface_("{}, about {} min in all").format(words, max(1, round((seconds + ahead) / 60))))
+    return (
+        words
+        if ahead is None
+        else iface_("{}, about {} min in all").format(words, max(1, round((seconds + ahead) / 60)))
+    )
 
 
 def stage_label(job: Job) -> str:
     if job.waiting:
         return "Waiting"
-    return (stages.LABELS[job.stage] if job.stage in stages.LABELS
-            else {"install": "Installing", "ask": "Looking"}.get(job.goal, "Starting"))
+    return (
+        stages.LABELS[job.stage]
+        if job.stage in stages.LABELS
+        else {"install": "Installing", "ask": "Looking"}.get(job.goal, "Starting")
+    )
 
 
 def register():

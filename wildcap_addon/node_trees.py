@@ -25,8 +25,9 @@ def fingerprint(material: bpy.types.Material, without: str) -> str:
     for node in sorted(material.node_tree.nodes, key=lambda node: node.name):
         if node.name != without:
             defaults = [_plain(socket.default_value) for socket in node.inputs if hasattr(socket, "default_value")]
-            links = [[link.from_node.name, link.from_socket.identifier] for socket in node.inputs
-                     for link in socket.links]
+            links = [
+                [link.from_node.name, link.from_socket.identifier] for socket in node.inputs for link in socket.links
+            ]
             told.append([node.name, node.bl_idname, node.mute, defaults, links])
     return hashlib.blake2b(json.dumps(told).encode(), digest_size=16).hexdigest()
 
@@ -34,5 +35,8 @@ def fingerprint(material: bpy.types.Material, without: str) -> str:
 def _plain(value):
     if isinstance(value, float):
         return round(value, 5)
-    return (str(value) if isinstance(value, (str, int)) or not hasattr(value, "__len__")
-            else [round(float(component), 5) for component in value])
+    return (
+        str(value)
+        if isinstance(value, (str, int)) or not hasattr(value, "__len__")
+        else [round(float(component), 5) for component in value]
+    )

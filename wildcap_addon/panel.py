@@ -12,8 +12,15 @@ from . import batches, captures, jobs, next_step, preferences, problems, status
 from .base_panel import WildcapPanel, region_width
 from .paint import session
 
-STATE_ICONS = {"done": 'CHECKMARK', "absent": 'CHECKMARK', "stale": 'FILE_REFRESH', "older": 'TIME',
-               "to do": 'RADIOBUT_OFF', "not needed": 'BLANK1', "running": 'PLAY'}
+STATE_ICONS = {
+    "done": 'CHECKMARK',
+    "absent": 'CHECKMARK',
+    "stale": 'FILE_REFRESH',
+    "older": 'TIME',
+    "to do": 'RADIOBUT_OFF',
+    "not needed": 'BLANK1',
+    "running": 'PLAY',
+}
 
 
 class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
@@ -68,8 +75,13 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
         column = self.layout.column(align=True)
         ready = known is not None and bool(known.source or known.has_head)  # for the first stage that is to do
         for stage in stages.STAGES:
-            state = ("running" if job and job.stage == stage.name else known.stages.get(stage.name, "to do") if known
-                     else "to do")
+            state = (
+                "running"
+                if job and job.stage == stage.name
+                else known.stages.get(stage.name, "to do")
+                if known
+                else "to do"
+            )
             if (
                 state == "to do"
                 and known
@@ -122,15 +134,19 @@ class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
 def gather(context, item) -> next_step.Facts:
     """What the next step depends on, from what is known already."""
     if item is None:
-        return next_step.Facts(has_python=preferences.python() is not None,
-                               running=jobs.of("").goal if jobs.of("") else "")
+        return next_step.Facts(
+            has_python=preferences.python() is not None, running=jobs.of("").goal if jobs.of("") else ""
+        )
     head = captures.head(context, item)
     job = jobs.of(captures.root(item)) or jobs.of("")
     return next_step.Facts(
-        has_capture=True, has_python=preferences.python() is not None, running=_running(job, captures.root(item)),
+        has_capture=True,
+        has_python=preferences.python() is not None,
+        running=_running(job, captures.root(item)),
         painting=session.active(),
         head_time=head.get("wildcap_head_time", 0.0) if head else -1.0,
-        maps_time=head.get("wildcap_maps_time", -1.0) if head else -1.0, status=status.of(item),
+        maps_time=head.get("wildcap_maps_time", -1.0) if head else -1.0,
+        status=status.of(item),
     )
 
 

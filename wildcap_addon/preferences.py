@@ -14,19 +14,34 @@ from ..core.contract.messages import Problem
 from ..core.worker import environment
 from . import extension
 
-COMPUTES = [('auto', "Automatic", "For the GPU where there is an NVIDIA one or an Apple one, else for the CPU"),
-            *([('apple', "Apple", "For Apple GPUs, by Metal; the CPU can be chosen as well")]
-              if sys.platform == "darwin" else
-              [('cuda', "CUDA", "For NVIDIA GPUs; several times larger")]),
-            ('cpu', "CPU", "For the processor alone: the smallest")]
-SOURCES = [('pytorch', "PyTorch and PyPI",
-            "PyTorch from its own package index where PyPI lacks the build for your device, all others from PyPI"),
-           ('folder', "A Folder of Wheels",
-            "All packages from a folder, as `python -m core wheels` makes one: no network needed"),
-           ('pip', "As pip Is Set Up",
-            "All packages from where this machine's pip is set up to look (pip.conf, PIP_INDEX_URL), as with a "
-            "studio's own index; "
-            "that also decides what its PyTorch computes on")]
+COMPUTES = [
+    ('auto', "Automatic", "For the GPU where there is an NVIDIA one or an Apple one, else for the CPU"),
+    *(
+        [('apple', "Apple", "For Apple GPUs, by Metal; the CPU can be chosen as well")]
+        if sys.platform == "darwin"
+        else [('cuda', "CUDA", "For NVIDIA GPUs; several times larger")]
+    ),
+    ('cpu', "CPU", "For the processor alone: the smallest"),
+]
+SOURCES = [
+    (
+        'pytorch',
+        "PyTorch and PyPI",
+        "PyTorch from its own package index where PyPI lacks the build for your device, all others from PyPI",
+    ),
+    (
+        'folder',
+        "A Folder of Wheels",
+        "All packages from a folder, as `python -m core wheels` makes one: no network needed",
+    ),
+    (
+        'pip',
+        "As pip Is Set Up",
+        "All packages from where this machine's pip is set up to look (pip.conf, PIP_INDEX_URL), as with a "
+        "studio's own index; "
+        "that also decides what its PyTorch computes on",
+    ),
+]
 DEVICES = {"cpu": "CPU", "cuda": "CUDA", "mps": "Metal", "": ""}
 _aside: set[str] = set()  # Pythons that were found not to answer, in this session
 
@@ -38,33 +53,43 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = extension.NAME
 
     python: bpy.props.StringProperty(
-        name="Solver Python", subtype='FILE_PATH',
+        name="Solver Python",
+        subtype='FILE_PATH',
         description="Python that runs the solver, with the packages of requirements/worker.txt installed",
     )
     environment: bpy.props.StringProperty(
-        name="Solver Folder", subtype='DIR_PATH',
+        name="Solver Folder",
+        subtype='DIR_PATH',
         description="Where Install Solver puts its packages; empty: .wildcap/solver in your home folder",
     )
-    compute: bpy.props.EnumProperty(name="Compute On", items=COMPUTES, default='auto',
-                                    description="What Install Solver downloads PyTorch for")
-    packages: bpy.props.EnumProperty(name="Packages From", items=SOURCES, default='pytorch',
-                                     description="Where Install Solver downloads from")
-    wheels: bpy.props.StringProperty(name="Wheels", subtype='DIR_PATH',
-                                     description="The folder of wheels that Install Solver takes all packages from")
+    compute: bpy.props.EnumProperty(
+        name="Compute On", items=COMPUTES, default='auto', description="What Install Solver downloads PyTorch for"
+    )
+    packages: bpy.props.EnumProperty(
+        name="Packages From", items=SOURCES, default='pytorch', description="Where Install Solver downloads from"
+    )
+    wheels: bpy.props.StringProperty(
+        name="Wheels",
+        subtype='DIR_PATH',
+        description="The folder of wheels that Install Solver takes all packages from",
+    )
     device: bpy.props.StringProperty(name="Device", description="What the solver's Python was found to compute on")
-    device_reason: bpy.props.StringProperty(name="Why This Device",
-                                            description="What was found when the solver's devices were tried")
+    device_reason: bpy.props.StringProperty(
+        name="Why This Device", description="What was found when the solver's devices were tried"
+    )
     tested: bpy.props.StringProperty(name="Self-Test", description="How the last self-test ended")
     captures: bpy.props.StringProperty(
-        name="Captures Folder", subtype='DIR_PATH',
+        name="Captures Folder",
+        subtype='DIR_PATH',
         description="Where new captures go while the .blend is not saved; empty: WildCap in your home folder, which no "
-                    "cloud copies",
+        "cloud copies",
     )
 
     switchlight_key: bpy.props.StringProperty(
-        name="SwitchLight Key", subtype='PASSWORD',
+        name="SwitchLight Key",
+        subtype='PASSWORD',
         description="Your key for SwitchLight, a paid service. Blender keeps it readable in its preferences file; an "
-                    "environment variable does not",
+        "environment variable does not",
     )
 
     def draw(self, context):
@@ -87,8 +112,9 @@ def draw_solver(layout, preferences) -> None:
         if preferences.device_reason:
             layout.label(text=preferences.device_reason, translate=False)
     else:
-        layout.label(text="The solver is ready" if ready else "There is no solver yet",
-                     icon='CHECKMARK' if ready else 'INFO')
+        layout.label(
+            text="The solver is ready" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO'
+        )
     if ready and preferences.tested:
         layout.label(text=preferences.tested, translate=False, icon='CHECKMARK')
     column = layout.column()
@@ -137,8 +163,10 @@ def worker_environment(delighter: str) -> dict[str, str]:
     if delighter != "switchlight":
         return {}
     key = os.environ.get(switchlight_api.KEY_VARIABLE) or get().switchlight_key
-    return {switchlight_api.KEY_VARIABLE: key,
-            **({} if bpy.app.online_access else {switchlight_api.OFFLINE_VARIABLE: "1"})}
+    return {
+        switchlight_api.KEY_VARIABLE: key,
+        **({} if bpy.app.online_access else {switchlight_api.OFFLINE_VARIABLE: "1"}),
+    }
 
 
 def require_online(otherwise: str) -> None:
@@ -159,8 +187,10 @@ def require_python() -> Path:
     """As `python`. Raises Problem where there is none."""
     path = python()
     if path is None:
-        raise Problem("The solver is not set up on this machine.",
-                      "Click Install Solver in the Setup panel, or Use an Existing Python.")
+        raise Problem(
+            "The solver is not set up on this machine.",
+            "Click Install Solver in the Setup panel, or Use an Existing Python.",
+        )
     return path
 
 
@@ -194,9 +224,10 @@ def wheels_folder() -> Path | None:
         return None
     folder = Path(bpy.path.abspath(get().wheels))
     if not get().wheels or not any(folder.glob("*.whl")):
-        raise Problem(f"There are no wheels in {folder if get().wheels else 'a folder that is not chosen'}.",
-                      "Choose the folder that `python -m core wheels` made, in the extension's preferences under "
-                      "Wheels.")
+        raise Problem(
+            f"There are no wheels in {folder if get().wheels else 'a folder that is not chosen'}.",
+            "Choose the folder that `python -m core wheels` made, in the extension's preferences under Wheels.",
+        )
     return folder
 
 

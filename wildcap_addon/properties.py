@@ -26,8 +26,9 @@ SHARED_TOOLTIPS = core_settings.tooltips(core_settings.Settings)
 def settings_group(stage: str, kind: type) -> type:
     """A PropertyGroup with one property per field of a stage's settings."""
     annotations = {f.name: _property(f, core_settings.tooltips(kind)[f.name]) for f in fields(kind)}
-    return type(f"WILDCAP_PG_{stage}", (bpy.types.PropertyGroup,),
-                {"__annotations__": annotations, "__doc__": kind.__doc__})
+    return type(
+        f"WILDCAP_PG_{stage}", (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": kind.__doc__}
+    )
 
 
 def _property(field, tooltip: str):
@@ -75,41 +76,61 @@ def _apply_quality(self, context):
 class WILDCAP_PG_capture(bpy.types.PropertyGroup):
     """One capture folder in the scene's list."""
 
-    path: bpy.props.StringProperty(name="Capture Folder", subtype='DIR_PATH',
-                                   description="The folder that holds everything about this face")
+    path: bpy.props.StringProperty(
+        name="Capture Folder", subtype='DIR_PATH', description="The folder that holds everything about this face"
+    )
     from_blend: bpy.props.StringProperty(
-        name="From the .blend", options={'HIDDEN'},
+        name="From the .blend",
+        options={'HIDDEN'},
         description="The folder as it was reached from the .blend when that was last saved",
     )
     head: bpy.props.PointerProperty(name="Head", type=bpy.types.Object, description="The head object of this capture")
     quality: bpy.props.EnumProperty(
-        name="Quality", items=[(q, q.title(), "") for q in core_settings.QUALITIES], default="standard",
+        name="Quality",
+        items=[(q, q.title(), "") for q in core_settings.QUALITIES],
+        default="standard",
         update=_apply_quality,
         description="Draft to look, standard to work, film to deliver. Choosing one sets the fields of all stages that "
-                    "it covers: change single ones afterwards",
+        "it covers: change single ones afterwards",
     )
     device: bpy.props.EnumProperty(
-        name="Device", default="auto", description=SHARED_TOOLTIPS["device"],
-        items=[("auto", "Automatic", "Where a pass of the solver's network ran fastest when it was set up"),
-               ("cpu", "CPU", ""), ("cuda", "CUDA", ""), ("mps", "Metal", "")],
+        name="Device",
+        default="auto",
+        description=SHARED_TOOLTIPS["device"],
+        items=[
+            ("auto", "Automatic", "Where a pass of the solver's network ran fastest when it was set up"),
+            ("cpu", "CPU", ""),
+            ("cuda", "CUDA", ""),
+            ("mps", "Metal", ""),
+        ],
     )
     seed: bpy.props.IntProperty(name="Seed", min=0, default=0, description=SHARED_TOOLTIPS["seed"])
     use_skin_tone: bpy.props.BoolProperty(
-        name="Set Skin Tone", default=False,
+        name="Set Skin Tone",
+        default=False,
         description="Use the colour below as the mean skin colour; off: it is estimated from the video",
     )
     skin_tone: bpy.props.FloatVectorProperty(
-        name="Skin Tone", subtype='COLOR_GAMMA', size=3, min=0, max=1, default=(0.69, 0.54, 0.45),
+        name="Skin Tone",
+        subtype='COLOR_GAMMA',
+        size=3,
+        min=0,
+        max=1,
+        default=(0.69, 0.54, 0.45),
         description="Mean colour of the facial skin without lips, brows and stubble, as the eye sees it (sRGB)",
     )
     estimated_tone: bpy.props.FloatVectorProperty(
-        name="Estimated Tone", size=3, options={'HIDDEN'}, description="What the last estimate was")
-    tone_group: bpy.props.StringProperty(name="Tone Group", options={'HIDDEN'},
-                                         description="What such a tone is called")
-    tone_source: bpy.props.StringProperty(name="Tone Source", options={'HIDDEN'},
-                                          description="What the last estimate was taken from")
-    tone_deviation: bpy.props.FloatProperty(name="Tone Deviation", options={'HIDDEN'},
-                                            description="One deviation of its lightness L*")
+        name="Estimated Tone", size=3, options={'HIDDEN'}, description="What the last estimate was"
+    )
+    tone_group: bpy.props.StringProperty(
+        name="Tone Group", options={'HIDDEN'}, description="What such a tone is called"
+    )
+    tone_source: bpy.props.StringProperty(
+        name="Tone Source", options={'HIDDEN'}, description="What the last estimate was taken from"
+    )
+    tone_deviation: bpy.props.FloatProperty(
+        name="Tone Deviation", options={'HIDDEN'}, description="One deviation of its lightness L*"
+    )
 
 
 WILDCAP_PG_capture.__annotations__ |= {stage: bpy.props.PointerProperty(type=group) for stage, group in GROUPS.items()}
@@ -136,62 +157,96 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     """The scene's captures and how they are lit."""
 
     captures: bpy.props.CollectionProperty(type=WILDCAP_PG_capture)
-    active_index: bpy.props.IntProperty(name="Capture", update=_show_chosen,
-                                        description="The capture that the panel shows while no head is active")
+    active_index: bpy.props.IntProperty(
+        name="Capture", update=_show_chosen, description="The capture that the panel shows while no head is active"
+    )
     light: bpy.props.EnumProperty(
-        name="Light", default='three_point',
+        name="Light",
+        default='three_point',
         items=[(name, label, what, "", number) for name, label, what, number in LIGHTS],
         description="The light for Render",
     )
-    hdri: bpy.props.EnumProperty(name="Surroundings", items=worlds.items,
-                                 description="Blender's own worlds, and those installed in its preferences (Lights)")
+    hdri: bpy.props.EnumProperty(
+        name="Surroundings",
+        items=worlds.items,
+        description="Blender's own worlds, and those installed in its preferences (Lights)",
+    )
     hdri_file: bpy.props.StringProperty(
         name="Own File",
         subtype='FILE_PATH',
         description="A panoramic HDR picture of your own; it comes before the one above",
     )
-    hdri_rotation: bpy.props.FloatProperty(name="Rotation", subtype='ANGLE',
-                                           description="Turns the light about the head, counter-clockwise from above")
-    hdri_strength: bpy.props.FloatProperty(name="Strength", min=0, soft_max=4, default=1,
-                                           description="How bright the surroundings are")
+    hdri_rotation: bpy.props.FloatProperty(
+        name="Rotation", subtype='ANGLE', description="Turns the light about the head, counter-clockwise from above"
+    )
+    hdri_strength: bpy.props.FloatProperty(
+        name="Strength", min=0, soft_max=4, default=1, description="How bright the surroundings are"
+    )
     shadow_tint: bpy.props.FloatVectorProperty(
-        name="Shadow Tint", subtype='COLOR', size=3, min=0, max=1, default=(1.0, 0.0, 0.0),
+        name="Shadow Tint",
+        subtype='COLOR',
+        size=3,
+        min=0,
+        max=1,
+        default=(1.0, 0.0, 0.0),
         description="Colour in which the shadow mask is shown",
     )
     protect_tint: bpy.props.FloatVectorProperty(
-        name="Protect Tint", subtype='COLOR', size=3, min=0, max=1, default=(0.0, 0.6, 0.1),
+        name="Protect Tint",
+        subtype='COLOR',
+        size=3,
+        min=0,
+        max=1,
+        default=(0.0, 0.6, 0.1),
         description="Colour in which the protect mask is shown",
     )
-    tint_strength: bpy.props.FloatProperty(name="Tint Strength", min=0.05, max=1, default=0.45,
-                                           description="How strongly a mask covers the texture")
-    resolution: bpy.props.IntProperty(name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024,
-                                      description="Side of the rendered picture")
-    samples: bpy.props.IntProperty(name="Samples", min=1, max=65536, default=128,
-                                   description="Cycles samples per pixel")
+    tint_strength: bpy.props.FloatProperty(
+        name="Tint Strength", min=0.05, max=1, default=0.45, description="How strongly a mask covers the texture"
+    )
+    resolution: bpy.props.IntProperty(
+        name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024, description="Side of the rendered picture"
+    )
+    samples: bpy.props.IntProperty(
+        name="Samples", min=1, max=65536, default=128, description="Cycles samples per pixel"
+    )
     view: bpy.props.EnumProperty(
-        name="View", default='Standard',
+        name="View",
+        default='Standard',
         description="How the picture is shown; the linear EXR beside it is the same in both",
-        items=[('Standard', "Standard", "Colours as they are; what is brighter than white is cut off"),
-               ('AgX', "AgX",
-                "As on film: bright lights and strong colours fade softly; a skin's tone is not what it was")],
+        items=[
+            ('Standard', "Standard", "Colours as they are; what is brighter than white is cut off"),
+            (
+                'AgX',
+                "AgX",
+                "As on film: bright lights and strong colours fade softly; a skin's tone is not what it was",
+            ),
+        ],
     )
     turns: bpy.props.EnumProperty(
-        name="Turns", default='HEAD', description="What goes once around",
-        items=[('HEAD', "Head", "The head, under a light that stays"),
-               ('LIGHT', "Light", "The light, around a head that stays")],
+        name="Turns",
+        default='HEAD',
+        description="What goes once around",
+        items=[
+            ('HEAD', "Head", "The head, under a light that stays"),
+            ('LIGHT', "Light", "The light, around a head that stays"),
+        ],
     )
-    turn_frames: bpy.props.IntProperty(name="Frames", min=2, max=1000, default=48,
-                                       description="Pictures of one turn; a video plays 24 per second")
+    turn_frames: bpy.props.IntProperty(
+        name="Frames", min=2, max=1000, default=48, description="Pictures of one turn; a video plays 24 per second"
+    )
     turn_file: bpy.props.EnumProperty(
-        name="As", default='MP4', description="What renders/turntable gets",
+        name="As",
+        default='MP4',
+        description="What renders/turntable gets",
         items=[('MP4', "Video", "One MP4"), ('PNG', "Pictures", "A PNG per frame")],
     )
 
 
 def job_settings(item: WILDCAP_PG_capture) -> dict:
     """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device. Paths are absolute."""
-    stage_settings = {stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)}
-                      for stage, kind in STAGE_KINDS.items()}
+    stage_settings = {
+        stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()
+    }
     stage_settings["solve"]["skin_tone"] = _tone(item) if item.use_skin_tone else "auto"
     return {**stage_settings, "seed": item.seed, "device": device(item)}
 

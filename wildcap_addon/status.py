@@ -72,9 +72,13 @@ def refresh(context) -> None:
 def look(capture: Capture, settings) -> Status:
     """Reads the folder; hashes only files that changed since they were last hashed."""
     if not capture.root.is_dir():
-        return Status(missing=True, problem=Problem(
-            f"The capture folder {capture.root} is not there any more.",
-            "Connect its disk, or click Locate Capture and show where it is now."))
+        return Status(
+            missing=True,
+            problem=Problem(
+                f"The capture folder {capture.root} is not there any more.",
+                "Connect its disk, or click Locate Capture and show where it is now.",
+            ),
+        )
     try:
         record = capture.read()
         verdicts = {stage.name: _verdict(capture, stage, record, settings) for stage in stages.STAGES}
@@ -82,20 +86,30 @@ def look(capture: Capture, settings) -> Status:
     except Problem as problem:
         return Status(problem=problem)
     except OSError as error:
-        return Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error.strerror or error}).",
-                                      "Check the disk, or open the capture from where it is now."))
+        return Status(
+            problem=Problem(
+                f"The capture folder {capture.root} cannot be read ({error.strerror or error}).",
+                "Check the disk, or open the capture from where it is now.",
+            )
+        )
     maps_time = max(map(_time, worn))
     render = max(capture.renders.glob("[!.]*.png"), key=_time, default=Path())
     states = {name: verdict.state for name, verdict in verdicts.items()}
     return Status(
-        source=str(capture.source or ""), stages=states,
+        source=str(capture.source or ""),
+        stages=states,
         versions={name: verdict.version for name, verdict in verdicts.items()},
         whole_solve=_whole_solve(capture, states["solve"], settings),
         seconds={name: done["seconds"] for name, done in record["stages"].items()},
-        has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
-        findings=tuple(report.findings(record)), interrupted=_interrupted(capture),
-        has_maps=all(path.is_file() for path in worn), maps_time=maps_time,
-        render=render.name if _time(render) >= maps_time else "", **_sending(capture, settings),
+        has_head=capture.head.is_file(),
+        head_time=_time(capture.head),
+        has_mask=capture.shadow_mask.is_file(),
+        findings=tuple(report.findings(record)),
+        interrupted=_interrupted(capture),
+        has_maps=all(path.is_file() for path in worn),
+        maps_time=maps_time,
+        render=render.name if _time(render) >= maps_time else "",
+        **_sending(capture, settings),
     )
 
 
@@ -103,8 +117,9 @@ def _verdict(capture: Capture, stage: stages.Stage, record: dict, settings) -> f
     if stage.name not in record["stages"]:
         # and did not end: what is there is of another run, or half new
         begun = (capture.logs / f"{stage.name}.log").is_file()
-        return freshness.Verdict("absent" if all(capture.has(name) for name in stage.writes) and not begun
-                                 else freshness.TO_DO)
+        return freshness.Verdict(
+            "absent" if all(capture.has(name) for name in stage.writes) and not begun else freshness.TO_DO
+        )
     return capture.verdict(stage, settings)
 
 
@@ -119,8 +134,11 @@ def _sending(capture: Capture, settings) -> dict:
 
 
 def _whole_solve(capture: Capture, state: str, settings) -> str:
-    return ("The mask is as it was at the last solve." if state in freshness.FINISHED
-            else mask_edit.obstacle(capture, settings))
+    return (
+        "The mask is as it was at the last solve."
+        if state in freshness.FINISHED
+        else mask_edit.obstacle(capture, settings)
+    )
 
 
 def _interrupted(capture: Capture) -> bool:
@@ -158,10 +176,20 @@ def _look(root: str, item) -> None:
 
 def _stamp(capture: Capture, settings: str) -> tuple:
     """What a capture's status depends on: the settings, as text, and a few file times."""
-    watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved,
-               capture.checkpoints, capture.frames_json, capture.consent, capture.switchlight,
-               *(folder / name for folder in (capture.maps, capture.maps_4k) for name in newest_maps.WORN),
-               capture.renders)
+    watched = (
+        capture.json,
+        capture.head,
+        capture.shadow_mask,
+        capture.protect_mask,
+        capture.texture,
+        capture.solved,
+        capture.checkpoints,
+        capture.frames_json,
+        capture.consent,
+        capture.switchlight,
+        *(folder / name for folder in (capture.maps, capture.maps_4k) for name in newest_maps.WORN),
+        capture.renders,
+    )
     return settings, *map(_changed, watched)
 
 
@@ -178,8 +206,12 @@ def _tick() -> float:
         if root not in _wanted or root in _looking:
             continue
         _looking.add(root)
-        threading.Thread(target=_look_aside, name="wildcap-status", daemon=True, args=(
-            root, repr(properties.job_settings(item)), captures.folder(item), properties.settings(item))).start()
+        threading.Thread(
+            target=_look_aside,
+            name="wildcap-status",
+            daemon=True,
+            args=(root, repr(properties.job_settings(item)), captures.folder(item), properties.settings(item)),
+        ).start()
     _wanted.intersection_update(shown())  # the others are again when they are drawn
     return INTERVAL_S
 
@@ -198,9 +230,18 @@ def _look_aside(root: str, told: str, capture: Capture, settings) -> None:
             return
         _found.put((root, stamp, look(capture, settings)))
     except Exception as error:  # of a folder that changes under the look: the next stamp is another one
-        _found.put((root, stamp,
-                    Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error}).",
-                                           "WildCap looks again in a second."))))
+        _found.put(
+            (
+                root,
+                stamp,
+                Status(
+                    problem=Problem(
+                        f"The capture folder {capture.root} cannot be read ({error}).",
+                        "WildCap looks again in a second.",
+                    )
+                ),
+            )
+        )
 
 
 def redraw() -> None:

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The add-on from a terminal, without a window:
 
-    blender --command wildcap run me.mp4 me.wildcap --quality film
-    blender --command wildcap solve me.wildcap
-    blender --command wildcap relight me.wildcap three_point sunset --resolution 1024
-    blender --command wildcap turntable me.wildcap --light overcast --turns light --film
-    blender --command wildcap deliver me.wildcap --preset metahuman
+blender --command wildcap run me.mp4 me.wildcap --quality film
+blender --command wildcap solve me.wildcap
+blender --command wildcap relight me.wildcap three_point sunset --resolution 1024
+blender --command wildcap turntable me.wildcap --light overcast --turns light --film
+blender --command wildcap deliver me.wildcap --preset metahuman
 """
 
 import argparse
@@ -58,8 +58,9 @@ def execute(words: list[str]) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """What can be asked for."""
-    whole = argparse.ArgumentParser(prog=f"blender --command {NAME}", description=__doc__,
-                                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    whole = argparse.ArgumentParser(
+        prog=f"blender --command {NAME}", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     kinds = whole.add_subparsers(dest="what", required=True)
     for command in commands:
         one = kinds.add_parser(command.name, help=command.help)

@@ -31,8 +31,11 @@ def minutes(quality: str, device: str) -> float | None:
 
 def describe_minutes(device: str) -> str:
     """All qualities in one line; '' before the first solve."""
-    return (", ".join(f"{quality.title()} {_spoken(minutes(quality, device))}" for quality in QUALITIES)
-            if device in _rates else "")
+    return (
+        ", ".join(f"{quality.title()} {_spoken(minutes(quality, device))}" for quality in QUALITIES)
+        if device in _rates
+        else ""
+    )
 
 
 def record(settings: Settings, seconds: float) -> None:

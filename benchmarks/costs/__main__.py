@@ -15,8 +15,11 @@ COMMANDS = ("chain", "solver", "opendelight", "blender", "acting", "stage")
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.costs", description=costs.__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.costs",
+        description=costs.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("command", choices=COMMANDS)
     command = parser.parse_args(arguments[:1]).command
     import_module(f"{__package__}.{command}").main(arguments[1:])

@@ -26,8 +26,9 @@ BUTTONS = {"add_face_units": "Add Face Units", "close_up": "Close-Up Eyes", "gro
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser("python -m benchmarks.costs acting", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.costs acting", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("capture", type=Path)
     parser.add_argument("--resolution", type=int, default=512)
     parser.add_argument("--samples", type=int, default=32)
@@ -35,14 +36,23 @@ def main(arguments: list[str]) -> None:
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
         capture = Path(folder) / "face.wildcap"
-        shutil.copytree(options.capture, capture,
-                        ignore=shutil.ignore_patterns("frames", "delit", "checkpoints", "logs", "renders"))
+        shutil.copytree(
+            options.capture, capture, ignore=shutil.ignore_patterns("frames", "delit", "checkpoints", "logs", "renders")
+        )
         with extension():
             found = measure(capture, options.resolution, options.samples)
     if options.json:
-        write_record(options.json, "costs", "python -m benchmarks.costs acting CAPTURE",
-                     {"resolution": options.resolution, "samples": options.samples,
-                      "faces": {options.capture.resolve().stem: found}}, keep=True)
+        write_record(
+            options.json,
+            "costs",
+            "python -m benchmarks.costs acting CAPTURE",
+            {
+                "resolution": options.resolution,
+                "samples": options.samples,
+                "faces": {options.capture.resolve().stem: found},
+            },
+            keep=True,
+        )
 
 
 def measure(capture: Path, resolution: int, samples: int) -> dict:
@@ -70,8 +80,11 @@ def measure(capture: Path, resolution: int, samples: int) -> dict:
         print(f"{title}: {spent.seconds:.1f} s, {found[button]['mib']:.0f} MiB more", flush=True)
     found["render"] = render()
     added = set(bpy.data.objects) - known
-    return {**found, "hairs": sum(len(thing.data.curves) for thing in added if thing.type == 'CURVES'),
-            "vertices": sum(len(thing.data.vertices) for thing in added if thing.type == 'MESH')}
+    return {
+        **found,
+        "hairs": sum(len(thing.data.curves) for thing in added if thing.type == 'CURVES'),
+        "vertices": sum(len(thing.data.vertices) for thing in added if thing.type == 'MESH'),
+    }
 
 
 def render() -> dict[str, float]:

@@ -28,8 +28,9 @@ MASK = 4096
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser("python -m benchmarks.costs blender", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.costs blender", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("capture", type=Path)
     parser.add_argument("--resolution", type=int, default=64)
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/blender_memory.json")
@@ -61,8 +62,10 @@ def measure(capture: Path, resolution: int) -> dict:
         if image.size[0]:
             image.pixels[0]  # loads it, as a viewport that shows it does
     loaded = [image for image in bpy.data.images if image.size[0]]
-    shown, loading = say("every picture loaded: " + ", ".join(
-        f"{Path(image.filepath).name or image.name} {image.size[0]}" for image in loaded))
+    shown, loading = say(
+        "every picture loaded: "
+        + ", ".join(f"{Path(image.filepath).name or image.name} {image.size[0]}" for image in loaded)
+    )
     save_a_mask(capture)
     _, opened = say(f"a mask of {MASK} read")
     return {"empty_gb": empty, "shown_gb": shown, "loading_gb": loading, "mask_opened_gb": opened}
@@ -87,8 +90,11 @@ def save_a_mask(folder: Path) -> None:
     into = other.copy()
     with spending() as copying:
         into[:] = other
-    print(f"a save of a mask of {MASK} holds Blender for {min(held) * 1e3:.0f} ms (the first time {held[0] * 1e3:.0f} "
-          f"ms); copying as many bytes takes {copying.seconds * 1e3:.0f} ms", flush=True)
+    print(
+        f"a save of a mask of {MASK} holds Blender for {min(held) * 1e3:.0f} ms (the first time {held[0] * 1e3:.0f} "
+        f"ms); copying as many bytes takes {copying.seconds * 1e3:.0f} ms",
+        flush=True,
+    )
 
 
 def say(what: str) -> tuple[float, float]:

@@ -42,19 +42,22 @@ from .stage import measure_stage
 VIDEO = figures.ROOT / "core" / "synthetic" / "sample" / "capture.mp4"
 NOISE = 1.5
 """Deviation of a repeated frame's noise, in steps of 255."""
-LEFT_OUT = shutil.ignore_patterns("maps*", "checkpoints", "comparison", "delivery", "exports", "renders", "report*",
-                                  "logs", "lock", "job.json")
+LEFT_OUT = shutil.ignore_patterns(
+    "maps*", "checkpoints", "comparison", "delivery", "exports", "renders", "report*", "logs", "lock", "job.json"
+)
 """What a copy of a finished capture does without: each row solves before it needs maps."""
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser("python -m benchmarks.costs chain", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.costs chain", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("work", type=Path)
     parser.add_argument("--json", type=Path, required=True)
     parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS))
-    parser.add_argument("--capture", type=Path,
-                        help="a finished capture of the sample to copy, for rows without the row standard")
+    parser.add_argument(
+        "--capture", type=Path, help="a finished capture of the sample to copy, for rows without the row standard"
+    )
     parser.add_argument("--film", type=Path, help="a long video, for the rows frames-N")
     parser.add_argument("--limit-s", type=float, default=600, help="seconds that a stage may take")
     parser.add_argument("--again", action="store_true", help="measure once more what other processes disturbed")
@@ -73,13 +76,16 @@ def main(arguments: list[str]) -> None:
 def measured(name: str, options: argparse.Namespace) -> bool:
     """Measures a row's stages that the JSON does not have yet (or has disturbed, with options.again: the less disturbed
     one stays); False where one failed, which is printed. Raises Problem where it has nothing to start from."""
-    row, found = (ROWS[name],
-                  figures.read_record(options.json.stem, options.json.parent)["figures"] if options.json.exists()
-                  else {})
+    row, found = (
+        ROWS[name],
+        figures.read_record(options.json.stem, options.json.parent)["figures"] if options.json.exists() else {},
+    )
     here = machine()
     if other := [what for what, value in found.get("machine", {}).items() if value != here[what]]:
-        raise Problem(f"{options.json} was measured on another machine ({', '.join(other)}).",
-                      "Name a new --json: one table holds one machine's costs.")
+        raise Problem(
+            f"{options.json} was measured on another machine ({', '.join(other)}).",
+            "Name a new --json: one table holds one machine's costs.",
+        )
     costs = found.setdefault(name, {})
     found["machine"] = here
     capture = options.work / f"{name}.wildcap"
@@ -100,8 +106,9 @@ def measured(name: str, options: argparse.Namespace) -> bool:
             costs[stage] = cost
         print(cell(cost), flush=True)
         found["together"] = {whole: costs_of for whole in WHOLES if (costs_of := together(found, whole))}
-        found["growth"] = {title: exponents for title, values, grown in GROWTH
-                           if (exponents := growth(found, values, grown))}
+        found["growth"] = {
+            title: exponents for title, values, grown in GROWTH if (exponents := growth(found, values, grown))
+        }
         figures.write_record(options.json, "costs", "python -m benchmarks.costs chain WORK --json OUT.json", found)
         if "over_s" in cost:
             break
@@ -120,8 +127,10 @@ def prepare(row: StageRun, capture: Path, options: argparse.Namespace) -> Path:
     reads = stages.by_name(row.stages[0]).reads
     missing = [name for name in reads if not Capture(base).has(name)]
     if missing:
-        raise Problem(f"There is no {missing[0]} of the sample to start from in {base}.",
-                      "Measure the row standard first, or name a finished --capture.")
+        raise Problem(
+            f"There is no {missing[0]} of the sample to start from in {base}.",
+            "Measure the row standard first, or name a finished --capture.",
+        )
     if reads and not capture.exists():
         with replacing_folder(capture) as folder:
             shutil.copytree(base, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
@@ -145,10 +154,12 @@ def select(capture: Capture, count: int) -> None:
 
     frames = read_frames(capture)
     chosen = select_views(np.array([record.sharpness for record in frames.records]), turns(frames.records), count)
-    write_frames(capture.frames,
-                 replace(frames,
-                         records=tuple(replace(record, selected=i in chosen)
-                                       for i, record in enumerate(frames.records))))
+    write_frames(
+        capture.frames,
+        replace(
+            frames, records=tuple(replace(record, selected=i in chosen) for i, record in enumerate(frames.records))
+        ),
+    )
 
 
 def length(video: Path) -> int:

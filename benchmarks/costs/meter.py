@@ -63,8 +63,15 @@ def run_alone(words: Sequence[str], limit_s: float | None = None, quiet: bool = 
     """Runs Python with these words in the checkout, in a session of its own that is ended after `limit_s` seconds, its
     own children with it. quiet: what it says on stderr is dropped."""
     load, busy, own, began = round(os.getloadavg()[0], 2), busy_s(), own_s(), time.monotonic()
-    child = subprocess.Popen([sys.executable, *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, encoding="utf-8",
-                             stderr=subprocess.DEVNULL if quiet else None, start_new_session=True)
+    child = subprocess.Popen(
+        [sys.executable, *words],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        stderr=subprocess.DEVNULL if quiet else None,
+        start_new_session=True,
+    )
     said, code = "", None
     try:
         said = child.communicate(timeout=limit_s)[0]
@@ -113,8 +120,10 @@ def peak(children: bool = False) -> int:
     import resource  # Windows has none
 
     unit = 1 if sys.platform == "darwin" else 1024  # macOS counts bytes, Linux KiB
-    return max(_own_peak() or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit,
-               resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * unit if children else 0)
+    return max(
+        _own_peak() or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit,
+        resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * unit if children else 0,
+    )
 
 
 def _own_peak() -> int | None:

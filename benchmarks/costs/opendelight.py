@@ -32,8 +32,11 @@ SIZE = 512
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser("python -m benchmarks.costs opendelight", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.costs opendelight",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--frames", type=int, default=1)
     parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/opendelight_cost.json")
@@ -45,12 +48,24 @@ def main(arguments: list[str]) -> None:
     picture = torch.rand(1, 3, SIZE, SIZE, generator=torch.Generator().manual_seed(0)).to(options.device)
     yardsticks, frames, steps = [_yardstick(options.device)], [], []
     for _ in range(options.frames):
-        frames.append(_seconds(lambda: delight_crop(checkpoint.base, checkpoint.enhancer, picture,
-                                                    lambda: steps.append(time.monotonic())), options.device))
+        frames.append(
+            _seconds(
+                lambda: delight_crop(
+                    checkpoint.base, checkpoint.enhancer, picture, lambda: steps.append(time.monotonic())
+                ),
+                options.device,
+            )
+        )
         yardsticks.append(_yardstick(options.device))
-    found = plain({"tera_multiplications": round(multiplications(), 2), "peak_gb": round(_peak_gb(options.device), 1),
-                   "seconds": round(np.mean(frames), 1), "seconds_of_a_product": round(np.mean(yardsticks), 1),
-                   "seconds_to_cancel": round(np.diff(steps).max(), 1)})
+    found = plain(
+        {
+            "tera_multiplications": round(multiplications(), 2),
+            "peak_gb": round(_peak_gb(options.device), 1),
+            "seconds": round(np.mean(frames), 1),
+            "seconds_of_a_product": round(np.mean(yardsticks), 1),
+            "seconds_to_cancel": round(np.diff(steps).max(), 1),
+        }
+    )
     print(f"{options.device}, {torch.get_num_threads()} threads, {before:.1f} GB before the first frame:", found)
     if options.json:
         write_record(options.json, "costs", "python -m benchmarks.costs opendelight", found)
@@ -59,13 +74,16 @@ def main(arguments: list[str]) -> None:
 def multiplications() -> float:
     """Of one frame, in 10^12, counted without computing anything."""
     with torch.device("meta"), FlopCounterMode(display=False) as counter:
-        delight_crop(*({name: torch.zeros(shape) for name, shape in shapes.items()} for shapes in (base(), enhancer())),
-                     torch.zeros(1, 3, SIZE, SIZE))
+        delight_crop(
+            *({name: torch.zeros(shape) for name, shape in shapes.items()} for shapes in (base(), enhancer())),
+            torch.zeros(1, 3, SIZE, SIZE),
+        )
     return counter.get_total_flops() / 2e12
 
 
-def write_random_checkpoint(folder: Path, width: int = 768, depth: int = 12, channels: int = 512, unet: int = 64,
-                            seed: int = 0) -> None:
+def write_random_checkpoint(
+    folder: Path, width: int = 768, depth: int = 12, channels: int = 512, unet: int = 64, seed: int = 0
+) -> None:
     """Writes the two files of a checkpoint with random values; sizes that are not given are the published ones.
 
     Parameters
@@ -84,19 +102,30 @@ def write_random_checkpoint(folder: Path, width: int = 768, depth: int = 12, cha
 
 def base(width: int = 768, depth: int = 12, channels: int = 512) -> dict[str, tuple[int, ...]]:
     """Name -> shape of the first network's tensors, written down from the authors' published configuration."""
-    shapes = {"encoder.cls_token": (1, 1, width), "encoder.reg_token": (2, 4, width),
-              "encoder.patch_embed.proj.weight": (width, 3, 16, 16),
-              "encoder.patch_embed.proj.bias": (width,), "encoder.norm.weight": (width,), "encoder.norm.bias": (width,)}
+    shapes = {
+        "encoder.cls_token": (1, 1, width),
+        "encoder.reg_token": (2, 4, width),
+        "encoder.patch_embed.proj.weight": (width, 3, 16, 16),
+        "encoder.patch_embed.proj.bias": (width,),
+        "encoder.norm.weight": (width,),
+        "encoder.norm.bias": (width,),
+    }
     for i in range(depth):
-        for layer, out, into in (("attn.qkv", 3 * width, width), ("attn.proj", width, width),
-                                 ("mlp.fc1", 4 * width, width), ("mlp.fc2", width, 4 * width)):
+        for layer, out, into in (
+            ("attn.qkv", 3 * width, width),
+            ("attn.proj", width, width),
+            ("mlp.fc1", 4 * width, width),
+            ("mlp.fc2", width, 4 * width),
+        ):
             shapes |= {f"encoder.blocks.{i}.{layer}.weight": (out, into), f"encoder.blocks.{i}.{layer}.bias": (out,)}
         for layer in ("norm1", "norm2"):
             shapes |= {f"encoder.blocks.{i}.{layer}.weight": (width,), f"encoder.blocks.{i}.{layer}.bias": (width,)}
     for i in (0, 3, 6, 9):
-        shapes |= {f"decoder.deconv_layers.{i}.weight": (channels if i else width, channels, 4, 4),
-                   f"decoder.conv_layers.{i}.weight": (channels, channels, 1, 1),
-                   f"decoder.conv_layers.{i}.bias": (channels,)}
+        shapes |= {
+            f"decoder.deconv_layers.{i}.weight": (channels if i else width, channels, 4, 4),
+            f"decoder.conv_layers.{i}.weight": (channels, channels, 1, 1),
+            f"decoder.conv_layers.{i}.bias": (channels,),
+        }
     return shapes | {"decoder.cls_conv.weight": (3, channels, 1, 1), "decoder.cls_conv.bias": (3,)}
 
 
@@ -108,8 +137,10 @@ def enhancer(width: int = 64) -> dict[str, tuple[int, ...]]:
         shapes.update({f"{name}.weight": (out, into, kernel, kernel), f"{name}.bias": (out,)})
 
     def put_norm(name: str, size: int) -> None:
-        shapes.update({f"{name}.{kind}": (size,) for kind in ("weight", "bias", "running_mean", "running_var")}
-                      | {f"{name}.num_batches_tracked": ()})
+        shapes.update(
+            {f"{name}.{kind}": (size,) for kind in ("weight", "bias", "running_mean", "running_var")}
+            | {f"{name}.num_batches_tracked": ()}
+        )
 
     at = "inc_1.res_conv."
     put(at + "0", 3, width, 6)
@@ -117,10 +148,16 @@ def enhancer(width: int = 64) -> dict[str, tuple[int, ...]]:
     put(at + "3", 3, width, width)
     put_norm(at + "4", width)
     put("inc_1.addtion_layer", 1, width, 6)
-    for name, into, out in (("down1_1.resdown_conv.1", 1, 2), ("down2_1.resdown_conv.1", 2, 4),
-                            ("down3_1.resdown_conv.1", 4, 8),
-                            ("down4_1.resdown_conv.1", 8, 8), ("up1_1.conv", 16, 4), ("up2_1.conv", 8, 2),
-                            ("up3_1.conv", 4, 1), ("up4_1.conv", 2, 1)):
+    for name, into, out in (
+        ("down1_1.resdown_conv.1", 1, 2),
+        ("down2_1.resdown_conv.1", 2, 4),
+        ("down3_1.resdown_conv.1", 4, 8),
+        ("down4_1.resdown_conv.1", 8, 8),
+        ("up1_1.conv", 16, 4),
+        ("up2_1.conv", 8, 2),
+        ("up3_1.conv", 4, 1),
+        ("up4_1.conv", 2, 1),
+    ):
         put_norm(f"{name}.res_conv.0", into * width), put(f"{name}.res_conv.2", 3, out * width, into * width)
         put_norm(f"{name}.res_conv.3", out * width), put(f"{name}.res_conv.5", 3, out * width, out * width)
         if into != out:

@@ -36,7 +36,7 @@ LENGTHS = (60, 120, 300, 1000)
 ROWS = {
     "standard": StageRun(stages.NAMES),
     # frames and cameras have the same settings in both
-    "draft": StageRun(stages.NAMES[stages.NAMES.index("scan"):], quality="draft"),
+    "draft": StageRun(stages.NAMES[stages.NAMES.index("scan") :], quality="draft"),
     "float32": StageRun(("solve", "upscale"), float32=True),
     **{f"solve-{size}": StageRun(("solve",), {"solve": {"size": size}}) for size in (512, 2048)},
     **{f"texture-{size}": StageRun(("texture",), {"texture": {"size": size}}) for size in (512, 2048)},
@@ -48,9 +48,15 @@ ROWS = {
 WHOLES = ("standard", "float32", "draft", *(f"frames-{count}" for count in LENGTHS))
 """Rows that are a whole chain, with the standard row's costs of the stages they do not measure."""
 GROWTH = (
-    ("side of the map", (512, 1024, 2048),
-     {"texture": ("texture-512", "standard", "texture-2048"), "solve": ("solve-512", "standard", "solve-2048"),
-      "upscale": ("draft", "standard", "")}),
+    (
+        "side of the map",
+        (512, 1024, 2048),
+        {
+            "texture": ("texture-512", "standard", "texture-2048"),
+            "solve": ("solve-512", "standard", "solve-2048"),
+            "upscale": ("draft", "standard", ""),
+        },
+    ),
     ("cells of the light grid", (1, 24, 96, 384), {"solve": ("grid-1", "grid-24", "standard", "grid-384")}),
     ("views", (8, 16, 32), dict.fromkeys(("delight", "texture"), ("views-8", "standard", "views-32"))),
     ("frames", LENGTHS, dict.fromkeys(stages.NAMES, tuple(f"frames-{count}" for count in LENGTHS))),
@@ -65,9 +71,12 @@ def together(found: dict, whole: str) -> dict | None:
     if any(cost is None or "over_s" in cost for cost in costs):
         return None
     others = [cost["others"] for cost in costs if cost["others"] is not None]
-    return {"minutes": round(sum(cost["seconds"] for cost in costs) / 60, 1),
-            "processor_minutes": round(sum(cost["processor_s"] for cost in costs) / 60, 1),
-            "peak_mb": max(cost["peak_mb"] for cost in costs), "others": max(others) if others else None}
+    return {
+        "minutes": round(sum(cost["seconds"] for cost in costs) / 60, 1),
+        "processor_minutes": round(sum(cost["processor_s"] for cost in costs) / 60, 1),
+        "peak_mb": max(cost["peak_mb"] for cost in costs),
+        "others": max(others) if others else None,
+    }
 
 
 def stage_of(found: dict, whole: str, stage: str) -> dict | None:
@@ -80,8 +89,11 @@ def growth(found: dict, values: tuple[int, ...], grown: dict[str, tuple[str, ...
     without stages with fewer than two."""
     exponents = {}
     for stage, rows in grown.items():
-        known = [(value, cost["processor_s"]) for value, row in zip(values, rows, strict=True)
-                 if "processor_s" in (cost := found.get(row, {}).get(stage, {}))]
+        known = [
+            (value, cost["processor_s"])
+            for value, row in zip(values, rows, strict=True)
+            if "processor_s" in (cost := found.get(row, {}).get(stage, {}))
+        ]
         if len(known) > 1:
             exponents[stage] = {"exponent": round(float(np.polyfit(*np.log(known).T, 1)[0]), 2), "points": len(known)}
     return exponents
@@ -91,13 +103,22 @@ def table(found: dict) -> str:
     """The Markdown tables: the chain stage by stage, then what grows with what."""
     shown = WHOLES[:3]
     chain = [[stage, *(cell(stage_of(found, whole, stage)) for whole in shown)] for stage in stages.NAMES]
-    tables = [markdown(["stage: seconds, peak memory", *shown],
-                               [*chain, ["**together**", *(whole_cell(found, whole) for whole in shown)]])]
+    tables = [
+        markdown(
+            ["stage: seconds, peak memory", *shown],
+            [*chain, ["**together**", *(whole_cell(found, whole) for whole in shown)]],
+        )
+    ]
     for title, values, grown in GROWTH:
-        powers = {stage: "{exponent:.2f} ({points})".format(**fitted)
-                  for stage, fitted in found.get("growth", {}).get(title, {}).items()}
-        rows = [[stage, *(cell(found.get(row, {}).get(stage)) for row in rows), powers.get(stage)]
-                for stage, rows in grown.items() if stage in powers]
+        powers = {
+            stage: "{exponent:.2f} ({points})".format(**fitted)
+            for stage, fitted in found.get("growth", {}).get(title, {}).items()
+        }
+        rows = [
+            [stage, *(cell(found.get(row, {}).get(stage)) for row in rows), powers.get(stage)]
+            for stage, rows in grown.items()
+            if stage in powers
+        ]
         if title == "frames":
             rows.append(["**together**", *(whole_cell(found, f"frames-{count}") for count in values), None])
         if powers:  # one value alone tells of no growth
@@ -117,8 +138,11 @@ def cell(cost: dict | None) -> str | None:
         return None
     if "over_s" in cost:
         return f"over {cost['over_s']:.0f} s"
-    beside = (f" ({cost['processor_s']:.0f} s of processor; others took {cost['others']:.1f} cores)" if disturbed(cost)
-              else "")
+    beside = (
+        f" ({cost['processor_s']:.0f} s of processor; others took {cost['others']:.1f} cores)"
+        if disturbed(cost)
+        else ""
+    )
     return f"{cost['seconds']:.0f} s, {cost['peak_mb'] / 1000:.1f} GB{beside}"
 
 

@@ -44,10 +44,21 @@ from core.solve.skin_tone import read_given_tone
 from ..figures import write_record
 from .meter import GIB, peak, run_alone, spending
 
-AUTHORS = {"model": {"type": "image_v1", "input_channels": 7, "patch_size": 1, "mapping_out": 256,
-                     "depths": [2, 2, 4, 4], "channels": [128, 256, 256, 512],
-                     "augment_wrapper": True, "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80},
-           "cond": {"type": "coord"}}
+AUTHORS = {
+    "model": {
+        "type": "image_v1",
+        "input_channels": 7,
+        "patch_size": 1,
+        "mapping_out": 256,
+        "depths": [2, 2, 4, 4],
+        "channels": [128, 256, 256, 512],
+        "augment_wrapper": True,
+        "sigma_data": 0.5,
+        "sigma_min": 0.01,
+        "sigma_max": 80,
+    },
+    "cond": {"type": "coord"},
+}
 """The bounds that the paper's time and memory set leave about this (54 to 73 million parameters)."""
 TONE = "0.69,0.54,0.45"
 
@@ -81,8 +92,9 @@ ROWS = {
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser("python -m benchmarks.costs solver", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.costs solver", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS)[:-2])
     parser.add_argument("--size", type=int, default=1024, help="of the rows of single steps")
     parser.add_argument("--steps", type=int, default=6)
@@ -106,23 +118,37 @@ def main(arguments: list[str]) -> None:
     if options.json:
         plain = rows.get("plain", {}).get("seconds_per_step")
         command = f"python -m benchmarks.costs solver --rows {shlex.join(options.rows)} --steps {options.steps}"
-        write_record(options.json, "costs", command, {
-            "network": options.network, "device": options.device, "size": options.size,
-            "python_gib": next(row["peak_gib"] - row["added_gib"] for row in rows.values()),
-            "steps": {name: {**row, "to_plain": plain and row["seconds_per_step"] / plain} for name, row in rows.items()
-                      if not ROWS[name].stage},
-            "stage": {name: {**row, "allowed": ROWS[name].target} for name, row in rows.items() if ROWS[name].stage}})
+        write_record(
+            options.json,
+            "costs",
+            command,
+            {
+                "network": options.network,
+                "device": options.device,
+                "size": options.size,
+                "python_gib": next(row["peak_gib"] - row["added_gib"] for row in rows.values()),
+                "steps": {
+                    name: {**row, "to_plain": plain and row["seconds_per_step"] / plain}
+                    for name, row in rows.items()
+                    if not ROWS[name].stage
+                },
+                "stage": {
+                    name: {**row, "allowed": ROWS[name].target} for name, row in rows.items() if ROWS[name].stage
+                },
+            },
+        )
 
 
 def line(name: str, row: dict, plain: dict | None) -> str:
     """What a row says, for the screen."""
     parts = [f"{row['seconds']:7.2f} s, of the processor's {row['processor_s']:.2f} s"]
     if "seconds_per_step" in row:
-        parts.append(f"{row['seconds_per_step']:.3f} s a step, of the processor's "
-                     f"{row['processor_s_per_step']:.3f} s")
+        parts.append(f"{row['seconds_per_step']:.3f} s a step, of the processor's {row['processor_s_per_step']:.3f} s")
         if plain is not None:
-            parts.append(" and ".join(f"{row[name] / plain[name]:.2f}"
-                                      for name in ("seconds_per_step", "processor_s_per_step")) + " of plain's")
+            parts.append(
+                " and ".join(f"{row[name] / plain[name]:.2f}" for name in ("seconds_per_step", "processor_s_per_step"))
+                + " of plain's"
+            )
     if ROWS[name].target:
         parts.append(f"{ROWS[name].target} s allowed on two cores alone")
     parts.append(f"{row['peak_gib']:5.2f} GiB, {row['added_gib']:.2f} of it since the libraries were loaded")
@@ -137,8 +163,9 @@ def make(folder: str, source: str) -> None:
 
     capture = Capture(Path(folder) / "a.wildcap")
     if source:
-        shutil.copytree(source, capture.root,
-                        ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "logs", "lock"))
+        shutil.copytree(
+            source, capture.root, ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "logs", "lock")
+        )
         return
     make_plain_problem(9000, "leaves", 512).write(capture)
 
@@ -148,8 +175,11 @@ def measured(row: SolverVariant, folder: Path, options: argparse.Namespace) -> d
     before = peak()  # all that the stage imports counts as loaded
     capture = Capture(folder / "a.wildcap")
     found = whole_stage(row, capture, options) if row.stage else single_steps(row, capture, options)
-    found |= {"peak_gib": round(peak() / GIB, 3), "added_gib": round((peak() - before) / GIB, 3),
-              "threads": torch.get_num_threads()}
+    found |= {
+        "peak_gib": round(peak() / GIB, 3),
+        "added_gib": round((peak() - before) / GIB, 3),
+        "threads": torch.get_num_threads(),
+    }
     if options.device.startswith("cuda"):
         found["device_peak_gib"] = round(torch.cuda.max_memory_allocated() / GIB, 3)
     return found
@@ -172,12 +202,18 @@ def single_steps(row: SolverVariant, capture: Capture, options: argparse.Namespa
         begun.state.step, begun.state.x, begun.state.denoised = 0, None, begun.reference
     report = Reporter("solve", emit=lambda message: print(message.text, file=sys.stderr))
     with spending() as spent:
-        sample_within_memory(Sampler(conditioned, short, seed_noise(0)), begun.observations, begun.state,
-                             log=report.log)
+        sample_within_memory(
+            Sampler(conditioned, short, seed_noise(0)), begun.observations, begun.state, log=report.log
+        )
     dtype = str(prior.network.proj_in.weight.dtype).removeprefix("torch.")
-    return {"seconds": round(spent.seconds, 3), "processor_s": round(spent.processor_s, 2),
-            "seconds_per_step": round(spent.seconds / short.steps, 4),
-            "processor_s_per_step": round(spent.processor_s / short.steps, 4), "steps": short.steps, "dtype": dtype}
+    return {
+        "seconds": round(spent.seconds, 3),
+        "processor_s": round(spent.processor_s, 2),
+        "seconds_per_step": round(spent.seconds / short.steps, 4),
+        "processor_s_per_step": round(spent.processor_s / short.steps, 4),
+        "steps": short.steps,
+        "dtype": dtype,
+    }
 
 
 def whole_stage(row: SolverVariant, capture: Capture, options: argparse.Namespace) -> dict:
@@ -190,8 +226,11 @@ def whole_stage(row: SolverVariant, capture: Capture, options: argparse.Namespac
         if capture.delit.is_dir():
             shadow_mask.run(capture, settings, report)
         solve.run(capture, settings, report)
-    return {"seconds": round(spent.seconds, 2), "processor_s": round(spent.processor_s, 2),
-            "dtype": str(dtype).removeprefix("torch.")}
+    return {
+        "seconds": round(spent.seconds, 2),
+        "processor_s": round(spent.processor_s, 2),
+        "dtype": str(dtype).removeprefix("torch."),
+    }
 
 
 def prior_of(row: SolverVariant, options: argparse.Namespace) -> priors.Prior:

@@ -28,8 +28,15 @@ def main(arguments: list[str]) -> None:
     print(json.dumps(run(*arguments)))
 
 
-def measure_stage(capture: Path, stage: str, source: Path | str = "", quality: str = "standard",
-                  settings: dict | None = None, limit_s: float | None = None, float32: bool = False) -> dict:
+def measure_stage(
+    capture: Path,
+    stage: str,
+    source: Path | str = "",
+    quality: str = "standard",
+    settings: dict | None = None,
+    limit_s: float | None = None,
+    float32: bool = False,
+) -> dict:
     """Runs a stage of a capture in a process of its own, and measures it.
 
     Parameters
@@ -54,8 +61,10 @@ def measure_stage(capture: Path, stage: str, source: Path | str = "", quality: s
         return {"over_s": limit_s, "load": ran.load}
     said = ran.said.strip().splitlines()
     if ran.code or not said:
-        return {"problem": f"The process of the stage {stage} ended with code {ran.code}.",
-                "remedy": f"See {Capture(capture).logs}."}
+        return {
+            "problem": f"The process of the stage {stage} ended with code {ran.code}.",
+            "remedy": f"See {Capture(capture).logs}.",
+        }
     cost = json.loads(said[-1])
     if "problem" in cost:
         return cost
@@ -75,9 +84,12 @@ def run(capture: str, stage: str, job: str = "{}") -> dict:
             if asked.get("source") and not step.reads:
                 capture.set_source(asked["source"])
             capture.forget([stage])
-            run_stage(step, JobRequest(capture, asked.get("source", ""), (step,), True, settings),
-                      lambda message: finished.append(message) if isinstance(message, StageDone) else None,
-                      lambda: False)
+            run_stage(
+                step,
+                JobRequest(capture, asked.get("source", ""), (step,), True, settings),
+                lambda message: finished.append(message) if isinstance(message, StageDone) else None,
+                lambda: False,
+            )
     except Exception as error:  # told as the chain tells it
         problem: Problem = explained(error, stage, capture.logs / f"{stage}.log")
         return {"problem": problem.problem, "remedy": problem.remedy}

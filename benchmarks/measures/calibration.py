@@ -40,5 +40,9 @@ def negative_log_likelihood(error: np.ndarray, sigma: np.ndarray | float) -> flo
 def calibrate(error: np.ndarray, sigma: np.ndarray) -> Calibration:
     """Of errors [N] and their sigmas [N]. The best constant is the errors' root mean square."""
     best = max(float(np.sqrt(np.mean(np.asarray(error, np.float64) ** 2))), 1e-12)
-    return Calibration(negative_log_likelihood(error, sigma), negative_log_likelihood(error, best),
-                       float(np.mean(np.abs(error) <= sigma)), len(error))
+    return Calibration(
+        negative_log_likelihood(error, sigma),
+        negative_log_likelihood(error, best),
+        float(np.mean(np.abs(error) <= sigma)),
+        len(error),
+    )

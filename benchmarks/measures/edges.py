@@ -48,8 +48,14 @@ class EdgeScores:
         return None if self.bright is None else self.bright + self.dark
 
 
-def score_edges(log: np.ndarray, log_true: np.ndarray, shadow: np.ndarray, mask: np.ndarray, height: float,
-                lit: np.ndarray | None = None) -> EdgeScores:
+def score_edges(
+    log: np.ndarray,
+    log_true: np.ndarray,
+    shadow: np.ndarray,
+    mask: np.ndarray,
+    height: float,
+    lit: np.ndarray | None = None,
+) -> EdgeScores:
     """Measures what an answer leaves along the edges of a shadow.
 
     Parameters
@@ -78,19 +84,26 @@ def score_edges(log: np.ndarray, log_true: np.ndarray, shadow: np.ndarray, mask:
     above = np.maximum(line - np.maximum(bright_side, dark_side), 0)
     below = np.maximum(np.minimum(bright_side, dark_side) - line, 0)
     band = cv2.dilate(at.astype(np.uint8), np.ones((2 * max(round(LINE * height), 1) + 1,) * 2, np.uint8)) > 0
-    return EdgeScores(float((bright_side - dark_side).mean()), float(above.mean()), float(below.mean()),
-                      *_detail(log, log_true, mask, band))
+    return EdgeScores(
+        float((bright_side - dark_side).mean()),
+        float(above.mean()),
+        float(below.mean()),
+        *_detail(log, log_true, mask, band),
+    )
 
 
 def _between(distance: np.ndarray, height: float) -> np.ndarray:
     return (distance > SIDES[0] * height) & (distance < SIDES[1] * height)
 
 
-def _detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray,
-            band: np.ndarray) -> tuple[float | None, float | None]:
+def _detail(
+    log: np.ndarray, log_true: np.ndarray, mask: np.ndarray, band: np.ndarray
+) -> tuple[float | None, float | None]:
     """Correlation of the two logarithms between 1 and 3 px, as pictures.detail has it, within a band [H, W] and off
     it."""
     (one, true), inner = pictures.fine_bands(log, log_true, mask)
-    within, away = (pictures.correlation(one[where], true[where]) if where.sum() >= LEAST_PIXELS else None
-                    for where in (inner & band, inner & ~band))
+    within, away = (
+        pictures.correlation(one[where], true[where]) if where.sum() >= LEAST_PIXELS else None
+        for where in (inner & band, inner & ~band)
+    )
     return within, away

@@ -17,12 +17,44 @@ from core.imaging import images
 from core.synthetic.pigment import LUMINANCE
 
 BROWS = ((70, 63, 105, 66, 107, 55, 65, 52, 53, 46), (336, 296, 334, 293, 300, 276, 283, 282, 295, 285))
-EYES = ((33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7),
-        (362, 398, 384, 385, 386, 387, 388, 466, 263, 249, 390, 373, 374, 380, 381, 382))
+EYES = (
+    (33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7),
+    (362, 398, 384, 385, 386, 387, 388, 466, 263, 249, 390, 373, 374, 380, 381, 382),
+)
 LIPS = ((61, 185, 40, 39, 37, 0, 267, 269, 270, 409, 291, 375, 321, 405, 314, 17, 84, 181, 91, 146),)
 CHIN = ((172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 422, 424, 418, 421, 200, 201, 194, 204, 202),)
-CHEEKS = ((234, 227, 116, 117, 118, 119, 120, 121, 128, 188, 351, 357, 350, 349, 348, 347, 346, 345, 447, 454, 366, 371,
-           266, 425, 205, 36, 142, 137),)
+CHEEKS = (
+    (
+        234,
+        227,
+        116,
+        117,
+        118,
+        119,
+        120,
+        121,
+        128,
+        188,
+        351,
+        357,
+        350,
+        349,
+        348,
+        347,
+        346,
+        345,
+        447,
+        454,
+        366,
+        371,
+        266,
+        425,
+        205,
+        36,
+        142,
+        137,
+    ),
+)
 """Outlines of MediaPipe's landmarks; the chin's skin, where a beard would be, is compared with the cheeks'."""
 REGIONS = {"brows": BROWS, "eyes": EYES, "lips": LIPS}
 BARE, AROUND = 0.02, 0.08
@@ -51,8 +83,11 @@ def contrasts(srgb: np.ndarray, points: np.ndarray, face: np.ndarray) -> dict[st
 
 def contrast_kept(answer: dict[str, float | None], truth: dict[str, float | None]) -> dict[str, float]:
     """Region -> share of the truth's contrast, of the regions where both are known and the truth has some."""
-    return {name: answer[name] / true for name, true in truth.items() if true is not None and abs(true) > LEAST_CONTRAST
-            and answer.get(name) is not None}
+    return {
+        name: answer[name] / true
+        for name, true in truth.items()
+        if true is not None and abs(true) > LEAST_CONTRAST and answer.get(name) is not None
+    }
 
 
 def joint(answers: list[dict[str, float]], filmed: list[dict[str, float]]) -> dict[str, float | None]:
@@ -63,11 +98,14 @@ def joint(answers: list[dict[str, float]], filmed: list[dict[str, float]]) -> di
     """
     names = [name for name in JUDGED if any(name in one for one in answers)]
     lost = [abs(1 - one[name]) for one in answers for name in names if name in one]
-    ours, theirs = (float(np.mean([np.std([one[name] for one in pictures if name in one]) for name in names])) if names
-                    else 0.0
-                    for pictures in (answers, filmed))
-    return {"lost": float(np.mean(lost)) if lost else None,
-            "between_lights": ours / theirs if len(answers) > 1 and theirs > 1e-6 else None}
+    ours, theirs = (
+        float(np.mean([np.std([one[name] for one in pictures if name in one]) for name in names])) if names else 0.0
+        for pictures in (answers, filmed)
+    )
+    return {
+        "lost": float(np.mean(lost)) if lost else None,
+        "between_lights": ours / theirs if len(answers) > 1 and theirs > 1e-6 else None,
+    }
 
 
 def _within(points: np.ndarray, outlines: tuple, shape: tuple[int, int], grown: int = 0) -> np.ndarray:

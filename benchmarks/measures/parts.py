@@ -33,6 +33,13 @@ def score_parts(answer: np.ndarray, truth: np.ndarray, regions: dict[str, np.nda
     """Linear colours of the face's texels [N, 3]; regions: bool [N] each. Parts of few texels are left out."""
     toned = to_tone(answer, truth.mean(0))
     ratio = log_ratio(toned, truth)
-    return {name: PartScore(to_decibels(squared_error(toned[where], truth[where])), float(np.median(ratio[where])),
-                            float(ratio[where].std()), int(where.sum()))
-            for name, where in regions.items() if where.sum() >= LEAST_TEXELS}
+    return {
+        name: PartScore(
+            to_decibels(squared_error(toned[where], truth[where])),
+            float(np.median(ratio[where])),
+            float(ratio[where].std()),
+            int(where.sum()),
+        )
+        for name, where in regions.items()
+        if where.sum() >= LEAST_TEXELS
+    }

@@ -21,8 +21,9 @@ from core.imaging import images
 
 def face_box(mask: np.ndarray) -> tuple[slice, slice]:
     """Rows and columns about a mask [H, W], by a margin wider than any of the measures' filters."""
-    return tuple(slice(max(side[0] - 40, 0), side[-1] + 41)
-                 for side in (np.flatnonzero(mask.any(axis)) for axis in (1, 0)))
+    return tuple(
+        slice(max(side[0] - 40, 0), side[-1] + 41) for side in (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
+    )
 
 
 def with_gain(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -41,10 +42,14 @@ def differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> di
     a, b = (np.where(mask[..., None], picture, 0.5).astype(np.float64) for picture in (predicted, true))
     error = ((a - b)[mask] ** 2).mean()
     _, ssim = structural_similarity(a, b, channel_axis=2, data_range=1.0, full=True)
-    flip, _, _ = flip_evaluate(b.astype(np.float32), a.astype(np.float32), "LDR", applyMagma=False,
-                               computeMeanError=False)
-    return {"psnr": float(-10 * np.log10(max(error, 1e-12))), "ssim": float(ssim[mask].mean()),
-            "flip": float(np.squeeze(flip)[mask].mean())}
+    flip, _, _ = flip_evaluate(
+        b.astype(np.float32), a.astype(np.float32), "LDR", applyMagma=False, computeMeanError=False
+    )
+    return {
+        "psnr": float(-10 * np.log10(max(error, 1e-12))),
+        "ssim": float(ssim[mask].mean()),
+        "flip": float(np.squeeze(flip)[mask].mean()),
+    }
 
 
 def detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The answers that stand in every table beside a method's, made like any other: they say what a measure is worth.
 
-    doing nothing     the picture or texture as filmed: keeps all of the face, and all of the light
-    flat colour       one colour everywhere: no light, and no face
-    blur divided out  what one does by hand: keeps what is small, light and skin alike
-    true light        the true light divided out: what the registration and the texture leave
+doing nothing     the picture or texture as filmed: keeps all of the face, and all of the light
+flat colour       one colour everywhere: no light, and no face
+blur divided out  what one does by hand: keeps what is small, light and skin alike
+true light        the true light divided out: what the registration and the texture leave
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ def blur_divided_out(filmed: np.ndarray, mask: np.ndarray) -> np.ndarray:
     weight = mask.astype(np.float32)
     share = np.maximum(cv2.GaussianBlur(weight, (0, 0), deviation), 1e-4)[..., None]
     blurred = cv2.GaussianBlur((filmed * weight[..., None]).astype(np.float32), (0, 0), deviation) / share
-    return np.where(mask[..., None], filmed / np.maximum(blurred, DARKEST) * filmed[mask].mean(0),
-                    filmed).astype(np.float32)
+    return np.where(mask[..., None], filmed / np.maximum(blurred, DARKEST) * filmed[mask].mean(0), filmed).astype(
+        np.float32
+    )
 
 
 def face_height(mask: np.ndarray) -> float:

@@ -15,8 +15,9 @@ import numpy as np
 DARKEST = 1e-3
 
 
-def slope(answers: tuple[np.ndarray, np.ndarray], causes: tuple[np.ndarray, np.ndarray],
-          mask: np.ndarray) -> float | None:
+def slope(
+    answers: tuple[np.ndarray, np.ndarray], causes: tuple[np.ndarray, np.ndarray], mask: np.ndarray
+) -> float | None:
     """How far the change between two answers follows the change between their causes: least squares over the pixels
     `mask` bool [H, W], all channels.
 

@@ -51,12 +51,19 @@ def summarise(scores: Scores, columns: dict[str, Column], against: str | None = 
             known = {person: value for person, row in people.items() if _is_known(value := row.get(measure))}
             if not known:
                 continue
-            pairs = [value - theirs for person, value in known.items()
-                     if _is_known(theirs := other.get(person, {}).get(measure))]
+            pairs = [
+                value - theirs
+                for person, value in known.items()
+                if _is_known(theirs := other.get(person, {}).get(measure))
+            ]
             values = list(known.values())
             found.setdefault(method, {})[measure] = Cell(
-                float(np.mean(values)), _deviation(values), float(np.mean(pairs)) if pairs else None,
-                standard_error(pairs), len(values))
+                float(np.mean(values)),
+                _deviation(values),
+                float(np.mean(pairs)) if pairs else None,
+                standard_error(pairs),
+                len(values),
+            )
     return found
 
 
@@ -66,8 +73,9 @@ def standard_error(differences: list[float]) -> float | None:
     return None if deviation is None else deviation / math.sqrt(len(differences))
 
 
-def format_table(summary: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str,
-                 against: str | None = None) -> str:
+def format_table(
+    summary: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str, against: str | None = None
+) -> str:
     """A line per method: mean +- spread over people; with `against`, a second table of the paired differences +- their
     standard errors. A column that nobody has is left out.
 
@@ -83,12 +91,21 @@ def format_table(summary: dict[str, dict[str, Cell]], columns: dict[str, Column]
     Markdown.
     """
     shown = {name: column for name, column in columns.items() if any(name in row for row in summary.values())}
-    tables = [markdown([title, *(column.label for column in shown.values())],
-                       [[method, *(_mean_text(row.get(name), column) for name, column in shown.items())]
-                        for method, row in summary.items()])]
+    tables = [
+        markdown(
+            [title, *(column.label for column in shown.values())],
+            [
+                [method, *(_mean_text(row.get(name), column) for name, column in shown.items())]
+                for method, row in summary.items()
+            ],
+        )
+    ]
     if against in summary:
-        rows = [[method, *(_difference_text(row.get(name), column) for name, column in shown.items())]
-                for method, row in summary.items() if method != against]
+        rows = [
+            [method, *(_difference_text(row.get(name), column) for name, column in shown.items())]
+            for method, row in summary.items()
+            if method != against
+        ]
         if any(cell is not None for row in rows for cell in row[1:]):
             heads = [f"less *{against}*, person by person", *(column.label for column in shown.values())]
             tables.append(markdown(heads, rows))
@@ -97,12 +114,22 @@ def format_table(summary: dict[str, dict[str, Cell]], columns: dict[str, Column]
 
 def to_record(summary: dict[str, dict[str, Cell]], scores: Scores) -> dict:
     """What figures.write_record takes: per method the cells, and every person's figures behind them."""
-    return {"summary": {method: {name: {key: value for key, value in vars(cell).items() if value is not None}
-                                 for name, cell in row.items()}
-                        for method, row in summary.items()},
-            "people": {method: {person: {name: value for name, value in row.items() if _is_known(value)}
-                                for person, row in people.items()}
-                       for method, people in scores.items()}}
+    return {
+        "summary": {
+            method: {
+                name: {key: value for key, value in vars(cell).items() if value is not None}
+                for name, cell in row.items()
+            }
+            for method, row in summary.items()
+        },
+        "people": {
+            method: {
+                person: {name: value for name, value in row.items() if _is_known(value)}
+                for person, row in people.items()
+            }
+            for method, people in scores.items()
+        },
+    }
 
 
 def _mean_text(cell: Cell | None, column: Column) -> str | None:

@@ -20,8 +20,9 @@ def to_tone(answer: np.ndarray, tone: np.ndarray) -> np.ndarray:
 
 def squared_error(answer: np.ndarray, truth: np.ndarray) -> float:
     """Mean squared difference in sRGB of linear colours [N, 3]."""
-    one, other = (images.linear_to_srgb(np.asarray(values, np.float32)).astype(np.float64)
-                  for values in (answer, truth))
+    one, other = (
+        images.linear_to_srgb(np.asarray(values, np.float32)).astype(np.float64) for values in (answer, truth)
+    )
     return float(((one - other) ** 2).mean())
 
 

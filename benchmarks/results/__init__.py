@@ -45,8 +45,11 @@ def main() -> int:
     except Problem as problem:
         print(problem, file=sys.stderr)
         return 1
-    wrong = [f"{path.relative_to(ROOT)} is not as the records have it: run `make results`."
-             for path, text in new.items() if not path.is_file() or path.read_text(encoding="utf-8") != text]
+    wrong = [
+        f"{path.relative_to(ROOT)} is not as the records have it: run `make results`."
+        for path, text in new.items()
+        if not path.is_file() or path.read_text(encoding="utf-8") != text
+    ]
     for path, text in {} if asked.check else new.items():
         replace_text(path, text)
     for command in pictures(asked.captures.resolve()) if asked.captures else ():
@@ -75,8 +78,11 @@ def page(name: str) -> str:
 def strangers() -> list[str]:
     """What lies in docs/results and is no page of ours."""
     there = sorted((ROOT / "docs" / "results").glob("*.md"))
-    return [f"{path.relative_to(ROOT)} has no benchmarks/results/{path.stem}.py that writes it."
-            for path in there if path.stem not in NAMES]
+    return [
+        f"{path.relative_to(ROOT)} has no benchmarks/results/{path.stem}.py that writes it."
+        for path in there
+        if path.stem not in NAMES
+    ]
 
 
 def pictures(captures: Path) -> Iterator[list[str]]:

@@ -22,7 +22,11 @@ def sections(ablation: Figures) -> Sections:
         changes = (f"{part[row].to_first:+.1f}" for part in (shadow, band, outside))
         return ", ".join("0.0" if float(change) == 0 else change for change in changes) + " dB"
 
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose(
+                """
         ![texture, without texel grid, without prior, full method, truth](../pictures/ablation.jpg)
 
         *Texture, without texel grid, without prior, full method, truth.*
@@ -33,12 +37,18 @@ def sections(ablation: Figures) -> Sections:
         delighter has seen these textures: all of the light is in them. PSNR in sRGB after one gain per channel. Tie:
         within the full method's spread over two seeds. Rows on 6 problems have one shadow per subject; the two recipes
         of 600 steps ran on one problem.
-        """, table(ablation), f"""
+        """,
+                table(ablation),
+                f"""
         Spread of the full method over its seeds: {spread.shadow:.2f} dB in the shadow, {spread.band:.2f} dB in the
         band, {spread.outside:.2f} dB outside. Skin tone, CIEDE2000 of the solved mean to the request over six tones:
         {tone.delivered:.2f} at most as delivered, {tone.sampled:.2f} by the sampling alone.
-        """)),
-        ("How we read it", prose(f"""
+        """,
+            ),
+        ),
+        (
+            "How we read it",
+            prose(f"""
         What a row changes in the shadow, in the band about its border, and outside:
 
         - **The texel grid and the prior carry the method**: without either {min(lost):.0f} to {max(lost):.0f} dB are
@@ -62,4 +72,6 @@ def sections(ablation: Figures) -> Sections:
         - **Guidance in closed form**, without the network's gradient: {told("proximal guidance")}.
         - **The recipes of the paper and of the released code**, with our weights: {told("recipe paper")} and
           {told("recipe released")}.
-        """))]
+        """),
+        ),
+    ]

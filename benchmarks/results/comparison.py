@@ -25,10 +25,18 @@ def sections(comparison: Figures) -> Sections:
 
     def each(kind: str, row: str) -> str:
         """The same, person by person."""
-        return by_person({name: subject[kind].wildcap["0"].raw.psnr - subject[kind][row]["0"].raw.psnr
-                          for name, subject in people.items()})
+        return by_person(
+            {
+                name: subject[kind].wildcap["0"].raw.psnr - subject[kind][row]["0"].raw.psnr
+                for name, subject in people.items()
+            }
+        )
 
-    return [("", prose(f"""
+    return [
+        (
+            "",
+            prose(
+                f"""
         The baselines are of our own writing (`benchmarks/light_models.py`), not those authors' code, and put other
         light models behind our solver: the same prior, guidance and start. *Regions*: five or ten soft regions with an
         SH light each; where they lie is learned, as in DeFace, and begins as clusters of place and lightness, so they
@@ -39,12 +47,23 @@ def sections(comparison: Figures) -> Sections:
         each input apart. SSIM and FLIP are those after one gain. The head scan is filmed under the sun behind leaves
         (`python -m benchmarks.scan_captures DATA FOLDER --lights leaves`); its own map, which stands for the truth,
         holds light itself.
-        """, table(comparison))),
-        ("Person by person", prose("""
+        """,
+                table(comparison),
+            ),
+        ),
+        (
+            "Person by person",
+            prose(
+                """
         Ours less each other method, the mean over the six people ± its standard error: bold where ours is better by
         more than two of those, italic where it is worse by more than one.
-        """, paired_table(people))),
-        ("How we read it", prose(f"""
+        """,
+                paired_table(people),
+            ),
+        ),
+        (
+            "How we read it",
+            prose(f"""
         **On raw frames**, which is what the paper's light model is for, ours is {ours_less("raw", "texture")} over the
         texture, {ours_less("raw", "environment")} over one environment ({each("raw", "environment")}) and
         {ours_less("raw", "regions 10")} over ten regions that learn where the shadows lie
@@ -61,10 +80,13 @@ def sections(comparison: Figures) -> Sections:
         **Without the prior**, under one environment and with free texels, what is solved lies behind ours by
         {ours_less("raw", FREE)} on raw frames and by {ours_less("delit", FREE)} on delit ones: there is little light
         left there to tell from skin.
-        """))]
+        """),
+        ),
+    ]
 
 
 def by_person(gains: dict[str, float]) -> str:
     """dB by person, the most first."""
-    return ", ".join(f"{name.replace('_', ' ')} {gain:+.1f}"
-                     for name, gain in sorted(gains.items(), key=lambda item: -item[1]))
+    return ", ".join(
+        f"{name.replace('_', ' ')} {gain:+.1f}" for name, gain in sorted(gains.items(), key=lambda item: -item[1])
+    )

@@ -18,24 +18,40 @@ TITLE = "Delighters"
 SAYS = "The network, shading and others on real photographs, portraits of six tones, the scan and the sample."
 RECORDS = ("delight", "state", "state_sky")
 PEOPLE = ("bearded_overcast", "closed_overcast", "dark_overcast", "fringed_overcast", "stubbled_below", "light_below")
-SURVIVING = {name: state.TABLES[title][name]
-             for title, names in (("In the picture", ("psnr", "ssim", "flip", "detail")),
-                                  ("Up to a light, and across lights", ("psnr_uv", "psnr_alone")))
-             for name in names}
+SURVIVING = {
+    name: state.TABLES[title][name]
+    for title, names in (
+        ("In the picture", ("psnr", "ssim", "flip", "detail")),
+        ("Up to a light, and across lights", ("psnr_uv", "psnr_alone")),
+    )
+    for name in names
+}
 
 
 def sections(delight: Figures, before: Figures, now: Figures) -> Sections:
     real, portraits, scan, sample = delight.faceolat, delight.portraits, delight.lps_sun, delight.sample
     alone = "network, one photograph"
     photograph, untouched, flat = real[alone].figures, real.none.figures, real["flat true tone"].figures
-    gains, alone_gains = ([delight[name][row].figures.psnr - delight[name][f"{row}, before"].figures.psnr
-                           for name in PEOPLE] for row in ("network", "shading"))
-    sample_gain, scan_gain, *scans = (found.network.figures.psnr - found["network, before"].figures.psnr
-                                      for found in (sample, scan, delight.scan_overcast, delight.scan_lamps))
-    lost = shortfalls({name: {row: rows[row] for row in ("none", "shading", "network") if row in rows}
-                       for name, rows in delight.items()})  # of groups as well, which have a second colon
+    gains, alone_gains = (
+        [delight[name][row].figures.psnr - delight[name][f"{row}, before"].figures.psnr for name in PEOPLE]
+        for row in ("network", "shading")
+    )
+    sample_gain, scan_gain, *scans = (
+        found.network.figures.psnr - found["network, before"].figures.psnr
+        for found in (sample, scan, delight.scan_overcast, delight.scan_lamps)
+    )
+    lost = shortfalls(
+        {
+            name: {row: rows[row] for row in ("none", "shading", "network") if row in rows}
+            for name, rows in delight.items()
+        }
+    )  # of groups as well, which have a second colon
     left = [portraits[row].groups.light.figures.shadow_step for row in (alone, "none")]
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose(
+                """
         Delit pictures against the true albedo, over the facial skin, after one gain per channel in linear light; means
         over the pictures. *features* is the distance in EfficientNet-Lite0's features (it is not LPIPS), *detail* the
         correlation with the truth's detail between 1 and 3 px, *shadow step* what is left of the light's step along the
@@ -55,7 +71,9 @@ def sections(delight: Figures, before: Figures, now: Figures) -> Sections:
         Captures are named by `--sets TRUTH --capture TRUTH=CAPTURE`. The rows *before* are by the same command at
         commit 3cc06ee0, before the fitted light expected a sky ([delighting](../method/delighting.md)) and hues in the
         dark were settled, which these sets hardly show. *features* was not measured anew.
-        """, table(delight), f"""
+        """,
+                table(delight),
+                f"""
         **What the sky is worth**: to the frames that the network leaves of the six people
         {mean(gains):+.2f} ± {stdev(gains) / len(gains) ** 0.5:.2f} dB (each: {listed(gains)}), to those of *shading*
         {mean(alone_gains):+.2f} ± {stdev(alone_gains) / len(alone_gains) ** 0.5:.2f} dB ({listed(alone_gains)}).
@@ -82,7 +100,11 @@ def sections(delight: Figures, before: Figures, now: Figures) -> Sections:
 
         `--quick` takes every fourth picture and leaves the feature distance out; `--weights FILE` measures other
         weights of our network, `--opendelight FOLDER` the authors' checkpoint.
-        """)), ("After the solve", after_the_solve(before, now))]
+        """,
+            ),
+        ),
+        ("After the solve", after_the_solve(before, now)),
+    ]
 
 
 def after_the_solve(before: Figures, now: Figures) -> str:
@@ -91,7 +113,8 @@ def after_the_solve(before: Figures, now: Figures) -> str:
     shared = [name for name in now.captures if name in before.captures]
     gains = [now.captures[name][SOLVED].psnr - before.captures[name][SOLVED].psnr for name in shared]
     most, least = (shared[gains.index(gain)] for gain in (max(gains), min(gains)))
-    return prose(f"""
+    return (
+        prose(f"""
         How much of the sky's worth the solve would have found by itself: {len(shared)} captures of [the state of the
         albedo](state.md), rendered anew and taken through a delighter that expects a sky (with `--run` first), beside
         that page's own figures, *before*. Means over
@@ -99,18 +122,29 @@ def after_the_solve(before: Figures, now: Figures) -> str:
         {sum(gain > 0 for gain in gains)} of {len(gains)} came nearer to the truth in the picture, from
         {min(gains):+.2f} dB (`{least}`) to {max(gains):+.2f} dB (`{most}`). The solver is the same but for how far
         skins' traits differ from place to place ([the prior](prior.md)); hues in the dark were not settled yet.
-        """) + "\n\n" + "\n\n".join(
-        format_table(summarise({row: rows[row] for row in (f"{method}, before", method)}, SURVIVING,
-                               f"{method}, before"), SURVIVING, "taken for albedo", f"{method}, before")
-        for method in (DELIT, SOLVED))
+        """)
+        + "\n\n"
+        + "\n\n".join(
+            format_table(
+                summarise({row: rows[row] for row in (f"{method}, before", method)}, SURVIVING, f"{method}, before"),
+                SURVIVING,
+                "taken for albedo",
+                f"{method}, before",
+            )
+            for method in (DELIT, SOLVED)
+        )
+    )
 
 
 def paired(before: Figures, now: Figures) -> Scores:
     """Texture and solved albedo of both records -> person -> figures: means over the captures that both hold."""
     shared = [name for name in now.captures if name in before.captures]
     people = {person: [name for name in shared if person_of(name) == person] for person in map(person_of, shared)}
-    return {title: {person: mean_of([record.captures[name][method] for name in own]) for person, own in people.items()}
-            for method in (DELIT, SOLVED) for title, record in ((f"{method}, before", before), (method, now))}
+    return {
+        title: {person: mean_of([record.captures[name][method] for name in own]) for person, own in people.items()}
+        for method in (DELIT, SOLVED)
+        for title, record in ((f"{method}, before", before), (method, now))
+    }
 
 
 def person_of(capture: str) -> str:

@@ -13,12 +13,22 @@ RECORDS = ("own_mesh", "carried_skins", "atlas")
 
 
 def sections(own: Figures, carried: Figures, atlas: Figures) -> Sections:
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose(
+                """
         Your own mesh on the sample's head: median and 95th percentile of its drawn skin's distance to the built-in
         head; none has a flipped triangle.
-        """, markdown(["mesh", "shapes", "median", "95 %"], [
-            [name, row.shapes, f"{row.median_mm:.2f} mm", f"{row.p95_mm:.2f} mm"]
-            for name, row in own.rows.items()]), f"""
+        """,
+                markdown(
+                    ["mesh", "shapes", "median", "95 %"],
+                    [
+                        [name, row.shapes, f"{row.median_mm:.2f} mm", f"{row.p95_mm:.2f} mm"]
+                        for name, row in own.rows.items()
+                    ],
+                ),
+                f"""
         That says how near the surfaces lie, not whether a cheek's middle is a cheek's middle. For a mesh whose answer
         is known (the built-in head, coarser, in centimetres, Y up) `tests/test_own_template.py` keeps the vertices in
         the face within 1 mm of where they belong (median; 95 %: 2 mm). Lids stay as your mesh has them: open eyes stay
@@ -33,4 +43,7 @@ def sections(own: Figures, carried: Figures, atlas: Figures) -> Sections:
         {atlas.stretch_p95:.2f} (95th percentile; 1 is none), in {atlas.seconds} s of the stage Delivery on two busy
         cores. The scan's albedo beyond the head's reach (hair, clothes) is the filmed colour times one gain, so sunlit
         cloth is too bright; `scan_albedo_known.png` says where.
-        """))]
+        """,
+            ),
+        )
+    ]

@@ -21,10 +21,16 @@ def sections(engines: Figures) -> Sections:
         """Percent by which EEVEE differs there, in the colour and light in which it does most."""
         return max((100 * (ratio - 1) for light in lights for ratio in engines[light][skin].values()), key=abs)
 
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose(
+                """
         EEVEE's light over Cycles's, red, green, blue: the sample head in a real window, linear light, the same camera
         and maps, without denoising.
-        """, table(engines), f"""
+        """,
+                table(engines),
+                f"""
         Under lamps the two agree ({off(LAMPS, "surface"):+.1f} % at most) as long as no light goes under the skin;
         under the overcast sky EEVEE is brighter, as it has less shadow from a sky. With light under the skin EEVEE
         gives back all of the Base Color and Cycles a little less: {off(LAMPS, "random_walk_skin"):.0f} % are left of
@@ -32,4 +38,7 @@ def sections(engines: Figures) -> Sections:
         was up to {off(LAMPS, "random_walk"):.0f} % brighter under lamps and {off(SKY, "random_walk"):.0f} % under a
         sky. [What skin gives back of its albedo](even_light.md). Final pictures are Cycles's; EEVEE is for looking
         while you work.
-        """))]
+        """,
+            ),
+        )
+    ]

@@ -23,9 +23,16 @@ def sections(record: Figures) -> Sections:
     filmed = {name: row for name, row in rows.items() if not name[0].isdigit()}
     fitted = {name: row for name, row in rows.items() if name[0].isdigit() and not name.endswith(ALONE)}
     still = {name: row for name, row in rows.items() if name.endswith(ALONE)}
-    table = [["true heads, fitted", *_means(fitted)], ["true heads, by the head alone", *_means(still)],
-             ["filmed", *_means(filmed)]]
-    return [("", prose("""
+    table = [
+        ["true heads, fitted", *_means(fitted)],
+        ["true heads, by the head alone", *_means(still)],
+        ["filmed", *_means(filmed)],
+    ]
+    return [
+        (
+            "",
+            prose(
+                """
         Synthetic people with open eyes, by the eye reader (`core/face/eye_reader.py`) and the fit of
         `core/registration/lid_marks.py`. *True heads*: six people in ten frames with true cameras, whose eyes are
         fitted to their own heads, half a millimetre off. *By the head alone* is what such a head says of its eyes when
@@ -35,9 +42,19 @@ def sections(record: Figures) -> Sections:
         eyes' corners, where the opening is thinner than the reader tells. Irises of true heads are measured over their
         true skin (a dash: not measured), those of filmed people over the skin that the solve found; both eyes have one
         colour, so that a person's two figures are alike.
-        """, markdown(["mean over eyes", *COLUMNS[:7]], table), *filter(None, [left_out(rows)]))),
-        ("Eye by eye", markdown(["eye", *COLUMNS], [[name, *(_shown(row[column]) for column in COLUMNS)]
-                                                    for name, row in {**fitted, **filmed}.items()]))]
+        """,
+                markdown(["mean over eyes", *COLUMNS[:7]], table),
+                *filter(None, [left_out(rows)]),
+            ),
+        ),
+        (
+            "Eye by eye",
+            markdown(
+                ["eye", *COLUMNS],
+                [[name, *(_shown(row[column]) for column in COLUMNS)] for name, row in {**fitted, **filmed}.items()],
+            ),
+        ),
+    ]
 
 
 def left_out(rows: dict) -> str:
@@ -45,8 +62,14 @@ def left_out(rows: dict) -> str:
     opened = [person.name for person in LIKENESSES if sample_person(person.seed).openness]
     taken = [name for name in opened if rows.get(f"{name}, left", {}).get("rim, mm", 0) is None]
     absent = [name for name in opened if f"{name}, left" not in rows]
-    return " ".join(f"{words}: {', '.join(names)}." for words, names in (
-        ("Taken for closed, and in no mean", taken), ("Filmed with open eyes, too, and not measured", absent)) if names)
+    return " ".join(
+        f"{words}: {', '.join(names)}."
+        for words, names in (
+            ("Taken for closed, and in no mean", taken),
+            ("Filmed with open eyes, too, and not measured", absent),
+        )
+        if names
+    )
 
 
 def _means(rows: dict) -> list[str | None]:

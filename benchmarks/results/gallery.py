@@ -9,16 +9,27 @@ from ..pages import Sections, prose
 TITLE = "The gallery"
 SAYS = "The sample and six people of six skin tones in five lights: every map, and four new lights."
 RECORDS = ()
-SHOWN = {"sample": "the sample, sun behind leaves", "very_light": "very light, noon sun behind leaves",
-         "light": "light, overcast", "intermediate": "intermediate, a low sun through window bars",
-         "tan": "tan, three mixed lamps", "brown": "brown, a hazy sun from the side",
-         "dark": "dark, noon sun behind leaves"}
+SHOWN = {
+    "sample": "the sample, sun behind leaves",
+    "very_light": "very light, noon sun behind leaves",
+    "light": "light, overcast",
+    "intermediate": "intermediate, a low sun through window bars",
+    "tan": "tan, three mixed lamps",
+    "brown": "brown, a hazy sun from the side",
+    "dark": "dark, noon sun behind leaves",
+}
 
 
 def sections() -> Sections:
-    pictures = [prose(f"![{words}](../pictures/gallery_{name}.jpg)", f"*{words[0].upper()}{words[1:]}.*")
-                for name, words in SHOWN.items()]
-    return [("", prose("""
+    pictures = [
+        prose(f"![{words}](../pictures/gallery_{name}.jpg)", f"*{words[0].upper()}{words[1:]}.*")
+        for name, words in SHOWN.items()
+    ]
+    return [
+        (
+            "",
+            prose(
+                """
         Made by `python -m benchmarks.people FOLDER`, then `python -m benchmarks.gallery FOLDER/NAME.wildcap OUT.jpg
         --truth FOLDER/NAME/maps` for each, on 2026-11-28, the people by commit 1036f6da and the sample by 4ce0418a.
 
@@ -40,4 +51,8 @@ def sections() -> Sections:
         fainter than they are. On *intermediate* a dark spot stays on the lips and shade around the eye that lay under
         the bar, on the sample a trace of a leaf beside the bridge of the nose. Crumbs of the collar stay on the neck's
         rim of *intermediate* and *dark*.
-        """, *pictures))]
+        """,
+                *pictures,
+            ),
+        )
+    ]

@@ -17,9 +17,15 @@ def sections(geometry: Figures, scale: Figures) -> Sections:
     sun = geometry.lps_sun
     truth, head = sun.cameras.against_truth, sun.head.against_truth
     worst = max(abs(scale.set_on.worst), abs(scale.others.worst))
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose(
+                """
         ![frame, scan, wireframe and texture of the synthetic sample](../pictures/geometry.jpg)
-        """, table(geometry), f"""
+        """,
+                table(geometry),
+                f"""
         Made on a machine shared with other work: its seconds are upper bounds, and older than [the costs](costs.md).
 
         **Scale** comes from the whole head fitted to the landmarks; on the scan it came out {100 * scale.scan:.1f} %
@@ -28,4 +34,7 @@ def sections(geometry: Figures, scale: Figures) -> Sections:
         distance to the truth: {head.by_cameras.median_mm:.2f} mm by the cameras, {head.after_icp.median_mm:.2f} mm
         after ICP. **The scan has holes** where a nose or an ear is in hard light from one side only (the head bridges
         them; the delivered raw scan shows them).
-        """))]
+        """,
+            ),
+        )
+    ]

@@ -16,14 +16,38 @@ from ..pages import Sections, prose
 from ..people import PEOPLE
 
 TITLE = "What was measured"
-RECORDS = ("state", "demo", "relit", "relit_people", "scan_albedo", "whole_chain", "costs", "comparison", "photographs",
-           "whole_head", "skin_tone", "confidence")
+RECORDS = (
+    "state",
+    "demo",
+    "relit",
+    "relit_people",
+    "scan_albedo",
+    "whole_chain",
+    "costs",
+    "comparison",
+    "photographs",
+    "whole_head",
+    "skin_tone",
+    "confidence",
+)
 GROUPS = {
-    "The albedo": ("sample", "relit", "state", "state_0_1_0", "split", "scan", "gallery", "comparison", "rerender",
-                   "controlled", "ablation", "prior", "confidence"),
+    "The albedo": (
+        "sample",
+        "relit",
+        "state",
+        "state_0_1_0",
+        "split",
+        "scan",
+        "gallery",
+        "comparison",
+        "rerender",
+        "controlled",
+        "ablation",
+        "prior",
+        "confidence",
+    ),
     "Before the solve": ("geometry", "eyes", "delighters", "answers", "photographs", "shadows", "skin_tone"),
-    "After the solve": ("head", "upscale", "whole_head", "hair", "even_light", "engines", "delivery",
-                        "reimported"),
+    "After the solve": ("head", "upscale", "whole_head", "hair", "even_light", "engines", "delivery", "reimported"),
     "Time and memory": ("costs", "png_levels", "blender"),
 }
 ELSEWHERE = """
@@ -34,17 +58,22 @@ ELSEWHERE = """
 
 def sections(*records: Figures) -> Sections:
     of = Figures(zip(RECORDS, records, strict=True))
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose("""
         Every page has command, commit and day of its figures, all on 2 cores of a shared machine (25 GB; each page
         names the processor), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only, and may be
         older. The sample is by today's solver and a delighter that did not yet settle [hues in the
         dark](../method/delighting.md); all other pages with delit frames but the delighters' and the photographs' are
         by one that did not yet [expect a sky](delighters.md#after-the-solve) either.
-        """)),
+        """),
+        ),
         ("In short", headline(of)),
         ("Over people", spread(of.state)),
         ("Where we lose", losses(of)),
-        ("Pages", "\n".join([*(list_pages(group, names) for group, names in GROUPS.items()), prose(ELSEWHERE)]))]
+        ("Pages", "\n".join([*(list_pages(group, names) for group, names in GROUPS.items()), prose(ELSEWHERE)])),
+    ]
 
 
 def list_pages(group: str, names: tuple[str, ...]) -> str:
@@ -66,30 +95,51 @@ def headline(of: Figures) -> str:
     def others(row: str) -> list[str | None]:
         return [found[row] and f"{found[row].psnr:.2f}" for found in sets]
 
-    sets = [{"raw": sample["raw video"], "flat": sample["flat true tone"], "delit": None, "solved": sample.WildCap},
-            {"raw": scan["raw video"], "flat": scan["flat true tone"], "delit": None, "solved": scan.WildCap},
-            {**relit, "flat": None}, {**people, "flat": None}]
-    rows = [["the filmed texture", over_people(summary, "doing nothing"), *others("raw")],
-            ["one flat colour", over_people(summary, "flat colour"), *others("flat")],
-            ["the delit texture", over_people(summary, "delit texture"), *others("delit")],
-            ["**WildCap**", over_people(summary, "solved"), *others("solved")],
-            ["the true albedo's texture", over_people(summary, "true light"), None, None, None, None]]
-    head = ["PSNR, dB", f"[albedo, {summary.solved.psnr.people} people](state.md)", "[albedo, sample](sample.md)",
-            "[albedo, head scan](scan.md)", "[relit, sample](relit.md)", "[relit, six people](relit.md)"]
-    return prose(markdown(head, rows), f"""
+    sets = [
+        {"raw": sample["raw video"], "flat": sample["flat true tone"], "delit": None, "solved": sample.WildCap},
+        {"raw": scan["raw video"], "flat": scan["flat true tone"], "delit": None, "solved": scan.WildCap},
+        {**relit, "flat": None},
+        {**people, "flat": None},
+    ]
+    rows = [
+        ["the filmed texture", over_people(summary, "doing nothing"), *others("raw")],
+        ["one flat colour", over_people(summary, "flat colour"), *others("flat")],
+        ["the delit texture", over_people(summary, "delit texture"), *others("delit")],
+        ["**WildCap**", over_people(summary, "solved"), *others("solved")],
+        ["the true albedo's texture", over_people(summary, "true light"), None, None, None, None],
+    ]
+    head = [
+        "PSNR, dB",
+        f"[albedo, {summary.solved.psnr.people} people](state.md)",
+        "[albedo, sample](sample.md)",
+        "[albedo, head scan](scan.md)",
+        "[relit, sample](relit.md)",
+        "[relit, six people](relit.md)",
+    ]
+    return prose(
+        markdown(head, rows),
+        f"""
         The true skin tone is given to all; in the first column each picture gets one gain per channel on top. On
         sample and scan the filmed frames stand for their texture. A face takes [{minutes.standard.minutes:.1f} minutes
         on 2 cores](costs.md), of 300 frames {minutes["frames-300"].minutes:.1f}.
-        """)
+        """,
+    )
 
 
 def spread(state: Figures) -> str:
     """What the solve adds to the delit texture, and how unevenly."""
     solved, captures = state.summary.solved, state.captures
-    gains = {measure: {name: rows.solved[measure] - rows["delit texture"][measure] for name, rows in captures.items()
-                       if rows.solved.get(measure) is not None} for measure in ("psnr", "psnr_shared")}
-    (worst, least), (best, most) = (chosen(gains["psnr_shared"].items(), key=lambda item: item[1])
-                                    for chosen in (min, max))
+    gains = {
+        measure: {
+            name: rows.solved[measure] - rows["delit texture"][measure]
+            for name, rows in captures.items()
+            if rows.solved.get(measure) is not None
+        }
+        for measure in ("psnr", "psnr_shared")
+    }
+    (worst, least), (best, most) = (
+        chosen(gains["psnr_shared"].items(), key=lambda item: item[1]) for chosen in (min, max)
+    )
     return prose(f"""
         Over {solved.psnr.people} people ({len(gains["psnr"])} captures) the solve adds {solved.psnr.difference:+.2f} ±
         {solved.psnr.error:.2f} dB to the delit texture in the picture (person by person, ± the standard error of the
@@ -104,8 +154,12 @@ def spread(state: Figures) -> str:
 def worse_in_the_picture(gains: dict[str, float]) -> str:
     """How many captures lose by the solve, and how many of these are the head scan's; gains: dB by capture."""
     worse, scanned = [name for name, gain in gains.items() if gain < 0], [name for name in gains if is_scanned(name)]
-    of_scan = (f", among them {sum(map(is_scanned, worse))} of the {len(scanned)} of the one real scan, whose own map "
-               "holds light" if scanned else "")
+    of_scan = (
+        f", among them {sum(map(is_scanned, worse))} of the {len(scanned)} of the one real scan, whose own map "
+        "holds light"
+        if scanned
+        else ""
+    )
     return f"{len(worse)} of {len(gains)} captures become worse in the picture{of_scan}."
 
 
@@ -113,8 +167,7 @@ def the_synthetic(people: Iterable[str]) -> str:
     """How many people are of benchmarks/likenesses.py, and how many of benchmarks/people.py."""
     made = [name for name in people if not is_scanned(name)]
     bald = [name for name in made if is_bald(name)]
-    kinds = [(len(made) - len(bald), "with strands, eyes and a phone's pipeline"),
-             (len(bald), "bald, by true cameras")]
+    kinds = [(len(made) - len(bald), "with strands, eyes and a phone's pipeline"), (len(bald), "bald, by true cameras")]
     return f"The others are synthetic: {', '.join(f'{count} {what}' for count, what in kinds if count)}."
 
 
@@ -125,8 +178,9 @@ def gains_by_kind(people: Figures) -> str:
         kinds[is_bald(name)].append(solved["psnr"] - people["delit texture"][name]["psnr"])
     if min(map(len, kinds.values())) < 2:
         return ""
-    bald, others = (f"{np.mean(gains):+.2f} ± {np.std(gains, ddof=1) / len(gains) ** 0.5:.2f} dB"
-                    for gains in kinds.values())
+    bald, others = (
+        f"{np.mean(gains):+.2f} ± {np.std(gains, ddof=1) / len(gains) ** 0.5:.2f} dB" for gains in kinds.values()
+    )
     return f"To the bald, of the generator that trained the networks, the solve adds {bald}, to the others {others}."
 
 

@@ -15,5 +15,11 @@ RECORDS = ("photographs",)
 
 
 def sections(record: Figures) -> Sections:
-    return [("", WORDS), *((title, format_table(summarise(record[name].people, COLUMNS), COLUMNS, "answer"))
-                           for name, title in TITLES.items() if name in record)]
+    return [
+        ("", WORDS),
+        *(
+            (title, format_table(summarise(record[name].people, COLUMNS), COLUMNS, "answer"))
+            for name, title in TITLES.items()
+            if name in record
+        ),
+    ]

@@ -9,14 +9,19 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "The prior"
-SAYS = ("What it was trained on, that it does not copy, that normals and specular do not follow from the diffuse; and "
-        "what skins' large shapes are like.")
+SAYS = (
+    "What it was trained on, that it does not copy, that normals and specular do not follow from the diffuse; and "
+    "what skins' large shapes are like."
+)
 RECORDS = ("prior_training", "prior", "traits")
 
 
 def sections(training: Figures, prior: Figures, traits: Figures) -> Sections:
     samples, response = prior.samples, prior.response.sampled
-    return [("", prose(f"""
+    return [
+        (
+            "",
+            prose(f"""
         {training.million_parameters:.1f} million parameters, trained {training.minutes} minutes on two CPU cores on
         {training.synthetic_skins} synthetic skins and {training.scanned_skins} skins of the VALID avatars (diffuse
         only); the card beside the weights has its held-out losses.
@@ -30,4 +35,7 @@ def sections(training: Figures, prior: Figures, traits: Figures) -> Sections:
         {response.specular_of_mean_face:.2f} of its error, {response.normals_of_another:.2f} and
         {response.specular_of_another:.2f} of another subject's); 20 % better was the aim. A longer training, on a GPU,
         is the next thing to try; the command is ready.
-        """)), *benchmark.sections(traits)]
+        """),
+        ),
+        *benchmark.sections(traits),
+    ]

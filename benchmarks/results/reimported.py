@@ -14,7 +14,10 @@ RECORDS = ("reimported",)
 
 
 def sections(record: Figures) -> Sections:
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose("""
         The sample head in its material, and each file that Deliver makes of it as Blender's own importer reads it,
         under the same light before the same camera: PSNR over the pixels of the head, in sRGB. Wanted: 30 dB for glTF
         and USD. No exchange format holds scattering under the skin, so the next column compares with the same head
@@ -22,6 +25,8 @@ def sections(record: Figures) -> Sections:
         specular map, FBX shines a little otherwise. *Points*: the farthest that a vertex came back from where it was.
         OBJ's pictures are switched to Non-Color, as its hint says: left as Blender imports them the normals are taken
         for colours, and the head comes out dark.
-        """)),
+        """),
+        ),
         ("", table(record)),
-        ("", "![The original, without scattering, and back from glTF, USD, FBX and OBJ](../pictures/reimported.jpg)")]
+        ("", "![The original, without scattering, and back from glTF, USD, FBX and OBJ](../pictures/reimported.jpg)"),
+    ]

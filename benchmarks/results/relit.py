@@ -16,7 +16,10 @@ RECORDS = ("relit", "relit_people")
 
 def sections(relit: Figures, people: Figures) -> Sections:
     sample, mean = relit.sample, people.mean
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose("""
         The presets *three-point*, *window*, *sun* and *coloured*, Blender's worlds *city* and *interior*. Both heads
         wear the add-on's material on the same registered head, so what differs is the maps; it wears the true ones
         where its surface lies on the true head. (Where UVs agree is a millimetre beside that, by which all fine detail
@@ -28,8 +31,13 @@ def sections(relit: Figures, people: Figures) -> Sections:
         over confident facial skin, by one gain per channel; every row wears the solved relief and gloss where it does
         not say otherwise. Maps are averaged to 1024, where a texel is finer than a
         pixel: nothing of this says what 4K adds.
-        """)),
-        (SAMPLE, prose(table(relit), f"""
+        """),
+        ),
+        (
+            SAMPLE,
+            prose(
+                table(relit),
+                f"""
         Solved is {sample.solved.psnr - sample.raw.psnr:.1f} dB over the filmed texture (asked for: 1 dB) and
         {sample.solved.psnr - sample.delit.psnr:.2f} dB over the delit one (0.5 dB). The albedo costs nearly all that is
         missing: with the true one {sample.true_albedo.psnr:.0f} dB are reached. **Relief and gloss hardly matter**:
@@ -44,17 +52,30 @@ def sections(relit: Figures, people: Figures) -> Sections:
 
         *Three-point, window and sun (left), coloured, city and interior (right); from left to right the true subject,
         the solved maps, the delit and the filmed texture as albedo (sRGB curve; Blender's view transform Standard).*
-        """)),
-        ("Six people", prose("""
+        """,
+            ),
+        ),
+        (
+            "Six people",
+            prose(
+                """
         Those of the [gallery](gallery.md), solved at standard quality from forty frames, maps of 1024.
-        """, table(people), f"""
+        """,
+                table(people),
+                f"""
         On their mean the solve gains {mean.solved.psnr - mean.raw.psnr:.1f} dB over the filmed texture and
         {mean.solved.psnr - mean.delit.psnr:.2f} dB over the delit one, and relief and gloss
         {mean.solved.psnr - mean.plain.psnr:+.2f} dB over none and an even one: {by_person(people)}.
-        """))]
+        """,
+            ),
+        ),
+    ]
 
 
 def by_person(people: Figures) -> str:
     """What relief and gloss are worth to each: 'dark +1.30'."""
-    return ", ".join(f"{name.replace('_', ' ')} {rows.solved.psnr - rows.plain.psnr:+.2f}"
-                     for name, rows in people.items() if name != "mean")
+    return ", ".join(
+        f"{name.replace('_', ' ')} {rows.solved.psnr - rows.plain.psnr:+.2f}"
+        for name, rows in people.items()
+        if name != "mean"
+    )

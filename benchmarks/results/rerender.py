@@ -15,13 +15,22 @@ RECORDS = ("rerender",)
 
 def sections(rerender: Figures) -> Sections:
     ahead = rerender.mean["environment, no prior"].psnr - rerender.mean.wildcap.psnr
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose(
+                """
         Albedo times shading of the delit rows of [the comparison](comparison.md), in the sixteen views that the texture
         came from, against their delit frames, on facial skin seen from less than 72 degrees to the side; one gain per
         channel and view for all rows. *The texture itself* says how far the views agree with each other.
-        """, table(rerender), f"""
+        """,
+                table(rerender),
+                f"""
         **A tie, not a first place**: what is asked for (28.8 dB, SSIM 0.95) is reached by every row. Sampling under
         guidance explains the texture whatever the light model, and what is left is where the views differ; texels that
         follow the frames alone explain them best ({ahead:+.1f} dB), baked shadows and all. Our figure lies above the
         paper's because its captures are real, and this set's cameras and heads are nearly the true ones.
-        """))]
+        """,
+            ),
+        )
+    ]

@@ -14,7 +14,11 @@ RECORDS = ("demo",)
 
 
 def sections(demo: Figures) -> Sections:
-    return [("", prose(f"""
+    return [
+        (
+            "",
+            prose(
+                f"""
         ![Frame, mask over the delit texture, solved albedo; the head under three lights](../pictures/teaser.jpg)
 
         *Above: a frame, the shadow mask over the delit texture, and the solved albedo, which keeps a faint outline of
@@ -24,7 +28,12 @@ def sections(demo: Figures) -> Sections:
         The solved albedo against the truth, in the picture, on facial skin; the true skin tone is given (mean of
         {demo.views} frames). *After one gain*: per channel, in linear light. *Detail*: the correlation with the truth's
         log green between 1 and 3 px. *Shadow step*: log(answer / truth), lit less dark, at the shadow's edge.
-        """, table(demo), """
+        """,
+                table(demo),
+                """
         What a delighter alone leaves, and what the solve adds to it, is on other pages: [relit](relit.md),
         [the head scan](scan.md), [the state of the albedo](state.md). The [gallery](gallery.md) shows every map.
-        """))]
+        """,
+            ),
+        )
+    ]

@@ -17,15 +17,25 @@ def sections(tone: Figures, real: Figures) -> Sections:
     everybody, dark, lightest = tone.groups["all"], tone.groups.dark, tone.groups["very light"]
     scan, sample = tone.captures.lps_sun, tone.captures.sample
     before, after = widest_move(real, "before"), widest_move(real, "after")
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose(
+                """
         Held-out simulated subjects, each in three random lights by two simulated phones (`core/synthetic/exposure.py`:
         a meter that weighs face and surroundings, white balance that leaves a cast; the model of the camera was fitted
         on other subjects before phones of the same kind, that of people on measured skin). *scene* is the estimate from
         the frames alone; *measured* the same with a white card held before the face, up to 0.12 rad askew. A cell is
         the mean signed error of L* and the mean delta E 2000.
-        """, markdown(["group", "subjects", *WAYS], [
-            [name, row.subjects, *(f"{row[way].lightness:+.2f}, {row[way].delta_e:.2f}" for way in WAYS)]
-            for name, row in tone.groups.items()]), f"""
+        """,
+                markdown(
+                    ["group", "subjects", *WAYS],
+                    [
+                        [name, row.subjects, *(f"{row[way].lightness:+.2f}, {row[way].delta_e:.2f}" for way in WAYS)]
+                        for name, row in tone.groups.items()
+                    ],
+                ),
+                f"""
         **Frames alone tell little**: under an unknown exposure light skin in dim light and dark skin in bright light
         differ in colour only, and the white balance blurs that. So the estimate stays near the middle of the people
         that were measured: the lightest subjects come out {-lightest.scene.lightness:.1f} L* too dark, the darkest
@@ -39,8 +49,13 @@ def sections(tone: Figures, real: Figures) -> Sections:
         sample ({sample.lightness:.1f}) by {sample.scene.lightness:+.1f}, {sample.scene.delta_e:.1f} (stated
         {sample.scene.stated:.1f}). A ColorChecker drawn into a frame gives its light within 2 percent
         (`tests/test_white_point.py`). Not measured: a real card.
-        """)),
-        ("Real people", prose(f"""
+        """,
+            ),
+        ),
+        (
+            "Real people",
+            prose(
+                f"""
         L* of the estimate ± its stated deviation, before and after the estimate ceased to follow the ground and to be
         drawn away from the middle (`python -m benchmarks.real_tones DATA FOLDER`; *before* is c1434e25). The people
         london_NNN were photographed in one light before a light ground; *white* and *black* are the same pixels of the
@@ -49,9 +64,17 @@ def sections(tone: Figures, real: Figures) -> Sections:
         facial skin has an L* of 58 ± 5, dark skin of 34 ± 7 (International Skin Spectra Archive, less the surface's
         reflection): who is dark in a picture that is not comes out too light, who is fair in a dim one too dark
         (lisa1, lisa3), and the stated deviation is wide there, but not wide enough for all.
-        """, markdown(["capture", "before", "after"], [
-            [name, *(f"{row[way].lightness:.1f} ± {row[way].deviation:.1f}" for way in ("before", "after"))]
-            for name, row in real.items()])))]
+        """,
+                markdown(
+                    ["capture", "before", "after"],
+                    [
+                        [name, *(f"{row[way].lightness:.1f} ± {row[way].deviation:.1f}" for way in ("before", "after"))]
+                        for name, row in real.items()
+                    ],
+                ),
+            ),
+        ),
+    ]
 
 
 def widest_move(real: Figures, way: str) -> float:

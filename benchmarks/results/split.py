@@ -19,8 +19,14 @@ OLDER = """
 
 
 def sections(record: Figures) -> Sections:
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose("""
         The split of that commit took traits to be as large everywhere, and to reach farther;
         [what is measured of them now](prior.md#how-skins-differ) leaves hair out. The picture of the parts is by
         today's, its solved map by the solver of [the state of the albedo](state.md).
-        """)), *split.sections(record)]
+        """),
+        ),
+        *split.sections(record),
+    ]

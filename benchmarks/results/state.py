@@ -9,13 +9,16 @@ from ..figures import Figures
 from ..pages import Sections
 
 TITLE = "The state of the albedo"
-SAYS = ("People like people, by the measures that tell light from skin, beside answers that do nothing or know the "
-        "light.")
+SAYS = (
+    "People like people, by the measures that tell light from skin, beside answers that do nothing or know the light."
+)
 RECORDS = ("state",)
-CHOSEN = ("How far the fitted light counts in the delit texture was chosen on these people but the six bald, and on "
-          "others; what it is worth to people who are left out of the choice is on [the page of answers](answers.md). "
-          "The delighter of that commit did not expect a sky yet ([what that is "
-          "worth](delighters.md#after-the-solve)).")
+CHOSEN = (
+    "How far the fitted light counts in the delit texture was chosen on these people but the six bald, and on "
+    "others; what it is worth to people who are left out of the choice is on [the page of answers](answers.md). "
+    "The delighter of that commit did not expect a sky yet ([what that is "
+    "worth](delighters.md#after-the-solve))."
+)
 
 
 def sections(record: Figures) -> Sections:

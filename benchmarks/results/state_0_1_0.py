@@ -13,21 +13,30 @@ from ..state_captures import DELIT, SOLVED
 TITLE = "The state of version 0.1.0"
 SAYS = "The same captures, heads and measures by the delighter and the solver of 0.1.0, and what has changed since."
 RECORDS = ("state_0_1_0", "state")
-COMPARED = {name: state.TABLES[table][name]
-            for table, names in (("In the picture", ("psnr", "ssim", "flip", "detail", "shadow_step")),
-                                 ("Up to a light, and across lights", ("psnr_shared", "agreement")),
-                                 ("Features kept", ("lost",)))
-            for name in names}
+COMPARED = {
+    name: state.TABLES[table][name]
+    for table, names in (
+        ("In the picture", ("psnr", "ssim", "flip", "detail", "shadow_step")),
+        ("Up to a light, and across lights", ("psnr_shared", "agreement")),
+        ("Features kept", ("lost",)),
+    )
+    for name in names
+}
 
 
 def sections(before: Figures, now: Figures) -> Sections:
-    return [("", prose(f"""
+    return [
+        (
+            "",
+            prose(f"""
         `python -m benchmarks.earlier` took the captures of [the state](state.md) through 0.1.0's own code and weights,
         from the delighter on; frames, cameras and heads are today's. {left_out(before, now)} The tables below the first
         are those of that page.
-        """)),
-            ("What has changed", changes(before, now)),
-            *((title or "By 0.1.0 alone", text) for title, text in state.sections(before.people, before.captures))]
+        """),
+        ),
+        ("What has changed", changes(before, now)),
+        *((title or "By 0.1.0 alone", text) for title, text in state.sections(before.people, before.captures)),
+    ]
 
 
 def left_out(before: Figures, now: Figures) -> str:
@@ -39,9 +48,14 @@ def left_out(before: Figures, now: Figures) -> str:
 def changes(before: Figures, now: Figures) -> str:
     """Today's texture and albedo less those of 0.1.0, person by person, on the captures that 0.1.0 was measured on."""
     return "\n\n".join(
-        format_table(summarise(paired(before, now, method), COMPARED, f"{method}, 0.1.0"), COMPARED,
-                     "taken for albedo", f"{method}, 0.1.0")
-        for method in (DELIT, SOLVED))
+        format_table(
+            summarise(paired(before, now, method), COMPARED, f"{method}, 0.1.0"),
+            COMPARED,
+            "taken for albedo",
+            f"{method}, 0.1.0",
+        )
+        for method in (DELIT, SOLVED)
+    )
 
 
 def paired(before: Figures, now: Figures, method: str) -> Scores:
@@ -54,5 +68,7 @@ def paired(before: Figures, now: Figures, method: str) -> Scores:
             today |= {"captures": 1, "psnr_shared": today["psnr_alone"]} if today else {}
         if today.get("captures") == then["captures"]:
             rows[person] = then, today
-    return {f"{method}, 0.1.0": {person: then for person, (then, _) in rows.items()},
-            method: {person: today for person, (_, today) in rows.items()}}
+    return {
+        f"{method}, 0.1.0": {person: then for person, (then, _) in rows.items()},
+        method: {person: today for person, (_, today) in rows.items()},
+    }

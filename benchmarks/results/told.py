@@ -34,10 +34,12 @@ def corrected(text: str, phrase: str, name: str) -> str:
     words = (r"\s+".join(map(re.escape, re.split(r" +", part))) for part in re.split(NUMBER, phrase))
     matches = list(re.finditer(f"({NUMBER})".join(words), text))
     if len(matches) != 1:
-        raise Problem(f"{name} has the phrase {phrase!r} {len(matches)} times.",
-                      "Write it there once, or change it in benchmarks/results/told.py.")
+        raise Problem(
+            f"{name} has the phrase {phrase!r} {len(matches)} times.",
+            "Write it there once, or change it in benchmarks/results/told.py.",
+        )
     for group, number in reversed(list(enumerate(re.findall(NUMBER, phrase), 1))):
-        text = text[:matches[0].start(group)] + number + text[matches[0].end(group):]
+        text = text[: matches[0].start(group)] + number + text[matches[0].end(group) :]
     return text
 
 
@@ -58,16 +60,19 @@ def told() -> dict[str, list[str]]:
         "docs/scan_and_head.md": in_scan_and_head(of.geometry.lps_sun, of.sample_surfaces),
         "docs/guide/install.md": [
             f"it announces {installed.told_gb:.1f} GB, and **Remove Solver**, which says first what it frees, gives "
-            f"back {installed.freed_gb:.1f} GB"],
+            f"back {installed.freed_gb:.1f} GB"
+        ],
         "docs/guide/relight.md": [
             f"takes {memory.shown_gb:.1f} GB of memory ({memory.empty_gb:.1f} GB empty; {memory.loading_gb:.1f} GB "
-            f"while they load, {memory.mask_opened_gb:.1f} GB when a mask"],
+            f"while they load, {memory.mask_opened_gb:.1f} GB when a mask"
+        ],
         "docs/delighters.md": [
             f"{cost.tera_multiplications:.2f} x 10^12 multiplications, three quarters of them in the decoder, and "
             f"{cost.peak_gb:.1f} GB of memory",
             f"a frame took {cost.seconds:.0f} s on two threads, while 10^12 multiplications of one large matrix "
             f"product took {cost.seconds_of_a_product:.0f} s there; a cancel was heard within "
-            f"{cost.seconds_to_cancel:.1f} s"],
+            f"{cost.seconds_to_cancel:.1f} s",
+        ],
     }
 
 
@@ -82,7 +87,8 @@ def in_readme(of: _Published) -> list[str]:
         f"| the filmed texture | {relit.raw.psnr:.2f} dB | {over_people(answers, 'doing nothing')} dB |",
         f"| one flat colour | - | {over_people(answers, 'flat colour')} dB |",
         f"| the delit texture | {relit.delit.psnr:.2f} dB | {over_people(answers, 'delit texture')} dB |",
-        f"| **WildCap** | {relit.solved.psnr:.2f} dB | {over_people(answers, 'solved')} dB |"]
+        f"| **WildCap** | {relit.solved.psnr:.2f} dB | {over_people(answers, 'solved')} dB |",
+    ]
 
 
 def in_cameras(sun: figures.Figures, scale: figures.Figures) -> list[str]:
@@ -98,7 +104,8 @@ def in_cameras(sun: figures.Figures, scale: figures.Figures) -> list[str]:
         f"six synthetic heads it was set on: median {percent(scale.set_on.median)}, worst "
         f"{percent(scale.set_on.worst)}; three others: {percent(scale.others.median)}, "
         f"worst {percent(scale.others.worst)}",
-        f"lids closed: {percent(scale.scan)} ({100 * scale.scan_by_corners:.1f} % by the corners of the eyes)"]
+        f"lids closed: {percent(scale.scan)} ({100 * scale.scan_by_corners:.1f} % by the corners of the eyes)",
+    ]
 
 
 def in_scan_and_head(sun: figures.Figures, sample: figures.Figures) -> list[str]:
@@ -106,8 +113,11 @@ def in_scan_and_head(sun: figures.Figures, sample: figures.Figures) -> list[str]
     apart, phrases = sample.head_to_scan_mm, []
     for name in ("scan", "head"):
         truth = sun[name].against_truth
-        rows = {"head scan under hard sun": [way[key] for way in (truth.by_cameras, truth.after_icp) for key in keys],
-                "sample": [sample[name][before + key] for before in ("", "icp_") for key in keys]}
-        phrases += [f"| {name}, {row} | {' | '.join(f'{value:.2f}' for value in values)} |"
-                    for row, values in rows.items()]
+        rows = {
+            "head scan under hard sun": [way[key] for way in (truth.by_cameras, truth.after_icp) for key in keys],
+            "sample": [sample[name][before + key] for before in ("", "icp_") for key in keys],
+        }
+        phrases += [
+            f"| {name}, {row} | {' | '.join(f'{value:.2f}' for value in values)} |" for row, values in rows.items()
+        ]
     return [*phrases, f"Head to scan, median: {apart.sample:.2f} and {apart.scan:.2f} mm"]

@@ -19,36 +19,73 @@ def sections(record: Figures, cost: Figures) -> Sections:
     def both(digits: int, *rows: Figures) -> list[str]:
         return [", ".join(f"{row[key]:.{digits}f}" for row in rows) for key in ("fill", "completed")]
 
-    return [("", prose("""
+    return [
+        (
+            "",
+            prose(
+                """
         *fill* is what the solver gives where nobody looked, the mean face in the subject's tone; *completed* is what
         the stage 4K Maps delivers. Six synthetic subjects of which only the face was seen (maps of 512), and the solved
         captures (1024; the sample's truth by `--subject 900006`). Errors are those of the tone over 2 mm, in sRGB of
         255.
-        """, OLDER, markdown(["", "fill", "completed"], [
-            ["synthetic: neck, ears", *both(1, people.neck, people.ears)],
-            ["synthetic: scalp, of which nothing was seen", *both(1, people.scalp)],
-            ["synthetic: fine band of the hidden neck over the face's (1 is alike)", *both(2, people.grain)],
-            ["sample: neck, ears, scalp", *both(1, sample.tone.neck, sample.tone.ears, sample.tone.scalp)],
-            ["sample: step of the log tone over the border (within the seen part, as far apart: "
-             f"{sample.border.within:.3f})", *both(3, sample.border)],
-            [f"head scan: the same (within: {scan.border.within:.3f})", *both(3, scan.border)]]), """
+        """,
+                OLDER,
+                markdown(
+                    ["", "fill", "completed"],
+                    [
+                        ["synthetic: neck, ears", *both(1, people.neck, people.ears)],
+                        ["synthetic: scalp, of which nothing was seen", *both(1, people.scalp)],
+                        [
+                            "synthetic: fine band of the hidden neck over the face's (1 is alike)",
+                            *both(2, people.grain),
+                        ],
+                        ["sample: neck, ears, scalp", *both(1, sample.tone.neck, sample.tone.ears, sample.tone.scalp)],
+                        [
+                            "sample: step of the log tone over the border (within the seen part, as far apart: "
+                            f"{sample.border.within:.3f})",
+                            *both(3, sample.border),
+                        ],
+                        [f"head scan: the same (within: {scan.border.within:.3f})", *both(3, scan.border)],
+                    ],
+                ),
+                """
         Here the fill is flattered: the mean face was learnt from subjects of the same generator and is given the true
         tone (synthetic) or nearly so (sample), so on neck and ears it can hardly be beaten. On the sample the seen neck
         is solved too dark in places, and the completed neck goes on from it. **Of a scalp that nobody saw we make bare
         skin**, while the painted subjects wear cropped hair of 25 to 100 %; where part of it was seen (sample), it goes
         on with its tone and is the nearer one. On the head scan a faint step remains over the scalp. What was seen well
         keeps its bytes (a test).
-        """)),
-        ("The hair's masks", prose(markdown(["hair, six synthetic subjects", ""], [
-            ["correlation of the brows' mask with what the painted brows take from the albedo", f"{people.brows:.2f}"],
-            ["the same for the beard (0 where it was not found: fair or grey hair on light or mottled skin)",
-             f"{people.beard:.2f}"],
-            ["beard found on a bare chin", f"{people.bare_chin:.0f} cm^2"],
-            ["error below brows and beard against the skin painted without hair: with hair, clean",
-             f"{people.below_hair['with hair']:.1f}, {people.below_hair.clean:.1f}"]]), f"""
+        """,
+            ),
+        ),
+        (
+            "The hair's masks",
+            prose(
+                markdown(
+                    ["hair, six synthetic subjects", ""],
+                    [
+                        [
+                            "correlation of the brows' mask with what the painted brows take from the albedo",
+                            f"{people.brows:.2f}",
+                        ],
+                        [
+                            "the same for the beard (0 where it was not found: fair or grey hair on light or mottled skin)",
+                            f"{people.beard:.2f}",
+                        ],
+                        ["beard found on a bare chin", f"{people.bare_chin:.0f} cm^2"],
+                        [
+                            "error below brows and beard against the skin painted without hair: with hair, clean",
+                            f"{people.below_hair['with hair']:.1f}, {people.below_hair.clean:.1f}",
+                        ],
+                    ],
+                ),
+                f"""
         These are by the strokes alone, without the face parser that is asked today; [hair](hair.md) has what is grown
         with it. Sample: brows {sample.hair.brows:.1f} cm^2, beard {sample.hair.beard:.1f} cm^2 (painted: 15 % of a full
         one). Head scan: brows {scan.hair.brows:.1f}, lashes {scan.hair.lashes:.1f}, beard {scan.hair.beard:.1f} cm^2.
         On maps of 1024 the processor is busy for about {cost.completing_seconds} s with completing, {cost.hair_seconds}
         s with the hair and {cost.layout_seconds} s with laying out the head; {cost.peak_gb:.1f} GB at most.
-        """))]
+        """,
+            ),
+        ),
+    ]

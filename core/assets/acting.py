@@ -77,13 +77,13 @@ def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarra
     matrix = matrix[rows]
     closed = builder._lips_closed(builder._lids_closed(body))
     triangles = order[triangles]
-    outer = triangles[:len(builder.faces)]
+    outer = triangles[: len(builder.faces)]
     face, corner = np.nonzero(outer != builder.faces)
     eyes, teeth = _balls(base, body), _jaws(base)
-    strips = triangles[len(builder.faces):]
+    strips = triangles[len(builder.faces) :]
     placed = _placed(matrix @ closed, body, base)
     placed[:welded] = builder.head(body)
-    placed[welded:welded + len(copies)] = placed[copies]
+    placed[welded : welded + len(copies)] = placed[copies]
     kind, uv, anchors, weights, slots = _soft(placed, strips, copies, welded, uvs)
     start = len(placed)
     faces = [np.pad(strips, ((0, 0), (0, 1)), constant_values=-1)]
@@ -104,10 +104,21 @@ def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarra
     balls = np.array([[*_placed(centre[None], body, base)[0], radius * scale] for centre, radius in balls])
     mouth = (builder._lips[0], *(upper for upper, _ in builder._lids.values()))
     ends = np.searchsorted(builder.used, [[chain[0], chain[-1]] for chain in mouth])
-    return ActingHead(copies, np.stack([face, corner, outer[face, corner]], 1), np.concatenate(faces),
-                      np.concatenate(slot_rows), np.concatenate(uv_rows), kinds,
-                      np.pad(anchors, ((0, missing), (0, 0))), np.pad(weights, ((0, missing), (0, 0))), rest,
-                      _seam(rest, copies), ends, sparse.vstack(matrices).tocsr(), balls)
+    return ActingHead(
+        copies,
+        np.stack([face, corner, outer[face, corner]], 1),
+        np.concatenate(faces),
+        np.concatenate(slot_rows),
+        np.concatenate(uv_rows),
+        kinds,
+        np.pad(anchors, ((0, missing), (0, 0))),
+        np.pad(weights, ((0, missing), (0, 0))),
+        rest,
+        _seam(rest, copies),
+        ends,
+        sparse.vstack(matrices).tocsr(),
+        balls,
+    )
 
 
 def _order(target: np.ndarray, lower: np.ndarray, welded: int) -> tuple[np.ndarray, np.ndarray]:
@@ -149,12 +160,14 @@ def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sp
             rows += [(between[-1] - count, lower[a], 1 - t), (between[-1] - count, lower[b], t)]
         extra[lower[a], lower[b]], extra[lower[b], lower[a]] = between, between[::-1]
     r, c, v = zip(*rows, strict=True)
-    extended = sparse.vstack([sparse.identity(count),
-                              sparse.csr_matrix((v, (r, c)), shape=(len(parent) - count, count))]).tocsr()
+    extended = sparse.vstack(
+        [sparse.identity(count), sparse.csr_matrix((v, (r, c)), shape=(len(parent) - count, count))]
+    ).tocsr()
 
     def grown(polygon):
-        return [i for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True)
-                for i in (int(a), *extra.get((a, b), ()))]
+        return [
+            i for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True) for i in (int(a), *extra.get((a, b), ()))
+        ]
 
     cavities = torch.load(base.folder / "template_mesh_internal_cavities.pth", weights_only=True)
     inner = [base.faces[int(i)] for i in cavities["face_indices"]]
@@ -168,8 +181,9 @@ def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sp
     return [grown(p) for p in builder._open_polygons()], [grown(p) for p in kept], parent, extended
 
 
-def _targets(builder: HeadBuilder, polygons: list, inner: list, parent: np.ndarray, used: np.ndarray,
-             number: np.ndarray) -> np.ndarray:
+def _targets(
+    builder: HeadBuilder, polygons: list, inner: list, parent: np.ndarray, used: np.ndarray, number: np.ndarray
+) -> np.ndarray:
     """The vertex of the subdivided head that each vertex of the subdivided open head came from, -1 for inner ones."""
     coarse = np.full(len(parent), -1)
     coarse[builder.used] = np.arange(len(builder.used))
@@ -194,7 +208,7 @@ def _lower(base: Base, builder: HeadBuilder, parent: np.ndarray) -> np.ndarray:
     for _, rim in builder._lids.values():
         lower[rim[1:-1]] = True
     lower[[i for i in builder._lips[1][1:-1] if i is not None]] = True
-    lower[len(base.vertices):] = True
+    lower[len(base.vertices) :] = True
     return lower
 
 
@@ -253,8 +267,9 @@ def _balls(base: Base, body: np.ndarray) -> list[tuple]:
     bulge = 1 + 0.06 * np.clip(1 - (angle / 0.52) ** 2, 0, None)
     turn = np.arange(around) * 2 * np.pi / around
     ring = np.sin(angle)[1:-1, None] * bulge[1:-1, None]
-    body_of = np.stack([ring * np.cos(turn), ring * np.sin(turn),
-                        (np.cos(angle) * bulge)[1:-1, None] * np.ones(around)], -1).reshape(-1, 3)
+    body_of = np.stack(
+        [ring * np.cos(turn), ring * np.sin(turn), (np.cos(angle) * bulge)[1:-1, None] * np.ones(around)], -1
+    ).reshape(-1, 3)
     unit = np.concatenate([[[0, 0, bulge[0]]], body_of, [[0, 0, -1]]])
     # the iris gets the most of the picture
     radius = 0.5 * (np.concatenate([[0], np.repeat(angle[1:-1], around), [np.pi]]) / np.pi) ** 0.6
@@ -267,8 +282,17 @@ def _balls(base: Base, body: np.ndarray) -> list[tuple]:
     for r in range(rows - 1):
         a, b = 1 + r * around, 1 + (r + 1) * around
         faces.append(np.stack([a + k, b + k, b + n, a + n], 1))
-    faces.append(np.stack([1 + (rows - 1) * around + n, 1 + (rows - 1) * around + k, np.full(around, len(unit) - 1),
-                           np.full(around, -1)], 1))
+    faces.append(
+        np.stack(
+            [
+                1 + (rows - 1) * around + n,
+                1 + (rows - 1) * around + k,
+                np.full(around, len(unit) - 1),
+                np.full(around, -1),
+            ],
+            1,
+        )
+    )
     faces = np.concatenate(faces)
     result = []
     for side, kind in (("l", LEFT_EYE), ("r", RIGHT_EYE)):
@@ -285,8 +309,9 @@ def _jaws(base: Base) -> list[tuple]:
         number = np.full(len(base.vertices), -1)
         number[members] = np.arange(len(members))
         faces = np.array([[number[i] for i in f] + [-1] * (4 - len(f)) for f in base.helper_faces(group)])
-        matrix = sparse.csr_matrix((np.ones(len(members)), (np.arange(len(members)), members)),
-                                   shape=(len(members), len(base.vertices)))
+        matrix = sparse.csr_matrix(
+            (np.ones(len(members)), (np.arange(len(members)), members)), shape=(len(members), len(base.vertices))
+        )
         result.append((None, faces, np.full((len(members), 2), 0.5), JAWS, slot, matrix))
     return result
 

@@ -30,8 +30,9 @@ def main() -> None:
     mean, components = identity_space(base, builder)
     face, bary, weight = find_landmarks(mean, components, builder.faces)
     points = (mean[builder.faces[face]] * bary[..., None]).sum(1)
-    uvs, face_uvs = unwrap(mean, builder.faces, builder.mirror,
-                           choose_scale(mean, builder.faces, face_outline(points), FACE_SHARE))
+    uvs, face_uvs = unwrap(
+        mean, builder.faces, builder.mirror, choose_scale(mean, builder.faces, face_outline(points), FACE_SHARE)
+    )
     mesh = Mesh(mean, builder.faces, uvs, face_uvs)
     meshes.write_obj(ASSETS / "head.obj", mesh)
     mesh = meshes.read_obj(ASSETS / "head.obj")  # as everybody will read it, rounded

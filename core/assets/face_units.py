@@ -113,8 +113,12 @@ def _sides(head: ActingHead) -> np.ndarray:
     double above."""
     count, inner = len(head.rest) - len(head.kind), head.kind
     first = count - len(head.copies)
-    nearest = np.concatenate([np.argmin(np.linalg.norm(chunk[:, None] - head.rest[head.copies][None], axis=2), 1)
-                              for chunk in np.array_split(head.rest, 40)])
+    nearest = np.concatenate(
+        [
+            np.argmin(np.linalg.norm(chunk[:, None] - head.rest[head.copies][None], axis=2), 1)
+            for chunk in np.array_split(head.rest, 40)
+        ]
+    )
     side = np.where(head.rest[:, 2] >= head.rest[head.copies[nearest], 2], 1, -1)
     side[head.copies], side[first:count] = 1, -1
     side[count:][inner != 0] = 0
@@ -167,7 +171,7 @@ def on_template(head: ActingHead, vertices: np.ndarray) -> tuple[ActingHead, np.
     turn = (u @ vt).T * (singular_values.sum() / ((a - a.mean(0)) ** 2).sum())
     rest = (head.rest - a.mean(0)) @ turn.T + b.mean(0)
     rest[:count] = vertices
-    rest[count:count + len(head.copies)] = vertices[head.copies]
+    rest[count : count + len(head.copies)] = vertices[head.copies]
     balls = head.balls.copy()
     balls[:, :3] = (balls[:, :3] - a.mean(0)) @ turn.T + b.mean(0)
     balls[:, 3] *= np.cbrt(np.linalg.det(turn))
@@ -178,15 +182,21 @@ def stored(head: ActingHead, units: dict[str, np.ndarray], mirror: np.ndarray) -
     """The arrays of the file: lengths in counts of STEP_M. Of two units that mirror each other the left one is kept, of
     a symmetric one its half."""
     arrays = {
-        "step": np.float32(STEP_M), "head_vertices": np.int32(len(head.rest) - len(head.kind) - len(head.copies)),
+        "step": np.float32(STEP_M),
+        "head_vertices": np.int32(len(head.rest) - len(head.kind) - len(head.copies)),
         "mirror": mirror.astype(np.int16),
-        "copies": head.copies.astype(np.int16), "corners": head.corners.astype(np.int32),
+        "copies": head.copies.astype(np.int16),
+        "corners": head.corners.astype(np.int32),
         "seam": head.seam.astype(np.int8),
-        "faces": head.faces.astype(np.int16), "slots": head.slots.astype(np.int8), "uvs": head.uvs.astype(np.float32),
+        "faces": head.faces.astype(np.int16),
+        "slots": head.slots.astype(np.int8),
+        "uvs": head.uvs.astype(np.float32),
         "kind": head.kind.astype(np.int8),
-        "anchors": head.anchors.astype(np.int16), "weights": head.weights.astype(np.float16),
+        "anchors": head.anchors.astype(np.int16),
+        "weights": head.weights.astype(np.float16),
         "balls": head.balls.astype(np.float32),
-        "parts": np.round(head.rest[-len(head.kind):] / STEP_M).astype(np.int16), "names": np.array(list(units)),
+        "parts": np.round(head.rest[-len(head.kind) :] / STEP_M).astype(np.int16),
+        "names": np.array(list(units)),
     }
     half = np.arange(len(mirror)) <= mirror
     for name, moved in units.items():

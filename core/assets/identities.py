@@ -13,10 +13,25 @@ from .makehuman import Base, HeadBuilder
 
 COMPONENTS = 40  # principal directions that are kept
 SAMPLES = 700  # heads that they are told from
-_OPPOSITES = (("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"), ("compress", "uncompress"),
-              ("concave", "convex"))
-_FOLDERS = {"head": 0.17, "forehead": 0.25, "eyebrows": 0.25, "eyes": 0.2, "nose": 0.28, "mouth": 0.23, "cheek": 0.3,
-            "chin": 0.27, "ears": 0.25}
+_OPPOSITES = (
+    ("decr", "incr"),
+    ("down", "up"),
+    ("in", "out"),
+    ("backward", "forward"),
+    ("compress", "uncompress"),
+    ("concave", "convex"),
+)
+_FOLDERS = {
+    "head": 0.17,
+    "forehead": 0.25,
+    "eyebrows": 0.25,
+    "eyes": 0.2,
+    "nose": 0.28,
+    "mouth": 0.23,
+    "cheek": 0.3,
+    "chin": 0.27,
+    "ears": 0.25,
+}
 _LEFT_OUT = re.compile(
     r"head-trans|head-angle|head-scale-horiz|head-back|eye-scale|mouth-trans-(in|out)|nose-trans-(in|out)|head-age"
     r"|chin-jaw-drop|mouth-dimples|ear-trans|asym"
@@ -60,10 +75,10 @@ def _controls(base: Base) -> list[tuple[float, list[np.ndarray]]]:
                 targets[stem] = targets.get(stem, 0) + base.target(name)
         for stem in list(targets):
             for low, high in _OPPOSITES:
-                if stem.endswith("-" + low) and stem[:-len(low)] + high in targets:
-                    controls.append((sigma, [targets[stem], targets[stem[:-len(low)] + high]]))
+                if stem.endswith("-" + low) and stem[: -len(low)] + high in targets:
+                    controls.append((sigma, [targets[stem], targets[stem[: -len(low)] + high]]))
                     break
-                if stem.endswith("-" + high) and stem[:-len(high)] + low in targets:
+                if stem.endswith("-" + high) and stem[: -len(high)] + low in targets:
                     break
             else:
                 controls.append((sigma, [targets[stem]]))

@@ -52,11 +52,16 @@ class Base:
 
     def target(self, name: str) -> np.ndarray:
         """Displacement [N, 3] of a target file below mpfb2/targets/ or faceunits01/targets/, without its suffix."""
-        path = next(p for folder in ("mpfb2", "faceunits01") for suffix in (".target.gz", ".target")
-                    if (p := self.folder / folder / "targets" / (name + suffix)).exists())
+        path = next(
+            p
+            for folder in ("mpfb2", "faceunits01")
+            for suffix in (".target.gz", ".target")
+            if (p := self.folder / folder / "targets" / (name + suffix)).exists()
+        )
         text = gzip.decompress(path.read_bytes()).decode() if path.suffix == ".gz" else path.read_text()
-        rows = np.array([line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")],
-                        np.float64).reshape(-1, 4)
+        rows = np.array(
+            [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")], np.float64
+        ).reshape(-1, 4)
         offset = np.zeros_like(self.vertices)
         offset[rows[:, 0].astype(int)] = rows[:, 1:]
         return offset
@@ -74,8 +79,9 @@ class Base:
 
     def target_names(self, folder: str) -> list[str]:
         """Names of all targets in one folder below mpfb2/targets/."""
-        return sorted(f"{folder}/{p.name.split('.')[0]}"
-                      for p in (self.folder / "mpfb2/targets" / folder).glob("*.target.gz"))
+        return sorted(
+            f"{folder}/{p.name.split('.')[0]}" for p in (self.folder / "mpfb2/targets" / folder).glob("*.target.gz")
+        )
 
 
 def read_base() -> Base:
@@ -109,8 +115,10 @@ class HeadBuilder:
         mirror = base.mirror
         # the targets that close the eyes, split by side so that each can have its own strength
         self._blink = {side: base.target(f"faceunits/eyeBlink{side}") for side in ("Left", "Right")}
-        self._lids = {"Left": (np.array(UPPER_LID), np.array(LOWER_LID)),
-                      "Right": (mirror[list(UPPER_LID)], mirror[list(LOWER_LID)])}
+        self._lids = {
+            "Left": (np.array(UPPER_LID), np.array(LOWER_LID)),
+            "Right": (mirror[list(UPPER_LID)], mirror[list(LOWER_LID)]),
+        }
         self._lips = self._lip_chain()
         polygons = self._welded(self._open_polygons())
         used = np.unique([i for polygon in polygons for i in polygon])
@@ -150,8 +158,9 @@ class HeadBuilder:
         y, z = self.base.vertices[:, 1], self.base.vertices[:, 2]
         above = y > offset + slope * z
         near = np.abs(self.base.vertices[:, 0]) < 1.2
-        return [f for k, f in enumerate(self.base.faces) if k not in inner and above[list(f)].all()
-                and near[list(f)].all()]
+        return [
+            f for k, f in enumerate(self.base.faces) if k not in inner and above[list(f)].all() and near[list(f)].all()
+        ]
 
     def _welded(self, polygons: list[tuple[int, ...]]) -> list[list[int]]:
         """The polygons with the lids' and the lips' two rims made one; a lower-lip edge gains the upper lip's extra
@@ -245,8 +254,12 @@ def catmull_clark(polygons: list[list[int]], count: int) -> tuple[sparse.csr_mat
     inner = np.array([len(f) == 2 for f in edge_faces])
     face_point = _matrix([(k, i, 1 / len(p)) for k, p in enumerate(polygons) for i in p], len(polygons), count)
     middle = _matrix([(e, i, 0.5) for e, pair in enumerate(ends) for i in pair], len(ends), count)
-    both = _matrix([(e, k, 0.5) for e, faces in enumerate(edge_faces) if inner[e] for k in faces], len(ends),
-                   len(polygons)) @ face_point
+    both = (
+        _matrix(
+            [(e, k, 0.5) for e, faces in enumerate(edge_faces) if inner[e] for k in faces], len(ends), len(polygons)
+        )
+        @ face_point
+    )
     edge_point = sparse.diags(np.where(inner, 0.5, 1.0)) @ middle + 0.5 * both
     touches = _matrix([(i, e, 1.0) for e, pair in enumerate(ends) for i in pair], count, len(ends))
     rim = _matrix([(i, e, 1.0) for e, pair in enumerate(ends) if not inner[e] for i in pair], count, len(ends))

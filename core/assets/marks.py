@@ -14,13 +14,50 @@ from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.raster import RayCaster
 from ..imaging import images
 
-OVAL = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149,
-        150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109)
+OVAL = (
+    10,
+    338,
+    297,
+    332,
+    284,
+    251,
+    389,
+    356,
+    454,
+    323,
+    361,
+    288,
+    397,
+    365,
+    379,
+    378,
+    400,
+    377,
+    152,
+    148,
+    176,
+    149,
+    150,
+    136,
+    172,
+    58,
+    132,
+    93,
+    234,
+    127,
+    162,
+    21,
+    54,
+    103,
+    67,
+    109,
+)
 YAWS_DEG = (-35, -18, 0, 18, 35)  # turns of the head at which the net is asked
 
 
-def find_landmarks(mean: np.ndarray, components: np.ndarray, triangles: np.ndarray,
-                   identities: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def find_landmarks(
+    mean: np.ndarray, components: np.ndarray, triangles: np.ndarray, identities: int = 6
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where each landmark lies on the mean head, left and right made alike.
 
     The first round sees plain heads, the second ones with brows and lips painted where the first found them.
@@ -37,8 +74,9 @@ def find_landmarks(mean: np.ndarray, components: np.ndarray, triangles: np.ndarr
     Triangle [468], barycentric [468, 3] and weight [468] in [0, 1].
     """
     rng = np.random.default_rng(1)
-    shapes = [mean] + [mean + np.tensordot(rng.normal(0, 0.7, len(components)), components, 1)
-                       for _ in range(identities)]
+    shapes = [mean] + [
+        mean + np.tensordot(rng.normal(0, 0.7, len(components)), components, 1) for _ in range(identities)
+    ]
     colours = np.tile([0.55, 0.36, 0.28], (len(mean), 1))
     for chosen in (shapes[:2], shapes):
         # [views, 468, 3] on the mean head
@@ -139,7 +177,8 @@ def _painted(vertices, points):
     colours = np.tile([0.55, 0.36, 0.28], (len(vertices), 1))
     for outline, colour in [(faces.LIP_LINE, (0.42, 0.14, 0.13)), *((b, (0.08, 0.05, 0.04)) for b in faces.BROW_LINES)]:
         polygon = points[list(outline)][:, [0, 2]].astype(np.float32)
-        inside = [v[1] < 0.03 and cv2.pointPolygonTest(polygon, (float(v[0]), float(v[2])), False) >= 0
-                  for v in vertices]
+        inside = [
+            v[1] < 0.03 and cv2.pointPolygonTest(polygon, (float(v[0]), float(v[2])), False) >= 0 for v in vertices
+        ]
         colours[np.array(inside)] = colour
     return colours

@@ -134,8 +134,9 @@ def _ear(position: np.ndarray) -> np.ndarray:
 def _connected(mask: np.ndarray) -> np.ndarray:
     """Holes closed, specks removed, edge softened."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
-    closed = cv2.morphologyEx(cv2.morphologyEx(mask.astype(np.uint8) * 255, cv2.MORPH_CLOSE, disc), cv2.MORPH_OPEN,
-                              disc)
+    closed = cv2.morphologyEx(
+        cv2.morphologyEx(mask.astype(np.uint8) * 255, cv2.MORPH_CLOSE, disc), cv2.MORPH_OPEN, disc
+    )
     return cv2.GaussianBlur(cv2.dilate(closed, disc), (0, 0), 2).astype(np.float32) / 255
 
 
@@ -157,5 +158,6 @@ def _nostrils(mesh: Mesh, position: np.ndarray, nose: np.ndarray) -> np.ndarray:
     dark = np.zeros(len(mesh.vertices))
     dark[index] = np.clip((0.36 - free / 48) / 0.08, 0, 1)
     face, bary = rasterize_uv(mesh, len(nose))
-    return cv2.GaussianBlur(interpolate(dark[:, None], mesh.faces, face, bary)[..., 0].astype(np.float32), (0, 0),
-                            2) * (nose > 0.05)
+    return cv2.GaussianBlur(
+        interpolate(dark[:, None], mesh.faces, face, bary)[..., 0].astype(np.float32), (0, 0), 2
+    ) * (nose > 0.05)

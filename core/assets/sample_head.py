@@ -64,8 +64,9 @@ def _vertices(head: Path) -> str:
     head."""
     lines, own = (path.read_text(encoding="utf-8").splitlines() for path in (head, ASSETS / "head.obj"))
     if [line for line in lines if not line.startswith("v ")] != [line for line in own if not line.startswith("v ")]:
-        raise Problem(f"{head} has not the built-in head's faces and UVs.",
-                      "Name a capture whose template is the built-in head.")
+        raise Problem(
+            f"{head} has not the built-in head's faces and UVs.", "Name a capture whose template is the built-in head."
+        )
     return "".join(line + "\n" for line in lines if line.startswith("v "))
 
 

@@ -15,8 +15,9 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
 
-def unwrap(vertices: np.ndarray, faces: np.ndarray, mirror: np.ndarray, scale: np.ndarray,
-           steps: int = 60) -> tuple[np.ndarray, np.ndarray]:
+def unwrap(
+    vertices: np.ndarray, faces: np.ndarray, mirror: np.ndarray, scale: np.ndarray, steps: int = 60
+) -> tuple[np.ndarray, np.ndarray]:
     """Lays the head out on the unit square.
 
     Parameters
@@ -108,8 +109,9 @@ def _mean_value_embedding(points, faces, start):
         rows += [i, i]
         columns += [j, o]
         edge_weights += [half / la, half / lb]
-    weights = sparse.csr_matrix((np.concatenate(edge_weights), (np.concatenate(rows), np.concatenate(columns))),
-                                shape=(len(points),) * 2)
+    weights = sparse.csr_matrix(
+        (np.concatenate(edge_weights), (np.concatenate(rows), np.concatenate(columns))), shape=(len(points),) * 2
+    )
     laplacian = sparse.diags(np.asarray(weights.sum(1)).ravel()) - weights
     uv = np.where(pinned[:, None], start, 0)
     solver = splu(laplacian[~pinned][:, ~pinned].tocsc())

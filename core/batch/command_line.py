@@ -40,37 +40,56 @@ NONE = "none"
 def add_commands(commands) -> None:
     """Adds `batch` and `slim` to the subparsers of `python -m core`."""
     slim_command.add_commands(commands)
-    many = commands.add_parser("batch",
-                               help="many faces: plan them from a table, run them here or on a farm, review them")
+    many = commands.add_parser(
+        "batch", help="many faces: plan them from a table, run them here or on a farm, review them"
+    )
     many = many.add_subparsers(required=True, metavar="plan|run|status|retry|accept|review|commands|task")
     _add_plan(many)
     _add_runs(many)
     add_command(many, "status", _status, "say how far each face is", "BATCH")
-    accept = add_command(many, "accept", _accept,
-                         "solve with the shadow mask as it is, where the batch waits for that", "BATCH")
+    accept = add_command(
+        many, "accept", _accept, "solve with the shadow mask as it is, where the batch waits for that", "BATCH"
+    )
     accept.add_argument("names", metavar="NAME", nargs="+")
-    add_command(many, "review", _review, "write the page that shows all faces, those to look at first in front",
-                "BATCH")
-    lines = add_command(many, "commands", _commands,
-                        "one line for each task that is left: its name, the task it waits for, and the command",
-                        "BATCH")
-    lines.add_argument("--python", default=sys.executable,
-                       help="the solver's Python on the machines that will run them")
-    lines.add_argument("--wildcap", metavar="FOLDER", default=ROOT,
-                       help="WildCap's folder on those machines, the one that holds core")
-    lines.add_argument("--flamenco", action="store_true",
-                       help="a line of JSON for each face instead: a job to submit to Flamenco (docs/farm.md)")
+    add_command(
+        many, "review", _review, "write the page that shows all faces, those to look at first in front", "BATCH"
+    )
+    lines = add_command(
+        many,
+        "commands",
+        _commands,
+        "one line for each task that is left: its name, the task it waits for, and the command",
+        "BATCH",
+    )
+    lines.add_argument(
+        "--python", default=sys.executable, help="the solver's Python on the machines that will run them"
+    )
+    lines.add_argument(
+        "--wildcap", metavar="FOLDER", default=ROOT, help="WildCap's folder on those machines, the one that holds core"
+    )
+    lines.add_argument(
+        "--flamenco",
+        action="store_true",
+        help="a line of JSON for each face instead: a job to submit to Flamenco (docs/farm.md)",
+    )
     task = add_command(many, "task", _task, "do one task of one face, as a scheduler asks for it", "BATCH")
     task.add_argument("name", metavar="NAME")
     task.add_argument("group", metavar="TASK", help=", ".join(group.name for group in GROUPS))
 
 
 def _add_plan(subcommands) -> None:
-    plan = add_command(subcommands, "plan", _plan,
-                       "make a batch of a table of videos, or of a folder of them; planned again, it takes in what is "
-                       "new")
-    plan.add_argument("shots", metavar="SHOTS", type=Path,
-                      help=f"a CSV with the columns {', '.join(HEADINGS)}, of which video alone is needed; or a folder")
+    plan = add_command(
+        subcommands,
+        "plan",
+        _plan,
+        "make a batch of a table of videos, or of a folder of them; planned again, it takes in what is new",
+    )
+    plan.add_argument(
+        "shots",
+        metavar="SHOTS",
+        type=Path,
+        help=f"a CSV with the columns {', '.join(HEADINGS)}, of which video alone is needed; or a folder",
+    )
     plan.add_argument("batch", metavar="BATCH", type=Path, help="the batch's folder, with a capture for each face")
     plan.add_argument("--quality", choices=settings.QUALITIES, default="standard")
     plan.add_argument(
@@ -78,26 +97,37 @@ def _add_plan(subcommands) -> None:
         choices=GATES,
         help="artist: no face is solved before somebody has looked at its shadow mask; automatic: at once",
     )
-    plan.add_argument("--deliver", metavar="PRESET",
-                      help="deliver each head for that program as well (`presets` lists them); none: no more")
-    plan.add_argument("--to", metavar="FOLDER", type=Path,
-                      help="folder of the deliveries; without it they lie in the captures")
-    plan.add_argument("--blender", metavar="PROGRAM",
-                      help="a Blender with the extension, which renders a contact sheet of each face; none: no more")
+    plan.add_argument(
+        "--deliver",
+        metavar="PRESET",
+        help="deliver each head for that program as well (`presets` lists them); none: no more",
+    )
+    plan.add_argument(
+        "--to", metavar="FOLDER", type=Path, help="folder of the deliveries; without it they lie in the captures"
+    )
+    plan.add_argument(
+        "--blender",
+        metavar="PROGRAM",
+        help="a Blender with the extension, which renders a contact sheet of each face; none: no more",
+    )
     command_settings.add_assignments(plan, "run")
 
 
 def _add_runs(subcommands) -> None:
-    for word, words in (("run", "do what is left; what has stopped with a problem stays"),
-                        ("retry", "the same, and what has stopped is tried again")):
+    for word, words in (
+        ("run", "do what is left; what has stopped with a problem stays"),
+        ("retry", "the same, and what has stopped is tried again"),
+    ):
         run = add_command(subcommands, word, _run, words, "BATCH")
         run.add_argument("names", metavar="NAME", nargs="*", help="faces; without one, all")
         run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
-        run.add_argument("--address",
-                         help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of "
-                              "one")
-        run.add_argument("--at-once", metavar="N", type=int,
-                         help="faces that this machine works on at the same time, else 1")
+        run.add_argument(
+            "--address",
+            help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of one",
+        )
+        run.add_argument(
+            "--at-once", metavar="N", type=int, help="faces that this machine works on at the same time, else 1"
+        )
         run.add_argument(
             "--cores",
             metavar="N",
@@ -113,8 +143,9 @@ def _plan(options: argparse.Namespace) -> int:
     before = read_batch(root) if (root / NAME).is_file() else Batch(root, ())
     _refuse_strangers(root)
     batch = _with_options(before, options)
-    faces, faults = read_faces(options.shots, root, options.quality, command_settings.read_options(options, "run"),
-                               before.faces)
+    faces, faults = read_faces(
+        options.shots, root, options.quality, command_settings.read_options(options, "run"), before.faces
+    )
     kept = [face for face in before.faces if face.name not in {new.name for new in faces}]
     if faces or kept:
         write_batch(replace(batch, faces=(*kept, *faces)))
@@ -141,8 +172,9 @@ def _with_options(batch: Batch, options: argparse.Namespace) -> Batch:
 def _refuse_strangers(root: Path) -> None:
     """Raises Problem for a folder that holds something and is no batch."""
     try:
-        strangers = (sorted(path.name for path in root.iterdir()) if root.is_dir() and not (root / NAME).is_file()
-                     else [])
+        strangers = (
+            sorted(path.name for path in root.iterdir()) if root.is_dir() and not (root / NAME).is_file() else []
+        )
     except OSError as error:
         raise storage_problem(error, root) from error
     if strangers:
@@ -153,8 +185,11 @@ def _run(options: argparse.Namespace) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     batch = read_batch(options.batch)
     faces = [batch.face(name) for name in dict.fromkeys(options.names)] or list(batch.faces)
-    for flag, value, where in (("--at-once", options.at_once, "local"), ("--cores", options.cores, "ray"),
-                               ("--address", options.address, "ray")):
+    for flag, value, where in (
+        ("--at-once", options.at_once, "local"),
+        ("--cores", options.cores, "ray"),
+        ("--address", options.address, "ray"),
+    ):
         if value is not None and options.on != where:
             raise Problem(f"{flag} goes with --on {where} only.", f"Add --on {where}, or leave {flag} out.")
         if isinstance(value, int) and value < 1:
@@ -163,8 +198,9 @@ def _run(options: argparse.Namespace) -> int:
         if options.on == "ray":
             from .ray_cluster import run_on_ray
 
-            tally = run_on_ray(batch, faces, options.retry, _tell, options.until, options.address,
-                               options.cores or CORES_PER_TASK)
+            tally = run_on_ray(
+                batch, faces, options.retry, _tell, options.until, options.address, options.cores or CORES_PER_TASK
+            )
         else:
             tally = run_local(batch, faces, options.at_once or 1, options.retry, _tell, options.until)
     return _sum_up(tally, len(faces))
@@ -182,8 +218,12 @@ def _held(batch: Batch) -> Iterator[None]:
 
 
 def _sum_up(tally: Tally, of: int) -> int:
-    counts = [(tally.count(DONE), "done"), (tally.count(WAITING), "waiting for the artist"),
-              (tally.count(STOPPED), "stopped"), (of - len(tally.ended) + tally.count(CANCELLED), "not reached")]
+    counts = [
+        (tally.count(DONE), "done"),
+        (tally.count(WAITING), "waiting for the artist"),
+        (tally.count(STOPPED), "stopped"),
+        (of - len(tally.ended) + tally.count(CANCELLED), "not reached"),
+    ]
     print(f"{of} face{'' if of == 1 else 's'}: " + ", ".join(f"{count} {words}" for count, words in counts if count))
     return 2 if tally.count(STOPPED) else 130 if counts[-1][0] else 0
 
@@ -204,8 +244,10 @@ def _status(options: argparse.Namespace) -> int:
     with contextlib.suppress(Problem):
         holder = lease.present_holder(batch.root / "lock")
         if holder:
-            print(f"The batch is being run on {str(holder['host']).partition('/')[0]} (process {holder['pid']}, since "
-                  f"{holder['since']}).")
+            print(
+                f"The batch is being run on {str(holder['host']).partition('/')[0]} (process {holder['pid']}, since "
+                f"{holder['since']})."
+            )
     return 0
 
 
@@ -245,12 +287,15 @@ def _task(options: argparse.Namespace) -> int:
 
     for each in (signal.SIGINT, signal.SIGTERM):  # a scheduler ends a task by either
         signal.signal(each, stop)
-    final = run_task(batch, face, group, lambda message: print_message(message, face.capture, line),
-                     lambda: bool(stopped))
+    final = run_task(
+        batch, face, group, lambda message: print_message(message, face.capture, line), lambda: bool(stopped)
+    )
     if isinstance(final, Failed):
         line.clear()
         raise Problem(final.problem, final.remedy)
-    line.keep("Cancelled; finished stages are kept." if isinstance(final, Cancelled)
-              else f"{face.name}: {group.label.lower()} done")
+    line.keep(
+        "Cancelled; finished stages are kept."
+        if isinstance(final, Cancelled)
+        else f"{face.name}: {group.label.lower()} done"
+    )
     return 130 if isinstance(final, Cancelled) else 0
-

@@ -24,10 +24,12 @@ def accept_mask(capture: Capture) -> None:
     """The mask as it is now, painted or proposed, is good enough to solve with. Raises Problem where there is no
     proposal."""
     if not capture.shadow_mask_auto.is_file():
-        raise Problem(f"{capture.root.stem} has no proposed shadow mask to accept yet.",
-                      "Run the batch up to its masks first.")
-    write_json(capture.root / NAME,
-               {"proposal": hash_file(capture.shadow_mask_auto), "at": time.strftime("%Y-%m-%dT%H:%M:%S")})
+        raise Problem(
+            f"{capture.root.stem} has no proposed shadow mask to accept yet.", "Run the batch up to its masks first."
+        )
+    write_json(
+        capture.root / NAME, {"proposal": hash_file(capture.shadow_mask_auto), "at": time.strftime("%Y-%m-%dT%H:%M:%S")}
+    )
 
 
 def is_accepted(capture: Capture) -> bool:

@@ -30,7 +30,7 @@ class StageGroup:
 
     @property
     def stages(self) -> tuple[Stage, ...]:
-        return stages.STAGES[NAMES.index(self.first):NAMES.index(self.last) + 1]
+        return stages.STAGES[NAMES.index(self.first) : NAMES.index(self.last) + 1]
 
 
 GROUPS = (
@@ -47,5 +47,6 @@ def group_named(name: str) -> StageGroup:
     for group in GROUPS:
         if group.name == name:
             return group
-    raise Problem(f"There is no task named {name!r}.",
-                  f"The tasks of a face are {', '.join(group.name for group in GROUPS)}.")
+    raise Problem(
+        f"There is no task named {name!r}.", f"The tasks of a face are {', '.join(group.name for group in GROUPS)}."
+    )

@@ -31,8 +31,10 @@ def known_hashes(root: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        known = {(kind, path): [kind, path, size, when, digest]
-                 for kind, path, size, when, digest in sorted(tell_known(root), key=lambda each: each[3])}
+        known = {
+            (kind, path): [kind, path, size, when, digest]
+            for kind, path, size, when, digest in sorted(tell_known(root), key=lambda each: each[3])
+        }
         if len(tell_known(root)) > before:
             with contextlib.suppress(Problem):
                 write_json(root / NAME, list(known.values()))

@@ -41,19 +41,28 @@ class BatchTask:
 def list_tasks(batch: Batch, python: str = sys.executable, root: Path = ROOT) -> list[BatchTask]:
     """Every task that is left to do, in an order in which they could be done one by one; none beyond a mask that still
     has to be looked at. `python` and `root`, WildCap's folder, are those of the machines that will run them."""
-    return [task for face in batch.faces
-            for task in _of_face(batch, face.name, derive_state(batch, face), (python, str(root)))]
+    return [
+        task
+        for face in batch.faces
+        for task in _of_face(batch, face.name, derive_state(batch, face), (python, str(root)))
+    ]
 
 
 def _of_face(batch: Batch, name: str, state: FaceState, program: tuple[str, str]) -> list[BatchTask]:
     if state.state in (DONE, WAITING) or state.group is None:
         return []
     tasks: list[BatchTask] = []
-    for group in GROUPS[GROUPS.index(state.group):]:
+    for group in GROUPS[GROUPS.index(state.group) :]:
         if waits(batch, batch.face(name), group):
             break
-        tasks.append(BatchTask(name, group.name, tasks[-1].name if tasks else "",
-                               (*program, "batch", "task", str(batch.root), name, group.name)))
+        tasks.append(
+            BatchTask(
+                name,
+                group.name,
+                tasks[-1].name if tasks else "",
+                (*program, "batch", "task", str(batch.root), name, group.name),
+            )
+        )
     return tasks
 
 
@@ -67,6 +76,13 @@ def list_flamenco_jobs(batch: Batch) -> list[dict]:
     jobs = []
     for face, indices in left.items():
         part = PARTS[1] if indices[-1] < gate else PARTS[2] if indices[0] >= gate else PARTS[0]
-        jobs.append({"name": f"WildCap {face}", "type": "wildcap", "priority": 50, "submitter_platform": platform,
-                     "settings": {"batch": str(batch.root), "faces": face, "part": part}})
+        jobs.append(
+            {
+                "name": f"WildCap {face}",
+                "type": "wildcap",
+                "priority": 50,
+                "submitter_platform": platform,
+                "settings": {"batch": str(batch.root), "faces": face, "part": part},
+            }
+        )
     return jobs

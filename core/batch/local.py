@@ -71,9 +71,11 @@ class Board:
         self._working.pop(face.name, None)
         self.tally.ended[face.name] = state
         left = self.left_s()
-        self.say(face,
-                 f"{words} ({len(self.tally.ended)} of "
-                 f"{self._faces}{f', about {max(1, round(left / 60))} min left' if left else ''})")
+        self.say(
+            face,
+            f"{words} ({len(self.tally.ended)} of "
+            f"{self._faces}{f', about {max(1, round(left / 60))} min left' if left else ''})",
+        )
         self.write(now=True)
 
     def left_s(self) -> float | None:
@@ -88,13 +90,25 @@ class Board:
                 return
             self._written = time.monotonic()
             with contextlib.suppress(Problem):  # a full disk keeps nobody from working on a capture that lies elsewhere
-                write_json(self._batch.root / PROGRESS,
-                           {"ended": len(self.tally.ended), "of": self._faces, "left_s": self.left_s(),
-                            "working": dict(self._working)})
+                write_json(
+                    self._batch.root / PROGRESS,
+                    {
+                        "ended": len(self.tally.ended),
+                        "of": self._faces,
+                        "left_s": self.left_s(),
+                        "working": dict(self._working),
+                    },
+                )
 
 
-def run_local(batch: Batch, faces: Iterable[BatchFace], at_once: int, retry: bool, tell: Callable[[str], None],
-              until: str | None = None) -> Tally:
+def run_local(
+    batch: Batch,
+    faces: Iterable[BatchFace],
+    at_once: int,
+    retry: bool,
+    tell: Callable[[str], None],
+    until: str | None = None,
+) -> Tally:
     """Runs what is to be done of these faces. The caller holds the batch's lease. Ends early by KeyboardInterrupt or
     the file `stop`; what was finished is kept.
 
@@ -156,8 +170,15 @@ def forget_stop(root: Path) -> None:
         (root / STOP).unlink(missing_ok=True)
 
 
-def _run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled: Callable[[], bool],
-              until: str | None = None, threads: int | None = None) -> None:
+def _run_face(
+    batch: Batch,
+    face: BatchFace,
+    board: Board,
+    retry: bool,
+    cancelled: Callable[[], bool],
+    until: str | None = None,
+    threads: int | None = None,
+) -> None:
     """One face's tasks, one after the other, as far as they go."""
     names = [group.name for group in GROUPS]
     last = names.index(until) if until else len(names) - 1
@@ -165,8 +186,9 @@ def _run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelle
         state = derive_state(batch, face)
         if state.state == STOPPED and retry and state.group is not None:
             state, retry = FaceState(TO_DO, state.group), False
-        if state.state == DONE or (state.group is not None and names.index(state.group.name) > last
-                                   and state.state != STOPPED):
+        if state.state == DONE or (
+            state.group is not None and names.index(state.group.name) > last and state.state != STOPPED
+        ):
             return board.end(face, DONE, "done")
         if state.state not in (TO_DO, WORKING):  # who works there may be a machine that has gone: the task finds out
             return board.end(face, WAITING if state.state == WAITING else STOPPED, state.words())
@@ -178,8 +200,9 @@ def _run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelle
     board.end(face, CANCELLED, "cancelled; what was finished is kept")
 
 
-def _run(batch: Batch, face: BatchFace, group: StageGroup, board: Board, cancelled: Callable[[], bool],
-         threads: int | None) -> Message:
+def _run(
+    batch: Batch, face: BatchFace, group: StageGroup, board: Board, cancelled: Callable[[], bool], threads: int | None
+) -> Message:
     began = time.monotonic()
     board.tally.worked.add(face.name)
     final = run_task(batch, face, group, lambda message: board.hear(face, message), cancelled, threads)
@@ -203,6 +226,9 @@ def check_result(batch: Batch, face: BatchFace, group: StageGroup, final: Messag
     `final`, or a Failed in place of Done.
     """
     if isinstance(final, Done) and derive_state(batch, face) == FaceState(TO_DO, group):
-        return Failed("", f"The task {group.name} ended well, and its result is not what was asked for.",
-                      "Look whether another program writes there.")
+        return Failed(
+            "",
+            f"The task {group.name} ended well, and its result is not what was asked for.",
+            "Look whether another program writes there.",
+        )
     return final

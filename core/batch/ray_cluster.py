@@ -39,8 +39,15 @@ OUT_S = 1.6
 connection."""
 
 
-def run_on_ray(batch: Batch, faces: Iterable[BatchFace], retry: bool, tell: Callable[[str], None], until: str | None,
-               address: str | None, cores: int) -> Tally:
+def run_on_ray(
+    batch: Batch,
+    faces: Iterable[BatchFace],
+    retry: bool,
+    tell: Callable[[str], None],
+    until: str | None,
+    address: str | None,
+    cores: int,
+) -> Tally:
     """Runs what is to be done of these faces on a cluster. The caller holds the batch's lease. Ends early by
     KeyboardInterrupt or the file `stop`; what was finished is kept.
 
@@ -76,12 +83,13 @@ def run_on_ray(batch: Batch, faces: Iterable[BatchFace], retry: bool, tell: Call
 class _Run:
     """Faces on their way through the cluster. `advance` until nothing is under way, then `end`."""
 
-    def __init__(self, ray, batch: Batch, faces: list[BatchFace], retry: bool, board: Board, until: str | None,
-                 cores: int):
+    def __init__(
+        self, ray, batch: Batch, faces: list[BatchFace], retry: bool, board: Board, until: str | None, cores: int
+    ):
         self._ray, self._batch, self._retry, self._cores = ray, batch, retry, cores
         self.board = board
         names = [group.name for group in GROUPS]
-        self._groups = GROUPS[:names.index(until) + 1 if until else None]
+        self._groups = GROUPS[: names.index(until) + 1 if until else None]
         self._left = deque(faces)
         self._tasks: dict = {}  # Ray's reference -> (face, group, whether it is the face's last)
         self._call, self._post = _define_call(ray), _define_post(ray)
@@ -119,11 +127,26 @@ class _Run:
         has_gpu = self._ray.cluster_resources().get("GPU", 0) > 0 and face.chosen().device != "cpu"
         before, holder = None, lease.holder(face.capture.lock) if state.state == WORKING and not again else None
         stranger = str((holder or {}).get("token", ""))
-        for group in self._groups[self._groups.index(state.group):]:
-            task = self._call.options(name=f"{face.name}.{group.name}", num_cpus=self._cores, memory=_bytes(group),
-                                      num_gpus=int(has_gpu and group.on_device), max_retries=-1, retry_exceptions=False)
-            before = task.remote(before, str(ROOT), "do_task", self._post, str(self._batch.root), face.name, group.name,
-                                 self._cores, stranger)
+        for group in self._groups[self._groups.index(state.group) :]:
+            task = self._call.options(
+                name=f"{face.name}.{group.name}",
+                num_cpus=self._cores,
+                memory=_bytes(group),
+                num_gpus=int(has_gpu and group.on_device),
+                max_retries=-1,
+                retry_exceptions=False,
+            )
+            before = task.remote(
+                before,
+                str(ROOT),
+                "do_task",
+                self._post,
+                str(self._batch.root),
+                face.name,
+                group.name,
+                self._cores,
+                stranger,
+            )
             self._tasks[before] = face, group, group is self._groups[-1]
         return True
 
@@ -133,9 +156,11 @@ class _Run:
         except self._ray.exceptions.RayTaskError:
             raise  # an error of ours is told as one
         except self._ray.exceptions.RayError as error:
-            outcome = {"state": STOPPED,
-                       "words": f"Ray has given the task up ({type(error).__name__}). Run the batch again: finished "
-                                "stages are kept."}
+            outcome = {
+                "state": STOPPED,
+                "words": f"Ray has given the task up ({type(error).__name__}). Run the batch again: finished "
+                "stages are kept.",
+            }
         self.board.tally.worked.add(face.name)
         self._places.pop(face.name, None)
         if outcome["state"] == DONE:
@@ -145,9 +170,11 @@ class _Run:
             return
         # they pass the outcome on
         self._tasks = {other: task for other, task in self._tasks.items() if task[0].name != face.name}
-        self.board.end(face, outcome["state"],
-                       f"{group.label.lower()} stopped: {outcome['words']}" if outcome["state"] == STOPPED
-                       else outcome["words"])
+        self.board.end(
+            face,
+            outcome["state"],
+            f"{group.label.lower()} stopped: {outcome['words']}" if outcome["state"] == STOPPED else outcome["words"],
+        )
 
     def _hear(self) -> None:
         """What tasks say of where they are and how far, asked for once in a while and not waited for; nothing is lost
@@ -213,8 +240,10 @@ def _define_call(ray):
         code = os.environ.get(variable, code)
         # another one may lie where this Python looks as well
         if not os.path.isfile(os.path.join(code, *package.split(".")) + ".py"):
-            return {"state": "stopped",
-                    "words": f"The node {socket.gethostname()} has no WildCap at {code}. Set {variable} there."}
+            return {
+                "state": "stopped",
+                "words": f"The node {socket.gethostname()} has no WildCap at {code}. Set {variable} there.",
+            }
         sys.path[:] = [code, *(place for place in sys.path if place != code)]
         module = importlib.import_module(package)
         if post is None:
@@ -227,6 +256,7 @@ def _define_call(ray):
 
 def _define_post(ray):
     """An actor beside us, for what tasks say: of each face the node that works on it, and the last line of progress."""
+
     @ray.remote(num_cpus=0, max_restarts=-1)
     class Post:
         def __init__(self):
@@ -251,13 +281,20 @@ def _examine_nodes(ray, batch: Batch, cores: int) -> None:
     """Raises Problem where no node has what a task needs, and for the first one that does not have the code or see the
     batch: it would stop face after face."""
     need = max(GROUPS, key=lambda group: group.memory_gb)
-    fit = [node for node in ray.nodes() if node["Alive"] and node["Resources"].get("CPU", 0) >= cores
-           and node["Resources"].get("memory", 0) >= _bytes(need)]
+    fit = [
+        node
+        for node in ray.nodes()
+        if node["Alive"]
+        and node["Resources"].get("CPU", 0) >= cores
+        and node["Resources"].get("memory", 0) >= _bytes(need)
+    ]
     if not fit:
-        raise Problem(f"No node of the cluster has {cores} core{'' if cores == 1 else 's'} and {need.memory_gb:.0f} "
-                      f"GB, as the task {need.name} needs.",
-                      "Start one with `ray start` and its --num-cpus and --memory, or have each task take fewer cores "
-                      "with --cores.")
+        raise Problem(
+            f"No node of the cluster has {cores} core{'' if cores == 1 else 's'} and {need.memory_gb:.0f} "
+            f"GB, as the task {need.name} needs.",
+            "Start one with `ray start` and its --num-cpus and --memory, or have each task take fewer cores "
+            "with --cores.",
+        )
     call, words = _define_call(ray), ("examine", None, str(batch.root), __version__, hash_file(batch.root / NAME))
     pending = [
         call.options(
@@ -273,7 +310,9 @@ def _examine_nodes(ray, batch: Batch, cores: int) -> None:
         with contextlib.suppress(ray.exceptions.RayError):  # a node that has just gone harms nobody
             outcome = ray.get(ref)
             if outcome["words"]:
-                raise Problem(outcome["words"],
-                              "Give the node the same WildCap, its packages, and the batch's folder under the same "
-                              "path, as the page on farms"
-                              " (docs/farm.md) says; or stop Ray there.")
+                raise Problem(
+                    outcome["words"],
+                    "Give the node the same WildCap, its packages, and the batch's folder under the same "
+                    "path, as the page on farms"
+                    " (docs/farm.md) says; or stop Ray there.",
+                )

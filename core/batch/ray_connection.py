@@ -16,8 +16,12 @@ from pathlib import Path
 
 from ..contract.messages import Problem
 
-QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_BACKEND_LOG_LEVEL": "fatal", "RAY_DEDUP_LOGS_SKIP_REGEX": "^",
-         "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
+QUIET = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_BACKEND_LOG_LEVEL": "fatal",
+    "RAY_DEDUP_LOGS_SKIP_REGEX": "^",
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+}
 """Ray tells nobody of its use, and nothing on our terminal."""
 REACH_S, JOIN_S = 3.0, 12.0
 """How long a head node may take to answer at all, and then to take us in: Ray itself would try for minutes."""
@@ -41,14 +45,23 @@ def connect(address: str | None) -> Iterator:
             import ray
             import ray.util.scheduling_strategies
     except ImportError as error:
-        raise Problem(f"This Python has no Ray ({error}).",
-                      "Install what requirements/farm.txt names, or run the batch with --on local.") from error
+        raise Problem(
+            f"This Python has no Ray ({error}).",
+            "Install what requirements/farm.txt names, or run the batch with --on local.",
+        ) from error
     quiet = {"log_to_driver": False, "configure_logging": False, "logging_level": "CRITICAL"}
     with _mute():
         try:
             if address is None:
-                _begin(lambda: ray.init("local", include_dashboard=False, object_store_memory=STORE_BYTES,
-                                        _node_ip_address="127.0.0.1", **quiet))
+                _begin(
+                    lambda: ray.init(
+                        "local",
+                        include_dashboard=False,
+                        object_store_memory=STORE_BYTES,
+                        _node_ip_address="127.0.0.1",
+                        **quiet,
+                    )
+                )
             else:
                 _reach(address)
                 _join(lambda: ray.init(address, **quiet), address)
@@ -78,8 +91,10 @@ def _begin(begin: Callable[[], object]) -> None:
         begin()
     except Exception as error:  # it has no class of its own for that
         said = str(error).strip().partition("\n")[0]
-        raise Problem(f"Ray could not be started on this machine: {said}",
-                      "Try again when it is less busy, or run the batch with --on local.") from error
+        raise Problem(
+            f"Ray could not be started on this machine: {said}",
+            "Try again when it is less busy, or run the batch with --on local.",
+        ) from error
 
 
 def _reach(address: str) -> None:
@@ -88,8 +103,10 @@ def _reach(address: str) -> None:
         return
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal():
-        raise Problem(f"{address} is not the address of a Ray head node.",
-                      "Write it as HOST:PORT; `ray start --head` tells it. The port is 6379 if you chose none.")
+        raise Problem(
+            f"{address} is not the address of a Ray head node.",
+            "Write it as HOST:PORT; `ray start --head` tells it. The port is 6379 if you chose none.",
+        )
     try:
         socket.create_connection((host.strip("[]"), int(port)), REACH_S).close()
     except (OSError, OverflowError) as error:
@@ -115,7 +132,9 @@ def _join(begin: Callable[[], object], address: str) -> None:
 
 
 def _unreachable(address: str, why: str) -> Problem:
-    return Problem(f"No Ray cluster can be reached at {address} ({why}).",
-                   "See that its head node runs (`ray status` there), that this machine is one of its nodes (`ray "
-                   "start --address=HOST:PORT --num-cpus=0` makes"
-                   " it one), and that both have Ray's token.")
+    return Problem(
+        f"No Ray cluster can be reached at {address} ({why}).",
+        "See that its head node runs (`ray status` there), that this machine is one of its nodes (`ray "
+        "start --address=HOST:PORT --num-cpus=0` makes"
+        " it one), and that both have Ray's token.",
+    )

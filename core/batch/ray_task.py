@@ -122,8 +122,13 @@ def _listener(batch: Batch, name: str, say: Callable[[str], None]) -> Callable[[
             said[0] = time.monotonic()
             say(to_line(message))
         if begins or isinstance(message, StageDone) and not message.skipped:
-            line = {"at": round(time.time(), 2), "face": name, "stage": message.stage,
-                    "finished": isinstance(message, StageDone), "pid": os.getpid()}
+            line = {
+                "at": round(time.time(), 2),
+                "face": name,
+                "stage": message.stage,
+                "finished": isinstance(message, StageDone),
+                "pid": os.getpid(),
+            }
             with contextlib.suppress(OSError):
                 account.parent.mkdir(exist_ok=True)
                 with open(account, "a", encoding="utf-8") as file:

@@ -65,20 +65,33 @@ class Batch:
         for face in self.faces:
             if face.name == name:
                 return face
-        raise Problem(f"The batch {self.root} has no face named {name!r}.",
-                      f"`python -m core batch status {self.root}` lists them.")
+        raise Problem(
+            f"The batch {self.root} has no face named {name!r}.",
+            f"`python -m core batch status {self.root}` lists them.",
+        )
 
 
 def write_batch(batch: Batch) -> None:
     """Raises Problem where it cannot be written."""
+
     def portable(path: Path | str) -> str:
         return write_portable(path, batch.root)
 
-    faces = [{"name": face.name, "source": portable(face.source), "capture": portable(face.root),
-              "quality": face.quality, "settings": convert_settings(face.settings, portable)} for face in batch.faces]
+    faces = [
+        {
+            "name": face.name,
+            "source": portable(face.source),
+            "capture": portable(face.root),
+            "quality": face.quality,
+            "settings": convert_settings(face.settings, portable),
+        }
+        for face in batch.faces
+    ]
     deliver = batch.deliver and convert_settings({"deliver": batch.deliver}, portable)["deliver"]
-    write_json(batch.root / NAME,
-               {"format": FORMAT, "gate": batch.gate, "blender": batch.blender, "deliver": deliver, "faces": faces})
+    write_json(
+        batch.root / NAME,
+        {"format": FORMAT, "gate": batch.gate, "blender": batch.blender, "deliver": deliver, "faces": faces},
+    )
 
 
 def read_batch(root: str | Path) -> Batch:
@@ -88,23 +101,30 @@ def read_batch(root: str | Path) -> Batch:
     try:
         told = read_json(path)
     except FileNotFoundError:
-        raise Problem(f"There is no batch at {root}.",
-                      "Check the name; `python -m core batch plan SHOTS.csv BATCH` makes one.") from None
+        raise Problem(
+            f"There is no batch at {root}.", "Check the name; `python -m core batch plan SHOTS.csv BATCH` makes one."
+        ) from None
     except (OSError, ValueError) as error:
-        raise Problem(f"{path} cannot be read ({error}).",
-                      "Plan the batch again from its table: what its captures hold is kept.") from error
+        raise Problem(
+            f"{path} cannot be read ({error}).", "Plan the batch again from its table: what its captures hold is kept."
+        ) from error
     if isinstance(told, dict) and isinstance(told.get("format"), int) and told["format"] > FORMAT:
-        raise Problem("This batch was planned by a newer version of WildCap.",
-                      "Update WildCap to run it; nothing was changed.")
+        raise Problem(
+            "This batch was planned by a newer version of WildCap.", "Update WildCap to run it; nothing was changed."
+        )
     try:
         batch = _parse(root, told)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise Problem(f"{path} is not a batch record ({error!r}).",
-                      "Plan the batch again from its table: what its captures hold is kept.") from error
+        raise Problem(
+            f"{path} is not a batch record ({error!r}).",
+            "Plan the batch again from its table: what its captures hold is kept.",
+        ) from error
     names, roots = {face.name for face in batch.faces}, {face.root for face in batch.faces}
     if len(names) < len(batch.faces) or len(roots) < len(batch.faces):
-        raise Problem(f"{path} names a face or a capture twice.",
-                      "Plan the batch again from its table: what its captures hold is kept.")
+        raise Problem(
+            f"{path} names a face or a capture twice.",
+            "Plan the batch again from its table: what its captures hold is kept.",
+        )
     return batch
 
 

@@ -52,17 +52,32 @@ class Measure:
 FINDINGS = "Findings"
 MEASURES = (
     Measure(FINDINGS, "", "", "", 1, "What the stages found wrong with the film"),
-    Measure("Mask", "shadow_mask", "masked_percent", " %", 1,
-            "Share of the face that the proposed mask covers: there the albedo is guessed from the rest"),
-    Measure("Landmarks", "registration", "landmark_residual_mm", " mm", 1,
-            "How far the fitted head's landmarks lie from those seen in the frames: the median"),
+    Measure(
+        "Mask",
+        "shadow_mask",
+        "masked_percent",
+        " %",
+        1,
+        "Share of the face that the proposed mask covers: there the albedo is guessed from the rest",
+    ),
+    Measure(
+        "Landmarks",
+        "registration",
+        "landmark_residual_mm",
+        " mm",
+        1,
+        "How far the fitted head's landmarks lie from those seen in the frames: the median",
+    ),
     Measure("Seen", "texture", "seen_percent", " %", -1, "Share of the head that the frames show with confidence"),
-    Measure("Explained", "solve", "residual_psnr_db", " dB", -1,
-            "How well the solved maps and light give the texture again"),
+    Measure(
+        "Explained", "solve", "residual_psnr_db", " dB", -1, "How well the solved maps and light give the texture again"
+    ),
 )
-PICTURES = (("registration", "registration_*.jpg", "The head over the frames"),
-            ("shadow_mask", "shadow_mask_*.jpg", "As filmed, what was found, the mask"),
-            ("solve", "solve_texture*.jpg", "Texture, albedo, shading"))
+PICTURES = (
+    ("registration", "registration_*.jpg", "The head over the frames"),
+    ("shadow_mask", "shadow_mask_*.jpg", "As filmed, what was found, the mask"),
+    ("solve", "solve_texture*.jpg", "Texture, albedo, shading"),
+)
 """Stage, its picture in CAPTURE/report, and what it shows."""
 FIRST_PICTURE = ("frames", "frames_*.jpg", "Frames")
 """Shown where there is none of the others yet."""
@@ -112,17 +127,30 @@ def write_review(batch: Batch) -> tuple[Path, list[ReviewRow]]:
     if os.path.lexists(path) and not _is_ours(path):
         raise Problem(f"{path} is not a page that WildCap wrote.", "Move it away, then write the review again.")
     rows = sort_rows(read_rows(batch))
-    sections = "".join(_section(state,
-                                [row for row in rows if row.state.state == state or not state
-                                 and row.state.state not in ORDER], batch)
-                       for state in (*ORDER, ""))
+    sections = "".join(
+        _section(
+            state,
+            [row for row in rows if row.state.state == state or not state and row.state.state not in ORDER],
+            batch,
+        )
+        for state in (*ORDER, "")
+    )
     counts = {state: sum(row.state.state == state for row in rows) for state in STATES}
-    page = PAGE.format(mark=MARK, title=html.escape(batch.root.name), style=STYLE, sections=sections,
-                       version=__version__, written=time.strftime("%Y-%m-%d %H:%M"),
-                       counts="".join(f'<span class="badge {_kind(state)}">{count} {STATES[state]}</span>'
-                                      for state, count in counts.items() if count),
-                       faces=f"{len(rows)} face{'' if len(rows) == 1 else 's'}",
-                       time=_duration(sum(row.seconds for row in rows)))
+    page = PAGE.format(
+        mark=MARK,
+        title=html.escape(batch.root.name),
+        style=STYLE,
+        sections=sections,
+        version=__version__,
+        written=time.strftime("%Y-%m-%d %H:%M"),
+        counts="".join(
+            f'<span class="badge {_kind(state)}">{count} {STATES[state]}</span>'
+            for state, count in counts.items()
+            if count
+        ),
+        faces=f"{len(rows)} face{'' if len(rows) == 1 else 's'}",
+        time=_duration(sum(row.seconds for row in rows)),
+    )
     with replacing(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return path, rows
@@ -145,16 +173,27 @@ def read_rows(batch: Batch) -> list[ReviewRow]:
             record = face.capture.read()
         stages = record["stages"]
         findings = [finding for finding in report.findings(record) if not finding["stopped"]]
-        figures = {measure.label: stages[measure.stage]["figures"].get(measure.figure) for measure in MEASURES
-                   if measure.stage in stages}
+        figures = {
+            measure.label: stages[measure.stage]["figures"].get(measure.figure)
+            for measure in MEASURES
+            if measure.stage in stages
+        }
         # NaN says nothing
-        figures = {label: value for label, value in figures.items()
-                   if isinstance(value, int | float) and value == value}
-        told.append(({FINDINGS: len(findings), **figures} if stages else {},
-                     sum(entry["seconds"] for entry in stages.values()), findings))
+        figures = {
+            label: value for label, value in figures.items() if isinstance(value, int | float) and value == value
+        }
+        told.append(
+            (
+                {FINDINGS: len(findings), **figures} if stages else {},
+                sum(entry["seconds"] for entry in stages.values()),
+                findings,
+            )
+        )
     ranks = rank([figures for figures, _, _ in told])
-    return [ReviewRow(face, derive_state(batch, face), seconds, figures, own, findings)
-            for face, (figures, seconds, findings), own in zip(batch.faces, told, ranks, strict=True)]
+    return [
+        ReviewRow(face, derive_state(batch, face), seconds, figures, own, findings)
+        for face, (figures, seconds, findings), own in zip(batch.faces, told, ranks, strict=True)
+    ]
 
 
 def rank(measured: list[dict[str, float]]) -> list[dict[str, float]]:
@@ -171,9 +210,13 @@ def rank(measured: list[dict[str, float]]) -> list[dict[str, float]]:
 
 def sort_rows(rows: list[ReviewRow]) -> list[ReviewRow]:
     """Stopped, waiting, others; each the riskiest first, and by name where nothing tells them apart."""
+
     def key(row: ReviewRow) -> tuple:
-        return (ORDER.index(row.state.state) if row.state.state in ORDER else len(ORDER),
-                *(-share for share in row.risk), row.face.name)
+        return (
+            ORDER.index(row.state.state) if row.state.state in ORDER else len(ORDER),
+            *(-share for share in row.risk),
+            row.face.name,
+        )
 
     return sorted(rows, key=key)
 
@@ -189,19 +232,30 @@ def _card(row: ReviewRow, batch: Batch) -> str:
     state, name = row.state, html.escape(row.face.name)
     link = _link(row.face.capture.report, batch.root)
     title = f'<a href="{link}">{name}</a>' if link else name
-    left = [group.label for group in GROUPS[GROUPS.index(state.group):]] if state.group else []
+    left = [group.label for group in GROUPS[GROUPS.index(state.group) :]] if state.group else []
     still = f"; still to do: {', '.join(left).lower()}" if left else ""
     words = f"{_duration(row.seconds)} of work{still}" + (f"; on {state.machine}" if state.machine else "")
-    problem = (f'<p class="problem">{html.escape(state.problem)} <b>{html.escape(state.remedy)}</b></p>'
-               if state.state == STOPPED else "")
-    bullets = "".join(f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>"
-                      for finding in row.findings)
-    told = (f"<details><summary>{len(row.findings)} "
-            f"finding{'' if len(row.findings) == 1 else 's'}</summary><ul>{bullets}</ul></details>" if bullets else "")
-    return (f'<article><div class="told"><h3>{title} <span class="badge '
-            f'{_kind(state.state)}">{STATES[state.state]}</span></h3>'
-            f'<p class="when">{html.escape(words)}</p>{problem}{_bars(row)}{told}</div><div '
-            f'class="seen">{_thumbnails(row.face.capture, link)}</div></article>')
+    problem = (
+        f'<p class="problem">{html.escape(state.problem)} <b>{html.escape(state.remedy)}</b></p>'
+        if state.state == STOPPED
+        else ""
+    )
+    bullets = "".join(
+        f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>"
+        for finding in row.findings
+    )
+    told = (
+        f"<details><summary>{len(row.findings)} "
+        f"finding{'' if len(row.findings) == 1 else 's'}</summary><ul>{bullets}</ul></details>"
+        if bullets
+        else ""
+    )
+    return (
+        f'<article><div class="told"><h3>{title} <span class="badge '
+        f'{_kind(state.state)}">{STATES[state.state]}</span></h3>'
+        f'<p class="when">{html.escape(words)}</p>{problem}{_bars(row)}{told}</div><div '
+        f'class="seen">{_thumbnails(row.face.capture, link)}</div></article>'
+    )
 
 
 def _kind(state: str) -> str:
@@ -226,8 +280,11 @@ def _shown(row: ReviewRow, label: str) -> str:
 
 
 def _thumbnails(capture: Capture, link: str) -> str:
-    pictures = [(stage, path, words) for stage, pattern, words in PICTURES
-                for path in sorted(capture.pictures.glob(pattern))[:1]]
+    pictures = [
+        (stage, path, words)
+        for stage, pattern, words in PICTURES
+        for path in sorted(capture.pictures.glob(pattern))[:1]
+    ]
     renders = [path for path in capture.renders.glob("[!.]*") if path.suffix.lower() in (".jpg", ".jpeg", ".png")]
     pictures += [("", path, "Render") for path in sorted(renders, key=lambda path: path.stat().st_mtime)[-1:]]
     if not pictures:
@@ -237,8 +294,10 @@ def _thumbnails(capture: Capture, link: str) -> str:
     for stage, path, words in pictures:
         with contextlib.suppress(Problem, OSError):  # a damaged picture is left out
             content, aspect = shrink(path)
-            picture = (f'<img loading="lazy" alt="{html.escape(capture.root.stem)}: {words}" title="{words}" '
-                       f'src="data:image/jpeg;base64,{base64.b64encode(content).decode("ascii")}">')
+            picture = (
+                f'<img loading="lazy" alt="{html.escape(capture.root.stem)}: {words}" title="{words}" '
+                f'src="data:image/jpeg;base64,{base64.b64encode(content).decode("ascii")}">'
+            )
             picture = f'<a href="{link}{f"#{stage}" if stage else ""}">{picture}</a>' if link else picture
             shown += f'<div style="flex:{aspect:.3f} 1 0;max-width:{aspect * TALLEST_REM:.2f}rem">{picture}</div>'
     return shown
@@ -253,9 +312,11 @@ def shrink(path: Path) -> tuple[bytes, float]:
     height = min(THUMBNAIL_PX, len(picture))
     with tempfile.TemporaryDirectory(prefix="wildcap_review_") as folder:
         small = Path(folder) / "small.jpg"
-        images.write_srgb(small,
-                          images.resize(picture, max(1, round(picture.shape[1] * height / len(picture))), height),
-                          quality=QUALITY)
+        images.write_srgb(
+            small,
+            images.resize(picture, max(1, round(picture.shape[1] * height / len(picture))), height),
+            quality=QUALITY,
+        )
         return small.read_bytes(), picture.shape[1] / len(picture)
 
 
@@ -277,9 +338,8 @@ def _duration(seconds: float) -> str:
 
 def list_riskiest(rows: list[ReviewRow], most: int = 5) -> list[str]:
     """Lines for the terminal: the first faces of the page, each with why it comes first."""
+
     def why(row: ReviewRow) -> str:
         return row.state.words() if row.state.state in ORDER else row.words()
 
     return [f"{row.face.name:20} {why(row)}" for row in rows[:most]]
-
-

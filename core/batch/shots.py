@@ -35,8 +35,9 @@ MOST_BYTES = 16 << 20
 """Of a table: some hundred thousand rows."""
 
 
-def read_faces(shots: Path, root: Path, quality: str, shared: dict,
-               planned: Iterable[BatchFace] = ()) -> tuple[list[BatchFace], list[Problem]]:
+def read_faces(
+    shots: Path, root: Path, quality: str, shared: dict, planned: Iterable[BatchFace] = ()
+) -> tuple[list[BatchFace], list[Problem]]:
     """The faces of a table or a folder.
 
     Parameters
@@ -65,18 +66,23 @@ def read_faces(shots: Path, root: Path, quality: str, shared: dict,
             folder = _as_a_disk_tells(face.root)
             other = taken.setdefault(folder, place)
             if other != place:
-                raise Problem(f"The name {face.name} is taken by {other}.",
-                              "Give each face a name of its own in the column name.")
+                raise Problem(
+                    f"The name {face.name} is taken by {other}.", "Give each face a name of its own in the column name."
+                )
             if spelled.get(folder, face.name) != face.name:
-                raise Problem(f"The name {face.name} was planned before as {spelled[folder]}, and not every disk tells "
-                              "the two apart.", "Write it as before, or give the face another name in the column name.")
+                raise Problem(
+                    f"The name {face.name} was planned before as {spelled[folder]}, and not every disk tells "
+                    "the two apart.",
+                    "Write it as before, or give the face another name in the column name.",
+                )
             faces.append(face)
         except Problem as problem:
             faults.append(Problem(f"{place}: {problem.problem}", problem.remedy))
     if not rows:
-        raise Problem(f"{shots} names no video.",
-                      f"A folder holds videos or folders of photographs; a table has a line of headings: "
-                      f"{', '.join(HEADINGS)}.")
+        raise Problem(
+            f"{shots} names no video.",
+            f"A folder holds videos or folders of photographs; a table has a line of headings: {', '.join(HEADINGS)}.",
+        )
     return faces, faults
 
 
@@ -97,8 +103,9 @@ def _rows_of_folder(folder: Path, root: Path) -> list[tuple[str, dict[str, str]]
         if path.is_dir() and path.absolute() != root and _holds_photographs(path):
             rows.append((path.name, {"video": path.name}))
         elif path.is_file() and path.suffix.lower() in VIDEOS:
-            rows.append((path.name,
-                         {"video": path.name, "name": path.stem if stems.count(path.stem) == 1 else path.name}))
+            rows.append(
+                (path.name, {"video": path.name, "name": path.stem if stems.count(path.stem) == 1 else path.name})
+            )
     return rows
 
 
@@ -117,8 +124,9 @@ def _rows_of_table(table: Path) -> list[tuple[str, dict[str, str]]]:
     except FileNotFoundError:
         raise Problem(f"There is no table or folder at {table}.", "Check its name.") from None
     except OSError as error:
-        raise Problem(f"{table} cannot be read ({error.strerror or error}).",
-                      "Check the disk and the file's permissions.") from error
+        raise Problem(
+            f"{table} cannot be read ({error.strerror or error}).", "Check the disk and the file's permissions."
+        ) from error
     try:
         text = content.decode("utf-8-sig")
         if len(content) > MOST_BYTES or "\0" in text:
@@ -138,39 +146,55 @@ def _rows_of_table(table: Path) -> list[tuple[str, dict[str, str]]]:
                 names = [cell.lower() for cell in cells]
                 _check_headings(table, names)
             else:
-                rows.append((f"Line {reader.line_num}",
-                             dict(zip(names, cells, strict=False)) | {"": "more" if len(cells) > len(names) else ""}))
+                rows.append(
+                    (
+                        f"Line {reader.line_num}",
+                        dict(zip(names, cells, strict=False)) | {"": "more" if len(cells) > len(names) else ""},
+                    )
+                )
     except csv.Error as error:
-        raise Problem(f"{table} cannot be read as a table (line {reader.line_num}: {error}).",
-                      "Save it from the spreadsheet as CSV, UTF-8.") from error
+        raise Problem(
+            f"{table} cannot be read as a table (line {reader.line_num}: {error}).",
+            "Save it from the spreadsheet as CSV, UTF-8.",
+        ) from error
     return rows
 
 
 def _check_headings(table: Path, names: list[str]) -> None:
     unknown = [name for name in names if name and name not in HEADINGS]
     if "video" not in names or unknown or any(names.count(name) > 1 for name in names if name):
-        wrong = (f"a column {unknown[0]!r} that means nothing" if unknown else "no column video" if "video" not in names
-                 else "a column twice")
-        raise Problem(f"{table} has {wrong}.",
-                      f"Its first line names the columns: video, and any of {', '.join(HEADINGS[1:])}.")
+        wrong = (
+            f"a column {unknown[0]!r} that means nothing"
+            if unknown
+            else "no column video"
+            if "video" not in names
+            else "a column twice"
+        )
+        raise Problem(
+            f"{table} has {wrong}.", f"Its first line names the columns: video, and any of {', '.join(HEADINGS[1:])}."
+        )
 
 
 def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: dict) -> BatchFace:
     """One row's face. Raises Problem."""
     if row.get(""):
-        raise Problem("It has more cells than there are columns.",
-                      "A cell that holds the separator is put in quotation marks, as a tone is: \"0.8,0.6,0.5\".")
+        raise Problem(
+            "It has more cells than there are columns.",
+            "A cell that holds the separator is put in quotation marks, as a tone is: \"0.8,0.6,0.5\".",
+        )
     if not row.get("video"):
         raise Problem("It names no video.", "Name a video or a folder of photographs in the column video.")
     source = Path(absolute_path(row["video"], folder.absolute()))
     if not source.exists():
-        raise Problem(f"There is no video or folder at {source}.",
-                      "Check its name and whether the disk it is on is connected.")
+        raise Problem(
+            f"There is no video or folder at {source}.", "Check its name and whether the disk it is on is connected."
+        )
     name = row.get("name") or source.stem
     # it becomes a word of commands, and of lists
     if not plain_name(name) or name.startswith("-") or not name.isprintable():
-        raise Problem(f"{name!r} cannot be the name of a folder.",
-                      "Use letters, digits, spaces, hyphens and underscores.")
+        raise Problem(
+            f"{name!r} cannot be the name of a folder.", "Use letters, digits, spaces, hyphens and underscores."
+        )
     settings = {stage: dict(own) if isinstance(own, dict) else own for stage, own in shared.items()}
     if row.get("settings"):
         for stage, own in read_file(Path(absolute_path(row["settings"], folder.absolute()))).items():

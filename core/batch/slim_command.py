@@ -23,9 +23,13 @@ from .task import ROOT
 
 def add_commands(commands) -> None:
     """Adds `slim` to the subparsers of `python -m core`."""
-    slim = add_command(commands, "slim", _slim,
-                       "remove what the video gives again in a minute, of a face that is done, or of a batch's; "
-                       "without --yes, list it")
+    slim = add_command(
+        commands,
+        "slim",
+        _slim,
+        "remove what the video gives again in a minute, of a face that is done, or of a batch's; "
+        "without --yes, list it",
+    )
     slim.add_argument("folder", metavar="CAPTURE|BATCH", type=Path)
     what = slim.add_mutually_exclusive_group()
     what.add_argument("--yes", action="store_true", help="remove it; a stage that needs it later has it made again")
@@ -62,10 +66,15 @@ def _slim_batch(batch: Batch, yes: bool) -> int:
             print(f"{face.name:20} left: {problem.problem} {problem.remedy}", flush=True)
             continue
         size, count = size + removal.size, count + bool(removal.going)
-        print(f"{face.name:20} {len(removal.going)} files, {megabytes(removal.size)}"
-              + "".join(f"; {note}" for note in removal.notes), flush=True)
-    print(f"{count} of {len(batch.faces)} faces, {megabytes(size)}"
-          + ("" if yes else ". Nothing was removed; --yes does it."))
+        print(
+            f"{face.name:20} {len(removal.going)} files, {megabytes(removal.size)}"
+            + "".join(f"; {note}" for note in removal.notes),
+            flush=True,
+        )
+    print(
+        f"{count} of {len(batch.faces)} faces, {megabytes(size)}"
+        + ("" if yes else ". Nothing was removed; --yes does it.")
+    )
     return 0
 
 

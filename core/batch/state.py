@@ -38,9 +38,12 @@ class FaceState:
         if self.state == DONE:
             return "done"
         label = self.group.label.lower() if self.group else ""
-        return {TO_DO: f"{label} is next", WORKING: f"{label}: working on {self.machine}",
-                WAITING: "its shadow mask waits to be looked at",
-                STOPPED: f"{label} stopped: {self.problem} {self.remedy}"}[self.state]
+        return {
+            TO_DO: f"{label} is next",
+            WORKING: f"{label}: working on {self.machine}",
+            WAITING: "its shadow mask waits to be looked at",
+            STOPPED: f"{label} stopped: {self.problem} {self.remedy}",
+        }[self.state]
 
 
 def derive_state(batch: Batch, face: BatchFace) -> FaceState:
@@ -50,8 +53,9 @@ def derive_state(batch: Batch, face: BatchFace) -> FaceState:
         group = next((group for group in GROUPS if not is_done(batch, face, group)), None)
         holder = lease.present_holder(capture.lock) if capture.root.is_dir() else None
         if holder is not None:
-            return FaceState(WORKING, group or GROUPS[-1],
-                             machine=str(holder.get("host", "another machine")).partition("/")[0])
+            return FaceState(
+                WORKING, group or GROUPS[-1], machine=str(holder.get("host", "another machine")).partition("/")[0]
+            )
         if group is None:
             return FaceState(DONE)
         stopped = capture.read().get("stopped")
@@ -104,6 +108,7 @@ def is_delivered(batch: Batch, face: BatchFace) -> bool:
 
 def has_sheet(capture: Capture) -> bool:
     """Whether the contact sheet is there and not older than the maps that it shows."""
+
     def age(path: Path) -> float:
         return path.stat().st_mtime
 

@@ -30,8 +30,14 @@ ROOT = Path(__file__).resolve().parents[2]
 POLL_S = 0.1  # between two looks at the worker
 
 
-def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[Message], None] = lambda message: None,
-             cancelled: Callable[[], bool] = lambda: False, threads: int | None = None) -> Message:
+def run_task(
+    batch: Batch,
+    face: BatchFace,
+    group: StageGroup,
+    hear: Callable[[Message], None] = lambda message: None,
+    cancelled: Callable[[], bool] = lambda: False,
+    threads: int | None = None,
+) -> Message:
     """Runs a task.
 
     Parameters
@@ -50,12 +56,19 @@ def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[M
     began, capture = time.monotonic(), face.capture
     try:
         if waits(batch, face, group):
-            raise Problem(f"The shadow mask of {face.name} waits to be looked at.",
-                          f"Open the batch in Blender, or accept it as it is: `python -m core batch accept "
-                          f"{batch.root} {face.name}`.")
+            raise Problem(
+                f"The shadow mask of {face.name} waits to be looked at.",
+                f"Open the batch in Blender, or accept it as it is: `python -m core batch accept "
+                f"{batch.root} {face.name}`.",
+            )
         wait_until_free(capture, lambda text: hear(Log(text)), cancelled)
-        job = write_job(capture, source=face.source if group is GROUPS[0] else "", last=group.last,
-                        settings=face.settings, quality=face.quality)
+        job = write_job(
+            capture,
+            source=face.source if group is GROUPS[0] else "",
+            last=group.last,
+            settings=face.settings,
+            quality=face.quality,
+        )
         final = _follow(capture, job, hear, cancelled, environment)
         if group.name == DELIVER and isinstance(final, Done):
             final = _deliver(batch, face, hear, cancelled, environment)
@@ -66,8 +79,13 @@ def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[M
     return Done(round(time.monotonic() - began, 2)) if isinstance(final, Done) else final
 
 
-def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancelled: Callable[[], bool],
-            environment: dict[str, str]) -> Message:
+def _follow(
+    capture: Capture,
+    job: Path,
+    hear: Callable[[Message], None],
+    cancelled: Callable[[], bool],
+    environment: dict[str, str],
+) -> Message:
     """Runs a job to its end and returns its final message. A worker that dies is started once more, for what killed it
     may have been the task beside it."""
     for again in (False, True):
@@ -100,17 +118,28 @@ def _paid_key(job: Path) -> dict[str, str]:
     """The key of a paid service that this process was started with, for a job that asks for that service, and for no
     other."""
     key = os.environ.get(switchlight_api.KEY_VARIABLE)
-    return ({switchlight_api.KEY_VARIABLE: key} if key and read_job(job).settings.delight.delighter == "switchlight"
-            else {})
+    return (
+        {switchlight_api.KEY_VARIABLE: key} if key and read_job(job).settings.delight.delighter == "switchlight" else {}
+    )
 
 
-def _deliver(batch: Batch, face: BatchFace, hear: Callable[[Message], None], cancelled: Callable[[], bool],
-             environment: dict[str, str]) -> Message:
+def _deliver(
+    batch: Batch,
+    face: BatchFace,
+    hear: Callable[[Message], None],
+    cancelled: Callable[[], bool],
+    environment: dict[str, str],
+) -> Message:
     """What comes after the last stage: the delivery, and the contact sheet. Raises Problem."""
     capture, final = face.capture, Done(0.0)
     if batch.deliver is not None and not is_delivered(batch, face):
-        final = _follow(capture, write_job(capture, tool="deliver", settings=deliver_settings(batch, face)), hear,
-                        cancelled, environment)
+        final = _follow(
+            capture,
+            write_job(capture, tool="deliver", settings=deliver_settings(batch, face)),
+            hear,
+            cancelled,
+            environment,
+        )
         # job.json is what the stages are judged by in `status` and in Blender
         write_job(capture, last=GROUPS[-1].last, settings=face.settings, quality=face.quality)
     if isinstance(final, Done) and batch.blender and not has_sheet(capture):
@@ -118,8 +147,9 @@ def _deliver(batch: Batch, face: BatchFace, hear: Callable[[Message], None], can
     return final
 
 
-def _render_sheet(blender: str, capture: Capture, hear: Callable[[Message], None],
-                  cancelled: Callable[[], bool]) -> Message:
+def _render_sheet(
+    blender: str, capture: Capture, hear: Callable[[Message], None], cancelled: Callable[[], bool]
+) -> Message:
     """The contact sheet, by a Blender that has the extension. Raises Problem where it cannot be started, or gives
     none."""
     hear(Log("Rendering the contact sheet"))
@@ -127,12 +157,18 @@ def _render_sheet(blender: str, capture: Capture, hear: Callable[[Message], None
     log = capture.logs / "contact_sheet.log"
     with open(log, "wb") as told:
         try:
-            process = subprocess.Popen([blender, "--command", "wildcap", "contact_sheet", str(capture.root)],
-                                       stdin=subprocess.DEVNULL, stdout=told, stderr=told,
-                                       env=switchlight_api.environment_without_key())
+            process = subprocess.Popen(
+                [blender, "--command", "wildcap", "contact_sheet", str(capture.root)],
+                stdin=subprocess.DEVNULL,
+                stdout=told,
+                stderr=told,
+                env=switchlight_api.environment_without_key(),
+            )
         except OSError as error:
-            raise Problem(f"Blender could not be started as {blender} ({error.strerror or error}).",
-                          "Plan the batch with --blender and its path.") from error
+            raise Problem(
+                f"Blender could not be started as {blender} ({error.strerror or error}).",
+                "Plan the batch with --blender and its path.",
+            ) from error
         try:
             while process.poll() is None:
                 if cancelled():
@@ -143,7 +179,8 @@ def _render_sheet(blender: str, capture: Capture, hear: Callable[[Message], None
                 process.kill()
             process.wait()
     if process.returncode or not has_sheet(capture):
-        raise Problem(f"Blender rendered no contact sheet of {capture.root.stem}.",
-                      f"Read {log}; the extension must be installed in that Blender.")
+        raise Problem(
+            f"Blender rendered no contact sheet of {capture.root.stem}.",
+            f"Read {log}; the extension must be installed in that Blender.",
+        )
     return Done(0.0)
-

@@ -50,32 +50,40 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     started = time.monotonic()
     frames = read_frames(capture)
     chosen = settings.cameras.import_from.strip()
-    solved = (_imported(Path(chosen).expanduser(), frames, capture, settings, report) if chosen
-              else solve(frames, capture, settings, report))
+    solved = (
+        _imported(Path(chosen).expanduser(), frames, capture, settings, report)
+        if chosen
+        else solve(frames, capture, settings, report)
+    )
     model = solved.model
     model.transform(solved.head.world_from_model)
     centres = np.array([image.projection_center() for image in model.images.values() if image.has_pose])
     widest = coverage.widest_deg(centres)
     records = solved.to_place or frames.records
     if widest < LEAST_COVERAGE_DEG and frames.kind != PHOTOGRAPHS:
-        raise Problem(f"The camera moved only {widest:.0f} degrees around the head; {LEAST_COVERAGE_DEG:.0f} are the "
-                      "least.",
-                      "Film again while you walk around the face from one ear to the other.")
+        raise Problem(
+            f"The camera moved only {widest:.0f} degrees around the head; {LEAST_COVERAGE_DEG:.0f} are the least.",
+            "Film again while you walk around the face from one ear to the other.",
+        )
     with replacing_folder(capture.cameras) as folder:
         write_model(folder, model)
         report.check()
     images.write_srgb(capture.picture("cameras", "world"), draw_cameras(model, records, capture.frames))
     _findings(solved, records, centres, report)
     registered, azimuth = model.num_reg_images(), coverage.angles(centres)[0]
-    for name, value in (("frames_registered", registered), ("share_registered", round(registered / len(records), 3)),
-                        ("reprojection_error_px",
-                         round(model.compute_mean_reprojection_error(), 3) if model.num_points3D() else None),
-                        ("sparse_points", model.num_points3D()), ("angular_coverage_deg", round(widest, 1)),
-                        ("from_person_right_deg", round(float(-azimuth.min()), 1)),
-                        ("to_person_left_deg", round(float(azimuth.max()), 1)),
-                        ("landmark_error_px", round(solved.head.error_px, 2)),
-                        ("focal_px", round(float(np.mean([c.mean_focal_length() for c in model.cameras.values()])), 1)),
-                        ("features", solved.way), ("solve_s", round(time.monotonic() - started, 1))):
+    for name, value in (
+        ("frames_registered", registered),
+        ("share_registered", round(registered / len(records), 3)),
+        ("reprojection_error_px", round(model.compute_mean_reprojection_error(), 3) if model.num_points3D() else None),
+        ("sparse_points", model.num_points3D()),
+        ("angular_coverage_deg", round(widest, 1)),
+        ("from_person_right_deg", round(float(-azimuth.min()), 1)),
+        ("to_person_left_deg", round(float(azimuth.max()), 1)),
+        ("landmark_error_px", round(solved.head.error_px, 2)),
+        ("focal_px", round(float(np.mean([c.mean_focal_length() for c in model.cameras.values()])), 1)),
+        ("features", solved.way),
+        ("solve_s", round(time.monotonic() - started, 1)),
+    ):
         report.figure(name, value)
     report.figure("head_miss_mm", round(1000 * solved.head.unlike_m, 2))
     if solved.swayed:
@@ -97,8 +105,9 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
     def checked(model) -> tuple[HeadFrame, float]:
         """The head, and by how many times what is allowed these cameras miss it."""
         head = find_head(model, faces, settings.cameras.interpupillary_mm / 1000)
-        return head, max(head.miss / IMPORT_MISS_SHARE, head.error_px / width / IMPORT_MISS_SHARE,
-                         head.unlike_m / IMPORT_UNLIKE_M)
+        return head, max(
+            head.miss / IMPORT_MISS_SHARE, head.error_px / width / IMPORT_MISS_SHARE, head.unlike_m / IMPORT_UNLIKE_M
+        )
 
     head, off = checked(model)
     if 1 <= off < IMPORT_NEAR_RATIO and len(frames.records) <= ALL_PAIRS_FRAMES:
@@ -108,12 +117,14 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
         model = refine(model, faces, matches, told, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
         head, off = checked(model)
     if not off < 1:
-        raise Problem(f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by "
-                      f"{head.error_px:.0f} px "
-                      f"({100 * head.error_px / width:.0f} % of the face's width), and a head by "
-                      f"{1000 * head.unlike_m:.0f} mm.",
-                      "Import the cameras that were solved from these very pictures, not cropped, under the same "
-                      "names; or empty the setting.")
+        raise Problem(
+            f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by "
+            f"{head.error_px:.0f} px "
+            f"({100 * head.error_px / width:.0f} % of the face's width), and a head by "
+            f"{1000 * head.unlike_m:.0f} mm.",
+            "Import the cameras that were solved from these very pictures, not cropped, under the same "
+            "names; or empty the setting.",
+        )
     return Solved(model, "imported", head, faces)
 
 
@@ -122,17 +133,22 @@ def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarra
     shown = {record.name: record.shown for record in records}
     if solved.way == "face" and not solved.every_frame_held and len(records) >= LEAST_VIEWS:
         rough = "refined by what little matches" if solved.refined else "to ten degrees or so"
-        report.finding(f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, "
-                       f"{rough}. Expect a rough head.",
-                       "Take a photograph every ten degrees around the face, from ear to ear, with a busy background.")
+        report.finding(
+            f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, "
+            f"{rough}. Expect a rough head.",
+            "Take a photograph every ten degrees around the face, from ear to ear, with a busy background.",
+        )
     if solved.stood_still:
-        report.finding("The head turned while the camera stood still. The cameras hold for the head, but light and "
-                       "shadows slide over the face as it turns.",
-                       "Let the person sit still and walk around them with the camera.")
+        report.finding(
+            "The head turned while the camera stood still. The cameras hold for the head, but light and "
+            "shadows slide over the face as it turns.",
+            "Let the person sit still and walk around them with the camera.",
+        )
     elif solved.head_moved:
-        report.finding("The head moved against its background during the capture; only what matches on the head itself "
-                       "was used.",
-                       "Let the person lean the head against a wall or a chair, look at one point, and keep still.")
+        report.finding(
+            "The head moved against its background during the capture; only what matches on the head itself was used.",
+            "Let the person lean the head against a wall or a chair, look at one point, and keep still.",
+        )
     changed = expression_changes(solved.face_by_name)
     if len(changed) > 0.1 * len(solved.face_by_name):
         report.finding(
@@ -142,9 +158,11 @@ def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarra
             [shown[name] for name in changed],
         )
     if solved.mirrored:
-        report.finding(f"Mirrored pictures were left out: {', '.join(shown[name] for name in solved.mirrored)}.",
-                       "Flip them back; on a phone, switch off the mirroring of the front camera.",
-                       [shown[name] for name in solved.mirrored])
+        report.finding(
+            f"Mirrored pictures were left out: {', '.join(shown[name] for name in solved.mirrored)}.",
+            "Flip them back; on a phone, switch off the mirroring of the front camera.",
+            [shown[name] for name in solved.mirrored],
+        )
     _left_out(solved, records, shown, report)
     for problem, remedy in coverage.missing(centres):
         report.finding(problem, remedy)
@@ -160,13 +178,22 @@ def _left_out(solved: Solved, records: Sequence[FrameRecord], shown_names: dict[
     blurred = sum(record.sharpness < BLURRED_SHARPNESS_SHARE * sharp for record in rest)
     if blurred > len(rest) / 2:
         why = f"; {blurred} of them are blurred"
-        remedy = ("Take those again, sharp." if photographs
-                  else "Move the camera slower, or add light, so that each frame is sharp.")
+        remedy = (
+            "Take those again, sharp."
+            if photographs
+            else "Move the camera slower, or add light, so that each frame is sharp."
+        )
     else:
         why = ""
-        remedy = ("Take more between those that fit and those that do not, with the whole head in the picture."
-                  if photographs
-                  else "Move the camera slower past the places where frames were lost, and keep the whole head in the "
-                       "picture.")
-    report.finding(f"{len(rest)} of {len(records)} {'photographs' if photographs else 'frames'} did not fit the others "
-                   f"and were left out{why}.", remedy, [shown_names[record.name] for record in rest])
+        remedy = (
+            "Take more between those that fit and those that do not, with the whole head in the picture."
+            if photographs
+            else "Move the camera slower past the places where frames were lost, and keep the whole head in the "
+            "picture."
+        )
+    report.finding(
+        f"{len(rest)} of {len(records)} {'photographs' if photographs else 'frames'} did not fit the others "
+        f"and were left out{why}.",
+        remedy,
+        [shown_names[record.name] for record in rest],
+    )

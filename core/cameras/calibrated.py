@@ -54,19 +54,22 @@ class Calibrated:
         lengths = PIXELS[self.model]
         if not self.width:
             params[:lengths] *= max(width, height)
-            params[lengths - 2:lengths] += width / 2, height / 2
+            params[lengths - 2 : lengths] += width / 2, height / 2
         elif abs(self.width / self.height / (width / height) - 1) > 0.01:
             turned = abs(self.height / self.width / (width / height) - 1) < 0.01
-            raise Problem(f"The camera of {self.name} was solved for a picture of {self.width} x {self.height} pixels; "
-                          f"{picture or 'here it'} is {width} x {height}.",
-                          "Solve the cameras from pictures that were saved upright, without a rotation in their EXIF "
-                          "data, and give the same ones here."
-                          if turned
-                          else "Give the very pictures the cameras were solved from: not cropped, not undistorted.")
+            raise Problem(
+                f"The camera of {self.name} was solved for a picture of {self.width} x {self.height} pixels; "
+                f"{picture or 'here it'} is {width} x {height}.",
+                "Solve the cameras from pictures that were saved upright, without a rotation in their EXIF "
+                "data, and give the same ones here."
+                if turned
+                else "Give the very pictures the cameras were solved from: not cropped, not undistorted.",
+            )
         else:
             across, down = width / self.width, height / self.height
-            params[:lengths] *= [down if i in ((1, lengths - 1) if lengths == 4 else (lengths - 1,)) else across
-                                 for i in range(lengths)]
+            params[:lengths] *= [
+                down if i in ((1, lengths - 1) if lengths == 4 else (lengths - 1,)) else across for i in range(lengths)
+            ]
         return pycolmap.Camera(camera_id=number, model=self.model, width=width, height=height, params=params)
 
 
@@ -75,8 +78,10 @@ def rigid(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     camera. Raises Problem."""
     size = np.linalg.norm(matrix[:3, :3], axis=0)
     if not (np.isfinite(matrix).all() and size.min() > 0 and size.max() / size.min() < 1.001):
-        raise Problem(f"The camera of {name} is stretched or has no rotation.",
-                      "Export the cameras again from an object without scale.")
+        raise Problem(
+            f"The camera of {name} is stretched or has no rotation.",
+            "Export the cameras again from an object without scale.",
+        )
     rotation = (matrix[:3, :3] / size).T
     return rotation, -rotation @ matrix[:3, 3]
 
@@ -84,5 +89,5 @@ def rigid(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
 def trailing_number(name: str) -> int | None:
     """The number a name ends with, without its ending: frame_0012.png -> 12."""
     stem = PurePath(name.replace("\\", "/")).stem
-    digits = stem[len(stem.rstrip("0123456789")):]
+    digits = stem[len(stem.rstrip("0123456789")) :]
     return int(digits) if 0 < len(digits) < 19 else None

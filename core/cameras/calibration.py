@@ -45,11 +45,13 @@ def import_cameras(path: Path, frames: Frames, folder: Path, report: Reporter) -
     matched = _match(cameras, frames)
     if len(matched) < LEAST_CAMERAS:
         here = ", ".join(_known_as(record)[0] for record in frames.records[:3])
-        raise Problem(f"{path.name} has cameras for {len(matched)} of the {len(frames.records)} frames; three are the "
-                      "least. "
-                      f"It names {', '.join(camera.name for camera in cameras[:3])}; the frames are {here}.",
-                      "Solve the cameras from these very pictures, under the same file names; for a video, name each "
-                      "camera by its frame's number.")
+        raise Problem(
+            f"{path.name} has cameras for {len(matched)} of the {len(frames.records)} frames; three are the "
+            "least. "
+            f"It names {', '.join(camera.name for camera in cameras[:3])}; the frames are {here}.",
+            "Solve the cameras from these very pictures, under the same file names; for a video, name each "
+            "camera by its frame's number.",
+        )
     model = pycolmap.Reconstruction()
     for number, (record, calibrated) in enumerate(matched, 1):
         width, height = images.size(folder / record.name)
@@ -69,18 +71,27 @@ def read_cameras(path: Path) -> list[Calibrated]:
     if path.stem in ("cameras", "images", "points3D") and path.suffix.lower() in (".bin", ".txt"):
         path = path.parent  # a file of COLMAP's folder, as a file selector gives
     if not (path.is_dir() or path.is_file()):
-        raise Problem(f"There is no file or folder of cameras at {path}.",
-                      "Check the path in the setting, or empty it to solve the cameras here.")
+        raise Problem(
+            f"There is no file or folder of cameras at {path}.",
+            "Check the path in the setting, or empty it to solve the cameras here.",
+        )
     if not path.is_dir() and path.suffix.lower() not in readers:
-        raise Problem(f"{path.name} is not a camera file that WildCap can read.",
-                      "Choose a COLMAP folder, Metashape's cameras (.xml), RealityScan's internal/external camera "
-                      "parameters (.csv), or Blender's (.json).")
+        raise Problem(
+            f"{path.name} is not a camera file that WildCap can read.",
+            "Choose a COLMAP folder, Metashape's cameras (.xml), RealityScan's internal/external camera "
+            "parameters (.csv), or Blender's (.json).",
+        )
     try:
         if path.is_file() and path.stat().st_size > MOST_TEXT_BYTES:
-            raise Problem(f"{path.name} is larger than {MOST_TEXT_BYTES >> 20} MB, too large for a list of cameras.",
-                          "Export the cameras without points.")
-        cameras = (colmap_folder.read(path) if path.is_dir()
-                   else readers[path.suffix.lower()](path.read_text(encoding="utf-8-sig"), path.name))
+            raise Problem(
+                f"{path.name} is larger than {MOST_TEXT_BYTES >> 20} MB, too large for a list of cameras.",
+                "Export the cameras without points.",
+            )
+        cameras = (
+            colmap_folder.read(path)
+            if path.is_dir()
+            else readers[path.suffix.lower()](path.read_text(encoding="utf-8-sig"), path.name)
+        )
     except Problem as problem:
         if path.name in problem.problem:
             raise
@@ -88,20 +99,30 @@ def read_cameras(path: Path) -> list[Calibrated]:
     except (OSError, UnicodeDecodeError) as error:
         raise Problem(f"{path.name} cannot be read ({error}).", "Export the cameras again.") from error
     if not cameras:
-        raise Problem(f"{path.name} holds no solved camera.",
-                      "Align the pictures in the program it comes from, then export the cameras again.")
+        raise Problem(
+            f"{path.name} holds no solved camera.",
+            "Align the pictures in the program it comes from, then export the cameras again.",
+        )
     for camera in cameras:
         sized = (camera.width, camera.height) == (0, 0) or min(camera.width, camera.height) > 0
         # false for NaN, too
-        finite = all((np.abs(parameters) <= FARTHEST_UNITS).all()
-                     for parameters in (camera.params, camera.rotation, camera.translation))
-        focal = min(camera.params[:PIXELS[camera.model] - 2], default=0.0)
-        if not (sized and finite and focal > LEAST_FOCAL_SHARE * (max(camera.width, camera.height) or 1)
-                and np.allclose(camera.rotation @ camera.rotation.T, np.eye(3), atol=1e-4)
-                and np.linalg.det(camera.rotation) > 0):
-            raise Problem(f"The camera of {camera.name} in {path.name} is damaged: its rotation, focal length or "
-                          "picture size makes no sense.",
-                          "Export the cameras again; a file that was edited by hand may be damaged.")
+        finite = all(
+            (np.abs(parameters) <= FARTHEST_UNITS).all()
+            for parameters in (camera.params, camera.rotation, camera.translation)
+        )
+        focal = min(camera.params[: PIXELS[camera.model] - 2], default=0.0)
+        if not (
+            sized
+            and finite
+            and focal > LEAST_FOCAL_SHARE * (max(camera.width, camera.height) or 1)
+            and np.allclose(camera.rotation @ camera.rotation.T, np.eye(3), atol=1e-4)
+            and np.linalg.det(camera.rotation) > 0
+        ):
+            raise Problem(
+                f"The camera of {camera.name} in {path.name} is damaged: its rotation, focal length or "
+                "picture size makes no sense.",
+                "Export the cameras again; a file that was edited by hand may be damaged.",
+            )
     return cameras
 
 

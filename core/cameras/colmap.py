@@ -42,8 +42,11 @@ def reconstruct(job: dict) -> bool:
     null), database and output (paths; null: matches are all that is wanted). Writes the largest model to output; False
     where there is none."""
     pycolmap.set_random_seed(job["seed"])
-    chosen = (_extract_film(job) if job["film"]
-              else _extract(job, [name for group in job["groups"] for name in group["names"]], job["finer"]))
+    chosen = (
+        _extract_film(job)
+        if job["film"]
+        else _extract(job, [name for group in job["groups"] for name in group["names"]], job["finer"])
+    )
     if not job["output"]:
         _match(job, skeleton.pairs_within(job["film"], chosen) + skeleton.pairs_between(job["film"], chosen))
         Path(job["database"]).with_name(CHOSEN).write_text(json.dumps(chosen), encoding="utf-8")
@@ -99,9 +102,17 @@ def _extract(job: dict, names: list[str], finer: bool, reduction: int = 1) -> li
         reader.existing_camera_id = camera_id
         options.max_image_size = -1 if reduction == 1 else max(group["width"], group["height"]) // reduction
         these = [name for name in group["names"] if name in missing and name in wanted]
-        for chunk in [these[start:start + CHUNK_PICTURES] for start in range(0, len(these), CHUNK_PICTURES)]:
-            _aside(pycolmap.extract_features, job["database"], job["images"], chunk, pycolmap.CameraMode.SINGLE, reader,
-                   options, pycolmap.Device.cpu)
+        for chunk in [these[start : start + CHUNK_PICTURES] for start in range(0, len(these), CHUNK_PICTURES)]:
+            _aside(
+                pycolmap.extract_features,
+                job["database"],
+                job["images"],
+                chunk,
+                pycolmap.CameraMode.SINGLE,
+                reader,
+                options,
+                pycolmap.Device.cpu,
+            )
             done += len(chunk)
             _say("finding features", done, total)
     return names
@@ -112,8 +123,9 @@ def _enter(job: dict) -> None:
     mapper's path depends on the numbers."""
     pycolmap.Database.open(job["database"]).close()  # makes the file
     for group in job["groups"]:
-        pycolmap.import_images(job["database"], job["images"], pycolmap.CameraMode.SINGLE, group["names"],
-                               _reader(job, group))
+        pycolmap.import_images(
+            job["database"], job["images"], pycolmap.CameraMode.SINGLE, group["names"], _reader(job, group)
+        )
 
 
 def _reader(job: dict, group: dict) -> pycolmap.ImageReaderOptions:
@@ -153,8 +165,14 @@ def _match(job: dict, pairs: list[tuple[str, str]] | None = None) -> None:
         pairing.match_list_path.write_text("".join(f"{first} {second}\n" for first, second in pairs), encoding="utf-8")
         _aside(pycolmap.match_image_pairs, job["database"], options, pairing, verification, pycolmap.Device.cpu)
     else:
-        _aside(pycolmap.match_exhaustive, job["database"], options, pycolmap.ExhaustivePairingOptions(), verification,
-               pycolmap.Device.cpu)
+        _aside(
+            pycolmap.match_exhaustive,
+            job["database"],
+            options,
+            pycolmap.ExhaustivePairingOptions(),
+            verification,
+            pycolmap.Device.cpu,
+        )
     _say("matching features", 1, 1)
 
 
@@ -173,8 +191,13 @@ def _map_film(job: dict, chosen: list[str]) -> list[pycolmap.Reconstruction]:
     mapped = {image.name for image in best.images.values() if image.has_pose}
     _match(job, skeleton.pairs_between(film, [name for name in chosen if name in mapped]))
     others = [name for name, _, _ in film if name not in mapped]
-    skeleton.place_others(best, Path(job["database"]), others, job["seed"],
-                          lambda done, of: _say("placing cameras", len(mapped) + done, len(mapped) + of))
+    skeleton.place_others(
+        best,
+        Path(job["database"]),
+        others,
+        job["seed"],
+        lambda done, of: _say("placing cameras", len(mapped) + done, len(mapped) + of),
+    )
     return [best]
 
 
@@ -187,8 +210,12 @@ def _map_photographs(job: dict) -> list[pycolmap.Reconstruction]:
         with pycolmap.Database.open(job["database"]) as stored:
             for camera_id, group in unknown:
                 camera = stored.read_camera(camera_id)
-                camera.params = [factor * max(group["width"], group["height"]), group["width"] / 2, group["height"] / 2,
-                                 0]
+                camera.params = [
+                    factor * max(group["width"], group["height"]),
+                    group["width"] / 2,
+                    group["height"] / 2,
+                    0,
+                ]
                 stored.update_camera(camera)
         models += _map(job)
     return models
@@ -230,8 +257,9 @@ def _map(job: dict, names: list[str] | None = None) -> list[pycolmap.Reconstruct
 
     folder = Path(job["output"]).with_name("models")
     folder.mkdir(parents=True, exist_ok=True)
-    models = pycolmap.incremental_mapping(job["database"], job["images"], str(folder), options,
-                                          next_image_callback=another)
+    models = pycolmap.incremental_mapping(
+        job["database"], job["images"], str(folder), options, next_image_callback=another
+    )
     return list(models.values())
 
 

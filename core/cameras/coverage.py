@@ -18,8 +18,11 @@ LEVEL_DEG = 5.0  # range of the cameras' heights below which all count as level
 
 def spread_evenly(members: Sequence, most: int) -> list:
     """At most that many of them, the first and the last among them."""
-    return [members[i] for i in np.unique(np.linspace(0, len(members) - 1, min(most, len(members))).round().astype(int))
-            ] if members else []
+    return (
+        [members[i] for i in np.unique(np.linspace(0, len(members) - 1, min(most, len(members))).round().astype(int))]
+        if members
+        else []
+    )
 
 
 def angles(centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -45,21 +48,34 @@ def missing(centres: np.ndarray) -> list[tuple[str, str]]:
         if reach >= WANTED_DEG:
             continue
         other = "right" if side == "left" else "left"
-        where = (f"{_degrees(reach)} to the person's {side} of the nose" if reach > 1
-                 else f"before the nose, on the person's {other}")
-        findings.append((f"{'Nothing' if reach < SIDE_DEG else 'Little'} was seen from the person's {side} side: the "
-                         f"pictures end {where}.",
-                         f"Go on around the face until the person's {side} ear is in the middle of the picture; "
-                         "otherwise that side is guessed."))
+        where = (
+            f"{_degrees(reach)} to the person's {side} of the nose"
+            if reach > 1
+            else f"before the nose, on the person's {other}"
+        )
+        findings.append(
+            (
+                f"{'Nothing' if reach < SIDE_DEG else 'Little'} was seen from the person's {side} side: the "
+                f"pictures end {where}.",
+                f"Go on around the face until the person's {side} ear is in the middle of the picture; "
+                "otherwise that side is guessed.",
+            )
+        )
     for low, high in zip(azimuth[:-1], azimuth[1:], strict=True):
         if high - low > GAP_DEG:
-            findings.append((f"Between {_place(low)} and {_place(high)} there is no picture: a gap of {high - low:.0f} "
-                             "degrees.",
-                             "Take a picture at least every 15 degrees on the way around the face."))
+            findings.append(
+                (
+                    f"Between {_place(low)} and {_place(high)} there is no picture: a gap of {high - low:.0f} degrees.",
+                    "Take a picture at least every 15 degrees on the way around the face.",
+                )
+            )
     if len(centres) >= 6 and np.ptp(elevation) < LEVEL_DEG:
-        findings.append(("All pictures were taken from one height: under the chin and the nose little was seen.",
-                         "Go around the face once more from a little below, or move the camera up and down on the "
-                         "way."))
+        findings.append(
+            (
+                "All pictures were taken from one height: under the chin and the nose little was seen.",
+                "Go around the face once more from a little below, or move the camera up and down on the way.",
+            )
+        )
     return findings
 
 
@@ -68,5 +84,8 @@ def _degrees(angle: float) -> str:
 
 
 def _place(azimuth: float) -> str:
-    return ("the front" if abs(azimuth) < 3
-            else f"{_degrees(abs(azimuth))} to the person's {'left' if azimuth > 0 else 'right'}")
+    return (
+        "the front"
+        if abs(azimuth) < 3
+        else f"{_degrees(abs(azimuth))} to the person's {'left' if azimuth > 0 else 'right'}"
+    )

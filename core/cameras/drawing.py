@@ -19,8 +19,9 @@ from ..imaging import images
 AXES = (((1.0, 0.2, 0.2), (0.1, 0, 0)), ((0.2, 0.9, 0.2), (0, -0.1, 0)), ((0.3, 0.5, 1.0), (0, 0, 0.1)))
 
 
-def draw_cameras(model: pycolmap.Reconstruction, records: Sequence[FrameRecord], folder: Path,
-                 height: int = 480) -> np.ndarray:
+def draw_cameras(
+    model: pycolmap.Reconstruction, records: Sequence[FrameRecord], folder: Path, height: int = 480
+) -> np.ndarray:
     """The world's axes in the frame that shows the face most from the front, and all cameras from above.
 
     Parameters
@@ -35,15 +36,18 @@ def draw_cameras(model: pycolmap.Reconstruction, records: Sequence[FrameRecord],
     [height, W, 3], sRGB in [0, 1].
     """
     yaw = {record.name: abs(record.yaw_deg) if record.yaw_deg is not None else 999 for record in records}
-    image = min((image for image in model.images.values() if image.has_pose),
-                key=lambda image: yaw.get(image.name, 999))
+    image = min(
+        (image for image in model.images.values() if image.has_pose), key=lambda image: yaw.get(image.name, 999)
+    )
     return np.concatenate([_axes(model, image, folder, height), _plan(model, height)], 1)
 
 
 def _axes(model: pycolmap.Reconstruction, image: pycolmap.Image, folder: Path, height: int) -> np.ndarray:
     picture = images.read_srgb(folder / image.name)
-    camera, pose = (model.cameras[image.camera_id],
-                    image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world)
+    camera, pose = (
+        model.cameras[image.camera_id],
+        image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world,
+    )
     tips = np.array([(0, 0, 0), *(tip for _, tip in AXES)]) @ pose.rotation.matrix().T + np.asarray(pose.translation)
     pixels = np.asarray(camera.img_from_cam(tips))
     start, *ends = [tuple(int(v) for v in pixel) for pixel in pixels]

@@ -37,9 +37,15 @@ FREE_SIGMA_LOG = 3.0
 FEWEST_TRACKS = 60  # below, what matches on the head says too little to refine by
 
 
-def refine(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], matches: Matches,
-           told: Mapping[str, float], report: Reporter, missing: Sequence[dict] = (),
-           agree: Sequence[float] = AGREE_WIDTH_SHARES) -> pycolmap.Reconstruction:
+def refine(
+    model: pycolmap.Reconstruction,
+    face_by_name: dict[str, faces.Face],
+    matches: Matches,
+    told: Mapping[str, float],
+    report: Reporter,
+    missing: Sequence[dict] = (),
+    agree: Sequence[float] = AGREE_WIDTH_SHARES,
+) -> pycolmap.Reconstruction:
     """The cameras refined by what matches on the head.
 
     Parameters
@@ -80,8 +86,9 @@ def refine(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face], 
         before = before or (len(tracks) if share <= AGREE_WIDTH_SHARES[0] else None)
         if len(tracks) < FEWEST_TRACKS:
             return model
-        seen = Observations(*(np.concatenate([a, b])
-                              for a, b in zip((marks.camera, marks.point, marks.pixel), added, strict=True)))
+        seen = Observations(
+            *(np.concatenate([a, b]) for a, b in zip((marks.camera, marks.point, marks.pixel), added, strict=True))
+        )
         bundle = adjust(bundle, seen, 30)
     if len(tracks) < 0.8 * before:
         report.log("The cameras were not refined by the face: less would match than before.")
@@ -102,9 +109,12 @@ def _told_of_lenses(model: pycolmap.Reconstruction, registered: list, told: Mapp
 
 def _lenses_of(group: dict, model: pycolmap.Reconstruction, lenses: Mapping[int, float | None]) -> list[int]:
     """Numbers of the cameras that may have taken a group of frames."""
-    return [number for number, camera in model.cameras.items()
-            if (camera.width, camera.height) == (group["width"], group["height"])
-            and (None in (lenses[number], group["focal_px"]) or lenses[number] == group["focal_px"])]
+    return [
+        number
+        for number, camera in model.cameras.items()
+        if (camera.width, camera.height) == (group["width"], group["height"])
+        and (None in (lenses[number], group["focal_px"]) or lenses[number] == group["focal_px"])
+    ]
 
 
 def as_bundle(model: pycolmap.Reconstruction, registered: list, told: Mapping[str, float]) -> Bundle:
@@ -115,14 +125,18 @@ def as_bundle(model: pycolmap.Reconstruction, registered: list, told: Mapping[st
     poses = [pose_of(image) for image in registered]
     focal = np.array([model.cameras[number].mean_focal_length() for number in numbers])
     used = [model.cameras[image.camera_id] for image in registered]
-    return Bundle(np.array([pose.rotation.matrix() for pose in poses]), np.array([pose.translation for pose in poses]),
-                  focal, np.array([lenses[number] or own for number, own in zip(numbers, focal, strict=True)]),
-                  np.array([TOLD_SIGMA_LOG if lenses[number] else FREE_SIGMA_LOG for number in numbers]),
-                  np.array([numbers.index(image.camera_id) for image in registered]),
-                  np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]),
-                  np.zeros(len(template_landmarks().basis)),
-                  template_landmarks().mean.copy(),
-                  FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used))
+    return Bundle(
+        np.array([pose.rotation.matrix() for pose in poses]),
+        np.array([pose.translation for pose in poses]),
+        focal,
+        np.array([lenses[number] or own for number, own in zip(numbers, focal, strict=True)]),
+        np.array([TOLD_SIGMA_LOG if lenses[number] else FREE_SIGMA_LOG for number in numbers]),
+        np.array([numbers.index(image.camera_id) for image in registered]),
+        np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]),
+        np.zeros(len(template_landmarks().basis)),
+        template_landmarks().mean.copy(),
+        FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used),
+    )
 
 
 def _landmarks(model: pycolmap.Reconstruction, registered: list, face_by_name: dict[str, faces.Face]) -> Observations:
@@ -130,8 +144,9 @@ def _landmarks(model: pycolmap.Reconstruction, registered: list, face_by_name: d
     for i, image in enumerate(registered):
         if image.name in face_by_name:
             camera.append(np.full(count, i))
-            pixel.append(_straight(model.cameras[image.camera_id],
-                                   face_by_name[image.name].landmarks[:, :2].astype(np.float64)))
+            pixel.append(
+                _straight(model.cameras[image.camera_id], face_by_name[image.name].landmarks[:, :2].astype(np.float64))
+            )
     return Observations(np.concatenate(camera), np.tile(np.arange(count), len(camera)), np.concatenate(pixel))
 
 
@@ -144,21 +159,31 @@ def _straight(camera: pycolmap.Camera, pixels: np.ndarray) -> np.ndarray:
 def straightened(model: pycolmap.Reconstruction, registered: list, matches: Matches) -> Matches:
     """The matches with pixels as lenses without distortion would show them."""
     camera_of = {image.name: model.cameras[image.camera_id] for image in registered}
-    keypoints = {name: _straight(camera_of[name], pixels) if name in camera_of and len(pixels) else pixels
-                 for name, pixels in matches.keypoints.items()}
+    keypoints = {
+        name: _straight(camera_of[name], pixels) if name in camera_of and len(pixels) else pixels
+        for name, pixels in matches.keypoints.items()
+    }
     return Matches(keypoints, matches.pairs)
 
 
-def _late(bundle: Bundle, model: pycolmap.Reconstruction, groups: list[dict], names: list[str], tracks: list,
-          matches: Matches) -> dict[str, tuple]:
+def _late(
+    bundle: Bundle, model: pycolmap.Reconstruction, groups: list[dict], names: list[str], tracks: list, matches: Matches
+) -> dict[str, tuple]:
     numbers = sorted(model.cameras)
     focal = np.array([bundle.focal[numbers.index(group["lens"])] for group in groups])
     group_of = {name: i for i, group in enumerate(groups) for name in group["names"] if name in matches.keypoints}
     return place_by_matches(replace(bundle, focal=focal), groups, group_of, names, tracks, matches) if group_of else {}
 
 
-def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tracks: list, matches: Matches,
-            late: Mapping[str, tuple] = MappingProxyType({}), groups: Sequence[dict] = ()) -> pycolmap.Reconstruction:
+def rebuilt(
+    model: pycolmap.Reconstruction,
+    bundle: Bundle,
+    registered: list,
+    tracks: list,
+    matches: Matches,
+    late: Mapping[str, tuple] = MappingProxyType({}),
+    groups: Sequence[dict] = (),
+) -> pycolmap.Reconstruction:
     """A model with a bundle's cameras and, as its points, the tracks.
 
     Parameters
@@ -178,10 +203,12 @@ def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tr
         params[list(camera.focal_length_idxs())] *= ratio
         camera.params = params
         rebuilt.add_camera_with_trivial_rig(camera)
-    poses = {image.name: (bundle.rotations[i], bundle.translations[i], image.camera_id)
-             for i, image in enumerate(registered)}
-    poses |= {name: (*pose, next(group["lens"] for group in groups if name in group["names"]))
-              for name, pose in late.items()}
+    poses = {
+        image.name: (bundle.rotations[i], bundle.translations[i], image.camera_id) for i, image in enumerate(registered)
+    }
+    poses |= {
+        name: (*pose, next(group["lens"] for group in groups if name in group["names"])) for name, pose in late.items()
+    }
     index: dict[str, list[int]] = {name: [] for name in poses}
     members: list[list] = []
     image_number = {name: number for number, name in enumerate(sorted(poses), 1)}

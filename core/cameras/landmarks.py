@@ -26,8 +26,9 @@ PUPILS_PER_LIDS = 63.0 / 62.156 / 1.019
 net's landmarks came out 1.9 % too large over six synthetic heads of known size (benchmarks/head_scale.py)."""
 
 
-def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporter,
-                   text: str = "finding the face") -> dict[str, faces.Face]:
+def find_landmarks(
+    records: Sequence[FrameRecord], folder: Path, report: Reporter, text: str = "finding the face"
+) -> dict[str, faces.Face]:
     """The face in each frame where one is found.
 
     A turned head is followed from the frame before and the one after it, which are near in a film: in a photograph that
@@ -64,8 +65,9 @@ def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporte
     return face_by_name
 
 
-def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray,
-             rounds: int = 20) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+def fit_rays(
+    origins: np.ndarray, directions: np.ndarray, points: np.ndarray, rounds: int = 20
+) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
     """The template's head laid against landmarks seen along rays.
 
     Measured across the rays: a net's landmarks slide as the head turns, so that the depths at which they intersect are

@@ -31,8 +31,9 @@ class Matches:
         lose their folder."""
         plain = {name: PurePosixPath(name).name for name in self.keypoints}
         keypoints = {plain[name]: pixels * scales[name] for name, pixels in self.keypoints.items()}
-        return Matches(keypoints,
-                       {(plain[first], plain[second]): index for (first, second), index in self.pairs.items()})
+        return Matches(
+            keypoints, {(plain[first], plain[second]): index for (first, second), index in self.pairs.items()}
+        )
 
     def kept(self, keep: dict[tuple[str, str], np.ndarray]) -> Matches:
         """Only those matches of each pair that `keep` [M] says."""
@@ -43,8 +44,9 @@ def read_matches(database: Path) -> Matches:
     """All matches of a COLMAP database, verified or not."""
     with pycolmap.Database.open(str(database)) as stored:
         names = {image.image_id: image.name for image in stored.read_all_images()}
-        keypoints = {name: np.asarray(stored.read_keypoints(number), np.float64)[:, :2]
-                     for number, name in names.items()}
+        keypoints = {
+            name: np.asarray(stored.read_keypoints(number), np.float64)[:, :2] for number, name in names.items()
+        }
         numbers, indices = stored.read_all_matches()
         pairs = {}
         for number, index in zip(numbers, indices, strict=True):

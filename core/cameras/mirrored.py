@@ -28,8 +28,13 @@ MOST_PAIRS = 60
 """That are compared, spread over all."""
 
 
-def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report: Reporter,
-                  face_by_name: Mapping[str, faces.Face] = MappingProxyType({})) -> list[str]:
+def find_mirrored(
+    suspects: list[str],
+    trusted: list[str],
+    folder: Path,
+    report: Reporter,
+    face_by_name: Mapping[str, faces.Face] = MappingProxyType({}),
+) -> list[str]:
     """Those pictures that are mirrored with respect to others.
 
     Of two pictures that show a face from its two sides, one flipped looks like the other whatever is true, for faces
@@ -43,7 +48,7 @@ def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report:
     report : hears of progress
     face_by_name : the face in each that shows one
     """
-    among_suspects = [(a, b) for i, a in enumerate(suspects) for b in suspects[i + 1:]]
+    among_suspects = [(a, b) for i, a in enumerate(suspects) for b in suspects[i + 1 :]]
     pairs = [(a, b) for a in suspects for b in trusted] or among_suspects
     if len(pairs) > MOST_PAIRS:
         pairs = [pairs[i] for i in np.linspace(0, len(pairs) - 1, MOST_PAIRS).round().astype(int)]
@@ -84,8 +89,11 @@ def _minority(relation: dict[tuple[str, str], int], suspects: list[str], trusted
     if not side and relation:
         side[max(suspects, key=lambda name: sum(name in pair for pair in relation))] = 1
     while True:
-        known = {a if b in side else b: sign * side[b if b in side else a] for (a, b), sign in relation.items()
-                 if (a in side) != (b in side)}
+        known = {
+            a if b in side else b: sign * side[b if b in side else a]
+            for (a, b), sign in relation.items()
+            if (a in side) != (b in side)
+        }
         if not known:
             break
         side |= known
@@ -101,16 +109,20 @@ def _beside(features: tuple, face: faces.Face, flip: bool, size: tuple[int, int]
     w, h = x1 - x0, y1 - y0
     x0, x1 = (size[0] - x1, size[0] - x0) if flip else (x0, x1)
     at = points / min(1.0, LONG_SIDE_PX / max(size))
-    off = ((at[:, 0] < x0 - 0.6 * w) | (at[:, 0] > x1 + 0.6 * w) | (at[:, 1] < y0 - 0.7 * h) if len(points)
-           else np.zeros(0, bool))
+    off = (
+        (at[:, 0] < x0 - 0.6 * w) | (at[:, 0] > x1 + 0.6 * w) | (at[:, 1] < y0 - 0.7 * h)
+        if len(points)
+        else np.zeros(0, bool)
+    )
     return points[off], descriptors[off]
 
 
 def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
     """Keypoints [K, 2] and RootSIFT descriptors [K, 128] of a picture, mirrored first where `flip`."""
     scale = min(1.0, LONG_SIDE_PX / max(srgb.shape[:2]))
-    grey = images.resize(srgb @ np.array([0.299, 0.587, 0.114], np.float32), round(srgb.shape[1] * scale),
-                         round(srgb.shape[0] * scale))
+    grey = images.resize(
+        srgb @ np.array([0.299, 0.587, 0.114], np.float32), round(srgb.shape[1] * scale), round(srgb.shape[0] * scale)
+    )
     grey = np.ascontiguousarray((np.clip(grey[:, ::-1] if flip else grey, 0, 1) * 255).astype(np.uint8))
     points, descriptors = cv2.SIFT_create(MOST_FEATURES, contrastThreshold=0.02).detectAndCompute(grey, None)
     if descriptors is None:
@@ -123,11 +135,15 @@ def _agreeing(a: tuple, b: tuple) -> int:
     """How many matches between two pictures lie on one epipolar geometry."""
     if min(len(a[0]), len(b[0])) < LEAST_MATCHES:
         return 0
-    matches = [pair[0] for pair in cv2.BFMatcher(cv2.NORM_L2).knnMatch(a[1], b[1], k=2) if len(pair) == 2
-               and pair[0].distance < 0.8 * pair[1].distance]
+    matches = [
+        pair[0]
+        for pair in cv2.BFMatcher(cv2.NORM_L2).knnMatch(a[1], b[1], k=2)
+        if len(pair) == 2 and pair[0].distance < 0.8 * pair[1].distance
+    ]
     if len(matches) < LEAST_MATCHES:
         return 0
     cv2.setRNGSeed(0)
-    _, good = cv2.findFundamentalMat(a[0][[m.queryIdx for m in matches]], b[0][[m.trainIdx for m in matches]],
-                                     cv2.FM_RANSAC, 1.5, 0.999)
+    _, good = cv2.findFundamentalMat(
+        a[0][[m.queryIdx for m in matches]], b[0][[m.trainIdx for m in matches]], cv2.FM_RANSAC, 1.5, 0.999
+    )
     return 0 if good is None else int(good.sum())

@@ -57,8 +57,9 @@ def in_background(pixels: np.ndarray, face: faces.Face) -> np.ndarray:
     return (aside & (pixels[:, 1] < y1)) | (pixels[:, 1] < y0 - 0.7 * (y1 - y0))
 
 
-def head_masks(face_by_name: dict[str, faces.Face], records: Sequence[FrameRecord], folder: Path, out: Path,
-               report: Reporter) -> None:
+def head_masks(
+    face_by_name: dict[str, faces.Face], records: Sequence[FrameRecord], folder: Path, out: Path, report: Reporter
+) -> None:
     """Writes NAME.png for each frame: white on the head, black elsewhere (all black without a face). A turning head
     leaves its shoulders behind.
 
@@ -77,11 +78,19 @@ def head_masks(face_by_name: dict[str, faces.Face], records: Sequence[FrameRecor
         if record.name in face_by_name:
             x0, y0, x1, y1 = face_by_name[record.name].box
             w, h = x1 - x0, y1 - y0
-            cv2.ellipse(mask, (round((x0 + x1) / 2), round((y0 + y1) / 2 - 0.2 * h)), (round(0.85 * w), round(0.8 * h)),
-                        0, 0, 360, 1.0, -1)
-            mask[round(max(y1 + 0.05 * h, 0)):] = 0
+            cv2.ellipse(
+                mask,
+                (round((x0 + x1) / 2), round((y0 + y1) / 2 - 0.2 * h)),
+                (round(0.85 * w), round(0.8 * h)),
+                0,
+                0,
+                360,
+                1.0,
+                -1,
+            )
+            mask[round(max(y1 + 0.05 * h, 0)) :] = 0
             person = faces.segment_person(images.read_srgb(folder / record.name)) > 0.5
-            if person[round(max(y0, 0)):round(y1), round(max(x0, 0)):round(x1)].mean() > 0.7:
+            if person[round(max(y0, 0)) : round(y1), round(max(x0, 0)) : round(x1)].mean() > 0.7:
                 mask *= person
         images.write_data(out / f"{record.name}.png", mask)
 
@@ -91,8 +100,12 @@ def expression_changes(face_by_name: dict[str, faces.Face]) -> list[str]:
     names = [name for name, face in face_by_name.items() if abs(face.yaw_deg) < 30]
     if len(names) < 3:
         return []
-    shape = np.array([[_apart(face_by_name[name], pair) / _apart(face_by_name[name], EYES) for pair in (MOUTH, CORNERS)]
-                      for name in names])
+    shape = np.array(
+        [
+            [_apart(face_by_name[name], pair) / _apart(face_by_name[name], EYES) for pair in (MOUTH, CORNERS)]
+            for name in names
+        ]
+    )
     off = np.abs(shape - np.median(shape, 0)) > (OPENED_SHARE, SMILED_SHARE)
     return [name for name, changed in zip(names, off.any(1), strict=True) if changed]
 

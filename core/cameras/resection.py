@@ -74,8 +74,11 @@ def resect(
     report.progress(0, 5, "placing cameras by the face")
     bundle = place_by_landmarks(groups, group_of, names, pixels)
     count = len(model.mean)
-    landmarks = Observations(np.repeat(np.arange(len(names)), count), np.tile(np.arange(count), len(names)),
-                             np.concatenate([pixels[n] for n in names]))
+    landmarks = Observations(
+        np.repeat(np.arange(len(names)), count),
+        np.tile(np.arange(count), len(names)),
+        np.concatenate([pixels[n] for n in names]),
+    )
     bundle = adjust(bundle, landmarks)
     seen, used = landmarks, []
     for step, share in enumerate(AGREE_WIDTH_SHARES, 1):
@@ -87,9 +90,15 @@ def resect(
     late = place_by_matches(bundle, groups, group_of, names, used, matches)
     miss = np.linalg.norm(bundle.project(landmarks.camera, landmarks.point) - landmarks.pixel, axis=1)
     error = float(np.median(miss[model.trust[landmarks.point] > 0.2]))
-    return Resection(_model(bundle, groups, group_of, names, seen, late), error, error / width, len(used),
-                     _trusted(names, matches, used), sorted(late),
-                      bundle.coefficients)
+    return Resection(
+        _model(bundle, groups, group_of, names, seen, late),
+        error,
+        error / width,
+        len(used),
+        _trusted(names, matches, used),
+        sorted(late),
+        bundle.coefficients,
+    )
 
 
 def _trusted(names: list[str], matches: Matches, used: list) -> bool:
@@ -151,12 +160,18 @@ def _epipolar(bundle: Bundle, number: dict, matches: Matches, reach_px: float) -
         shift = bundle.translations[j] - rotation @ bundle.translations[i]
         essential = np.cross(np.eye(3), shift / max(np.linalg.norm(shift), 1e-9)) @ rotation
         fa, fb = bundle.focal[bundle.lens[i]], bundle.focal[bundle.lens[j]]
-        rays_a, rays_b = (np.concatenate([(p - bundle.centre[k]) / f, np.ones((len(p), 1))], 1)
-                          for p, k, f in ((a, i, fa), (b, j, fb)))
+        rays_a, rays_b = (
+            np.concatenate([(p - bundle.centre[k]) / f, np.ones((len(p), 1))], 1)
+            for p, k, f in ((a, i, fa), (b, j, fb))
+        )
         lines_b, lines_a = rays_a @ essential.T, rays_b @ essential
         value = np.abs((rays_b * lines_b).sum(1))
-        keep[first, second] = np.maximum(fb * value / np.linalg.norm(lines_b[:, :2], axis=1),
-                                         fa * value / np.linalg.norm(lines_a[:, :2], axis=1)) < reach_px
+        keep[first, second] = (
+            np.maximum(
+                fb * value / np.linalg.norm(lines_b[:, :2], axis=1), fa * value / np.linalg.norm(lines_a[:, :2], axis=1)
+            )
+            < reach_px
+        )
     return matches.kept(keep)
 
 
@@ -172,8 +187,9 @@ def _triangulate(bundle: Bundle, camera: np.ndarray, pixel: np.ndarray) -> np.nd
     return np.linalg.solve(across.sum(0), (across @ centres[:, :, None]).sum(0))[:, 0]
 
 
-def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], used: list,
-                     matches: Matches) -> dict[str, tuple]:
+def place_by_matches(
+    bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], used: list, matches: Matches
+) -> dict[str, tuple]:
     """Frames without a face, placed by PnP on the tracks' points that their keypoints match.
 
     Parameters
@@ -196,8 +212,15 @@ def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: 
         points, pixels = [], []
         for (first, second), index in matches.pairs.items():
             other, mine, theirs = (second, 0, 1) if first == name else (first, 1, 0) if second == name else (None, 0, 1)
-            hits = ([(place[other, k], matches.keypoints[name][m]) for m, k in index[:, [mine, theirs]].tolist()
-                     if (other, k) in place] if other else [])
+            hits = (
+                [
+                    (place[other, k], matches.keypoints[name][m])
+                    for m, k in index[:, [mine, theirs]].tolist()
+                    if (other, k) in place
+                ]
+                if other
+                else []
+            )
             points += [point for point, _ in hits]
             pixels += [pixel for _, pixel in hits]
         if len(points) < LEAST_MATCHES:
@@ -206,23 +229,36 @@ def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: 
         focal = bundle.focal[group_of[name]]
         matrix = np.array([[focal, 0, group["width"] / 2], [0, focal, group["height"] / 2], [0, 0, 1.0]])
         cv2.setRNGSeed(0)
-        good, turn, shift, inliers = cv2.solvePnPRansac(np.array(points), np.array(pixels), matrix, None,
-                                                        iterationsCount=2000, reprojectionError=4.0)
+        good, turn, shift, inliers = cv2.solvePnPRansac(
+            np.array(points), np.array(pixels), matrix, None, iterationsCount=2000, reprojectionError=4.0
+        )
         if good and inliers is not None and len(inliers) >= LEAST_MATCHES:
-            turn, shift = cv2.solvePnPRefineLM(np.array(points)[inliers[:, 0]], np.array(pixels)[inliers[:, 0]], matrix,
-                                               None, turn, shift)
+            turn, shift = cv2.solvePnPRefineLM(
+                np.array(points)[inliers[:, 0]], np.array(pixels)[inliers[:, 0]], matrix, None, turn, shift
+            )
             poses[name] = cv2.Rodrigues(turn)[0], shift[:, 0]
     return poses
 
 
-def _model(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], observations: Observations,
-           late: dict[str, tuple]) -> pycolmap.Reconstruction:
+def _model(
+    bundle: Bundle,
+    groups: list[dict],
+    group_of: dict,
+    names: list[str],
+    observations: Observations,
+    late: dict[str, tuple],
+) -> pycolmap.Reconstruction:
     """As COLMAP writes it: cameras, images, and as points the landmarks and tracks."""
     model = pycolmap.Reconstruction()
     for number, group in enumerate(groups):
         width, height = group["width"], group["height"]
-        camera = pycolmap.Camera(camera_id=number + 1, model="SIMPLE_RADIAL", width=width, height=height,
-                                 params=[bundle.focal[number], width / 2, height / 2, 0])
+        camera = pycolmap.Camera(
+            camera_id=number + 1,
+            model="SIMPLE_RADIAL",
+            width=width,
+            height=height,
+            params=[bundle.focal[number], width / 2, height / 2, 0],
+        )
         model.add_camera_with_trivial_rig(camera)
     poses = {name: (bundle.rotations[i], bundle.translations[i]) for i, name in enumerate(names)} | late
     members: list[list] = [[] for _ in bundle.points]

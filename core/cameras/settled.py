@@ -54,8 +54,13 @@ class HeadCameras:
     tracks: list
 
 
-def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter,
-           by: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
+def settle(
+    model: pycolmap.Reconstruction,
+    head: HeadFrame,
+    matches: Matches,
+    report: Reporter,
+    by: Collection[str] | None = None,
+) -> tuple[pycolmap.Reconstruction, float | None]:
     """The model with its cameras placed with respect to the head, in the template's world.
 
     Parameters
@@ -92,12 +97,22 @@ def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, re
     cameras = _follow(room, registered, own, straight, still, width, report)
     if len(cameras.tracks) < LEAST_TRACKS:
         return model, left
-    return (_with_others(cameras, room, everything, registered, own, straight) if len(everything) > len(registered)
-            else cameras.model), left
+    return (
+        _with_others(cameras, room, everything, registered, own, straight)
+        if len(everything) > len(registered)
+        else cameras.model
+    ), left
 
 
-def _follow(room: pycolmap.Reconstruction, registered: list, own: Matches, straight: Matches, bundle: Bundle,
-            width: float, report: Reporter) -> HeadCameras:
+def _follow(
+    room: pycolmap.Reconstruction,
+    registered: list,
+    own: Matches,
+    straight: Matches,
+    bundle: Bundle,
+    width: float,
+    report: Reporter,
+) -> HeadCameras:
     """The cameras with respect to the head, by these of its matches (`straight`: of their pixels without the lens)."""
     names = [image.name for image in registered]
     for step, share in enumerate(REACH_WIDTH_SHARES):
@@ -112,8 +127,10 @@ def _follow(room: pycolmap.Reconstruction, registered: list, own: Matches, strai
 def _halves(matches: Matches, tracks: list) -> tuple[Matches, Matches]:
     """The matches of every other track, and those of the rest."""
     half = {seen: number % 2 for number, track in enumerate(tracks) for seen in track}
-    sides = {pair: np.array([[half.get((name, int(k)), -1) for k in index[:, i]] for i, name in enumerate(pair)])
-             for pair, index in matches.pairs.items()}
+    sides = {
+        pair: np.array([[half.get((name, int(k)), -1) for k in index[:, i]] for i, name in enumerate(pair)])
+        for pair, index in matches.pairs.items()
+    }
     first, second = (matches.kept({pair: (side == each).all(0) for pair, side in sides.items()}) for each in (0, 1))
     return first, second
 
@@ -124,25 +141,47 @@ def _miss(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -
     return float(np.median(np.linalg.norm(placed.project(camera, point) - pixel, axis=1))) if len(pixel) else np.inf
 
 
-def _with_others(cameras: HeadCameras, room: pycolmap.Reconstruction, everything: list, registered: list,
-                 own: Matches, straight: Matches) -> pycolmap.Reconstruction:
+def _with_others(
+    cameras: HeadCameras,
+    room: pycolmap.Reconstruction,
+    everything: list,
+    registered: list,
+    own: Matches,
+    straight: Matches,
+) -> pycolmap.Reconstruction:
     """The model of the frames `registered` with the others of `everything`: placed by its points, or where they were in
     the room if they show too few."""
     alone, bundle, tracks = cameras.model, cameras.bundle, cameras.tracks
     names = [image.name for image in registered]
     pose_by_name = {image.name: pose_of(image) for image in alone.images.values()}
     points = np.array([alone.points3D[number].xyz for number in sorted(alone.points3D)])
-    bundle = replace(bundle, rotations=np.array([pose_by_name[name].rotation.matrix() for name in names]),
-                     translations=np.array([pose_by_name[name].translation for name in names]),
-                     points=np.concatenate([bundle.points[:len(bundle.points) - len(points)], points]))
+    bundle = replace(
+        bundle,
+        rotations=np.array([pose_by_name[name].rotation.matrix() for name in names]),
+        translations=np.array([pose_by_name[name].translation for name in names]),
+        points=np.concatenate([bundle.points[: len(bundle.points) - len(points)], points]),
+    )
     others = [image for image in everything if image.name not in pose_by_name]
-    groups = [{"names": [image.name for image in others if image.camera_id == number], "width": camera.width,
-               "height": camera.height, "lens": number}
-              for number, camera in sorted(room.cameras.items())]
+    groups = [
+        {
+            "names": [image.name for image in others if image.camera_id == number],
+            "width": camera.width,
+            "height": camera.height,
+            "lens": number,
+        }
+        for number, camera in sorted(room.cameras.items())
+    ]
     group_of = {name: i for i, group in enumerate(groups) for name in group["names"]}
     poses = {image.name: (pose_of(image).rotation.matrix(), pose_of(image).translation) for image in others}
-    return rebuilt(room, bundle, registered, tracks, own,
-                   poses | place_by_matches(bundle, groups, group_of, names, tracks, straight), groups)
+    return rebuilt(
+        room,
+        bundle,
+        registered,
+        tracks,
+        own,
+        poses | place_by_matches(bundle, groups, group_of, names, tracks, straight),
+        groups,
+    )
 
 
 def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tuple[int, int, int, int]]:
@@ -155,8 +194,10 @@ def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tup
         if outline is not None:
             camera = room.cameras[image.camera_id]
             low, high, frame = outline.min(0), outline.max(0), np.array([camera.width, camera.height])
-            low, high = (np.clip(corner, 0, frame).astype(int)
-                         for corner in (low - AIR_SHARE * (high - low), high + AIR_SHARE * (high - low)))
+            low, high = (
+                np.clip(corner, 0, frame).astype(int)
+                for corner in (low - AIR_SHARE * (high - low), high + AIR_SHARE * (high - low))
+            )
             if (high - low).min() >= LEAST_SIDE_PX:
                 outlines[image.name] = low, high, frame
     sides = np.max([high - low for low, high, _ in outlines.values()], axis=0, initial=0)
@@ -181,8 +222,11 @@ def on_head(model: pycolmap.Reconstruction, registered: list, matches: Matches) 
         cv2.fillConvexPoly(mask, outline, 1)
         x, y = np.clip(keypoints.astype(int), 0, [camera.width - 1, camera.height - 1]).T
         inside[image.name] = mask[y, x] > 0
-    pairs = {(a, b): inside[a][index[:, 0]] & inside[b][index[:, 1]] for (a, b), index in matches.pairs.items()
-             if a in inside and b in inside}
+    pairs = {
+        (a, b): inside[a][index[:, 0]] & inside[b][index[:, 1]]
+        for (a, b), index in matches.pairs.items()
+        if a in inside and b in inside
+    }
     return matches.kept(pairs)
 
 
@@ -201,8 +245,14 @@ def _face_width(model: pycolmap.Reconstruction, registered: list) -> float:
     """Of the head's landmarks in pixels, in the median frame."""
     across = np.ptp(template_landmarks().mean[:, 0])
     depth = [(pose_of(image).rotation.matrix() @ np.zeros(3) + pose_of(image).translation)[2] for image in registered]
-    return float(np.median([model.cameras[image.camera_id].mean_focal_length() * across / z
-                            for image, z in zip(registered, depth, strict=True)]))
+    return float(
+        np.median(
+            [
+                model.cameras[image.camera_id].mean_focal_length() * across / z
+                for image, z in zip(registered, depth, strict=True)
+            ]
+        )
+    )
 
 
 def _adjust(model: pycolmap.Reconstruction) -> None:
@@ -229,8 +279,9 @@ def _with_poses(bundle: Bundle, model: pycolmap.Reconstruction, names: list[str]
     pose_by_name = {image.name: pose_of(image) for image in model.images.values()}
     rotations = np.array([pose_by_name[name].rotation.matrix() for name in names])
     translations = np.array([pose_by_name[name].translation for name in names])
-    centres, before = (-np.einsum("nij,ni->nj", r, t)
-                       for r, t in ((rotations, translations), (bundle.rotations, bundle.translations)))
+    centres, before = (
+        -np.einsum("nij,ni->nj", r, t) for r, t in ((rotations, translations), (bundle.rotations, bundle.translations))
+    )
     scale, turn, shift = similarity(centres[firm], before[firm], np.ones(int(firm.sum())))
     rotations = np.where(firm[:, None, None], rotations @ turn.T, bundle.rotations)
     centres = np.where(firm[:, None], scale * centres @ turn.T + shift, before)

@@ -58,8 +58,11 @@ def pairs_within(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
         pairs |= {(i, j) for j in near if j < len(chosen)}
         if turn[name] is None:
             continue
-        apart = [(abs(turn[other] - turn[name]), j) for j, other in enumerate(chosen) if abs(i - j) > NEIGHBOURS
-                 and turn[other] is not None]
+        apart = [
+            (abs(turn[other] - turn[name]), j)
+            for j, other in enumerate(chosen)
+            if abs(i - j) > NEIGHBOURS and turn[other] is not None
+        ]
         pairs |= {(min(i, j), max(i, j)) for degrees, j in sorted(apart)[:SAME_SIDE] if degrees < SAME_SIDE_DEG}
     return [(chosen[i], chosen[j]) for i, j in sorted(pairs)]
 
@@ -70,12 +73,14 @@ def pairs_between(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
     at = np.array([place[name] for name in chosen])
     rest = [name for name, _, _ in film if name not in set(chosen)]
     around = {name: int(np.searchsorted(at, place[name])) for name in rest}
-    return [(chosen[j], name) for name in rest
-            for j in range(max(0, around[name] - 2), min(len(chosen), around[name] + 2))]
+    return [
+        (chosen[j], name) for name in rest for j in range(max(0, around[name] - 2), min(len(chosen), around[name] + 2))
+    ]
 
 
-def place_others(model: pycolmap.Reconstruction, database: Path, names: Sequence[str], seed: int,
-                 step: Callable[[int, int], None]) -> None:
+def place_others(
+    model: pycolmap.Reconstruction, database: Path, names: Sequence[str], seed: int, step: Callable[[int, int], None]
+) -> None:
     """Adds those frames to the model whose matches with its frames give a pose; their keypoints become observations of
     its points.
 
@@ -121,12 +126,19 @@ def _points_of(model: pycolmap.Reconstruction, matched: list[tuple[int, np.ndarr
     return keypoints
 
 
-def _place(model: pycolmap.Reconstruction, image: pycolmap.Image, keypoints: np.ndarray, points: dict[int, int],
-           options, refined) -> None:
+def _place(
+    model: pycolmap.Reconstruction,
+    image: pycolmap.Image,
+    keypoints: np.ndarray,
+    points: dict[int, int],
+    options,
+    refined,
+) -> None:
     numbers, own = np.array(list(points)), np.array(list(points.values()))
     places = np.array([model.points3D[number].xyz for number in numbers])
     result = pycolmap.estimate_and_refine_absolute_pose(
-        keypoints[own], places, model.cameras[image.camera_id], options, refined)
+        keypoints[own], places, model.cameras[image.camera_id], options, refined
+    )
     if result is None or result["num_inliers"] < LEAST_POINTS:
         return
     added = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image.image_id, keypoints=keypoints)

@@ -39,9 +39,11 @@ FEW_PHOTOGRAPHS = 12
 """Up to this many photographs the face's landmarks are tried before the costly features."""
 MOST_FACES = 24
 """Frames in which the face is looked for where structure from motion has found the cameras."""
-FILM_AGAIN = ("Film again: the person sits still, the camera moves slowly around the face at arm's length, and the "
-              "background is busy rather than a white "
-              "wall; or take a photograph every ten degrees around the face.")
+FILM_AGAIN = (
+    "Film again: the person sits still, the camera moves slowly around the face at arm's length, and the "
+    "background is busy rather than a white "
+    "wall; or take a photograph every ten degrees around the face."
+)
 
 
 @dataclass(frozen=True)
@@ -88,16 +90,26 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
     face_by_name = find_landmarks(records if few else _spread(records), capture.frames, report)
     if frames.kind == VIDEO and not few and surroundings_stay(face_by_name, capture.frames):
         to_place = spread_over(records)
-        report.log(f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in "
-                   f"{len(to_place)} of {len(records)} frames.")
+        report.log(
+            f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in "
+            f"{len(to_place)} of {len(records)} frames."
+        )
         face_by_name = find_landmarks(_spread(to_place), capture.frames, report)
-        return replace(_solve(Frames(to_place, frames.kind), face_by_name, capture, settings, report, stood=True),
-                       to_place=to_place)
+        return replace(
+            _solve(Frames(to_place, frames.kind), face_by_name, capture, settings, report, stood=True),
+            to_place=to_place,
+        )
     return _solve(frames, face_by_name, capture, settings, report)
 
 
-def _solve(frames: Frames, face_by_name: dict[str, faces.Face], capture: Capture, settings: Settings, report: Reporter,
-           stood: bool = False) -> Solved:
+def _solve(
+    frames: Frames,
+    face_by_name: dict[str, faces.Face],
+    capture: Capture,
+    settings: Settings,
+    report: Reporter,
+    stood: bool = False,
+) -> Solved:
     """`solve` with these frames alone and the faces in some of them; `stood`: it is known that the camera stood still
     while the head turned."""
     records = frames.records
@@ -113,8 +125,10 @@ def _solve(frames: Frames, face_by_name: dict[str, faces.Face], capture: Capture
                 face_by_name = find_landmarks(records, capture.frames, report)
             solved, fault = _by_face(records, capture, face_by_name, matches, settings, report)
             if solved and few and not solved.refined and "skin" in ways[turn:]:
-                report.log("The face gives cameras, but too little else matches to refine them; features that hold on "
-                           "skin are tried.")
+                report.log(
+                    "The face gives cameras, but too little else matches to refine them; features that hold on "
+                    "skin are tried."
+                )
                 continue
         else:
             skin, alone = way == "skin", stood
@@ -126,13 +140,17 @@ def _solve(frames: Frames, face_by_name: dict[str, faces.Face], capture: Capture
         if solved and not fault:
             if partial and worth(partial) > worth(solved):
                 solved, matches = partial, partial.matches
-            rest = sorted({record.name for record in records}
-                          - {image.name for image in solved.model.images.values() if image.has_pose})
-            mirrored = tuple(_mirrored(frames, rest, solved.model, face_by_name, capture, report) if way != "face"
-                             else ()) or solved.mirrored
+            rest = sorted(
+                {record.name for record in records}
+                - {image.name for image in solved.model.images.values() if image.has_pose}
+            )
+            mirrored = (
+                tuple(_mirrored(frames, rest, solved.model, face_by_name, capture, report) if way != "face" else ())
+                or solved.mirrored
+            )
             solved = replace(solved, head_moved=moved, stood_still=stood, mirrored=mirrored)
             partial = replace(solved, matches=matches)
-            if few and len(rest) > len(mirrored) and ways[turn + 1:]:
+            if few and len(rest) > len(mirrored) and ways[turn + 1 :]:
                 report.log(f"{len(rest)} of {len(records)} frames do not fit the others yet; another way is tried.")
                 continue
             break
@@ -155,8 +173,9 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
     apart = settings.cameras.interpupillary_mm / 1000
     if frames.kind == VIDEO and solved.way != "face" and not solved.head_moved:
         film = film_of(frames.records)
-        model, left = settle(solved.model, solved.head, solved.matches, report,
-                             skeleton.choose(film, skeleton.size(film)))
+        model, left = settle(
+            solved.model, solved.head, solved.matches, report, skeleton.choose(film, skeleton.size(film))
+        )
         if left is None or model is not solved.model:  # a room's features are too coarse for a head
             boxes = head_boxes(solved.model, solved.head)
             if boxes:
@@ -164,8 +183,10 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
                 model, left = settle(solved.model, solved.head, fine, report, chosen)
         if model is solved.model:
             return solved
-        report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % "
-                   "less on its own; its cameras are taken.")
+        report.log(
+            f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % "
+            "less on its own; its cameras are taken."
+        )
         return replace(solved, model=model, head=find_head(model, solved.face_by_name, apart), swayed=1 - left)
     by_faces_alone = solved.way == "face" and not solved.refined
     if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or by_faces_alone:
@@ -176,21 +197,36 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
     model = refine(
         solved.model, solved.face_by_name, solved.matches, told, report, camera_groups(missing, capture.frames)
     )
-    return replace(solved, model=model, head=find_head(model, solved.face_by_name, apart),
-                   every_frame_held=holds_every_frame(model))
+    return replace(
+        solved,
+        model=model,
+        head=find_head(model, solved.face_by_name, apart),
+        every_frame_held=holds_every_frame(model),
+    )
 
 
-def _by_features(skin: bool, frames: Frames, capture: Capture, face_by_name: dict, settings: Settings, report: Reporter,
-                 alone: bool = False) -> tuple[Solved | None, Matches, str | None]:
+def _by_features(
+    skin: bool,
+    frames: Frames,
+    capture: Capture,
+    face_by_name: dict,
+    settings: Settings,
+    report: Reporter,
+    alone: bool = False,
+) -> tuple[Solved | None, Matches, str | None]:
     """The model of one kind of features, the matches, and its shortcoming; `alone`: on the head only. A model whose
     head moved is given, with that fault."""
     with capture.workspace() as work:
         if alone:
-            face_by_name = (face_by_name if len(face_by_name) > len(frames.records) / 2
-                            else find_landmarks(frames.records, capture.frames, report))
+            face_by_name = (
+                face_by_name
+                if len(face_by_name) > len(frames.records) / 2
+                else find_landmarks(frames.records, capture.frames, report)
+            )
             head_masks(face_by_name, frames.records, capture.frames, work, report)
-        model, matches = solve_structure(frames, capture, skin, settings.cameras.matching, settings.seed, report,
-                                         work if alone else None)
+        model, matches = solve_structure(
+            frames, capture, skin, settings.cameras.matching, settings.seed, report, work if alone else None
+        )
     fault = shortcoming(model, len(frames.records))
     if fault:
         return None, matches, fault
@@ -215,16 +251,26 @@ def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | Non
     return None
 
 
-def _by_face(records: Sequence[FrameRecord], capture: Capture, face_by_name: dict, matches: Matches, settings: Settings,
-             report: Reporter) -> tuple[Solved | None, str | None]:
+def _by_face(
+    records: Sequence[FrameRecord],
+    capture: Capture,
+    face_by_name: dict,
+    matches: Matches,
+    settings: Settings,
+    report: Reporter,
+) -> tuple[Solved | None, str | None]:
     shown = {record.name: record.shown for record in records}
     mirrored = (
         find_mirrored(sorted(face_by_name), [], capture.frames, report, face_by_name)
         if len(records) <= FEW_PHOTOGRAPHS
         else []
     )
-    result = resect(camera_groups(records, capture.frames),
-                    {name: face for name, face in face_by_name.items() if name not in mirrored}, matches, report)
+    result = resect(
+        camera_groups(records, capture.frames),
+        {name: face for name, face in face_by_name.items() if name not in mirrored},
+        matches,
+        report,
+    )
     registered = result.model.num_reg_images() if result else 0
     if registered < min(LEAST_VIEWS, len(records)):
         but = f", and {', '.join(shown[name] for name in mirrored)} is mirrored" if mirrored else ""
@@ -237,14 +283,24 @@ def _by_face(records: Sequence[FrameRecord], capture: Capture, face_by_name: dic
             f"{100 * result.landmark_miss:.0f} % of its width.",
         )
     apart = settings.cameras.interpupillary_mm / 1000
-    head = (find_head(result.model, face_by_name, apart) if registered > 1
-            else head_of_one(result.coefficients, result.landmark_px, result.landmark_miss, apart))
-    return Solved(result.model, "face", head, face_by_name, mirrored=tuple(mirrored), tracks=result.tracks,
-                  refined=result.refined), None
+    head = (
+        find_head(result.model, face_by_name, apart)
+        if registered > 1
+        else head_of_one(result.coefficients, result.landmark_px, result.landmark_miss, apart)
+    )
+    return Solved(
+        result.model, "face", head, face_by_name, mirrored=tuple(mirrored), tracks=result.tracks, refined=result.refined
+    ), None
 
 
-def _mirrored(frames: Frames, unplaced: list[str], model: pycolmap.Reconstruction, face_by_name: dict, capture: Capture,
-              report: Reporter) -> list[str]:
+def _mirrored(
+    frames: Frames,
+    unplaced: list[str],
+    model: pycolmap.Reconstruction,
+    face_by_name: dict,
+    capture: Capture,
+    report: Reporter,
+) -> list[str]:
     """Among photographs that did not fit, those that are mirrored."""
     if not unplaced or frames.kind == VIDEO or len(unplaced) > 2 * FEW_PHOTOGRAPHS:
         return []
@@ -260,22 +316,29 @@ def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
     return spread_evenly(seen, MOST_FACES)
 
 
-def _explained(frames: Frames, faults: list[str], face_by_name: dict, moved: bool, stood: bool, capture: Capture,
-               report: Reporter) -> Problem:
+def _explained(
+    frames: Frames, faults: list[str], face_by_name: dict, moved: bool, stood: bool, capture: Capture, report: Reporter
+) -> Problem:
     """The Problem that fits best what was tried."""
     records = frames.records
     names = {record.name: record.shown for record in records}
-    mirrored = (find_mirrored(sorted(names), [], capture.frames, report, face_by_name) if frames.kind != VIDEO
-                and len(names) <= FEW_PHOTOGRAPHS else [])
+    mirrored = (
+        find_mirrored(sorted(names), [], capture.frames, report, face_by_name)
+        if frames.kind != VIDEO and len(names) <= FEW_PHOTOGRAPHS
+        else []
+    )
     if mirrored:
         they = "is mirrored: it fits" if len(mirrored) == 1 else "are mirrored: they fit"
-        return Problem(f"{', '.join(names[name] for name in mirrored)} {they} the other pictures only when flipped "
-                       "left to right.",
-                       "Flip them back, or leave them out; on a phone, switch off the mirroring of the front camera.")
+        return Problem(
+            f"{', '.join(names[name] for name in mirrored)} {they} the other pictures only when flipped left to right.",
+            "Flip them back, or leave them out; on a phone, switch off the mirroring of the front camera.",
+        )
     if moved or stood:
-        return Problem("The head turned in front of a camera that stood still, and the face alone does not give its "
-                       "motion." if stood
-                       else "The face is not still with respect to its surroundings: the cameras follow the "
-                            "background, and the head moved.",
-                       "Let the person sit still, look at one point, and move the camera instead.")
+        return Problem(
+            "The head turned in front of a camera that stood still, and the face alone does not give its motion."
+            if stood
+            else "The face is not still with respect to its surroundings: the cameras follow the "
+            "background, and the head moved.",
+            "Let the person sit still, look at one point, and move the camera instead.",
+        )
     return Problem(" ".join(dict.fromkeys([faults[0], faults[-1]])), FILM_AGAIN)

@@ -33,8 +33,9 @@ NO_MODEL = 3
 """Exit code of the process that looks for a structure, where it finds none."""
 
 
-def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str, seed: int, report: Reporter,
-                    masks: Path | None = None) -> tuple[pycolmap.Reconstruction | None, Matches]:
+def solve_structure(
+    frames: Frames, capture: Capture, skin: bool, matching: str, seed: int, report: Reporter, masks: Path | None = None
+) -> tuple[pycolmap.Reconstruction | None, Matches]:
     """The largest model of the capture's frames, and all matches. Photographs are looked at as large as they were kept,
     though not with masks; pixels are the frames' in any case.
 
@@ -60,18 +61,26 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
         few = frames.kind == PHOTOGRAPHS and len(records) <= ALL_PAIRS_FRAMES
         looked_at = groups if masks else _enlarged(groups, folder)
         name_of = {PurePosixPath(name).name: name for group in looked_at for name in group["names"]}
-        job = {"images": str(folder.resolve()), "groups": looked_at, "skin": skin,
-               "film": [(name_of[name], *told) for name, *told in film_of(records)] if sequential else None,
-               "photographs": few,
-               "finer": skin or not sequential, "masks": str(masks) if masks else None, "seed": seed,
-               "database": str(work / "database.db"), "output": str(work / "model")}
+        job = {
+            "images": str(folder.resolve()),
+            "groups": looked_at,
+            "skin": skin,
+            "film": [(name_of[name], *told) for name, *told in film_of(records)] if sequential else None,
+            "photographs": few,
+            "finer": skin or not sequential,
+            "masks": str(masks) if masks else None,
+            "seed": seed,
+            "database": str(work / "database.db"),
+            "output": str(work / "model"),
+        }
         path = work / "job.json"
         path.write_text(json.dumps(job), encoding="utf-8")
         try:
             model = read_model(Path(job["output"])) if _follow(path, report) else None
         except (OSError, ValueError) as error:
-            raise Problem(f"The camera solver left a model that cannot be used ({error}).",
-                          advise_again("cameras")) from error
+            raise Problem(
+                f"The camera solver left a model that cannot be used ({error}).", advise_again("cameras")
+            ) from error
         matches = read_matches(Path(job["database"]))
         sizes = {name: (group["width"], group["height"]) for group in groups for name in group["names"]}
         scales = {}
@@ -84,8 +93,9 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
         return model, matches.scaled(scales)
 
 
-def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, capture: Capture, seed: int,
-                report: Reporter) -> tuple[Matches, list[str]]:
+def match_crops(
+    boxes: dict[str, tuple[int, int, int, int]], frames: Frames, capture: Capture, seed: int, report: Reporter
+) -> tuple[Matches, list[str]]:
     """Matches of fine features within a part of each frame of a film.
 
     Parameters
@@ -107,21 +117,35 @@ def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, cap
             report.progress(done, len(frames.records), "cutting out the head")
             if record.name in boxes:
                 left, top, right, bottom = boxes[record.name]
-                images.write_srgb(work / "parts" / record.name,
-                                  images.read_srgb(capture.frames / record.name)[top:bottom, left:right], quality=100)
+                images.write_srgb(
+                    work / "parts" / record.name,
+                    images.read_srgb(capture.frames / record.name)[top:bottom, left:right],
+                    quality=100,
+                )
                 names.setdefault((right - left, bottom - top), []).append(record.name)
-        groups = [{"names": same, "width": width, "height": height, "focal_px": None}
-                  for (width, height), same in names.items()]
-        job = {"images": str(work / "parts"), "groups": groups, "skin": False, "photographs": False, "finer": True,
-               "masks": None, "seed": seed,
-               "film": [frame for frame in film_of(frames.records) if frame[0] in boxes],
-               "database": str(work / "parts.db"), "output": None}
+        groups = [
+            {"names": same, "width": width, "height": height, "focal_px": None}
+            for (width, height), same in names.items()
+        ]
+        job = {
+            "images": str(work / "parts"),
+            "groups": groups,
+            "skin": False,
+            "photographs": False,
+            "finer": True,
+            "masks": None,
+            "seed": seed,
+            "film": [frame for frame in film_of(frames.records) if frame[0] in boxes],
+            "database": str(work / "parts.db"),
+            "output": None,
+        }
         path = work / "parts.json"
         path.write_text(json.dumps(job), encoding="utf-8")
         _follow(path, report)
         matches, chosen = read_matches(Path(job["database"])), json.loads((work / CHOSEN).read_text(encoding="utf-8"))
-    return Matches({name: pixels + boxes[name][:2] for name, pixels in matches.keypoints.items()},
-                   matches.pairs), chosen
+    return Matches(
+        {name: pixels + boxes[name][:2] for name, pixels in matches.keypoints.items()}, matches.pairs
+    ), chosen
 
 
 def film_of(records: Sequence[FrameRecord]) -> skeleton.Film:
@@ -150,8 +174,9 @@ def _enlarged(groups: list[dict], folder: Path) -> list[dict]:
             width, height = images.size(folder / FULL / name) if there else (group["width"], group["height"])
             diagonal = math.hypot(group["width"], group["height"])
             focal = group["focal_px"] and group["focal_px"] * math.hypot(width, height) / diagonal
-            one = split.setdefault((number, width, height),
-                                   {"names": [], "width": width, "height": height, "focal_px": focal})
+            one = split.setdefault(
+                (number, width, height), {"names": [], "width": width, "height": height, "focal_px": focal}
+            )
             one["names"].append(f"{FULL}/{name}" if there else name)
     return list(split.values())
 
@@ -174,8 +199,14 @@ def _reduce(model: pycolmap.Reconstruction, sizes: dict[str, tuple[int, int]]) -
 def _follow(job: Path, report: Reporter) -> bool:
     """Runs COLMAP's process, reporting its progress; ends it at a cancel. True where it made a model."""
     command = [sys.executable, "-E", "-s", "-B", "-m", f"{__package__}.colmap", str(job)]
-    process = subprocess.Popen(command, cwd=Path(__file__).parents[2], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                               text=True, encoding="utf-8")
+    process = subprocess.Popen(
+        command,
+        cwd=Path(__file__).parents[2],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+    )
     lines = queue.SimpleQueue()
     reader = threading.Thread(target=lambda: [lines.put(line) for line in process.stdout], daemon=True)
     reader.start()
@@ -197,6 +228,8 @@ def _follow(job: Path, report: Reporter) -> bool:
         process.stdin.close()
         process.stdout.close()
     if code not in (0, NO_MODEL):
-        raise Problem(f"The camera solver stopped unexpectedly (code {code}).",
-                      "Close other programs to free memory, or lower frames.max_frames, and run again.")
+        raise Problem(
+            f"The camera solver stopped unexpectedly (code {code}).",
+            "Close other programs to free memory, or lower frames.max_frames, and run again.",
+        )
     return code == 0

@@ -34,8 +34,9 @@ def surroundings_stay(face_by_name: dict[str, faces.Face], folder: Path) -> bool
     small = {name: _read(folder / name) for name in names}
     for i, first in enumerate(names):
         face = face_by_name[first]
-        second = next((name for name in names[i + 1:] if abs(face_by_name[name].yaw_deg - face.yaw_deg) >= TURNED_DEG),
-                      None)
+        second = next(
+            (name for name in names[i + 1 :] if abs(face_by_name[name].yaw_deg - face.yaw_deg) >= TURNED_DEG), None
+        )
         share = None if second is None else _share_that_stays(small[first], small[second], face, face_by_name[second])
         stayed += [] if share is None else [share > 0.6]
     return len(stayed) >= 2 and bool(np.mean(stayed) > 0.6)

@@ -63,8 +63,10 @@ def find_head(
     """`face_by_name`: name -> face. Raises Problem where fewer than two registered frames show a face."""
     seen = _registered_with_face(model, face_by_name)
     if len(seen) < 2:
-        raise Problem("The face is seen in fewer than two of the frames whose cameras were found.",
-                      "Film so that eyes, nose and mouth stay visible in most of the frames.")
+        raise Problem(
+            "The face is seen in fewer than two of the frames whose cameras were found.",
+            "Film so that eyes, nose and mouth stay visible in most of the frames.",
+        )
     origins, directions = zip(*(rays(image, model.cameras[image.camera_id], face) for image, face in seen), strict=True)
     origins, directions = np.array(origins), np.array(directions)
     points, angles = intersect_rays(origins, directions)
@@ -85,8 +87,13 @@ def find_head(
     head = scale * template_landmarks().shape(coefficients) @ rotation.T + translation
     offset = head[None] - origins[:, None]
     miss = np.linalg.norm(np.cross(offset, directions), axis=-1)[:, template_landmarks().trust > 0.2]
-    return HeadFrame(similarity, float(np.median(errors)), float(np.percentile(errors, 75) / width), apart,
-                     float(np.median(miss)) * size)
+    return HeadFrame(
+        similarity,
+        float(np.median(errors)),
+        float(np.percentile(errors, 75) / width),
+        apart,
+        float(np.median(miss)) * size,
+    )
 
 
 def head_of_one(coefficients: np.ndarray, error_px: float, miss: float, interpupillary_m: float) -> HeadFrame:
@@ -103,8 +110,9 @@ def head_of_one(coefficients: np.ndarray, error_px: float, miss: float, interpup
     right, left = pupils(coefficients)
     apart = float(np.linalg.norm(left - right))
     size = interpupillary_m / apart
-    return HeadFrame(pycolmap.Sim3d(size, pycolmap.Rotation3d(np.eye(3)), -size * (left + right) / 2), error_px, miss,
-                     apart, 0.0)
+    return HeadFrame(
+        pycolmap.Sim3d(size, pycolmap.Rotation3d(np.eye(3)), -size * (left + right) / 2), error_px, miss, apart, 0.0
+    )
 
 
 def agreeing_faces(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face]) -> dict[str, faces.Face]:
@@ -115,8 +123,9 @@ def agreeing_faces(model: pycolmap.Reconstruction, face_by_name: dict[str, faces
     origins, directions = zip(*(rays(image, model.cameras[image.camera_id], face) for image, face in seen), strict=True)
     _, angles = intersect_rays(np.array(origins), np.array(directions))
     focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in seen])
-    good = _together(np.median(angles * focal[:, None], axis=1),
-                     np.median([face.box[2] - face.box[0] for _, face in seen]))
+    good = _together(
+        np.median(angles * focal[:, None], axis=1), np.median([face.box[2] - face.box[0] for _, face in seen])
+    )
     return {image.name: face for (image, face), kept in zip(seen, good, strict=True) if kept}
 
 
@@ -155,8 +164,11 @@ def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10
 def _sure(model: pycolmap.Reconstruction, face_by_name: dict[str, faces.Face]) -> list[tuple]:
     """Registered images with their faces, without those that the net hardly believes itself, where there are others: in
     a profile it sees a face from in front that is none."""
-    seen = [(image, face_by_name[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name)
-            if image.has_pose and image.name in face_by_name]
+    seen = [
+        (image, face_by_name[image.name])
+        for image in sorted(model.images.values(), key=lambda image: image.name)
+        if image.has_pose and image.name in face_by_name
+    ]
     sure = [pair for pair in seen if pair[1].score > SURE_SCORE]
     return sure if len(sure) >= 2 else seen
 

@@ -30,12 +30,16 @@ def read(path: Path) -> dict[int, tuple[float, float, float]]:
     except FileNotFoundError:
         return {}
     except (OSError, ValueError) as error:
-        raise Problem(f"The landmarks in {path} cannot be read ({error}).",
-                      "Correct the file, or delete it to use the landmarks found in the frames.") from error
+        raise Problem(
+            f"The landmarks in {path} cannot be read ({error}).",
+            "Correct the file, or delete it to use the landmarks found in the frames.",
+        ) from error
     points = record.get("points") if isinstance(record, dict) else None
     if not isinstance(points, dict):
-        raise Problem(f"{path} holds no landmarks.",
-                      'Write them as {"points": {"152": [0.0, -0.01, -0.11]}}: index, and position in metres.')
+        raise Problem(
+            f"{path} holds no landmarks.",
+            'Write them as {"points": {"152": [0.0, -0.01, -0.11]}}: index, and position in metres.',
+        )
     return _checked(points, str(path))
 
 
@@ -67,8 +71,10 @@ def _checked(points: Mapping, owner: str) -> dict[int, tuple[float, float, float
         except (TypeError, ValueError, OverflowError):
             x = y = z = math.nan
         if not all(abs(v) <= FARTHEST_M for v in (x, y, z)):  # false for nan, too
-            raise Problem(f"{owner}: landmark {index} is at {point!r:.60}, which is not on the head.",
-                          "Give x, y and z in metres; the origin lies between the eyes.")
+            raise Problem(
+                f"{owner}: landmark {index} is at {point!r:.60}, which is not on the head.",
+                "Give x, y and z in metres; the origin lies between the eyes.",
+            )
         landmarks[index] = (x, y, z)
     return landmarks
 
@@ -76,6 +82,8 @@ def _checked(points: Mapping, owner: str) -> dict[int, tuple[float, float, float
 def _index(key, owner: str) -> int:
     text = str(key)
     if not (text.isdecimal() and len(text) <= len(str(COUNT)) and int(text) < COUNT):
-        raise Problem(f"{owner}: there is no landmark {key!r:.60}.",
-                      f"Landmarks are counted from 0 to {COUNT - 1}, as in landmarks.json.")
+        raise Problem(
+            f"{owner}: there is no landmark {key!r:.60}.",
+            f"Landmarks are counted from 0 to {COUNT - 1}, as in landmarks.json.",
+        )
     return int(text)

@@ -93,16 +93,20 @@ class Capture:
         except FileNotFoundError:
             return {"format": FORMAT, "source": "", "stages": {}}
         except (OSError, ValueError) as error:
-            raise Problem(f"{self.json} cannot be read ({error}).",
-                          "Restore it from a backup, or delete it to start this capture anew; pictures and masks "
-                          "stay.") from error
+            raise Problem(
+                f"{self.json} cannot be read ({error}).",
+                "Restore it from a backup, or delete it to start this capture anew; pictures and masks stay.",
+            ) from error
         if isinstance(record, dict) and is_number(record.get("format"), FORMAT + 1):
-            raise Problem("This capture was made by a newer version of WildCap.",
-                          "Update the extension to open it; nothing was changed.")
+            raise Problem(
+                "This capture was made by a newer version of WildCap.",
+                "Update the extension to open it; nothing was changed.",
+            )
         if fault := capture_record.find_fault(record):
-            raise Problem(f"{self.json} is not a capture record: {fault}.",
-                          "Choose a folder that ends in .wildcap, or delete this file to start anew; pictures and "
-                          "masks stay.")
+            raise Problem(
+                f"{self.json} is not a capture record: {fault}.",
+                "Choose a folder that ends in .wildcap, or delete this file to start anew; pictures and masks stay.",
+            )
         return record
 
     @property
@@ -114,8 +118,10 @@ class Capture:
         """Raises Problem for a source that is the capture or in it: it could be replaced, or our output be read."""
         place, root = (Path(os.path.realpath(path)) for path in (source, self.root))
         if place == root or place.is_relative_to(root):
-            raise Problem(f"{source} lies in the capture {self.root}, which writes its own files there.",
-                          "Keep the video or photographs elsewhere.")
+            raise Problem(
+                f"{source} lies in the capture {self.root}, which writes its own files there.",
+                "Keep the video or photographs elsewhere.",
+            )
 
     def set_source(self, source: str | Path) -> None:
         """Records where the pictures come from and what they hold: the video may go once its frames are taken."""
@@ -124,8 +130,13 @@ class Capture:
         self.claim()
         record = self.read()
         stamp, path = record.get("source_stamp", []), Path(source) if str(source) else None
-        changed = {**record, **format_1.keep_stamp(stamp), "format": FORMAT,
-                   "source": self._portable(path) if path else "", "source_stamp": hash_source(path) or stamp}
+        changed = {
+            **record,
+            **format_1.keep_stamp(stamp),
+            "format": FORMAT,
+            "source": self._portable(path) if path else "",
+            "source_stamp": hash_source(path) or stamp,
+        }
         if changed != record:
             write_json(self.json, changed)
 
@@ -137,8 +148,16 @@ class Capture:
         present = hash_source(Path(source))
         return first not in record["stages"] or not present or same_source(record.get("source_stamp", []), present)
 
-    def finish(self, stage: stages.Stage, conditions: dict, seconds: float, settings: Settings, figures: dict,
-               version: str, findings: Collection[dict] = ()) -> None:
+    def finish(
+        self,
+        stage: stages.Stage,
+        conditions: dict,
+        seconds: float,
+        settings: Settings,
+        figures: dict,
+        version: str,
+        findings: Collection[dict] = (),
+    ) -> None:
         """Records that a stage ended well.
 
         Parameters
@@ -153,9 +172,15 @@ class Capture:
         chosen = convert_settings({stage.name: asdict(getattr(settings, stage.name))}, self._portable)[stage.name]
         record["format"] = FORMAT
         record["stages"][stage.name] = {
-            **conditions, "seconds": round(seconds, 2), "finished": time.strftime("%Y-%m-%dT%H:%M:%S"),
-            "version": version, "settings": chosen, "seed": settings.seed, "device": settings.compute_device,
-            "figures": figures, "findings": list(findings),
+            **conditions,
+            "seconds": round(seconds, 2),
+            "finished": time.strftime("%Y-%m-%dT%H:%M:%S"),
+            "version": version,
+            "settings": chosen,
+            "seed": settings.seed,
+            "device": settings.compute_device,
+            "figures": figures,
+            "findings": list(findings),
         }
         write_json(self.json, record)
 
@@ -165,14 +190,26 @@ class Capture:
     def stop(self, stage: str, problem: Problem, findings: Collection[dict] = ()) -> None:
         """Records why a stage could not end, for the report; gone as soon as that stage is begun again."""
         record = self.read()
-        write_json(self.json, {**record, "stopped": {"stage": stage, "problem": problem.problem,
-                                                     "remedy": problem.remedy, "findings": list(findings)}})
+        write_json(
+            self.json,
+            {
+                **record,
+                "stopped": {
+                    "stage": stage,
+                    "problem": problem.problem,
+                    "remedy": problem.remedy,
+                    "findings": list(findings),
+                },
+            },
+        )
 
     def forget(self, names: Collection[str]) -> None:
         """Marks stages as not done; their files stay until they are written again."""
         record = self.read()
-        kept = {**record,
-                "stages": {name: finished for name, finished in record["stages"].items() if name not in names}}
+        kept = {
+            **record,
+            "stages": {name: finished for name, finished in record["stages"].items() if name not in names},
+        }
         if kept.get("stopped", {}).get("stage") in names:
             del kept["stopped"]
         if kept != record:
@@ -195,21 +232,27 @@ class Capture:
         be made again."""
         source = self.source
         if source is None or not source.exists():
-            raise Problem(f"{source or 'The video'} is not there any more, and frames that are slimmed away can be "
-                          "made from it alone.",
-                          f"Connect the disk that it is on, or choose it where it is now (`python -m core run VIDEO "
-                          f"{self.root}`).")
+            raise Problem(
+                f"{source or 'The video'} is not there any more, and frames that are slimmed away can be "
+                "made from it alone.",
+                f"Connect the disk that it is on, or choose it where it is now (`python -m core run VIDEO "
+                f"{self.root}`).",
+            )
         if not self.made_from(source):
-            raise Problem(f"{source} is not the video that this capture was made from: the same frames could not be "
-                          "taken from it.",
-                          f"Choose the right one where it is now (`python -m core run VIDEO {self.root}`).")
+            raise Problem(
+                f"{source} is not the video that this capture was made from: the same frames could not be "
+                "taken from it.",
+                f"Choose the right one where it is now (`python -m core run VIDEO {self.root}`).",
+            )
         return source
 
     def keep_hashes(self, trees: dict[str, dict]) -> None:
         """Records what is about to be slimmed away: stage -> {name it writes: what `hash_tree` gives for it}."""
         record = self.read()
-        entries = {name: {**entry, "slimmed": trees[name]} if name in trees else entry
-                   for name, entry in record["stages"].items()}
+        entries = {
+            name: {**entry, "slimmed": trees[name]} if name in trees else entry
+            for name, entry in record["stages"].items()
+        }
         write_json(self.json, {**record, "stages": entries})
 
     def drop_hashes(self, stage: stages.Stage) -> None:
@@ -249,8 +292,10 @@ class Capture:
     def require(self, name: str) -> None:
         """Raises Problem where an artefact was slimmed away, for what cannot have it made again."""
         if not self.holds(name) and self.has(name):
-            raise Problem(f"{name} was slimmed away from this capture.",
-                          f"Have it made again: `python -m core slim --undo {self.root}`.")
+            raise Problem(
+                f"{name} was slimmed away from this capture.",
+                f"Have it made again: `python -m core slim --undo {self.root}`.",
+            )
 
     def claim(self) -> None:
         """Makes the folder a capture, if it is not one yet. Raises Problem for a folder that holds something else, and
@@ -275,8 +320,10 @@ class Capture:
         except OSError as error:
             raise storage_problem(error, self.root) from error
         if strangers:
-            raise Problem(f"{self.root} is no capture: it holds {strangers[0]}.",
-                          "Name a new folder, as NAME.wildcap, and it will be made.")
+            raise Problem(
+                f"{self.root} is no capture: it holds {strangers[0]}.",
+                "Name a new folder, as NAME.wildcap, and it will be made.",
+            )
 
     # -- lock
 

@@ -9,8 +9,17 @@ from __future__ import annotations
 
 from .json_files import is_number
 
-ENTRY = {"finished": str, "version": str, "settings": dict, "seed": int, "device": str, "figures": dict,
-         "findings": list, "inputs": dict, "code": str}
+ENTRY = {
+    "finished": str,
+    "version": str,
+    "settings": dict,
+    "seed": int,
+    "device": str,
+    "figures": dict,
+    "findings": list,
+    "inputs": dict,
+    "code": str,
+}
 """What is told of a finished stage, beside its seconds."""
 SINCE_2 = {"inputs", "code", "settings", "seed", "device", "finished", "figures"}
 """What is never missing where `inputs` are told, as since format 2: freshness.py and the report count on it."""
@@ -22,10 +31,13 @@ def find_fault(record) -> str:
     if not isinstance(record, dict) or not isinstance(record.get("stages"), dict):
         return "it has no stages"
     source = record.get("source", "")
-    right = {"format": type(record.get("format", 0)) is int, "source": isinstance(source, str) and "\0" not in source,
-             **{field: _is_stamp(record.get(field, [])) for field in ("source_stamp", "format_1_stamp")},
-             **{f"stages.{name}": _is_entry(entry) for name, entry in record["stages"].items()},
-             "stopped": _is_stop(record.get("stopped"))}
+    right = {
+        "format": type(record.get("format", 0)) is int,
+        "source": isinstance(source, str) and "\0" not in source,
+        **{field: _is_stamp(record.get(field, [])) for field in ("source_stamp", "format_1_stamp")},
+        **{f"stages.{name}": _is_entry(entry) for name, entry in record["stages"].items()},
+        "stopped": _is_stop(record.get("stopped")),
+    }
     return next((f"its {field} makes no sense" for field, sound in right.items() if not sound), "")
 
 
@@ -34,21 +46,26 @@ def _is_entry(entry) -> bool:
         return False
     typed = all(isinstance(entry.get(field, kind()), kind) for field, kind in ENTRY.items())
     complete = "inputs" not in entry or entry.keys() >= SINCE_2
-    return (typed and complete and _are_findings(entry.get("findings", []))
-            and _are_hashes(entry.get("slimmed", {})))
+    return typed and complete and _are_findings(entry.get("findings", [])) and _are_hashes(entry.get("slimmed", {}))
 
 
 def _is_stop(stopped) -> bool:
     told = isinstance(stopped, dict) and all(
-        isinstance(stopped.get(field), str) for field in ("stage", "problem", "remedy"))
+        isinstance(stopped.get(field), str) for field in ("stage", "problem", "remedy")
+    )
     return stopped is None or told and _are_findings(stopped.get("findings"))
 
 
 def _is_stamp(stamp) -> bool:
     """Whether it is a source's stamp: [name, size, content hash, or time] of each file."""
     return isinstance(stamp, list) and all(
-        isinstance(file, list) and len(file) == 3 and _names_file(file[0]) and is_number(file[1], 0)
-        and (isinstance(file[2], str) or is_number(file[2])) for file in stamp)
+        isinstance(file, list)
+        and len(file) == 3
+        and _names_file(file[0])
+        and is_number(file[1], 0)
+        and (isinstance(file[2], str) or is_number(file[2]))
+        for file in stamp
+    )
 
 
 def _names_file(name) -> bool:
@@ -61,10 +78,15 @@ def _are_hashes(hashes) -> bool:
     """Whether it tells what was slimmed away: name -> content hash, or {file: hash} of a folder."""
     return isinstance(hashes, dict) and all(
         isinstance(tree, str) or isinstance(tree, dict) and all(isinstance(each, str) for each in tree.values())
-        for tree in hashes.values())
+        for tree in hashes.values()
+    )
 
 
 def _are_findings(findings) -> bool:
     return isinstance(findings, list) and all(
-        isinstance(finding, dict) and isinstance(finding.get("problem"), str)
-        and isinstance(finding.get("remedy"), str) and isinstance(finding.get("frames"), list) for finding in findings)
+        isinstance(finding, dict)
+        and isinstance(finding.get("problem"), str)
+        and isinstance(finding.get("remedy"), str)
+        and isinstance(finding.get("frames"), list)
+        for finding in findings
+    )

@@ -108,13 +108,15 @@ def _read_module(core: Path, file: str, changed: int) -> Module:
         if isinstance(node, ast.JoinedStr):
             imports.append(_run_module(core, package, node))
         elif node.level:
-            base = package[:len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
+            base = package[: len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
             imports += [_file_of(core, [*base, alias.name]) or _file_of(core, base) for alias in node.names]
-    named = [node.value for node in tree.body if isinstance(node, ast.Assign)
-             and getattr(node.targets[0], "id", "") == DATA_CONSTANT]
+    named = [
+        node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == DATA_CONSTANT
+    ]
     data = ast.literal_eval(named[0]) if named else ()
-    return Module(hash_bytes("".join(text).encode()),
-                  tuple(dict.fromkeys(filter(None, imports))), data)
+    return Module(hash_bytes("".join(text).encode()), tuple(dict.fromkeys(filter(None, imports))), data)
 
 
 def _run_module(core: Path, package: list[str], node: ast.JoinedStr) -> str:

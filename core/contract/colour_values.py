@@ -28,8 +28,10 @@ def parse_skin_tone(text: str) -> Colour | None:
             channels = [channel / 255 for channel in channels]
     channels = [round(channel, TONE_DECIMALS) for channel in channels]
     if len(channels) != 3 or not all(0 < channel <= 1 for channel in channels):
-        raise Problem(f"The skin tone {text!r} is not a colour.",
-                      "Write it in sRGB as 0.69,0.54,0.46, as 176,138,118 or as #B08A76, or write auto.")
+        raise Problem(
+            f"The skin tone {text!r} is not a colour.",
+            "Write it in sRGB as 0.69,0.54,0.46, as 176,138,118 or as #B08A76, or write auto.",
+        )
     return tuple(channels)
 
 
@@ -51,8 +53,10 @@ def parse_white_point(text: str) -> Colour | None:
         return None
     channels = _numbers(text)
     if len(channels) != 3 or not all(1e-3 < channel < 100 for channel in channels):
-        raise Problem(f"The white point {text!r} is not a colour.",
-                      "Give three numbers above 0 as linear light, as `core white` prints them, or auto.")
+        raise Problem(
+            f"The white point {text!r} is not a colour.",
+            "Give three numbers above 0 as linear light, as `core white` prints them, or auto.",
+        )
     return tuple(channels)
 
 

@@ -69,8 +69,9 @@ def selected(capture: Capture) -> list[str]:
     except Problem:
         names = []
     if not names:
-        raise Problem("This capture has no frames yet that could be sent.",
-                      "Reconstruct first: it stops before anything is sent.")
+        raise Problem(
+            "This capture has no frames yet that could be sent.", "Reconstruct first: it stops before anything is sent."
+        )
     return names
 
 
@@ -81,16 +82,31 @@ def answer(capture: Capture, content: str, preview: bool) -> Path:
 
 def lines(plan: Sending, translated=str) -> list[str]:
     """What the artist is told, whole sentences; `translated` looks a template up."""
-    fields = {"pictures": f"{len(plan.frames)} frame{'' if len(plan.frames) == 1 else 's'}", "company": service.COMPANY,
-              "host": plan.host, "website": service.WEBSITE, "credits": service.amount(plan.credits), "kept": plan.kept}
+    fields = {
+        "pictures": f"{len(plan.frames)} frame{'' if len(plan.frames) == 1 else 's'}",
+        "company": service.COMPANY,
+        "host": plan.host,
+        "website": service.WEBSITE,
+        "credits": service.amount(plan.credits),
+        "kept": plan.kept,
+    }
     return [translated(line).format(**fields) for line in (*TOLD, *([TOLD_AGAIN] if plan.kept else []))]
 
 
 def give(capture: Capture, plan: Sending) -> None:
     """Records that the artist agrees to it."""
-    write_json(capture.consent,
-               {"capture": _place(capture), "company": service.COMPANY, "host": plan.host, "credits": plan.credits,
-                "preview": plan.preview, "frames": plan.frames, "given": time.strftime("%Y-%m-%dT%H:%M:%S")})
+    write_json(
+        capture.consent,
+        {
+            "capture": _place(capture),
+            "company": service.COMPANY,
+            "host": plan.host,
+            "credits": plan.credits,
+            "preview": plan.preview,
+            "frames": plan.frames,
+            "given": time.strftime("%Y-%m-%dT%H:%M:%S"),
+        },
+    )
 
 
 def withdraw(capture: Capture) -> None:
@@ -106,9 +122,13 @@ def is_given(capture: Capture, plan: Sending) -> bool:
     credits. Damaged records count as none."""
     try:
         record = read_json(capture.consent)
-        return (record["capture"] == _place(capture) and record["host"] == plan.host
-                and record["preview"] is plan.preview
-                and plan.credits <= record["credits"] and plan.frames.items() <= record["frames"].items())
+        return (
+            record["capture"] == _place(capture)
+            and record["host"] == plan.host
+            and record["preview"] is plan.preview
+            and plan.credits <= record["credits"]
+            and plan.frames.items() <= record["frames"].items()
+        )
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
 
@@ -118,11 +138,13 @@ def require(capture: Capture, plan: Sending) -> None:
     if os.environ.get(GIVEN_VARIABLE) == _place(capture):
         give(capture, plan)
     if not is_given(capture, plan):
-        raise Problem(f"SwitchLight waits for your consent: {len(plan.frames)} frames that show a person's face would "
-                      f"go to {service.COMPANY} ({plan.host}) "
-                      f"for {service.amount(plan.credits)}. Nothing was sent.",
-                      "Click Allow Sending beside the delighter, or add --send-frames in the terminal; or choose "
-                      "another delighter, which sends nothing.")
+        raise Problem(
+            f"SwitchLight waits for your consent: {len(plan.frames)} frames that show a person's face would "
+            f"go to {service.COMPANY} ({plan.host}) "
+            f"for {service.amount(plan.credits)}. Nothing was sent.",
+            "Click Allow Sending beside the delighter, or add --send-frames in the terminal; or choose "
+            "another delighter, which sends nothing.",
+        )
 
 
 def by_flag(capture: Capture) -> dict[str, str]:

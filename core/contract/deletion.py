@@ -18,22 +18,42 @@ from .delivery_plan import PROVENANCE, is_as_delivered, read_delivered
 from .files import storage_problem
 from .messages import Problem
 
-LOGS = frozenset({"logs/worker.log", "logs/contact_sheet.log", f"logs/{unforeseen.LOG}",
-                  *(f"logs/{stage.name}.log" for stage in (*stages.STAGES, *stages.TOOLS))})
+LOGS = frozenset(
+    {
+        "logs/worker.log",
+        "logs/contact_sheet.log",
+        f"logs/{unforeseen.LOG}",
+        *(f"logs/{stage.name}.log" for stage in (*stages.STAGES, *stages.TOOLS)),
+    }
+)
 GROUPS = {
-    "frames": "Frames", "cameras": "Cameras", "scan.ply": "Scan", "head.obj": "Head", "own_head.obj": "Head",
+    "frames": "Frames",
+    "cameras": "Cameras",
+    "scan.ply": "Scan",
+    "head.obj": "Head",
+    "own_head.obj": "Head",
     "own_head.json": "Head",
-    "landmarks.json": "Landmarks", "landmarks_artist.json": "Landmarks", "delit": "Delit frames",
+    "landmarks.json": "Landmarks",
+    "landmarks_artist.json": "Landmarks",
+    "delit": "Delit frames",
     "switchlight": "SwitchLight's answers",
-    "shadow_mask.png": "Painted masks", "protect_mask.png": "Painted masks", "mask_history": "Painted masks",
-    "maps": "Maps", "maps_4k": "Maps",
-    "renders": "Renders", "delivery": "Exports", "exports": "Exports", "logs": "Logs", "report": "Report",
+    "shadow_mask.png": "Painted masks",
+    "protect_mask.png": "Painted masks",
+    "mask_history": "Painted masks",
+    "maps": "Maps",
+    "maps_4k": "Maps",
+    "renders": "Renders",
+    "delivery": "Exports",
+    "exports": "Exports",
+    "logs": "Logs",
+    "report": "Report",
     "report.html": "Report",
 }
 """What the first part of a file's path in the capture is called in the list."""
 REST = "Other working files"
-FOLDERS = tuple(f"{name}/-" for name in (*GROUPS, "checkpoints", "comparison", "preview", ownership.KEPT)
-                if "." not in name)
+FOLDERS = tuple(
+    f"{name}/-" for name in (*GROUPS, "checkpoints", "comparison", "preview", ownership.KEPT) if "." not in name
+)
 """Our own folders, which go where they are empty, as a file in each."""
 
 
@@ -76,8 +96,9 @@ def plan(capture: Capture) -> Deletion:
     kinds: dict[str, list[int]] = {}
     for inside, size in going.items():
         kinds.setdefault(GROUPS.get(inside.partition("/")[0], REST), []).append(size)
-    groups = sorted((FileGroup(label, len(sizes), sum(sizes)) for label, sizes in kinds.items()),
-                    key=lambda group: -group.size)
+    groups = sorted(
+        (FileGroup(label, len(sizes), sum(sizes)) for label, sizes in kinds.items()), key=lambda group: -group.size
+    )
     return Deletion(tuple(going), tuple(groups), tuple(staying))
 
 
@@ -93,8 +114,9 @@ def delete(capture: Capture) -> Deletion:
             for inside in sorted(deletion.going, key=lambda inside: PurePosixPath(inside).name == PROVENANCE):
                 if inside not in ownership.BOOKS:
                     (capture.root / inside).unlink(missing_ok=True)
-            for folder in sorted({folder for inside in (*deletion.going, *FOLDERS) for folder in _folders(inside)},
-                                 reverse=True):
+            for folder in sorted(
+                {folder for inside in (*deletion.going, *FOLDERS) for folder in _folders(inside)}, reverse=True
+            ):
                 with contextlib.suppress(OSError):  # it is not there, or somebody's files are in it
                     (capture.root / folder).rmdir()
             # a capture without its record would be taken for one of 0.1.0
@@ -124,24 +146,30 @@ def _folders(inside: str) -> list[str]:
 
 def _require(capture: Capture) -> None:
     if not capture.json.is_file() and not (capture.root / ownership.RECORD).is_file():
-        raise Problem(f"There is no capture at {capture.root}.",
-                      "Check the name: a capture's folder holds capture.json.")
+        raise Problem(
+            f"There is no capture at {capture.root}.", "Check the name: a capture's folder holds capture.json."
+        )
 
 
 def lines(deletion: Deletion, translated=lambda text: text) -> list[str]:
     """The list as sentences; `translated` gives a sentence in the reader's language."""
     words = translated("{} files of this face are deleted for good, {} in all:")
     said = [words.format(len(deletion.going), megabytes(deletion.size))]
-    said += [translated("{}: {} files, {}").format(translated(group.label), group.files, megabytes(group.size))
-             for group in deletion.groups]
+    said += [
+        translated("{}: {} files, {}").format(translated(group.label), group.files, megabytes(group.size))
+        for group in deletion.groups
+    ]
     if deletion.staying:
         more = (
             translated(" and {} more").format(len(deletion.staying) - SHOWN_FILES)
             if len(deletion.staying) > SHOWN_FILES
             else ""
         )
-        said.append(translated("{} files stay, which WildCap did not write or somebody changed: {}").format(
-            len(deletion.staying), ", ".join(deletion.staying[:SHOWN_FILES]) + more))
+        said.append(
+            translated("{} files stay, which WildCap did not write or somebody changed: {}").format(
+                len(deletion.staying), ", ".join(deletion.staying[:SHOWN_FILES]) + more
+            )
+        )
     return [*said, translated("The video and what was delivered elsewhere stay.")]
 
 

@@ -74,8 +74,9 @@ def plan(capture: Capture, settings: DeliverSettings) -> DeliveryPlan:
     pictures = preset.pictures if settings.pictures == "preset" else settings.pictures
     if pictures not in format.pictures:
         if settings.pictures != "preset":
-            raise Problem(f"{format.title} cannot hold {PICTURES[pictures]} pictures.",
-                          "Choose PNG, or another format.")
+            raise Problem(
+                f"{format.title} cannot hold {PICTURES[pictures]} pictures.", "Choose PNG, or another format."
+            )
         pictures = "png16"
     colour = ("linear" if pictures == "exr" else "srgb") if settings.colour == "preset" else settings.colour
     if colour == "linear" and format.pictures == ("png8", "png16"):
@@ -83,17 +84,31 @@ def plan(capture: Capture, settings: DeliverSettings) -> DeliveryPlan:
     if colour == "srgb" and pictures == "exr":
         raise Problem("EXR pictures hold linear light.", "Choose Linear, or PNG for sRGB.")
     if colour == "linear" and pictures == "png8":
-        raise Problem("8 bits are too few for linear colours: dark skin would show steps.",
-                      "Choose PNG with 16 bit, EXR, or sRGB.")
+        raise Problem(
+            "8 bits are too few for linear colours: dark skin would show steps.",
+            "Choose PNG with 16 bit, EXR, or sRGB.",
+        )
     name = safe_name(capture.root.stem)
     base = Path(settings.folder).expanduser() if settings.folder else capture.exports
     target = base / f"{name}_{settings.what}_{settings.preset}_{format_name}"
     if target.is_symlink():  # what is exchanged is the folder that it leads to, on whose disk that is one renaming
         target = target.resolve()
     numbered = preset.numbered if settings.udim == "preset" else settings.udim == "numbered"
-    return DeliveryPlan(name, capture.root.name, settings.what, preset, format, pictures, colour,
-                        format.normals or preset.normals, format.unit or preset.unit, numbered,
-                        target, target.with_name(f".{target.name}.staged"), settings.replace)
+    return DeliveryPlan(
+        name,
+        capture.root.name,
+        settings.what,
+        preset,
+        format,
+        pictures,
+        colour,
+        format.normals or preset.normals,
+        format.unit or preset.unit,
+        numbered,
+        target,
+        target.with_name(f".{target.name}.staged"),
+        settings.replace,
+    )
 
 
 def safe_name(text: str) -> str:
@@ -105,12 +120,15 @@ def safe_name(text: str) -> str:
 
 def needs(capture: Capture, kind: str) -> Path:
     """The mesh that is delivered. Raises Problem where the capture does not have it."""
-    mesh = {"head": capture.head, "own_mesh": capture.delivery / "own_head.obj",
-            "scan": capture.delivery / "scan.obj"}[kind]
+    mesh = {"head": capture.head, "own_mesh": capture.delivery / "own_head.obj", "scan": capture.delivery / "scan.obj"}[
+        kind
+    ]
     if not mesh.is_file():
-        remedy = {"head": "Click Reconstruct first.",
-                  "own_mesh": "Choose your mesh under Reconstruction, Head Mesh, and run the stages to the end.",
-                  "scan": "Run the stage Delivery with its scan switched on."}[kind]
+        remedy = {
+            "head": "Click Reconstruct first.",
+            "own_mesh": "Choose your mesh under Reconstruction, Head Mesh, and run the stages to the end.",
+            "scan": "Run the stage Delivery with its scan switched on.",
+        }[kind]
         words = {"head": "head", "own_mesh": "fitted mesh of yours", "scan": "scan with textures"}[kind]
         raise Problem(f"This capture has no {words} to deliver.", remedy)
     return mesh
@@ -150,25 +168,39 @@ def check_target(plan: DeliveryPlan) -> None:
         return
     delivered = read_delivered(target)
     if delivered is None:
-        raise Problem(f"{target} holds files that no delivery has put there.",
-                      "Move them away, or choose another folder to deliver to.")
+        raise Problem(
+            f"{target} holds files that no delivery has put there.",
+            "Move them away, or choose another folder to deliver to.",
+        )
     other = _delivered_capture(target)
     if other not in ("", plan.capture) and not plan.replace:
-        raise Problem(f"{target} holds the delivery of another capture, {other}.",
-                      "Deliver to another folder, rename the capture, or deliver again with Replace Changed Files "
-                      "(--replace) to give the other delivery up.")
-    changed = [name for name, digest in delivered.items() if (target / name).is_file()
-               and not is_as_delivered(target / name, digest)]
+        raise Problem(
+            f"{target} holds the delivery of another capture, {other}.",
+            "Deliver to another folder, rename the capture, or deliver again with Replace Changed Files "
+            "(--replace) to give the other delivery up.",
+        )
+    changed = [
+        name
+        for name, digest in delivered.items()
+        if (target / name).is_file() and not is_as_delivered(target / name, digest)
+    ]
     if changed and not plan.replace:
-        raise Problem(f"{name_some(changed)} in {target} changed since the last delivery, which would be replaced.",
-                      "Move what you want to keep to another folder, or deliver again with Replace Changed Files "
-                      "(--replace) to give it up.")
-    new = ({path.relative_to(plan.staged).as_posix() for path in plan.staged.rglob("*") if path.is_file()}
-           if plan.staged.is_dir() else set())
+        raise Problem(
+            f"{name_some(changed)} in {target} changed since the last delivery, which would be replaced.",
+            "Move what you want to keep to another folder, or deliver again with Replace Changed Files "
+            "(--replace) to give it up.",
+        )
+    new = (
+        {path.relative_to(plan.staged).as_posix() for path in plan.staged.rglob("*") if path.is_file()}
+        if plan.staged.is_dir()
+        else set()
+    )
     blocked = sorted(name for name in new - delivered.keys() if (target / name).exists())
     if blocked:
-        raise Problem(f"{name_some(blocked)} in {target} is in the way: no delivery has put it there.",
-                      "Move it to another folder, or deliver to another one.")
+        raise Problem(
+            f"{name_some(blocked)} in {target} is in the way: no delivery has put it there.",
+            "Move it to another folder, or deliver to another one.",
+        )
 
 
 def _recover(target: Path, set_aside: Path) -> None:

@@ -66,91 +66,163 @@ _GLTF = (
 FORMATS = {
     "glb": Format("glTF, one file", ".glb", _GLTF, unit="m", normals="opengl", pictures=("png8", "png16")),
     "gltf": Format("glTF with files", ".gltf", _GLTF, unit="m", normals="opengl", pictures=("png8", "png16")),
-    "usd": Format("USD", ".usdc",
-                  ("USD's preview material has no subsurface scattering; displacement and the specular map lie beside "
-                   "the file.",),
-                  unit="m", normals="opengl"),
-    "fbx": Format("FBX", ".fbx",
-                  ("FBX's material has no subsurface scattering, so no scale of it either, and no displacement.",
-                   "What does not read FBX's roughness and specular links needs those maps set by hand."), unit="cm"),
-    "obj": Format("OBJ", ".obj",
-                  ("OBJ has no shape keys and no units.",
-                   "Its MTL has no subsurface scattering, and says of no map that it is no colour: "
-                   "in Blender set all but the albedo to Non-Color."), shape_keys=False),
+    "usd": Format(
+        "USD",
+        ".usdc",
+        (
+            "USD's preview material has no subsurface scattering; displacement and the specular map lie beside "
+            "the file.",
+        ),
+        unit="m",
+        normals="opengl",
+    ),
+    "fbx": Format(
+        "FBX",
+        ".fbx",
+        (
+            "FBX's material has no subsurface scattering, so no scale of it either, and no displacement.",
+            "What does not read FBX's roughness and specular links needs those maps set by hand.",
+        ),
+        unit="cm",
+    ),
+    "obj": Format(
+        "OBJ",
+        ".obj",
+        (
+            "OBJ has no shape keys and no units.",
+            "Its MTL has no subsurface scattering, and says of no map that it is no colour: "
+            "in Blender set all but the albedo to Non-Color.",
+        ),
+        shape_keys=False,
+    ),
 }
 
 PICTURES = {"png8": "PNG, 8 bit", "png16": "PNG, 16 bit", "exr": "EXR, half float"}
 
 PRESETS = {
     "blender": DeliveryPreset(
-        "Blender", "Import it: the maps are linked; for skin with scattering, Assemble Material in this add-on.", "glb",
-        "m", "opengl", "png16", False, (
+        "Blender",
+        "Import it: the maps are linked; for skin with scattering, Assemble Material in this add-on.",
+        "glb",
+        "m",
+        "opengl",
+        "png16",
+        False,
+        (
             MapPicture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_normal", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_roughness", ("roughness",), DATA, "roughness"),
             MapPicture("{name}_specular_level", ("level",)),
-        )),
+        ),
+    ),
     "metahuman": DeliveryPreset(
         "MetaHuman from Mesh",
         "Import it as a static mesh for a MetaHuman Identity, which wants open eyes: the head has them, and no shape "
         "keys.",
-        "fbx", "cm", "directx", "png8", False, (
-            MapPicture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),
-        ), open_eyes=True),
+        "fbx",
+        "cm",
+        "directx",
+        "png8",
+        False,
+        (MapPicture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),),
+        open_eyes=True,
+    ),
     "unreal": DeliveryPreset(
-        "Unreal", "Leave Flip Green Channel off; switch sRGB off for all maps but BaseColor.", "fbx", "cm", "directx",
-        "png8", False, (
+        "Unreal",
+        "Leave Flip Green Channel off; switch sRGB off for all maps but BaseColor.",
+        "fbx",
+        "cm",
+        "directx",
+        "png8",
+        False,
+        (
             MapPicture("T_{name}_BaseColor", ALBEDO, COLOUR, "base_color"),
             MapPicture("T_{name}_N", TANGENT, NORMAL, "normal"),
             MapPicture("T_{name}_ORM", ("1", "roughness", "0")),
             MapPicture("T_{name}_Specular", ("unreal_specular",), DATA, "specular"),
-        )),
+        ),
+    ),
     "unity_hdrp": DeliveryPreset(
         "Unity HDRP",
         "A Lit material of the type Subsurface Scattering; reflectance at normal incidence comes from its diffusion "
         "profile (IOR 1.4).",
-        "fbx", "cm", "opengl", "png8", False, (
+        "fbx",
+        "cm",
+        "opengl",
+        "png8",
+        False,
+        (
             MapPicture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_NormalMap", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_MaskMap", ("0", "1", "1", "smoothness")),
-        )),
+        ),
+    ),
     "unity_urp": DeliveryPreset(
-        "Unity URP", "A Lit material with the workflow Specular; its smoothness is in the specular map's alpha.", "fbx",
-        "cm", "opengl", "png8", False, (
+        "Unity URP",
+        "A Lit material with the workflow Specular; its smoothness is in the specular map's alpha.",
+        "fbx",
+        "cm",
+        "opengl",
+        "png8",
+        False,
+        (
             MapPicture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_BumpMap", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_SpecGlossMap", (*F0, "smoothness"), COLOUR),
-        )),
+        ),
+    ),
     "character_creator": DeliveryPreset(
-        "Character Creator", "Give it to Headshot's mesh mode, or as a prop with the maps in its PBR channels.", "obj",
-        "cm", "opengl", "png8", False, (
+        "Character Creator",
+        "Give it to Headshot's mesh mode, or as a prop with the maps in its PBR channels.",
+        "obj",
+        "cm",
+        "opengl",
+        "png8",
+        False,
+        (
             MapPicture("{name}_Diffuse", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_Normal", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_Roughness", ("roughness",), DATA, "roughness"),
             MapPicture("{name}_Specular", ("weight",), DATA, "specular"),
-        )),
+        ),
+    ),
     "arnold": DeliveryPreset(
-        "Arnold", "The files are named after standard_surface's parameters: specular is a weight for specular_IOR 1.4.",
-        "fbx", "cm", "opengl", "exr", True, (
+        "Arnold",
+        "The files are named after standard_surface's parameters: specular is a weight for specular_IOR 1.4.",
+        "fbx",
+        "cm",
+        "opengl",
+        "exr",
+        True,
+        (
             MapPicture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_normal_camera", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_specular", ("weight",), DATA, "specular"),
             MapPicture("{name}_specular_roughness", ("roughness",), DATA, "roughness"),
             MapPicture("{name}_displacement", ("displacement",)),
-        )),
+        ),
+    ),
     "redshift": DeliveryPreset(
-        "Redshift", "The files are named after the Standard Material's inputs: refl_weight is for refl_ior 1.4.", "fbx",
-        "cm", "opengl", "exr", True, (
+        "Redshift",
+        "The files are named after the Standard Material's inputs: refl_weight is for refl_ior 1.4.",
+        "fbx",
+        "cm",
+        "opengl",
+        "exr",
+        True,
+        (
             MapPicture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_bump_input", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_refl_weight", ("weight",), DATA, "specular"),
             MapPicture("{name}_refl_roughness", ("roughness",), DATA, "roughness"),
             MapPicture("{name}_displacement", ("displacement",)),
-        )),
+        ),
+    ),
 }
 
 HAIR = (
-    MapPicture("{name}_brows_mask", ("brows",)), MapPicture("{name}_lashes_mask", ("lashes",)),
+    MapPicture("{name}_brows_mask", ("brows",)),
+    MapPicture("{name}_lashes_mask", ("lashes",)),
     MapPicture("{name}_beard_mask", ("beard",)),
     MapPicture("{name}_clean_albedo", ("clean.r", "clean.g", "clean.b"), COLOUR),
 )
@@ -161,8 +233,10 @@ WHAT = {
     "own_mesh": ("My Mesh", "Your own head mesh, fitted to the face, with the maps in its UVs"),
     "scan": ("Scan", "The raw scan with UVs, as filmed and as albedo"),
 }
-SCAN_MAPS = (MapPicture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
-             MapPicture("{name}_lit", ("lit.r", "lit.g", "lit.b"), COLOUR))
+SCAN_MAPS = (
+    MapPicture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
+    MapPicture("{name}_lit", ("lit.r", "lit.g", "lit.b"), COLOUR),
+)
 """Of the scan, whatever the preset: it has no other maps."""
 
 
@@ -170,12 +244,16 @@ def markdown() -> str:
     """The table of docs/guide/deliver.md."""
     lines = ["| preset | mesh | unit | normals | pictures | maps |", "| --- | --- | --- | --- | --- | --- |"]
     for preset in PRESETS.values():
-        names = ", ".join(f"`{picture.name.format(name='NAME')}{'.1001' if preset.numbered else ''}`"
-                          for picture in preset.maps)
+        names = ", ".join(
+            f"`{picture.name.format(name='NAME')}{'.1001' if preset.numbered else ''}`" for picture in preset.maps
+        )
         normals = {"opengl": "OpenGL, Y+", "directx": "DirectX, Y-"}[FORMATS[preset.format].normals or preset.normals]
-        lines.append(f"| {preset.title} | {FORMATS[preset.format].title} | "
-                     f"{FORMATS[preset.format].unit or preset.unit} | {normals} "
-                     f"| {PICTURES[preset.pictures]} | {names} |")
+        lines.append(
+            f"| {preset.title} | {FORMATS[preset.format].title} | "
+            f"{FORMATS[preset.format].unit or preset.unit} | {normals} "
+            f"| {PICTURES[preset.pictures]} | {names} |"
+        )
     lines += ["", "| format | what it drops |", "| --- | --- |"]
-    return "\n".join([*lines,
-                      *(f"| {each.title} (`{each.suffix}`) | {' '.join(each.drops)} |" for each in FORMATS.values())])
+    return "\n".join(
+        [*lines, *(f"| {each.title} (`{each.suffix}`) | {' '.join(each.drops)} |" for each in FORMATS.values())]
+    )

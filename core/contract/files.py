@@ -23,8 +23,18 @@ from .hashes import read_hash
 from .lease import check_lease
 from .messages import Problem
 
-_AWAY_NAMES = ("ESTALE", "ENOTCONN", "ETIMEDOUT", "EHOSTDOWN", "EHOSTUNREACH", "ENETDOWN", "ENETUNREACH", "ENODEV",
-               "ENXIO", "EREMOTEIO")
+_AWAY_NAMES = (
+    "ESTALE",
+    "ENOTCONN",
+    "ETIMEDOUT",
+    "EHOSTDOWN",
+    "EHOSTUNREACH",
+    "ENETDOWN",
+    "ENETUNREACH",
+    "ENODEV",
+    "ENXIO",
+    "EREMOTEIO",
+)
 AWAY = {getattr(errno, name) for name in _AWAY_NAMES if hasattr(errno, name)}
 """Errors of a file server or a disk that has gone."""
 _UMASK = os.umask(0o022)
@@ -110,9 +120,9 @@ def place_folder(temporary: Path, path: Path) -> None:
         if path.is_symlink():  # what it leads to is elsewhere, and its owner's
             ownership.keep_aside(root, path)
         ownership.note_temporary(root, old)
-        ownership.note_written(root,
-                               {ownership.path_inside(root, path / file.relative_to(temporary)): read_hash(file)
-                                for file in written})
+        ownership.note_written(
+            root, {ownership.path_inside(root, path / file.relative_to(temporary)): read_hash(file) for file in written}
+        )
         check_lease(root)
     if path.exists():
         _rename(path, old)
@@ -168,19 +178,28 @@ def storage_problem(error: OSError, path: Path) -> Problem:
     """The Problem of a failed write: disk full, read-only, or what the system says."""
     path = final_name(path)
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return Problem(f"The disk is full: {path} could not be written.",
-                       "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
+        return Problem(
+            f"The disk is full: {path} could not be written.",
+            "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.",
+        )
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         if ON_WINDOWS:  # which says the same of a file that is in use
-            return Problem(f"{path} cannot be written: the folder is read-only, or another program has the file open.",
-                           "Close it there, or choose a folder you may write to.")
-        return Problem(f"{path} cannot be written: the folder is read-only.",
-                       "Choose a folder you may write to, or change its permissions.")
+            return Problem(
+                f"{path} cannot be written: the folder is read-only, or another program has the file open.",
+                "Close it there, or choose a folder you may write to.",
+            )
+        return Problem(
+            f"{path} cannot be written: the folder is read-only.",
+            "Choose a folder you may write to, or change its permissions.",
+        )
     if error.errno in AWAY or error.errno == errno.ENOENT and not Path(path.anchor).exists():
-        return Problem(f"The disk or file server that {path} lies on does not answer ({error.strerror or error}).",
-                       "See that it is connected, then run again: what was finished is kept.")
-    return Problem(f"{path} could not be written ({error.strerror or error}).",
-                   "Check the disk and the folder, then run again.")
+        return Problem(
+            f"The disk or file server that {path} lies on does not answer ({error.strerror or error}).",
+            "See that it is connected, then run again: what was finished is kept.",
+        )
+    return Problem(
+        f"{path} could not be written ({error.strerror or error}).", "Check the disk and the folder, then run again."
+    )
 
 
 def final_name(path: Path) -> Path:

@@ -21,8 +21,13 @@ from .stages import Stage
 
 INDIFFERENT = ("checkpoint_every", "low_memory")
 """Settings that no result depended on."""
-PATHS = {"delight": "folder", "cameras": "import_from", "registration": "template", "shadow_mask": "softened",
-         "solve": "prior"}
+PATHS = {
+    "delight": "folder",
+    "cameras": "import_from",
+    "registration": "template",
+    "shadow_mask": "softened",
+    "solve": "prior",
+}
 """Settings that name something outside of the capture, by stage."""
 
 STAMP = "format_1_stamp"
@@ -46,10 +51,15 @@ def is_unchanged(root: Path, record: dict, stage: Stage, settings: Settings) -> 
     """
     finished, made = record["stages"][stage.name], _code_and_data()[stage.name]
     chosen = asdict(getattr(settings, stage.name))
-    parts: list = [{name: chosen.get(name, value) for name, value in finished.get("settings", {}).items()
-                    if name not in INDIFFERENT},
-                   {name: getattr(settings, "compute_device" if name == "device" else name) for name in made["shared"]},
-                   made["code"]]
+    parts: list = [
+        {
+            name: chosen.get(name, value)
+            for name, value in finished.get("settings", {}).items()
+            if name not in INDIFFERENT
+        },
+        {name: getattr(settings, "compute_device" if name == "device" else name) for name in made["shared"]},
+        made["code"],
+    ]
     if stage.name == "frames":
         parts.append(record.get(STAMP, record.get("source_stamp", [])))
     named = chosen[PATHS[stage.name]] if stage.name in PATHS else ""

@@ -82,8 +82,9 @@ def read_frames(capture: Capture) -> Frames:
         told = read_json(capture.frames_json)
         return Frames(tuple(_record(entry) for entry in told["frames"]), told.get("kind"))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise Problem(f"The frames of this capture cannot be read ({capture.frames_json.name}: {error}).",
-                      advise_again("frames")) from error
+        raise Problem(
+            f"The frames of this capture cannot be read ({capture.frames_json.name}: {error}).", advise_again("frames")
+        ) from error
 
 
 def write_frames(folder: Path, frames: Frames) -> None:
@@ -93,8 +94,9 @@ def write_frames(folder: Path, frames: Frames) -> None:
 
 
 def _record(entry: dict) -> FrameRecord:
-    record = FrameRecord(**{key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()
-                            if key in KEYS})
+    record = FrameRecord(
+        **{key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key in KEYS}
+    )
     if not plain_name(record.name):
         raise ValueError(f"{record.name!r} is no name of a frame")
     for name, sound in _JUDGES.items():
@@ -125,12 +127,23 @@ def _is_measure(value) -> bool:
 
 
 _JUDGES = {
-    "video_frame": _number(0, True), "time_s": _number(optional=True), "source": lambda value: isinstance(value, str),
+    "video_frame": _number(0, True),
+    "time_s": _number(optional=True),
+    "source": lambda value: isinstance(value, str),
     "size": _numbers(2, 1),
-    "sharpness": _number(), "selected": lambda value: isinstance(value, bool), "face_box": _numbers(4),
+    "sharpness": _number(),
+    "selected": lambda value: isinstance(value, bool),
+    "face_box": _numbers(4),
     "face_score": _number(),
-    "yaw_deg": _number(optional=True), "focal_px": _number(0, True), "blur": _is_measure, "brightness": _is_measure,
-    "clipped": _is_measure, "noise": _is_measure,
-    "eyes_open": _numbers(2), "blink": lambda value: isinstance(value, bool), "other_face": _number(),
-    "gain": _numbers(3, optional=False)}
+    "yaw_deg": _number(optional=True),
+    "focal_px": _number(0, True),
+    "blur": _is_measure,
+    "brightness": _is_measure,
+    "clipped": _is_measure,
+    "noise": _is_measure,
+    "eyes_open": _numbers(2),
+    "blink": lambda value: isinstance(value, bool),
+    "other_face": _number(),
+    "gain": _numbers(3, optional=False),
+}
 """Attribute -> whether a value from the file can be that."""

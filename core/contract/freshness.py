@@ -81,8 +81,10 @@ def judge_stage(root: Path, record: dict, stage: Stage, settings: Settings) -> V
         if same and not stage.reads:
             same = not _other_source(record.get("source_stamp", []), root, record)
         return Verdict(OLDER, version=version) if same else Verdict(STALE, ("an input or a setting",), version)
-    changed = [*_changed_inputs(finished["inputs"], root, record, stage, settings),
-               *_changed_settings(finished, stage, settings)]
+    changed = [
+        *_changed_inputs(finished["inputs"], root, record, stage, settings),
+        *_changed_settings(finished, stage, settings),
+    ]
     if changed:
         return Verdict(STALE, tuple(changed), version)
     return Verdict(DONE if finished["code"] == code_key(stage.module) else OLDER, version=version)
@@ -91,11 +93,16 @@ def judge_stage(root: Path, record: dict, stage: Stage, settings: Settings) -> V
 def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> dict:
     """Content hash by name: of the capture's files that the stage reads, of what its settings name elsewhere, and of
     the source for the first stage."""
-    names = (*stage.reads, *stage.optional_reads,
-             *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
+    names = (
+        *stage.reads,
+        *stage.optional_reads,
+        *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()),
+    )
     hashes = {name: _digest(hash_artefact(root, record, name)) for name in names}
-    hashes |= {f"{stage.name}.{name}": _digest(_hash_place(name, path))
-               for name, path in result_paths(getattr(settings, stage.name)).items()}
+    hashes |= {
+        f"{stage.name}.{name}": _digest(_hash_place(name, path))
+        for name, path in result_paths(getattr(settings, stage.name)).items()
+    }
     if not stage.reads:
         hashes[SOURCE] = record.get("source_stamp", [])
     return hashes
@@ -121,8 +128,11 @@ def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, sett
     present = _hash_inputs(root, record, stage, settings)
     # by settings, outside of the capture
     named = {name for name in {*present, *recorded} if name.startswith(f"{stage.name}.")}
-    gone = {f"{stage.name}.{name}" for name, path in result_paths(getattr(settings, stage.name)).items()
-            if not Path(path).exists()}
+    gone = {
+        f"{stage.name}.{name}"
+        for name, path in result_paths(getattr(settings, stage.name)).items()
+        if not Path(path).exists()
+    }
     changed = [name for name in present.keys() & recorded.keys() - gone - {SOURCE} if present[name] != recorded[name]]
     changed += [name for name in named if name not in present or name not in recorded]
     if SOURCE in present and _other_source(recorded.get(SOURCE, []), root, record):
@@ -136,12 +146,16 @@ def _changed_settings(finished: dict, stage: Stage, settings: Settings) -> list[
     chosen = getattr(settings, stage.name)
     then = {**asdict(type(chosen)()), **finished["settings"]}
     paths = {f.name for f in fields(chosen) if "path" in f.metadata}
-    changed = [f"{stage.name}.{name}" for name, value in result_settings(chosen).items() if name not in paths
-               and then[name] != value]
+    changed = [
+        f"{stage.name}.{name}"
+        for name, value in result_settings(chosen).items()
+        if name not in paths and then[name] != value
+    ]
     # what another one has made, here or on another machine, is as good
     any_device = {"device"} if settings.device == "auto" else set()
-    return changed + [name for name in stage.shared if name not in any_device
-                      and finished[name] != getattr(settings, name)]
+    return changed + [
+        name for name in stage.shared if name not in any_device and finished[name] != getattr(settings, name)
+    ]
 
 
 def _digest(tree: str | dict) -> str:

@@ -61,8 +61,11 @@ def hash_tree(path: Path, hash_one: Callable[[Path], str] = hash_file) -> str | 
     """The content hash of a file, {relative name: hash} of a folder, or '' for what is not there. What a system leaves
     in folders by itself, hidden files and LITTER, is not of it."""
     if path.is_dir():
-        return {p.relative_to(path).as_posix(): hash_one(p) for p in sorted(path.rglob("*")) if p.is_file()
-                and not p.name.startswith(".") and p.name.lower() not in LITTER}
+        return {
+            p.relative_to(path).as_posix(): hash_one(p)
+            for p in sorted(path.rglob("*"))
+            if p.is_file() and not p.name.startswith(".") and p.name.lower() not in LITTER
+        }
     return hash_one(path) if path.is_file() else ""
 
 
@@ -71,8 +74,13 @@ def hash_source(source: Path | None) -> list:
     photographs; [] where it is gone."""
     if source is None:
         return []
-    files = ([path for path in sorted(source.iterdir()) if path.is_file() and _is_photograph(path.name)]
-             if source.is_dir() else [source] if source.is_file() else [])
+    files = (
+        [path for path in sorted(source.iterdir()) if path.is_file() and _is_photograph(path.name)]
+        if source.is_dir()
+        else [source]
+        if source.is_file()
+        else []
+    )
     return [[path.name, path.stat().st_size, sample_file(path)] for path in files]
 
 
@@ -86,10 +94,13 @@ def same_source(recorded: list, present: list) -> bool:
 
     Captures of WildCap 0.1.0 recorded a time in place of the hash: of those, size and name must do.
     """
+
     def told(stamp: list) -> list:
         files = [file for file in stamp if _is_photograph(file[0])] or stamp
-        return [[name if len(files) > 1 or not hashed else "", size, digest if hashed else ""]
-                for name, size, digest in files]
+        return [
+            [name if len(files) > 1 or not hashed else "", size, digest if hashed else ""]
+            for name, size, digest in files
+        ]
 
     hashed = all(isinstance(digest, str) for _, _, digest in (*recorded, *present))
     return told(recorded) == told(present)
@@ -99,8 +110,11 @@ def tell_known(root: Path) -> list:
     """What this process knows of the files below a folder: [[kind, path in the folder, size, time in nanoseconds,
     hash]], for `take_known` of another one."""
     inside = str(root) + os.sep
-    return [[kind, path.removeprefix(inside), size, when, digest]
-            for (kind, path, size, when), digest in list(_hashes.items()) if path.startswith(inside)]
+    return [
+        [kind, path.removeprefix(inside), size, when, digest]
+        for (kind, path, size, when), digest in list(_hashes.items())
+        if path.startswith(inside)
+    ]
 
 
 def take_known(root: Path, entries: list) -> None:

@@ -45,13 +45,20 @@ def parse_json(text: str):
     while level:
         if depth > DEEPEST_LEVEL:
             raise ValueError("it is nested too deeply")
-        for word in (word for each in level
-                     for word in ([each] if isinstance(each, str) else each if isinstance(each, dict) else ())):
+        for word in (
+            word
+            for each in level
+            for word in ([each] if isinstance(each, str) else each if isinstance(each, dict) else ())
+        ):
             # half of a surrogate pair is no letter: no file could be written with it (UnicodeEncodeError is a
             # ValueError)
             word.encode()
-        level = [inner for each in level if isinstance(each, dict | list)
-                 for inner in (each.values() if isinstance(each, dict) else each)]
+        level = [
+            inner
+            for each in level
+            if isinstance(each, dict | list)
+            for inner in (each.values() if isinstance(each, dict) else each)
+        ]
         depth += 1
     return value
 
@@ -65,8 +72,13 @@ def is_number(value, low: float = -math.inf, high: float = math.inf) -> bool:
 def plain_name(name) -> bool:
     """Whether it is the name of a file in a folder, on any system: not empty, without a path or a drive, and not the
     folder itself or the one above."""
-    return (isinstance(name, str) and name not in ("", ".", "..") and "\0" not in name
-            and PurePosixPath(name).name == name and PureWindowsPath(name).name == name)
+    return (
+        isinstance(name, str)
+        and name not in ("", ".", "..")
+        and "\0" not in name
+        and PurePosixPath(name).name == name
+        and PureWindowsPath(name).name == name
+    )
 
 
 def _whole(digits: str) -> int:

@@ -58,9 +58,10 @@ def check_lease(root: Path) -> None:
     write nothing more."""
     lease = _held.get(_key(root / "lock"))
     if lease is not None and not lease.holds():
-        raise Problem("Another worker has taken this capture over while this one was asleep; nothing more was written "
-                      "here.",
-                      "Look at what the other one does, and run again when it has ended: finished stages are kept.")
+        raise Problem(
+            "Another worker has taken this capture over while this one was asleep; nothing more was written here.",
+            "Look at what the other one does, and run again when it has ended: finished stages are kept.",
+        )
 
 
 def holder(path: Path) -> dict | None:
@@ -90,11 +91,15 @@ def present_holder(path: Path) -> dict | None:
 def refuse(holder: dict, path: Path, folder_kind: str = "capture") -> Problem:
     """The Problem of a capture, or a batch, that is worked on."""
     if not holder:
-        return Problem(f"Another worker is just beginning to work on this {folder_kind}.",
-                       f"Wait a moment and try again; if nobody works on it, delete {path}.")
-    return Problem(f"Another worker (process {holder['pid']} on {str(holder['host']).partition('/')[0]}, since "
-                   f"{holder['since']}) is working on this {folder_kind}.",
-                   f"Wait for it or cancel it there; if it is gone, delete {path}.")
+        return Problem(
+            f"Another worker is just beginning to work on this {folder_kind}.",
+            f"Wait a moment and try again; if nobody works on it, delete {path}.",
+        )
+    return Problem(
+        f"Another worker (process {holder['pid']} on {str(holder['host']).partition('/')[0]}, since "
+        f"{holder['since']}) is working on this {folder_kind}.",
+        f"Wait for it or cancel it there; if it is gone, delete {path}.",
+    )
 
 
 def _refuse_stranger(path: Path) -> None:
@@ -104,15 +109,23 @@ def _refuse_stranger(path: Path) -> None:
         raise Problem(f"{path} is in the way: it is not one of WildCap's locks.", "Move it away, or delete it.")
 
 
-def hold(root: Path, tell: Callable[[str], None] = lambda text: None, folder_kind: str = "capture",
-         cancelled: Callable[[], bool] = lambda: False) -> contextlib.AbstractContextManager[Lease]:
+def hold(
+    root: Path,
+    tell: Callable[[str], None] = lambda text: None,
+    folder_kind: str = "capture",
+    cancelled: Callable[[], bool] = lambda: False,
+) -> contextlib.AbstractContextManager[Lease]:
     """Holds the lease of a capture's folder, or a batch's, which must be there: `hold_file` of its lock."""
     return hold_file(root / "lock", tell, folder_kind, cancelled)
 
 
 @contextlib.contextmanager
-def hold_file(path: Path, tell: Callable[[str], None] = lambda text: None, folder_kind: str = "capture",
-              cancelled: Callable[[], bool] = lambda: False) -> Iterator[Lease]:
+def hold_file(
+    path: Path,
+    tell: Callable[[str], None] = lambda text: None,
+    folder_kind: str = "capture",
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Iterator[Lease]:
     """Holds the lease whose file is `path`, in a folder that must be there.
 
     A process of this machine that is at work is refused at once, and one that has ended is replaced at once. For one
@@ -171,8 +184,9 @@ def _make(lease: Lease) -> bool:
     return True
 
 
-def _wait_out(path: Path, tell: Callable[[str], None], folder_kind: str,
-              cancelled: Callable[[], bool]) -> tuple[dict, tuple | None] | None:
+def _wait_out(
+    path: Path, tell: Callable[[str], None], folder_kind: str, cancelled: Callable[[], bool]
+) -> tuple[dict, tuple | None] | None:
     """What the lease says that can be taken over, and its stamp: its holder has ended, or a term went by without a
     refresh. None where it was given back. Raises Problem when it is held, and CancelledError."""
     _refuse_stranger(path)

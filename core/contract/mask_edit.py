@@ -41,18 +41,23 @@ def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     """All that a solve depends on beside the painted masks: name -> hash."""
     stage, record = stages.by_name("solve"), capture.read()
     chosen = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
-    files = {name: hash_artefact(capture.root, record, name) for name in (*stage.reads, *stage.optional_reads)
-             if name not in PAINTED}
+    files = {
+        name: hash_artefact(capture.root, record, name)
+        for name in (*stage.reads, *stage.optional_reads)
+        if name not in PAINTED
+    }
     inputs = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
-    return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest()
-            for name, value in inputs.items()}
+    return {
+        name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest()
+        for name, value in inputs.items()
+    }
 
 
 def _stored(path: Path) -> dict | None:
     """The conditions in a safetensors file's header: 8 bytes of length, then JSON; None where there are none."""
     try:
         with open(require_regular(path), "rb") as file:
-            length, = struct.unpack("<Q", file.read(8))
+            (length,) = struct.unpack("<Q", file.read(8))
             header = json.loads(file.read(min(length, 1 << 20)))
         return dict(json.loads(header["__metadata__"][FIELD]))
     except (OSError, ValueError, KeyError, TypeError, struct.error):

@@ -11,8 +11,15 @@ import json
 from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 
-NO_MEMORY = ("out of memory", "not enough memory", "can't allocate memory", "cannot allocate memory",
-             "insufficient memory", "bad_alloc", "unable to allocate")
+NO_MEMORY = (
+    "out of memory",
+    "not enough memory",
+    "can't allocate memory",
+    "cannot allocate memory",
+    "insufficient memory",
+    "bad_alloc",
+    "unable to allocate",
+)
 
 
 class Problem(Exception):
@@ -126,8 +133,13 @@ class Reporter:
     (several times a second) can be stopped at any report without code of its own.
     """
 
-    def __init__(self, stage: str, emit: Callable[[Message], None] = lambda message: None,
-                 cancelled: Callable[[], bool] = lambda: False, clock: Callable[[], float] | None = None):
+    def __init__(
+        self,
+        stage: str,
+        emit: Callable[[Message], None] = lambda message: None,
+        cancelled: Callable[[], bool] = lambda: False,
+        clock: Callable[[], float] | None = None,
+    ):
         import time
 
         self.stage = stage

@@ -28,5 +28,4 @@ def read_skin(capture: Capture, count: int) -> tuple[str, list[tuple[int, int]]]
             raise ValueError(f"its skin is not among the {count} triangles of {capture.own_head.name}")
         return str(told.get("template", "")), runs
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise Problem(f"{capture.own_head_skin} cannot be read ({error}).",
-                      advise_again("registration")) from error
+        raise Problem(f"{capture.own_head_skin} cannot be read ({error}).", advise_again("registration")) from error

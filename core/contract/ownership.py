@@ -34,18 +34,41 @@ LONG_BYTES = 1 << 18
 DIGIT = "[0-9]"
 FIVE = 5 * DIGIT
 FIRST_FORMAT = (
-    "frames/frames.json", f"frames/{FIVE}.jpg",
-    *(f"cameras/{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")), "scan.ply",
-    "head.obj", "own_head.obj", "own_head.json", "landmarks.json", "landmarks_artist.json", f"delit/{FIVE}.png",
+    "frames/frames.json",
+    f"frames/{FIVE}.jpg",
+    *(f"cameras/{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")),
+    "scan.ply",
+    "head.obj",
+    "own_head.obj",
+    "own_head.json",
+    "landmarks.json",
+    "landmarks_artist.json",
+    f"delit/{FIVE}.png",
     f"delit/shadow/{FIVE}.png",
-    "texture*.exr", "texture*.png", "shadow_mask*.png", "protect_mask.png",
+    "texture*.exr",
+    "texture*.png",
+    "shadow_mask*.png",
+    "protect_mask.png",
     f"mask_history/*_mask_{8 * DIGIT}_{6 * DIGIT}_{3 * DIGIT}.png",
-    "maps/*.png", "maps/*.exr", "maps/solved.safetensors", "maps_4k/*.png", "maps_4k/*.exr", "delivery/delivery.json",
+    "maps/*.png",
+    "maps/*.exr",
+    "maps/solved.safetensors",
+    "maps_4k/*.png",
+    "maps_4k/*.exr",
+    "delivery/delivery.json",
     *(f"delivery/own_{name}*.png" for name in ("diffuse_albedo", "normal", "specular_albedo", "confidence")),
-    "delivery/own_head.obj", "delivery/scan.obj",
-    *(f"delivery/scan_{name}.png" for name in ("lit", "albedo", "albedo_known")), "delivery/displacement.exr",
-    "comparison/*.png", "comparison/*.jpg", "preview/*.png", "report/*_*.jpg", "report.html", "consent.json",
-    "checkpoints/solve.safetensors", "switchlight/*.png",
+    "delivery/own_head.obj",
+    "delivery/scan.obj",
+    *(f"delivery/scan_{name}.png" for name in ("lit", "albedo", "albedo_known")),
+    "delivery/displacement.exr",
+    "comparison/*.png",
+    "comparison/*.jpg",
+    "preview/*.png",
+    "report/*_*.jpg",
+    "report.html",
+    "consent.json",
+    "checkpoints/solve.safetensors",
+    "switchlight/*.png",
 )
 """What WildCap 0.1.0 wrote, which kept no such record."""
 LEFT_BEFORE = re.compile(r"\.(?P<stem>.+)\.\d+\.tmp(?P<suffix>\..+)?|\.(?P<old>.+)\.old")
@@ -119,8 +142,10 @@ def clear_replaced(root: Path, replaced: Path, path: Path) -> None:
 
 def remove_empty_folders(folder: Path) -> None:
     """A folder and those in it, as far as nothing else is left in them."""
-    for each in (*sorted((path for path in folder.rglob("*") if path.is_dir() and not path.is_symlink()), reverse=True),
-                 folder):
+    for each in (
+        *sorted((path for path in folder.rglob("*") if path.is_dir() and not path.is_symlink()), reverse=True),
+        folder,
+    ):
         with contextlib.suppress(OSError):  # it is not empty
             each.rmdir()
 
@@ -149,8 +174,11 @@ def _shorten(root: Path) -> None:
     if not record.is_file() or record.stat().st_size < LONG_BYTES:
         return
     written, temporary = read_record(root)
-    lines = [{"path": path, "hash": read_hash(root / path)} for path in written if (root / path).is_file()
-             and is_ours(root, root / path)]
+    lines = [
+        {"path": path, "hash": read_hash(root / path)}
+        for path in written
+        if (root / path).is_file() and is_ours(root, root / path)
+    ]
     lines += [{"temporary": path, "by": by} for path, by in temporary.items() if (root / path).exists()]
     short = record.with_name(f".{RECORD}.{os.getpid()}.tmp")
     note_temporary(root, short)
@@ -161,7 +189,7 @@ def _shorten(root: Path) -> None:
 def take_back(root: Path, replaced: Path) -> None:
     """A folder that was put aside for a new one: finishes that, or undoes it where the new one never came. A link is
     kept aside as it is."""
-    path = replaced.with_name(replaced.name[1:-len(".old")])
+    path = replaced.with_name(replaced.name[1 : -len(".old")])
     if replaced.is_symlink():
         keep_aside(root, replaced, path_inside(root, path))
     elif path.exists():
@@ -201,19 +229,35 @@ def _is_temporary_name(path: str) -> bool:
     """Whether it can be a temporary file or folder of ours: in the capture, and hidden. A record may come from a
     stranger with the capture it lies in."""
     parts = PurePosixPath(path).parts
-    return (bool(parts) and not {"..", "/"} & set(parts) and "\\" not in path and ":" not in path
-            and parts[-1].startswith("."))
+    return (
+        bool(parts)
+        and not {"..", "/"} & set(parts)
+        and "\\" not in path
+        and ":" not in path
+        and parts[-1].startswith(".")
+    )
 
 
 def adopt_first_format(root: Path) -> None:
     """Makes the record of a capture of 0.1.0: what its finished stages wrote, and what killed ones left."""
-    note_written(root,
-                 {path_inside(root, path): read_hash(path) for pattern in FIRST_FORMAT
-                  for path in sorted(root.glob(pattern)) if path.is_file()})
+    note_written(
+        root,
+        {
+            path_inside(root, path): read_hash(path)
+            for pattern in FIRST_FORMAT
+            for path in sorted(root.glob(pattern))
+            if path.is_file()
+        },
+    )
     gone = {**identify_process(), "pid": -1}
-    _append(root,
-            [{"temporary": inside, "by": gone} for path in root.glob("**/.*")
-             if _was_left_before(inside := path_inside(root, path))])
+    _append(
+        root,
+        [
+            {"temporary": inside, "by": gone}
+            for path in root.glob("**/.*")
+            if _was_left_before(inside := path_inside(root, path))
+        ],
+    )
 
 
 def _was_left_before(inside: str) -> bool:
@@ -224,8 +268,9 @@ def _was_left_before(inside: str) -> bool:
     if not name_match:
         return False
     final = str(path.with_name(name_match["old"] or name_match["stem"] + (name_match["suffix"] or "")))
-    return any(fnmatch.fnmatchcase(final, each) or PurePosixPath(final) in PurePosixPath(each).parents
-               for each in FIRST_FORMAT)
+    return any(
+        fnmatch.fnmatchcase(final, each) or PurePosixPath(final) in PurePosixPath(each).parents for each in FIRST_FORMAT
+    )
 
 
 def _begin_record(root: Path) -> None:
@@ -273,8 +318,9 @@ def is_leftover(root: Path, path: Path) -> bool:
     """Whether a file is temporary, or lies in a temporary folder, and its process has ended. Not in a folder that was
     put aside, which may hold files of others."""
     inside = PurePosixPath(path_inside(root, path))
-    owners = [by for left, by in read_record(root)[1].items() if inside.is_relative_to(left)
-              and not left.endswith(".old")]
+    owners = [
+        by for left, by in read_record(root)[1].items() if inside.is_relative_to(left) and not left.endswith(".old")
+    ]
     return bool(owners) and not path.is_symlink() and all(is_gone(by) for by in owners)
 
 

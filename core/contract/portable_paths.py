@@ -43,8 +43,13 @@ def convert_settings(by_stage: dict, convert: Callable[[str], str]) -> dict:
     """The settings of stages, {stage: {name: value}} among other things, with `convert` applied to every path that is
     given."""
     kinds = {name: getattr(Settings(), name, None) for name in by_stage}
-    paths = {name: {f.name for f in fields(kind) if "path" in f.metadata} if hasattr(kind, "__dataclass_fields__")
-             else set() for name, kind in kinds.items()}
-    return {stage: {name: convert(value) if name in paths[stage] and value else value for name, value in chosen.items()}
-            if isinstance(chosen, dict) else chosen
-            for stage, chosen in by_stage.items()}
+    paths = {
+        name: {f.name for f in fields(kind) if "path" in f.metadata} if hasattr(kind, "__dataclass_fields__") else set()
+        for name, kind in kinds.items()
+    }
+    return {
+        stage: {name: convert(value) if name in paths[stage] and value else value for name, value in chosen.items()}
+        if isinstance(chosen, dict)
+        else chosen
+        for stage, chosen in by_stage.items()
+    }

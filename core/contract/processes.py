@@ -92,8 +92,13 @@ def _ask_beginning(pid: int) -> str:
         return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2].split()[19].decode()
     with contextlib.suppress(OSError, subprocess.SubprocessError):
         # in the same words for every program that asks, whatever its language and time zone
-        completed = subprocess.run(["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, timeout=5,
-                                   env={**os.environ, "LC_ALL": "C", "TZ": "UTC"})
+        completed = subprocess.run(
+            ["ps", "-o", "lstart=", "-p", str(pid)],
+            capture_output=True,
+            text=True,
+            timeout=5,
+            env={**os.environ, "LC_ALL": "C", "TZ": "UTC"},
+        )
         return completed.stdout.strip()
     return ""
 

@@ -47,18 +47,28 @@ def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Call
     """
     record = capture.read()
     return {
-        "made_by": MADE_BY, "written": time.strftime("%Y-%m-%dT%H:%M:%S"),
-        "delivery": {"what": plan.what, "preset": plan.preset.title, "format": plan.format.title,
-                     "pictures": plan.pictures, "colour": plan.colour,
-                     "normals": plan.normals, "unit": plan.unit, "drops": list(plan.format.drops)},
+        "made_by": MADE_BY,
+        "written": time.strftime("%Y-%m-%dT%H:%M:%S"),
+        "delivery": {
+            "what": plan.what,
+            "preset": plan.preset.title,
+            "format": plan.format.title,
+            "pictures": plan.pictures,
+            "colour": plan.colour,
+            "normals": plan.normals,
+            "unit": plan.unit,
+            "drops": list(plan.format.drops),
+        },
         "versions": {"WildCap": __version__, "Python": platform.python_version(), "packages": packages()},
         "capture": {"name": capture.root.name, "sources": _sources(capture.source, record, tick)},
         "stages": {name: _stage(done) for name, done in record["stages"].items()},
         "weights": _weights(record, settings, tick),
-        "data": {"built-in head": "MakeHuman base mesh and targets, CC0",
-                 "landmark and face nets": "MediaPipe, Apache-2.0"},
+        "data": {
+            "built-in head": "MakeHuman base mesh and targets, CC0",
+            "landmark and face nets": "MediaPipe, Apache-2.0",
+        },
         "licence": "The maps and meshes are yours. WildCap for Blender is GPL-3.0-or-later, which does not reach what "
-                   "it makes.",
+        "it makes.",
     }
 
 
@@ -67,17 +77,22 @@ def finish(folder: Path, **versions: str) -> None:
     cannot be written."""
     told = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
     told["versions"] |= versions
-    told["files"] = {path.relative_to(folder).as_posix(): sha256(path, lambda: None)
-                     for path in sorted(folder.rglob("*"))
-                     if path.is_file() and path.name != PROVENANCE}
+    told["files"] = {
+        path.relative_to(folder).as_posix(): sha256(path, lambda: None)
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != PROVENANCE
+    }
     write_json(folder / PROVENANCE, told)
 
 
 def packages() -> dict[str, str]:
     """The versions of the packages that the worker works with, as they are installed here."""
     listed = HERE.parent / "requirements" / "worker.txt"
-    names = (re.findall(r"^([A-Za-z0-9_-]+)==", listed.read_text(encoding="utf-8"), flags=re.MULTILINE)
-             if listed.is_file() else [])
+    names = (
+        re.findall(r"^([A-Za-z0-9_-]+)==", listed.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        if listed.is_file()
+        else []
+    )
     versions = {}
     for name in names:
         try:
@@ -109,10 +124,17 @@ def _sources(source: Path | None, record: dict, tick: Callable[[], None]) -> lis
 
 def _stage(done: dict) -> dict:
     """How a stage was run. What an artist keeps elsewhere is named without its folder."""
-    settings = {name: re.split(r"[\\/]", value.rstrip("\\/"))[-1] if isinstance(value, str) else value
-                for name, value in done["settings"].items()}
-    return {"finished": done["finished"], "version": done["version"], "seed": done["seed"], "device": done["device"],
-            "settings": settings}
+    settings = {
+        name: re.split(r"[\\/]", value.rstrip("\\/"))[-1] if isinstance(value, str) else value
+        for name, value in done["settings"].items()
+    }
+    return {
+        "finished": done["finished"],
+        "version": done["version"],
+        "seed": done["seed"],
+        "device": done["device"],
+        "settings": settings,
+    }
 
 
 def _weights(record: dict, settings: Settings, tick: Callable[[], None]) -> list[dict]:

@@ -25,13 +25,22 @@ def write(capture: Capture, settings: Settings) -> None:
     """Writes the capture's report.html; `settings` decide which stages count as out of date. Raises Problem when it
     cannot be written."""
     record = capture.read()
-    sections = "\n".join(_section(capture, stage, record["stages"].get(stage.name), settings)
-                         for stage in stages.STAGES)
-    renders = _pictures(sorted(p for p in capture.renders.glob("*") if p.suffix.lower() in (".jpg", ".jpeg", ".png")),
-                        "Render")
-    page = PAGE.format(title=html.escape(capture.root.stem), source=html.escape(str(capture.source or "")),
-                       summary=_summary(record), style=STYLE, doctor=_doctor(record), sections=sections,
-                       renders=f"<section><h2>Renders</h2>{renders}</section>" if renders else "", version=__version__)
+    sections = "\n".join(
+        _section(capture, stage, record["stages"].get(stage.name), settings) for stage in stages.STAGES
+    )
+    renders = _pictures(
+        sorted(p for p in capture.renders.glob("*") if p.suffix.lower() in (".jpg", ".jpeg", ".png")), "Render"
+    )
+    page = PAGE.format(
+        title=html.escape(capture.root.stem),
+        source=html.escape(str(capture.source or "")),
+        summary=_summary(record),
+        style=STYLE,
+        doctor=_doctor(record),
+        sections=sections,
+        renders=f"<section><h2>Renders</h2>{renders}</section>" if renders else "",
+        version=__version__,
+    )
     with replacing(capture.report) as temporary:
         temporary.write_text(page, encoding="utf-8")
 
@@ -42,8 +51,19 @@ def findings(record: dict) -> list[dict]:
     First the problem that stopped the chain, if any, then what the stages found, in their order.
     """
     stopped = record.get("stopped")
-    faults = ([{"stage": stopped["stage"], "problem": stopped["problem"], "remedy": stopped["remedy"], "frames": [],
-                "stopped": True}] if stopped else [])
+    faults = (
+        [
+            {
+                "stage": stopped["stage"],
+                "problem": stopped["problem"],
+                "remedy": stopped["remedy"],
+                "frames": [],
+                "stopped": True,
+            }
+        ]
+        if stopped
+        else []
+    )
     for name in stages.NAMES:
         here = record["stages"].get(name, {}).get("findings", [])
         if stopped and stopped["stage"] == name:
@@ -76,25 +96,32 @@ def _summary(record: dict) -> str:
     done = record["stages"].values()
     seconds = sum(stage["seconds"] for stage in done)
     last = max((stage["finished"].replace("T", " ") for stage in done), default="never")
-    return (f"{len(record['stages'])} of {len(stages.STAGES)} stages finished in {_duration(seconds)}; "
-            f"last change {html.escape(last)}")
+    return (
+        f"{len(record['stages'])} of {len(stages.STAGES)} stages finished in {_duration(seconds)}; "
+        f"last change {html.escape(last)}"
+    )
 
 
 def _section(capture: Capture, stage: stages.Stage, finished: dict | None, settings: Settings) -> str:
     verdict = capture.verdict(stage, settings)
     words = f"out of date: {verdict.reason()}" if verdict.state == STALE else verdict.reason() or verdict.state
-    head = (f'<h2>{html.escape(stage.label)} <small '
-            f'class="{verdict.state.replace(" ", "-")}">{html.escape(words)}</small></h2>')
+    head = (
+        f'<h2>{html.escape(stage.label)} <small '
+        f'class="{verdict.state.replace(" ", "-")}">{html.escape(words)}</small></h2>'
+    )
     if finished is None:
         return f'<section id="{stage.name}">{head}</section>'
     pictures = _pictures(sorted(capture.pictures.glob(f"{stage.name}_*.jpg")), stage.label, len(stage.name) + 1)
     changed = _rows(_changed(stage.name, finished["settings"]), tooltips(type(getattr(settings, stage.name))))
     figures = _rows(finished["figures"])
-    return (f'<section id="{stage.name}">{head}<p class="when">{_duration(finished["seconds"])}, '
-            f'{html.escape(finished["finished"].replace("T", " "))}, '
-            f'on {html.escape(finished["device"])}, seed {html.escape(str(finished["seed"]))}</p>{pictures}'
-            + (f"<h3>Figures</h3>{figures}" if figures else "")
-            + (f"<h3>Settings other than the defaults</h3>{changed}" if changed else "") + "</section>")
+    return (
+        f'<section id="{stage.name}">{head}<p class="when">{_duration(finished["seconds"])}, '
+        f'{html.escape(finished["finished"].replace("T", " "))}, '
+        f'on {html.escape(finished["device"])}, seed {html.escape(str(finished["seed"]))}</p>{pictures}'
+        + (f"<h3>Figures</h3>{figures}" if figures else "")
+        + (f"<h3>Settings other than the defaults</h3>{changed}" if changed else "")
+        + "</section>"
+    )
 
 
 def _changed(stage: str, options: dict) -> dict:
@@ -103,9 +130,12 @@ def _changed(stage: str, options: dict) -> dict:
 
 
 def _pictures(paths: list[Path], label: str, cut: int = 0) -> str:
-    return "".join(f'<figure><img loading="lazy" alt="{html.escape(label)}: {caption}" '
-                   f'src="{_embedded(path)}"><figcaption>{caption}</figcaption></figure>'
-                   for path in paths for caption in [html.escape(path.stem[cut:].replace("_", " "))])
+    return "".join(
+        f'<figure><img loading="lazy" alt="{html.escape(label)}: {caption}" '
+        f'src="{_embedded(path)}"><figcaption>{caption}</figcaption></figure>'
+        for path in paths
+        for caption in [html.escape(path.stem[cut:].replace("_", " "))]
+    )
 
 
 def _embedded(path: Path) -> str:

@@ -34,8 +34,10 @@ def _check(name: str, field: Field, value: str) -> None:
         return
     path = Path(os.path.expanduser(value))
     if not path.exists():
-        raise Problem(f"There is no file or folder at {path}, which {setting} names.",
-                      "Check its name and whether the disk it is on is connected.")
+        raise Problem(
+            f"There is no file or folder at {path}, which {setting} names.",
+            "Check its name and whether the disk it is on is connected.",
+        )
     if (about["path"] == "folder" and not path.is_dir()) or (about["path"] == "file" and not path.is_file()):
         raise Problem(f"{path}, which {setting} names, is not a {about['path']}.", f"Choose {_describe(about)}.")
     missing = [held for held in about.get("holds", ()) if path.is_dir() and not (path / held).is_file()]

@@ -43,8 +43,10 @@ def check_value(name: str, field: dataclasses.Field, value):
     expected, limits = type(field.default), field.metadata
     whole_for_float = expected is float and type(value) is int
     if type(value) is not expected and not whole_for_float:
-        raise Problem(f"{name} is {value!r}, which is not a {expected.__name__}.",
-                      f"{advise_values(field)} Its default is {field.default!r}.")
+        raise Problem(
+            f"{name} is {value!r}, which is not a {expected.__name__}.",
+            f"{advise_values(field)} Its default is {field.default!r}.",
+        )
     if "choices" in limits and value not in limits["choices"]:
         raise Problem(f"{name} is {value!r}.", advise_values(field))
     if "min" in limits and not limits["min"] <= value <= limits["max"]:
@@ -80,8 +82,9 @@ def value_from_text(name: str, field: dataclasses.Field, text: str, folder: Path
     try:
         value = kind(text)
     except ValueError:
-        raise Problem(f"{name} is {text!r}, which is not a {'whole ' if kind is int else ''}number.",
-                      advise_values(field)) from None
+        raise Problem(
+            f"{name} is {text!r}, which is not a {'whole ' if kind is int else ''}number.", advise_values(field)
+        ) from None
     return check_value(name, field, value)
 
 

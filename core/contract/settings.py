@@ -96,16 +96,22 @@ def known_settings() -> dict[str, Field]:
 
 def result_settings(stage_settings) -> dict:
     """The settings of one stage that its result depends on: name -> value."""
-    return {f.name: getattr(stage_settings, f.name) for f in fields(stage_settings)
-            if f.metadata.get("affects_result", True)}
+    return {
+        f.name: getattr(stage_settings, f.name)
+        for f in fields(stage_settings)
+        if f.metadata.get("affects_result", True)
+    }
 
 
 def result_paths(stage_settings) -> dict[str, str]:
     """The files and folders whose content the result of one stage depends on: name -> path with ~ expanded, of the
     settings that are not empty."""
     paths = [f.name for f in fields(stage_settings) if "path" in f.metadata]
-    return {name: os.path.expanduser(value) for name, value in result_settings(stage_settings).items() if name in paths
-            and value}
+    return {
+        name: os.path.expanduser(value)
+        for name, value in result_settings(stage_settings).items()
+        if name in paths and value
+    }
 
 
 def quality_settings(kind: type) -> list[str]:
@@ -130,8 +136,10 @@ def from_json(by_stage: dict, base: Settings | None = None) -> Settings:
         elif not isinstance(value, dict):
             raise Problem(f"The settings of the stage {name} have to be an object, not {value!r:.60}.", WRITTEN)
         else:
-            value = replace(getattr(settings, name),
-                            **{k: check_value(f"{name}.{k}", find_setting(f"{name}.{k}"), v) for k, v in value.items()})
+            value = replace(
+                getattr(settings, name),
+                **{k: check_value(f"{name}.{k}", find_setting(f"{name}.{k}"), v) for k, v in value.items()},
+            )
         settings = replace(settings, **{name: value})
     return settings
 
@@ -140,9 +148,11 @@ def find_setting(name: str) -> Field:
     """The field of STAGE.NAME, or of a shared setting. Raises Problem for an unknown one and names the nearest."""
     if name not in known_settings():
         near = difflib.get_close_matches(name, [*known_settings(), *STAGE_KINDS], 1, 0.5)
-        raise Problem(f"There is no setting named {name!r}.",
-                      f"{f'Did you mean {near[0]}? ' if near else ''}`python -m core settings` lists all of this "
-                      "version; a newer one may have more.")
+        raise Problem(
+            f"There is no setting named {name!r}.",
+            f"{f'Did you mean {near[0]}? ' if near else ''}`python -m core settings` lists all of this "
+            "version; a newer one may have more.",
+        )
     return known_settings()[name]
 
 

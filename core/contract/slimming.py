@@ -41,15 +41,18 @@ def plan(capture: Capture, settings: Settings) -> Slimming:
     """Looks at a capture; `settings` decide which stages count as finished. Raises Problem where it is none, cannot be
     read, is not finished to its last stage, or has lost the video that all of it was made from."""
     if not capture.json.is_file():
-        raise Problem(f"There is no capture at {capture.root}.",
-                      "Check the name: a capture's folder holds capture.json.")
+        raise Problem(
+            f"There is no capture at {capture.root}.", "Check the name: a capture's folder holds capture.json."
+        )
     verdicts = {stage.name: capture.verdict(stage, settings) for stage in stages.STAGES}
     for stage in stages.STAGES:
         verdict = verdicts[stage.name]
         if verdict.state not in FINISHED:
             words = f"out of date: {verdict.reason()}" if verdict.reason() else "still to do"
-            raise Problem(f"{capture.root.stem} is not finished: the stage {stage.label} is {words}.",
-                          f"Run the chain to its end first: `python -m core run - {capture.root}`.")
+            raise Problem(
+                f"{capture.root.stem} is not finished: the stage {stage.label} is {words}.",
+                f"Run the chain to its end first: `python -m core run - {capture.root}`.",
+            )
     capture.require_source()
     going, hashes, notes, older, record = {}, {}, [], [], capture.read()
     for name in stages.SLIMMED:
@@ -57,8 +60,9 @@ def plan(capture: Capture, settings: Settings) -> Slimming:
         try:
             files = [path for path in ownership.files_in(capture.root / name) if not path.name.startswith(".")]
             theirs = [path for path in files if not ownership.is_ours(capture.root, path)]
-            sizes = {ownership.path_inside(capture.root, path): path.lstat().st_size for path in files
-                     if path not in theirs}
+            sizes = {
+                ownership.path_inside(capture.root, path): path.lstat().st_size for path in files if path not in theirs
+            }
         except OSError as error:
             raise storage_problem(error, capture.root) from error
         gone = name in slimmed.hashes_of(record)
@@ -70,9 +74,11 @@ def plan(capture: Capture, settings: Settings) -> Slimming:
         going |= sizes
         older += [stage.label] if sizes and verdicts[stage.name].state == OLDER else []
     if older:
-        notes.append(f"Made by older code: {', '.join(older)}. Made again by WildCap {__version__} they may differ, "
-                     "and what was made from them is then out "
-                     "of date.")
+        notes.append(
+            f"Made by older code: {', '.join(older)}. Made again by WildCap {__version__} they may differ, "
+            "and what was made from them is then out "
+            "of date."
+        )
     return Slimming(going, hashes, tuple(notes))
 
 
@@ -112,12 +118,18 @@ def lines(slimming: Slimming, capture: Capture) -> list[str]:
     kinds: dict[str, list[int]] = {}
     for inside, size in slimming.going.items():
         kinds.setdefault(GROUPS[inside.partition("/")[0]], []).append(size)
-    said = [f"{label}: {len(sizes)} files, {megabytes(sum(sizes))}"
-            for label, sizes in kinds.items()] or ["Nothing is left that could go."]
+    said = [f"{label}: {len(sizes)} files, {megabytes(sum(sizes))}" for label, sizes in kinds.items()] or [
+        "Nothing is left that could go."
+    ]
     if slimming.going:
-        left = sum(path.lstat().st_size for path in ownership.files_in(capture.root)
-                   if ownership.path_inside(capture.root, path) not in slimming.going)
-        said.append(f"{megabytes(left)} stay: maps, masks, landmarks, head, renders, deliveries and the report among "
-                    "them. What goes is made again from the "
-                    "video when a stage needs it; keep the video.")
+        left = sum(
+            path.lstat().st_size
+            for path in ownership.files_in(capture.root)
+            if ownership.path_inside(capture.root, path) not in slimming.going
+        )
+        said.append(
+            f"{megabytes(left)} stay: maps, masks, landmarks, head, renders, deliveries and the report among "
+            "them. What goes is made again from the "
+            "video when a stage needs it; keep the video."
+        )
     return [*said, *slimming.notes]

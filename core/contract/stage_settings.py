@@ -69,16 +69,27 @@ class RegistrationSettings:
 
 @dataclass(frozen=True)
 class DelightSettings:
-    delighter: str = setting("network", choices=("network", "shading", "switchlight", "opendelight", "folder", "none"),
-                             flag="--delighter", per_face=True)
+    delighter: str = setting(
+        "network",
+        choices=("network", "shading", "switchlight", "opendelight", "folder", "none"),
+        flag="--delighter",
+        per_face=True,
+    )
     """How the light is taken out of the frames before the texture is built"""
-    switchlight_preview: bool = setting(False, label="Small Pictures at Half the Credits", flag="--preview",
-                                        per_face=True)
+    switchlight_preview: bool = setting(
+        False, label="Small Pictures at Half the Credits", flag="--preview", per_face=True
+    )
     """Have SwitchLight answer with pictures of at most 512 px, at half the credits: to see whether it helps"""
     folder: str = setting("", path="folder", flag="--folder", when=lambda own: own.delighter == "folder", required=True)
     """Folder of delit pictures for the folder delighter, matched by name"""
-    checkpoint: str = setting("", path="file_or_folder", flag="--checkpoint", required=True,
-                              when=lambda own: own.delighter == "opendelight", holds=("base_delight_network.pth",))
+    checkpoint: str = setting(
+        "",
+        path="file_or_folder",
+        flag="--checkpoint",
+        required=True,
+        when=lambda own: own.delighter == "opendelight",
+        holds=("base_delight_network.pth",),
+    )
     """OpenDelight's checkpoint as its authors publish it: the folder with base_delight_network.pth and
     unet_enhancer.pth"""
 
@@ -119,11 +130,13 @@ class SolveSettings:
     """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast"""
     grid_cells: int = setting(96, min=1, max=512)
     """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
-    skin_tone: str = setting("auto", form="R,G,B or #RRGGBB or auto", parse=parse_skin_tone, flag="--skin-tone",
-                             per_face=True)
+    skin_tone: str = setting(
+        "auto", form="R,G,B or #RRGGBB or auto", parse=parse_skin_tone, flag="--skin-tone", per_face=True
+    )
     """Skin tone in sRGB (linear mean over facial skin), as 0.69,0.54,0.46 or 176,138,118 or #B08A76; auto: estimated"""
-    white_point: str = setting("auto", form="R,G,B or auto", parse=parse_white_point, flag="--white-point",
-                               per_face=True)
+    white_point: str = setting(
+        "auto", form="R,G,B or auto", parse=parse_white_point, flag="--white-point", per_face=True
+    )
     """What a white surface in the face's light is in the frames, linear R,G,B, from a ColorChecker, a grey card or
     white paper; auto: from the scene"""
     prior: str = setting("", path="folder", flag="--prior", holds=("config.json", "ckpt.pth"))

@@ -32,8 +32,14 @@ class Stage:
     on_device: bool = False
 
 
-MAPS = ("diffuse_albedo.png", "diffuse_albedo.exr", "specular_albedo.png", "normal.png", "shading.exr",
-        "confidence.png")
+MAPS = (
+    "diffuse_albedo.png",
+    "diffuse_albedo.exr",
+    "specular_albedo.png",
+    "normal.png",
+    "shading.exr",
+    "confidence.png",
+)
 STRANDS = "strands.npz"
 """Beside the delivered maps, where hair was found: the single hairs that Grow Hair brings in."""
 OPEN_EYES = ("head_open.obj", "eyes.json")
@@ -44,26 +50,84 @@ STAGES = (
     Stage("frames", "Frames", (), ("frames/",), "core.frames"),
     Stage("cameras", "Cameras", ("frames/",), ("cameras/",), "core.cameras", shared=("seed",)),
     Stage("scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.scan", shared=("device",), on_device=True),
-    Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"),
-          "core.registration", optional_reads=("landmarks_artist.json",)),
-    Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight", shared=("device",),
-          on_device=True),
-    Stage("texture", "Texture", ("frames/", "delit/", "cameras/", "head.obj"),
-          ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture",
-          on_device=True, optional_reads=OPEN_EYES),
-    Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"),
-          ("shadow_mask_auto.png",),
-          "core.shadow_mask", optional_reads=("texture_filmed.png", PARTS, "frames/", *OPEN_EYES)),
-    Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-          tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), on_device=True,
-          optional_reads=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", PARTS, "frames/", "cameras/",
-                          "delit/", *OPEN_EYES)),
-    Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)),
-          tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale", shared=("seed", "device"), on_device=True,
-          optional_reads=("texture_confidence.exr", "texture_detail.exr", PARTS)),
-    Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
-          optional_reads=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/",
-                          "cameras/")),
+    Stage(
+        "registration",
+        "Head",
+        ("frames/", "cameras/", "scan.ply"),
+        ("head.obj", "landmarks.json"),
+        "core.registration",
+        optional_reads=("landmarks_artist.json",),
+    ),
+    Stage(
+        "delight",
+        "Delight",
+        ("frames/", "cameras/", "head.obj"),
+        ("delit/",),
+        "core.delight",
+        shared=("device",),
+        on_device=True,
+    ),
+    Stage(
+        "texture",
+        "Texture",
+        ("frames/", "delit/", "cameras/", "head.obj"),
+        ("texture.exr", "texture.png", "texture_confidence.exr"),
+        "core.texture",
+        on_device=True,
+        optional_reads=OPEN_EYES,
+    ),
+    Stage(
+        "shadow_mask",
+        "Shadow Mask",
+        ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"),
+        ("shadow_mask_auto.png",),
+        "core.shadow_mask",
+        optional_reads=("texture_filmed.png", PARTS, "frames/", *OPEN_EYES),
+    ),
+    Stage(
+        "solve",
+        "Solve",
+        ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
+        tuple(f"maps/{name}" for name in MAPS),
+        "core.solve",
+        shared=("seed",),
+        on_device=True,
+        optional_reads=(
+            "shadow_mask.png",
+            "protect_mask.png",
+            "texture_filmed.png",
+            PARTS,
+            "frames/",
+            "cameras/",
+            "delit/",
+            *OPEN_EYES,
+        ),
+    ),
+    Stage(
+        "upscale",
+        "4K Maps",
+        ("head.obj", *(f"maps/{name}" for name in MAPS)),
+        tuple(f"maps_4k/{name}" for name in MAPS),
+        "core.upscale",
+        shared=("seed", "device"),
+        on_device=True,
+        optional_reads=("texture_confidence.exr", "texture_detail.exr", PARTS),
+    ),
+    Stage(
+        "transfer",
+        "Delivery",
+        ("head.obj", *(f"maps/{name}" for name in MAPS)),
+        ("delivery/",),
+        "core.transfer",
+        optional_reads=(
+            *(f"maps_4k/{name}" for name in MAPS),
+            "own_head.obj",
+            "own_head.json",
+            "scan.ply",
+            "frames/",
+            "cameras/",
+        ),
+    ),
 )
 
 SLIMMED = ("frames/", "delit/")
@@ -73,16 +137,39 @@ cameras are moreover not the same bytes twice. All else is maps (309 MB, with th
 goes on from), masks, landmarks, heads, and what is painted on, delivered or looked at."""
 
 TOOLS = (
-    Stage("mask_edges", "Snap to Edges", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-          ("shadow_mask_edges.png",), "core.solve.snapping", on_device=True),
-    Stage("skin_tone", "Skin Tone", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (),
-          "core.solve.tone", on_device=True),
+    Stage(
+        "mask_edges",
+        "Snap to Edges",
+        ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
+        ("shadow_mask_edges.png",),
+        "core.solve.snapping",
+        on_device=True,
+    ),
+    Stage(
+        "skin_tone",
+        "Skin Tone",
+        ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
+        (),
+        "core.solve.tone",
+        on_device=True,
+    ),
     Stage("white_point", "White Point", ("frames/",), (), "core.solve.white_point"),
-    Stage("self_test", "Self-Test", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (),
-          "core.solve.self_test", on_device=True),
+    Stage(
+        "self_test",
+        "Self-Test",
+        ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
+        (),
+        "core.solve.self_test",
+        on_device=True,
+    ),
     Stage("bring_back", "Slimmed Files", SLIMMED, (), "core.frames.back"),
-    Stage("deliver", "Deliver", ("head.obj", *(f"maps/{name}" for name in MAPS if name.endswith(".png"))), (),
-          "core.deliver"),
+    Stage(
+        "deliver",
+        "Deliver",
+        ("head.obj", *(f"maps/{name}" for name in MAPS if name.endswith(".png"))),
+        (),
+        "core.deliver",
+    ),
 )
 """What a worker does for one button: no stage of the chain depends on it, and nothing of it is recorded."""
 LABELS = {stage.name: stage.label for stage in (*STAGES, *TOOLS)}
@@ -103,9 +190,9 @@ def advise_remaking(path: Path, otherwise: str) -> str:
         for name in stage.writes:
             own = PurePath(name).parts
             parts = path.parts[:-1] if name.endswith("/") else path.parts
-            while len(parts) > len(own) and name.endswith("/") and parts[-len(own):] != own:  # delit/shadow/00001.png
+            while len(parts) > len(own) and name.endswith("/") and parts[-len(own) :] != own:  # delit/shadow/00001.png
                 parts = parts[:-1]
-            if parts[-len(own):] == own and Path(*parts[:-len(own)], "capture.json").is_file():
+            if parts[-len(own) :] == own and Path(*parts[: -len(own)], "capture.json").is_file():
                 return advise_again(stage.name)
     return otherwise
 

@@ -59,8 +59,10 @@ def base() -> str:
     address = os.environ.get(BASE_VARIABLE, "").rstrip("/") or BASE
     parts = urllib.parse.urlsplit(address)
     if parts.scheme != "https" and not (parts.scheme == "http" and local(address)):
-        raise Problem(f"The address in {BASE_VARIABLE} is not a safe one.",
-                      "It begins with https://, or with http:// on this very machine.")
+        raise Problem(
+            f"The address in {BASE_VARIABLE} is not a safe one.",
+            "It begins with https://, or with http:// on this very machine.",
+        )
     return address
 
 
@@ -90,10 +92,14 @@ def key() -> str:
     message."""
     api_key = (os.environ.get(KEY_VARIABLE) or _kept).strip()
     if not api_key:
-        raise Problem("SwitchLight needs a key, and there is none.",
-                      f"Get one at {WEBSITE} and put it into the extension's preferences, or into the environment "
-                      f"variable {KEY_VARIABLE}.")
+        raise Problem(
+            "SwitchLight needs a key, and there is none.",
+            f"Get one at {WEBSITE} and put it into the extension's preferences, or into the environment "
+            f"variable {KEY_VARIABLE}.",
+        )
     if not (api_key.isascii() and api_key.isprintable()) or " " in api_key:
-        raise Problem("This is no key of SwitchLight: it holds spaces or other characters that no key has.",
-                      f"Copy it again from {WEBSITE}.")
+        raise Problem(
+            "This is no key of SwitchLight: it holds spaces or other characters that no key has.",
+            f"Copy it again from {WEBSITE}.",
+        )
     return api_key

@@ -24,8 +24,10 @@ def captures_in(named: str) -> list[Path]:
     folder = Path(named).expanduser()
     captures = [folder] if (folder / RECORD).is_file() else sorted(path.parent for path in folder.glob(f"*/{RECORD}"))
     if not captures:
-        raise Problem(f"{folder} is no capture, and holds none.",
-                      "Name the folder of another capture of the same person, usually NAME.wildcap.")
+        raise Problem(
+            f"{folder} is no capture, and holds none.",
+            "Name the folder of another capture of the same person, usually NAME.wildcap.",
+        )
     return captures
 
 

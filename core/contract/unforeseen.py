@@ -21,24 +21,29 @@ recent: deque[str] = deque(maxlen=10)
 """The last such errors of this process, as they went to the log."""
 LOG = "unforeseen.log"
 """In a capture's folder of logs, for those that no stage was stopped by."""
-KEPT = ("What was finished is kept. Try again; if it happens again, Save Report (in a terminal: core report-problem) "
-        "writes a file about it that you can send us.")
+KEPT = (
+    "What was finished is kept. Try again; if it happens again, Save Report (in a terminal: core report-problem) "
+    "writes a file about it that you can send us."
+)
 
 
 def explain(error: BaseException, stopped: str, log: Path | None = None) -> Problem:
     """The Problem of an error that stopped something ("the stage solve"), whose traceback is added to `log` where there
     is one."""
     name = identify(error)
-    text = (f"{time.strftime('%Y-%m-%d %H:%M:%S')} {name} stopped "
-            f"{stopped}\n{''.join(traceback.format_exception(error))}")
+    text = (
+        f"{time.strftime('%Y-%m-%d %H:%M:%S')} {name} stopped {stopped}\n{''.join(traceback.format_exception(error))}"
+    )
     recent.append(text)
     if log is not None:
         with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
             log.parent.mkdir(parents=True, exist_ok=True)
             with open(log, "a", encoding="utf-8", errors="backslashreplace") as file:
                 file.write(text)
-    return Problem(f"An error inside WildCap stopped {stopped} ({name}, {type(error).__name__}: {_first_line(error)}).",
-                   KEPT + (f" The log is {log}." if log is not None else ""))
+    return Problem(
+        f"An error inside WildCap stopped {stopped} ({name}, {type(error).__name__}: {_first_line(error)}).",
+        KEPT + (f" The log is {log}." if log is not None else ""),
+    )
 
 
 def identify(error: BaseException) -> str:

@@ -29,10 +29,19 @@ from .photograph import delight_photograph as delight_with_network
 from .shading import shading
 from .switchlight import switchlight
 
-DELIGHTERS: dict[str, Delighter] = {"network": network, "shading": shading, "switchlight": switchlight,
-                                    "opendelight": opendelight, "folder": folder, "none": none}
-PHOTOGRAPHERS: dict[str, Photographer] = {"network": delight_with_network, "opendelight": delight_with_opendelight,
-                                          "none": leave_photograph}
+DELIGHTERS: dict[str, Delighter] = {
+    "network": network,
+    "shading": shading,
+    "switchlight": switchlight,
+    "opendelight": opendelight,
+    "folder": folder,
+    "none": none,
+}
+PHOTOGRAPHERS: dict[str, Photographer] = {
+    "network": delight_with_network,
+    "opendelight": delight_with_opendelight,
+    "none": leave_photograph,
+}
 """Those that also serve a photograph that belongs to no capture."""
 
 
@@ -49,13 +58,13 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             shown.append((result.view, _small(result.view.read()), _small(result.image)))
             report.check()
         if not shown:
-            raise Problem("None of the frames that were chosen for the texture has a camera.",
-                          advise_again("cameras"))
+            raise Problem("None of the frames that were chosen for the texture has a camera.", advise_again("cameras"))
     report.figure("delighter", settings.delight.delighter)
     report.figure("delit_views", len(shown))
     middle = shown[:: max(1, len(shown) // 4)][:4]
-    images.write_srgb(capture.picture("delight", "views"),
-                      np.vstack([np.hstack([pair[i] for pair in middle]) for i in (1, 2)]))
+    images.write_srgb(
+        capture.picture("delight", "views"), np.vstack([np.hstack([pair[i] for pair in middle]) for i in (1, 2)])
+    )
 
 
 def _small(image: np.ndarray, height: int = 320) -> np.ndarray:

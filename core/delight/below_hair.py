@@ -52,8 +52,11 @@ def fill_hair(look: ShadingEstimate, own: ShadingEstimate, fitted: np.ndarray, s
     known = np.concatenate([look.shading - fitted, look.shadow[..., None]], -1)
     around = complete_shading(np.where(bare[..., None], known, 0), ~bare)
     moved = own.shading + FITTED_SHARE * (fitted + around[..., :3] - own.shading)
-    return replace(look, shading=np.where(hairy[..., None], moved, look.shading).astype(np.float32),
-                   shadow=np.where(hairy, around[..., 3], look.shadow).astype(np.float32))
+    return replace(
+        look,
+        shading=np.where(hairy[..., None], moved, look.shading).astype(np.float32),
+        shadow=np.where(hairy, around[..., 3], look.shadow).astype(np.float32),
+    )
 
 
 def _covered(share: np.ndarray) -> np.ndarray:

@@ -43,11 +43,14 @@ def remove_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[
         centre, level = np.average(x, axis=0, weights=trust), np.average(y, axis=0, weights=trust)
         weighted = (x - centre) * trust[:, None]
         # [4, 3]
-        slopes = np.linalg.solve(weighted.T @ (x - centre) + RIDGE * len(x) * np.eye(x.shape[1]),
-                                 weighted.T @ (y - level))
+        slopes = np.linalg.solve(
+            weighted.T @ (x - centre) + RIDGE * len(x) * np.eye(x.shape[1]), weighted.T @ (y - level)
+        )
         trust = 1 / (1 + ((y - level - (x - centre) @ slopes) ** 2).sum(1) / USUAL_HUE_LOG**2)
-    return [replace(look, shading=(look.shading + (f - centre) @ slopes).astype(np.float32))
-            for look, f in zip(looks, features, strict=True)]
+    return [
+        replace(look, shading=(look.shading + (f - centre) @ slopes).astype(np.float32))
+        for look, f in zip(looks, features, strict=True)
+    ]
 
 
 def settle_dim_hues(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[ShadingEstimate]:
@@ -58,12 +61,16 @@ def settle_dim_hues(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> li
     if sum(int(w.sum()) for w in where) < MIN_SKIN_CELLS:
         return looks
     hues, doubts = [_hue(look.log - look.shading) for look in looks], [_doubt(look.log) for look in looks]
-    level = np.average(np.concatenate([hue[w] for hue, w in zip(hues, where, strict=True)]), axis=0,
-                       weights=np.concatenate([1 / (HUE_DEVIATION_LOG**2 + doubt[w])
-                                               for doubt, w in zip(doubts, where, strict=True)]))
+    level = np.average(
+        np.concatenate([hue[w] for hue, w in zip(hues, where, strict=True)]),
+        axis=0,
+        weights=np.concatenate([1 / (HUE_DEVIATION_LOG**2 + doubt[w]) for doubt, w in zip(doubts, where, strict=True)]),
+    )
     moved = [skin * doubt / (HUE_DEVIATION_LOG**2 + doubt) for skin, doubt in zip(skins, doubts, strict=True)]
-    return [replace(look, shading=(look.shading + share[..., None] * (hue - level)).astype(np.float32))
-            for look, share, hue in zip(looks, moved, hues, strict=True)]
+    return [
+        replace(look, shading=(look.shading + share[..., None] * (hue - level)).astype(np.float32))
+        for look, share, hue in zip(looks, moved, hues, strict=True)
+    ]
 
 
 def _doubt(log: np.ndarray) -> np.ndarray:

@@ -53,8 +53,10 @@ def even_out(head: LitHead, views: list[View], looks: list[ShadingEstimate]) -> 
     albedo = np.zeros((UV_TEXELS**2, 3), np.float32)
     albedo[texel] = mean
     albedo, known = albedo.reshape(UV_TEXELS, UV_TEXELS, 3), known.reshape(UV_TEXELS, UV_TEXELS)
-    return [_agreeing(head, replace(look, shading=look.shading + off), albedo, known)
-            for look, off in zip(looks, level, strict=True)]
+    return [
+        _agreeing(head, replace(look, shading=look.shading + off), albedo, known)
+        for look, off in zip(looks, level, strict=True)
+    ]
 
 
 def estimate_exposures(colours: np.ndarray, weights: np.ndarray) -> np.ndarray:

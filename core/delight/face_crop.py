@@ -69,8 +69,9 @@ def face_mask(face: Face, to_crop: np.ndarray, size: int, growth: float = 1.0) -
     return mask.astype(np.float32)
 
 
-def put_face_back(frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask: np.ndarray,
-                  to_crop: np.ndarray) -> np.ndarray:
+def put_face_back(
+    frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask: np.ndarray, to_crop: np.ndarray
+) -> np.ndarray:
     """The frame with what was made of its crop, inside of the mask and feathered; elsewhere it stays.
 
     What the way through the crop took of the frame's sharpness is given back, so that a crop that was not changed gives
@@ -91,10 +92,13 @@ def put_face_back(frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask
     inverse = cv2.invertAffineTransform(_from_centres(to_crop))
     # 0 along the crop's border too
     inside = cv2.distanceTransform(np.pad(mask[2:-2, 2:-2], 2).astype(np.uint8), cv2.DIST_L2, 5)
-    alpha, through, made = (cv2.warpAffine(picture.astype(np.float32), inverse, (width, height), flags=cv2.INTER_CUBIC)
-                            for picture in (np.clip(inside / FEATHER_PX, 0, 1), before, after))
-    through, made, linear = (np.maximum(images.srgb_to_linear(np.clip(picture, 0, 1)), 1e-4)
-                             for picture in (through, made, frame))
+    alpha, through, made = (
+        cv2.warpAffine(picture.astype(np.float32), inverse, (width, height), flags=cv2.INTER_CUBIC)
+        for picture in (np.clip(inside / FEATHER_PX, 0, 1), before, after)
+    )
+    through, made, linear = (
+        np.maximum(images.srgb_to_linear(np.clip(picture, 0, 1)), 1e-4) for picture in (through, made, frame)
+    )
     sharp = images.linear_to_srgb(made * np.clip(linear / through, 1 / MAX_DETAIL_RATIO, MAX_DETAIL_RATIO))
     return (frame + np.clip(alpha, 0, 1)[..., None] * (sharp - frame)).astype(np.float32)
 

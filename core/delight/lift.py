@@ -27,8 +27,9 @@ def lift_shading(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
     small = cv2.resize(guide, (width, height), interpolation=cv2.INTER_AREA).reshape(shading.shape)
     slope, offset = _affine(small, shading)
     size = guide.shape[1::-1]
-    slope, offset = (cv2.resize(grid, size, interpolation=cv2.INTER_LINEAR).reshape(guide.shape)
-                     for grid in (slope, offset))
+    slope, offset = (
+        cv2.resize(grid, size, interpolation=cv2.INTER_LINEAR).reshape(guide.shape) for grid in (slope, offset)
+    )
     return slope * guide + offset
 
 
@@ -57,6 +58,7 @@ def _smooth(channel: np.ndarray, reach: float) -> np.ndarray:
 def _affine(guide: np.ndarray, shading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Per channel the slope and offset [h, w, C] that carry guide to values in each window, averaged over the windows a
     cell is in."""
+
     def mean(x: np.ndarray) -> np.ndarray:
         return cv2.blur(np.ascontiguousarray(x, np.float32), (2 * WINDOW_CELLS + 1,) * 2).reshape(x.shape)
 

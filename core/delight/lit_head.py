@@ -67,16 +67,22 @@ def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     see it, or no bare skin of it."""
     normals = smooth_normals(head)
     colours, count, hair, seen_brows = vertex_colours(head, normals, views, report)
-    transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done,
-                                 of: report.progress(2 * of + done, 8 * of, "Casting rays at the sky"))
+    transfer = radiance_transfer(
+        head.caster,
+        head.mesh.vertices,
+        normals,
+        step=lambda done, of: report.progress(2 * of + done, 8 * of, "Casting rays at the sky"),
+    )
     skin, features = skin_weights(head)
     skin, features = skin * (1 - hair) * (1 - seen_brows), np.maximum(features, seen_brows)
     told = (skin > 0.3) & (colours.min(1) > 1e-3)
     often = told & (count >= min(2, len(views)))
-    light, reached = _fit(head, normals, transfer, colours,
-                          skin * (often if often.sum() >= FEWEST_POINTS else told), report)
-    return LitHead(head, normals, transfer, skin, hair, features, light,
-                   _best_lit(light, normals, transfer, reached, count))
+    light, reached = _fit(
+        head, normals, transfer, colours, skin * (often if often.sum() >= FEWEST_POINTS else told), report
+    )
+    return LitHead(
+        head, normals, transfer, skin, hair, features, light, _best_lit(light, normals, transfer, reached, count)
+    )
 
 
 def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.ndarray]:
@@ -84,8 +90,10 @@ def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.n
     as even a draw of the other vertices, nan on those that were not drawn."""
     skin = np.flatnonzero(weights)
     if len(skin) < UNKNOWNS:
-        raise Problem("The selected frames show no bare skin of the face.",
-                      "Film the face from in front as well, or choose another delighter: Folder or None.")
+        raise Problem(
+            "The selected frames show no bare skin of the face.",
+            "Film the face from in front as well, or choose another delighter: Folder or None.",
+        )
     every = max(1, len(skin) // FIT_POINTS)
     drawn = skin[::every]
     origins = head.mesh.vertices[drawn] + 1e-3 * normals[drawn]
@@ -95,8 +103,14 @@ def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.n
         free[free] = ~head.caster.blocked(origins[free], np.repeat(direction[None], free.sum(), 0))
         return free.astype(float)
 
-    light, lit, inlier = fit_light(colours[drawn], normals[drawn], transfer[drawn], reaches, weights[drawn],
-                                   step=lambda done, of: report.progress(3 * of + done, 8 * of, "Fitting the light"))
+    light, lit, inlier = fit_light(
+        colours[drawn],
+        normals[drawn],
+        transfer[drawn],
+        reaches,
+        weights[drawn],
+        step=lambda done, of: report.progress(3 * of + done, 8 * of, "Fitting the light"),
+    )
     expected = light.ambient(transfer[drawn]) + lit[:, None] * light.direct(normals[drawn])
     residual = np.abs(np.log(colours[drawn] / np.maximum(expected, 1e-4))).mean(1)
     report.figure("inlier_percent", round(100 * float(inlier.mean()), 1))

@@ -66,8 +66,9 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     the head."""
     answers = ask(capture, settings, report)
     for i, (view, look, skin) in enumerate(zip(answers.views, put_together(answers), answers.skins, strict=True)):
-        report.progress(3 * len(answers.views) + i, 4 * len(answers.views),
-                        f"Delighting frame {i + 1} of {len(answers.views)}")
+        report.progress(
+            3 * len(answers.views) + i, 4 * len(answers.views), f"Delighting frame {i + 1} of {len(answers.views)}"
+        )
         srgb = view.read()
         albedo, shadow = divide(srgb, look, skin, light_in_frame(view, answers.head, srgb))
         yield Delit(view, albedo, shadow)
@@ -98,8 +99,10 @@ def put_together(answers: Answers) -> list[ShadingEstimate]:
 def load_network(device: str) -> DelightNet:
     """The shipped network. Raises Problem where its file or its card is missing."""
     if not has_files(WEIGHTS):
-        raise Problem("The weights of the delighting network are missing.",
-                      "Install the extension again, or choose the delighter Shading.")
+        raise Problem(
+            "The weights of the delighting network are missing.",
+            "Install the extension again, or choose the delighter Shading.",
+        )
     return read_network(DelightNet, WEIGHTS).to(torch.device(device), memory_format=torch.channels_last)
 
 
@@ -121,8 +124,13 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
         fine = crop(picture, box, size * step)
         return cv2.resize(fine, (size, size), interpolation=cv2.INTER_AREA)
     to_crop = np.float32([[scale, 0, -left * scale + 0.5 * (scale - 1)], [0, scale, -top * scale + 0.5 * (scale - 1)]])
-    return cv2.warpAffine(np.ascontiguousarray(picture, np.float32), to_crop, (size, size), flags=cv2.INTER_LINEAR,
-                          borderMode=cv2.BORDER_REPLICATE)
+    return cv2.warpAffine(
+        np.ascontiguousarray(picture, np.float32),
+        to_crop,
+        (size, size),
+        flags=cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
 
 
 def ask_of_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEstimate, np.ndarray]:
@@ -134,8 +142,9 @@ def ask_of_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEsti
     geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, (face >= 0).astype(np.float32))
     picture = crop(view.read(), box, SIDE_PX)
     look = look_at(net, box, picture, geometry)
-    light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary,
-                          round(max(view.width, view.height) * SIDE_PX / box[2]))
+    light, _ = light_seen(
+        images.srgb_to_linear(picture), head, face, bary, round(max(view.width, view.height) * SIDE_PX / box[2])
+    )
     cell_face, cell_bary = _hits(view, head, box, SIDE_PX // 2)
     return replace(look, face=cell_face, bary=cell_bary), average_cells(light, SIDE_PX // 2)
 
@@ -150,8 +159,9 @@ def _hits(view: View, head: LitHead, box: tuple[float, float, float], side: int)
 
 
 @torch.inference_mode()
-def look_at(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
-            geometry: tuple = ()) -> ShadingEstimate:
+def look_at(
+    net: DelightNet, box: tuple[float, float, float], picture: np.ndarray, geometry: tuple = ()
+) -> ShadingEstimate:
     """The mean of what the network says of a square picture and of its mirror image."""
     layers, middle = network_input(picture, *geometry)
     mirrored = layers[:, :, ::-1].copy()
@@ -159,8 +169,9 @@ def look_at(net: DelightNet, box: tuple[float, float, float], picture: np.ndarra
     device = next(net.parameters()).device
     both = torch.from_numpy(np.stack([layers, mirrored])).to(device, memory_format=torch.channels_last)
     shading, shadow = net(both)
-    shading, shadow = ((output[0] + output[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2
-                       for output in (shading, shadow.sigmoid()))
+    shading, shadow = (
+        (output[0] + output[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2 for output in (shading, shadow.sigmoid())
+    )
     small = cv2.resize(images.srgb_to_linear(picture), (SIDE_PX // 2, SIDE_PX // 2), interpolation=cv2.INTER_AREA)
     return ShadingEstimate(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, MIN_LINEAR)))
 
@@ -170,8 +181,9 @@ def seen_in(head: LitHead, vertex_values: np.ndarray, look: ShadingEstimate) -> 
     return interpolate(vertex_values[:, None], head.mesh.faces, look.face, look.bary)[..., 0]
 
 
-def divide(srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray,
-           fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+def divide(
+    srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray, fitted: tuple | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """A picture without its shading, and its shadows at its own size. On `skin` [h, h] in [0, 1] no outline of a shadow
     stays, and it tells how bright the picture came out: the wall behind may be whiter. Beyond the square `fitted` (of
     light_in_frame) is taken; without it the shading is that of the square's border, and nothing is said of shadows.
@@ -181,14 +193,16 @@ def divide(srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray,
     log = np.log(np.maximum(crop(linear, look.box, size), MIN_LINEAR))
     shading, shadow = lift_shading(look.shading, log), lift_share(look.shadow, log)
     cell, skin = size / len(skin), cv2.resize(skin, (size, size), interpolation=cv2.INTER_LINEAR)
-    shading = shading + remove_seams(log - shading, 1 - shadow, skin > 0.5, SEAM_ZONE_CELLS * cell,
-                                     SEAM_FINE_CELLS * cell)
-    y, x = np.mgrid[0:srgb.shape[0], 0:srgb.shape[1]]
+    shading = shading + remove_seams(
+        log - shading, 1 - shadow, skin > 0.5, SEAM_ZONE_CELLS * cell, SEAM_FINE_CELLS * cell
+    )
+    y, x = np.mgrid[0 : srgb.shape[0], 0 : srgb.shape[1]]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]
     within = np.minimum(at, size - at).min(1).reshape(srgb.shape[:2])  # pixels to the square's border
     inside = within >= 0
-    shading, shadow, skin = (sample(layer, at).reshape(*srgb.shape[:2], *layer.shape[2:])
-                             for layer in (shading, shadow, skin))
+    shading, shadow, skin = (
+        sample(layer, at).reshape(*srgb.shape[:2], *layer.shape[2:]) for layer in (shading, shadow, skin)
+    )
     shadow = shadow * inside
     if fitted is not None:
         share = np.clip(within / (FADE_SHARE * size), 0, 1).astype(np.float32)
@@ -196,8 +210,9 @@ def divide(srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray,
     albedo = linear / np.exp(shading)
     bare = inside & (skin > 0.5)
     bright = float(np.quantile(albedo[bare].max(-1), 0.75)) if bare.any() else 0.0
-    return images.linear_to_srgb(albedo
-                                 * min(1.0, MAX_ALBEDO / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(np.float32)
+    return images.linear_to_srgb(albedo * min(1.0, MAX_ALBEDO / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(
+        np.float32
+    )
 
 
 def _landmarks(head: LitHead) -> np.ndarray:

@@ -21,8 +21,15 @@ ZONE_SHARE = 0.008  # and of the zone about it that must be no darker or lighter
 FINE_SHARE = 0.0025  # skin's detail below this scale is kept even there
 
 
-def estimate_sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, skin: np.ndarray,
-                       head: np.ndarray, side: int) -> np.ndarray:
+def estimate_sun_share(
+    linear: np.ndarray,
+    ambient: np.ndarray,
+    direct: np.ndarray,
+    free: np.ndarray,
+    skin: np.ndarray,
+    head: np.ndarray,
+    side: int,
+) -> np.ndarray:
     """How much of the sun each pixel gets.
 
     Parameters
@@ -45,8 +52,10 @@ def estimate_sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarr
     albedo = np.zeros_like(log)
     share = np.full(head.shape, 0.5, np.float32)
     for _ in range(6):
-        evidence = skin * np.clip(log_likelihood(log - sunlit - albedo) - log_likelihood(log - shaded - albedo), -12,
-                                  12) + prior
+        evidence = (
+            skin * np.clip(log_likelihood(log - sunlit - albedo) - log_likelihood(log - shaded - albedo), -12, 12)
+            + prior
+        )
         for _ in range(4):
             around = _mean_over(share, head, 0.004 * side)
             odds = np.clip(evidence + COHERENCE_LOG_ODDS * (2 * around - 1), -30, 30)
@@ -54,12 +63,14 @@ def estimate_sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarr
         sharp = (share > 0.5)[..., None]
         deviation = np.clip(log - np.where(sharp, sunlit, shaded), -0.8, 0.8)
         albedo = _mean_over(deviation, head, ALBEDO_SHARE * side)
-    return _soften((share > 0.5) & head, log, np.where(sharp, sunlit, shaded), ambient, direct, head,
-                   max(1.5, BAND_SHARE * side))
+    return _soften(
+        (share > 0.5) & head, log, np.where(sharp, sunlit, shaded), ambient, direct, head, max(1.5, BAND_SHARE * side)
+    )
 
 
-def remove_seams(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, zone_px: float,
-                 fine_px: float) -> np.ndarray:
+def remove_seams(
+    log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, zone_px: float, fine_px: float
+) -> np.ndarray:
     """What to take from a log albedo along the edges of a shadow so that no outline of it stays.
 
     Bounces, subsurface light and the video's chroma make a penumbra that one share cannot explain. Near an edge the
@@ -109,14 +120,18 @@ def _mean_over(image: np.ndarray, mask: np.ndarray, sigma: float) -> np.ndarray:
         height, width = mask.shape
         small = (max(width // 4, 1), max(height // 4, 1))
         weight = cv2.resize(mask.astype(np.float32), small, interpolation=cv2.INTER_AREA)
-        total = cv2.resize(np.asarray(image * (mask if image.ndim == 2 else mask[..., None]), np.float32), small,
-                           interpolation=cv2.INTER_AREA)
+        total = cv2.resize(
+            np.asarray(image * (mask if image.ndim == 2 else mask[..., None]), np.float32),
+            small,
+            interpolation=cv2.INTER_AREA,
+        )
         norm = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma / 4), 1e-4)
         mean = cv2.GaussianBlur(total, (0, 0), sigma / 4) / (norm if image.ndim == 2 else norm[..., None])
         return cv2.resize(mean, (width, height), interpolation=cv2.INTER_LINEAR)
     weight = mask.astype(np.float32)
-    total = cv2.GaussianBlur(np.asarray(image * (weight if image.ndim == 2 else weight[..., None]), np.float32),
-                             (0, 0), sigma)
+    total = cv2.GaussianBlur(
+        np.asarray(image * (weight if image.ndim == 2 else weight[..., None]), np.float32), (0, 0), sigma
+    )
     norm = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-4)
     return total / (norm if image.ndim == 2 else norm[..., None])
 

@@ -36,6 +36,7 @@ def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Itera
     views = read_views(capture, selected_only=True)
     face, face_count = None, 0
     for i, view in enumerate(views):
+
         def step(i: int = i) -> None:
             report.progress(i, len(views), f"Delighting frame {i + 1} of {len(views)}")
 
@@ -59,13 +60,15 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
     checkpoint = _kept(settings.checkpoint, path.stat().st_mtime_ns if path.exists() else 0)
     face = detect(srgb)
     if face is None:
-        raise Problem("OpenDelight found no face in the photograph.",
-                      "Choose another photograph, or another delighter.")
+        raise Problem(
+            "OpenDelight found no face in the photograph.", "Choose another photograph, or another delighter."
+        )
     return delight_face(srgb, face, checkpoint), None
 
 
-def delight_face(srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu",
-                 step: Callable[[], None] = lambda: None) -> np.ndarray:
+def delight_face(
+    srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu", step: Callable[[], None] = lambda: None
+) -> np.ndarray:
     """A frame with the albedo of one face in it.
 
     Parameters
@@ -82,8 +85,9 @@ def delight_face(srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: s
     """
     to_crop = ffhq_alignment(face, CROP_PX, FFHQ_MARGIN)
     crop = cut_face(srgb, to_crop, CROP_PX)
-    mask = np.maximum(face_mask(face, to_crop, CROP_PX),
-                      face_mask(face, to_crop, CROP_PX, FACE_RIM) * (segment_person(crop) > 0.5))
+    mask = np.maximum(
+        face_mask(face, to_crop, CROP_PX), face_mask(face, to_crop, CROP_PX, FACE_RIM) * (segment_person(crop) > 0.5)
+    )
     picture = torch.from_numpy((crop * mask[..., None]).transpose(2, 0, 1)[None].astype(np.float32)).to(device)
     albedo = delight_crop(checkpoint.base, checkpoint.enhancer, picture, step)[0].permute(1, 2, 0).cpu().numpy()
     return put_face_back(srgb, crop, albedo, mask, to_crop)

@@ -16,8 +16,9 @@ from ..contract.messages import Problem
 from .opendelight_network import HEAD_WIDTH, base_shapes, enhancer_shapes
 
 BASE, ENHANCER = "base_delight_network.pth", "unet_enhancer.pth"
-CHOOSE = (f"Choose the folder with {BASE} and {ENHANCER}, as the authors of OpenDelight publish them, or another "
-          "delighter.")
+CHOOSE = (
+    f"Choose the folder with {BASE} and {ENHANCER}, as the authors of OpenDelight publish them, or another delighter."
+)
 
 
 @dataclass(frozen=True)
@@ -38,23 +39,31 @@ def load(path: str, device: str = "cpu") -> Checkpoint:
     if not base.is_file():
         raise Problem(f"There is no OpenDelight checkpoint at {base}.", CHOOSE)
     enhancer = base.with_name(ENHANCER)
-    return Checkpoint(_read(base, base_shapes, _fits_the_crop, device),
-                      _read(enhancer, enhancer_shapes, lambda state: "", device) if enhancer.is_file() else None)
+    return Checkpoint(
+        _read(base, base_shapes, _fits_the_crop, device),
+        _read(enhancer, enhancer_shapes, lambda state: "", device) if enhancer.is_file() else None,
+    )
 
 
 def _read(path: Path, shapes: Callable, fault: Callable[[dict], str], device: str) -> dict[str, Tensor]:
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # a damaged or hostile file can make the reader fail in any way
-        raise Problem(f"{path} cannot be read as weights: it is damaged, or holds more than weights "
-                      f"({type(error).__name__}). Nothing in it was run.",
-                      "Download it again from the page of OpenDelight's authors.") from error
+        raise Problem(
+            f"{path} cannot be read as weights: it is damaged, or holds more than weights "
+            f"({type(error).__name__}). Nothing in it was run.",
+            "Download it again from the page of OpenDelight's authors.",
+        ) from error
     try:
         wanted = shapes(state)
-        wrong = [f"{name} is missing" for name in wanted
-                 if name not in state] + [f"{name} is not part of it" for name in state if name not in wanted]
-        wrong += [f"{name} is {_size(state[name].shape)}, not {_size(shape)}" for name, shape in wanted.items()
-                  if name in state and state[name].shape != shape]
+        wrong = [f"{name} is missing" for name in wanted if name not in state] + [
+            f"{name} is not part of it" for name in state if name not in wanted
+        ]
+        wrong += [
+            f"{name} is {_size(state[name].shape)}, not {_size(shape)}"
+            for name, shape in wanted.items()
+            if name in state and state[name].shape != shape
+        ]
         wrong += [defect] if (defect := fault(state)) else []
     except (KeyError, IndexError, TypeError, AttributeError) as error:
         what = error.args[0] if isinstance(error, KeyError) else "its first tensors"

@@ -46,12 +46,21 @@ def base_shapes(state: State) -> dict[str, tuple[int, ...]]:
     IndexError where it is none."""
     patch = state["encoder.patch_embed.proj.weight"].shape
     width, hidden = patch[0], state["encoder.blocks.0.mlp.fc1.weight"].shape[0]
-    shapes = {"encoder.cls_token": (1, 1, width), "encoder.reg_token": (2, state["encoder.reg_token"].shape[1], width),
-              "encoder.patch_embed.proj.weight": (width, 3, patch[2], patch[2]),
-              "encoder.patch_embed.proj.bias": (width,)}
+    shapes = {
+        "encoder.cls_token": (1, 1, width),
+        "encoder.reg_token": (2, state["encoder.reg_token"].shape[1], width),
+        "encoder.patch_embed.proj.weight": (width, 3, patch[2], patch[2]),
+        "encoder.patch_embed.proj.bias": (width,),
+    }
     for i in range(_count(state, "encoder.blocks.{}.norm1.weight", 1)):
-        sizes = {"norm1": (width,), "attn.qkv": (3 * width, width), "attn.proj": (width, width), "norm2": (width,),
-                 "mlp.fc1": (hidden, width), "mlp.fc2": (width, hidden)}
+        sizes = {
+            "norm1": (width,),
+            "attn.qkv": (3 * width, width),
+            "attn.proj": (width, width),
+            "norm2": (width,),
+            "mlp.fc1": (hidden, width),
+            "mlp.fc2": (width, hidden),
+        }
         for name, size in sizes.items():
             shapes |= {f"encoder.blocks.{i}.{name}.weight": size, f"encoder.blocks.{i}.{name}.bias": size[:1]}
     shapes |= {"encoder.norm.weight": (width,), "encoder.norm.bias": (width,)}
@@ -61,8 +70,10 @@ def base_shapes(state: State) -> dict[str, tuple[int, ...]]:
         shapes[f"decoder.deconv_layers.{3 * i}.weight"] = (channels, out, 4, 4)
         channels = out
     for i in range(_count(state, "decoder.conv_layers.{}.weight", 3)):
-        shapes |= {f"decoder.conv_layers.{3 * i}.weight": (channels, channels, 1, 1),
-                   f"decoder.conv_layers.{3 * i}.bias": (channels,)}
+        shapes |= {
+            f"decoder.conv_layers.{3 * i}.weight": (channels, channels, 1, 1),
+            f"decoder.conv_layers.{3 * i}.bias": (channels,),
+        }
     return shapes | {"decoder.cls_conv.weight": (3, channels, 1, 1), "decoder.cls_conv.bias": (3,)}
 
 
@@ -70,11 +81,19 @@ def enhancer_shapes(state: State) -> dict[str, tuple[int, ...]]:
     """The same of the second network, for the width of `state`."""
     w = state["inc_1.res_conv.0.weight"].shape[0]
     shapes = _residual_shapes("inc_1", (0, 3), (1, 4), 6, w, first=True)
-    for name, channels, out in (("down1_1", w, 2 * w), ("down2_1", 2 * w, 4 * w), ("down3_1", 4 * w, 8 * w),
-                                ("down4_1", 8 * w, 8 * w)):
+    for name, channels, out in (
+        ("down1_1", w, 2 * w),
+        ("down2_1", 2 * w, 4 * w),
+        ("down3_1", 4 * w, 8 * w),
+        ("down4_1", 8 * w, 8 * w),
+    ):
         shapes |= _residual_shapes(f"{name}.resdown_conv.1", (2, 5), (0, 3), channels, out)
-    for name, channels, out in (("up1_1", 16 * w, 4 * w), ("up2_1", 8 * w, 2 * w), ("up3_1", 4 * w, w),
-                                ("up4_1", 2 * w, w)):
+    for name, channels, out in (
+        ("up1_1", 16 * w, 4 * w),
+        ("up2_1", 8 * w, 2 * w),
+        ("up3_1", 4 * w, w),
+        ("up4_1", 2 * w, w),
+    ):
         shapes |= _residual_shapes(f"{name}.conv", (2, 5), (0, 3), channels, out)
     return shapes | {"outc_1.conv.weight": (3, w, 1, 1), "outc_1.conv.bias": (3,)}
 
@@ -87,19 +106,22 @@ def _encoded(state: State, picture: Tensor, step: Step) -> Tensor:
     width, side = patches.shape[1:3]
     x = patches.flatten(2).transpose(1, 2) + _positions(side, width).to(picture)
     # the class token's position is zero
-    x = torch.cat([state["encoder.cls_token"], state["encoder.reg_token"][REGISTER_SET:REGISTER_SET + 1], x], 1)
+    x = torch.cat([state["encoder.cls_token"], state["encoder.reg_token"][REGISTER_SET : REGISTER_SET + 1], x], 1)
     for i in range(_count(state, "encoder.blocks.{}.norm1.weight", 1)):
         at = f"encoder.blocks.{i}."
-        query, key, value = _linear(state, at + "attn.qkv",
-                                    _norm(state, at + "norm1", x)).view(1, -1, 3, width // HEAD_WIDTH,
-                                                                        HEAD_WIDTH).permute(2, 0, 3, 1, 4)
+        query, key, value = (
+            _linear(state, at + "attn.qkv", _norm(state, at + "norm1", x))
+            .view(1, -1, 3, width // HEAD_WIDTH, HEAD_WIDTH)
+            .permute(2, 0, 3, 1, 4)
+        )
         seen = functional.scaled_dot_product_attention(query, key, value).transpose(1, 2).reshape(x.shape)
         x = x + _linear(state, at + "attn.proj", seen)
         step()
-        x = x + _linear(state, at + "mlp.fc2",
-                        functional.gelu(_linear(state, at + "mlp.fc1", _norm(state, at + "norm2", x))))
+        x = x + _linear(
+            state, at + "mlp.fc2", functional.gelu(_linear(state, at + "mlp.fc1", _norm(state, at + "norm2", x)))
+        )
         step()
-    return _norm(state, "encoder.norm", x)[:, -side * side:].transpose(1, 2).reshape(1, width, side, side)
+    return _norm(state, "encoder.norm", x)[:, -side * side :].transpose(1, 2).reshape(1, width, side, side)
 
 
 def _decoded(state: State, x: Tensor, step: Step) -> Tensor:
@@ -109,7 +131,7 @@ def _decoded(state: State, x: Tensor, step: Step) -> Tensor:
     for i in range(_count(state, "decoder.conv_layers.{}.weight", 3)):
         weight, bias = (state[f"decoder.conv_layers.{3 * i}.{kind}"] for kind in ("weight", "bias"))
         for top in range(0, x.shape[2], 4 * STRIP_ROWS):
-            x[:, :, top:top + 4 * STRIP_ROWS] = functional.conv2d(x[:, :, top:top + 4 * STRIP_ROWS], weight, bias)
+            x[:, :, top : top + 4 * STRIP_ROWS] = functional.conv2d(x[:, :, top : top + 4 * STRIP_ROWS], weight, bias)
             step()
         x = _activated(x, step)
     return torch.sigmoid(functional.conv2d(x, state["decoder.cls_conv.weight"], state["decoder.cls_conv.bias"]))
@@ -124,7 +146,7 @@ def _doubled(x: Tensor, weight: Tensor, step: Step) -> Tensor:
         end = min(top + STRIP_ROWS, height)
         above, below = max(top - 1, 0), min(end + 1, height)
         strip = functional.conv_transpose2d(x[:, :, above:below], weight, stride=2, padding=1)
-        out[:, :, 2 * top:2 * end] = strip[:, :, 2 * (top - above):2 * (end - above)]
+        out[:, :, 2 * top : 2 * end] = strip[:, :, 2 * (top - above) : 2 * (end - above)]
         step()
     return out
 
@@ -153,8 +175,9 @@ def _enhanced(state: State, x: Tensor, step: Step) -> Tensor:
 def _first(state: State, name: str, x: Tensor, step: Step) -> Tensor:
     y = x
     for convolution, norm in ((0, 1), (3, 4)):
-        y = functional.leaky_relu(_batch_norm(state, f"{name}.res_conv.{norm}",
-                                              _convolved(state, f"{name}.res_conv.{convolution}", y)), 0.02)
+        y = functional.leaky_relu(
+            _batch_norm(state, f"{name}.res_conv.{norm}", _convolved(state, f"{name}.res_conv.{convolution}", y)), 0.02
+        )
         step()
     return y + _convolved(state, f"{name}.addtion_layer", x)
 
@@ -163,21 +186,28 @@ def _residual(state: State, name: str, x: Tensor, step: Step) -> Tensor:
     """A residual block that normalises before it convolves; where the width changes, its shortcut is a convolution."""
     y = x
     for norm, convolution in ((0, 2), (3, 5)):
-        y = _convolved(state, f"{name}.res_conv.{convolution}",
-                       functional.leaky_relu(_batch_norm(state, f"{name}.res_conv.{norm}", y), 0.02))
+        y = _convolved(
+            state,
+            f"{name}.res_conv.{convolution}",
+            functional.leaky_relu(_batch_norm(state, f"{name}.res_conv.{norm}", y), 0.02),
+        )
         step()
     return y + (_convolved(state, f"{name}.addtion_layer", x) if f"{name}.addtion_layer.weight" in state else x)
 
 
-def _residual_shapes(name: str, convolutions: tuple, norms: tuple, channels: int, out: int,
-                     first: bool = False) -> dict[str, tuple[int, ...]]:
+def _residual_shapes(
+    name: str, convolutions: tuple, norms: tuple, channels: int, out: int, first: bool = False
+) -> dict[str, tuple[int, ...]]:
     shapes = {}
     for convolution, sizes in zip(convolutions, ((out, channels), (out, out)), strict=True):
-        shapes |= {f"{name}.res_conv.{convolution}.weight": (*sizes, 3, 3),
-                   f"{name}.res_conv.{convolution}.bias": (out,)}
+        shapes |= {
+            f"{name}.res_conv.{convolution}.weight": (*sizes, 3, 3),
+            f"{name}.res_conv.{convolution}.bias": (out,),
+        }
     for norm, size in zip(norms, (out, out) if first else (channels, out), strict=True):
-        shapes |= {f"{name}.res_conv.{norm}.{kind}": (size,)
-                   for kind in ("weight", "bias", "running_mean", "running_var")}
+        shapes |= {
+            f"{name}.res_conv.{norm}.{kind}": (size,) for kind in ("weight", "bias", "running_mean", "running_var")
+        }
         shapes[f"{name}.res_conv.{norm}.num_batches_tracked"] = ()
     if channels != out:
         shapes |= {f"{name}.addtion_layer.weight": (out, channels, 1, 1), f"{name}.addtion_layer.bias": (out,)}
@@ -210,9 +240,9 @@ def _linear(state: State, name: str, x: Tensor) -> Tensor:
 
 
 def _batch_norm(state: State, name: str, x: Tensor) -> Tensor:
-    return functional.batch_norm(x,
-                                 *(state[f"{name}.{kind}"]
-                                   for kind in ("running_mean", "running_var", "weight", "bias")))
+    return functional.batch_norm(
+        x, *(state[f"{name}.{kind}"] for kind in ("running_mean", "running_var", "weight", "bias"))
+    )
 
 
 def _convolved(state: State, name: str, x: Tensor) -> Tensor:

@@ -51,8 +51,10 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
     Problem where no face is found."""
     face = faces.detect(srgb)
     if face is None:
-        raise Problem("No face was found in the photograph.",
-                      "Choose a photograph that shows the face from the front or half from the side.")
+        raise Problem(
+            "No face was found in the photograph.",
+            "Choose a photograph that shows the face from the front or half from the side.",
+        )
     points = face.landmarks[:, :2].astype(np.float64)
     look = _ask(srgb, points)
     parts, side = parser.parse(srgb, face.landmarks), len(look.shading)
@@ -69,15 +71,19 @@ def fit_head(srgb: np.ndarray, points: np.ndarray) -> tuple[PhotographView, Head
     """The photograph [H, W, 3] as a view of the head of the identity space that its landmarks [468, 2] (pixels) show.
     How far away it stands is a guess, for its focal length is."""
     height, width = srgb.shape[:2]
-    bundle = place_by_landmarks([{"names": [NAME], "width": width, "height": height, "focal_px": None}], {NAME: 0},
-                                [NAME], {NAME: points})
+    bundle = place_by_landmarks(
+        [{"names": [NAME], "width": width, "height": height, "focal_px": None}], {NAME: 0}, [NAME], {NAME: points}
+    )
     bundle = adjust(bundle, Observations(np.zeros(len(points), int), np.arange(len(points)), points))
-    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=width, height=height,
-                             params=[bundle.focal[0], width / 2, height / 2])
+    camera = pycolmap.Camera(
+        model="SIMPLE_PINHOLE", width=width, height=height, params=[bundle.focal[0], width / 2, height / 2]
+    )
     mesh = template.load()
     mesh = mesh.moved(mesh.vertices + np.tensordot(bundle.coefficients, template.identity(), 1))
-    return (PhotographView(NAME, Path(NAME), camera, bundle.rotations[0], bundle.translations[0], True, srgb),
-            Head(mesh))
+    return (
+        PhotographView(NAME, Path(NAME), camera, bundle.rotations[0], bundle.translations[0], True, srgb),
+        Head(mesh),
+    )
 
 
 def _ask(srgb: np.ndarray, points: np.ndarray) -> ShadingEstimate:

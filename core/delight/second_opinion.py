@@ -31,8 +31,9 @@ FITTED = Weighing(share=0.6, doubt=0.15)
 """Of the fitted light: the best over twelve people in sixteen captures (benchmarks/delight_answers.py)."""
 
 
-def weigh_in(looks: list[ShadingEstimate], answers: list[np.ndarray], skins: list[np.ndarray],
-             weighing: Weighing = FITTED) -> list[ShadingEstimate]:
+def weigh_in(
+    looks: list[ShadingEstimate], answers: list[np.ndarray], skins: list[np.ndarray], weighing: Weighing = FITTED
+) -> list[ShadingEstimate]:
     """The looks moved towards another answer, brought to their level over bare skin; as they are where no skin tells
     the level.
 
@@ -43,20 +44,33 @@ def weigh_in(looks: list[ShadingEstimate], answers: list[np.ndarray], skins: lis
     skins : [h, h] for each, in [0, 1], bare skin above 0.5
     weighing : how far the other answer counts
     """
-    apart = np.concatenate([(answer - look.shading)[skin > 0.5]
-                            for look, answer, skin in zip(looks, answers, skins, strict=True)])
+    apart = np.concatenate(
+        [(answer - look.shading)[skin > 0.5] for look, answer, skin in zip(looks, answers, skins, strict=True)]
+    )
     if not len(apart):
         return looks
     level = np.median(apart, 0)
     weight = weighing.share / (1 + np.mean((apart - level).mean(-1) ** 2) / weighing.doubt**2)
-    return [replace(look, shading=np.where((look.face >= 0)[..., None],
-                                           look.shading + weight * (answer - level - look.shading),
-                                           look.shading).astype(np.float32))
-            for look, answer in zip(looks, answers, strict=True)]
+    return [
+        replace(
+            look,
+            shading=np.where(
+                (look.face >= 0)[..., None], look.shading + weight * (answer - level - look.shading), look.shading
+            ).astype(np.float32),
+        )
+        for look, answer in zip(looks, answers, strict=True)
+    ]
 
 
-def continue_beyond(shading: np.ndarray, shadow: np.ndarray, confidence: np.ndarray, box: tuple[slice, slice],
-                    light: np.ndarray, share: np.ndarray, on_head: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def continue_beyond(
+    shading: np.ndarray,
+    shadow: np.ndarray,
+    confidence: np.ndarray,
+    box: tuple[slice, slice],
+    light: np.ndarray,
+    share: np.ndarray,
+    on_head: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     """A frame's shading and shadow, carried on by the fitted light where confidence falls to 0: scalp and neck lie
     beyond what the network sees.
 
@@ -87,5 +101,6 @@ def continue_beyond(shading: np.ndarray, shadow: np.ndarray, confidence: np.ndar
 
 def average_cells(light: np.ndarray, side: int) -> np.ndarray:
     """The log [side, side, 3] of the light in a square picture, linear [S, S, 3], averaged as the eye would."""
-    return np.log(np.maximum(cv2.resize(np.asarray(light, np.float32), (side, side), interpolation=cv2.INTER_AREA),
-                             1e-4))
+    return np.log(
+        np.maximum(cv2.resize(np.asarray(light, np.float32), (side, side), interpolation=cv2.INTER_AREA), 1e-4)
+    )

@@ -44,8 +44,9 @@ def _delight(view: View, head: LitHead) -> Delit:
     return Delit(view, srgb, shadow if head.light.has_sun else None)
 
 
-def light_in_frame(view: View, head: LitHead,
-                   srgb: np.ndarray) -> tuple[tuple[slice, slice], np.ndarray, np.ndarray, np.ndarray] | None:
+def light_in_frame(
+    view: View, head: LitHead, srgb: np.ndarray
+) -> tuple[tuple[slice, slice], np.ndarray, np.ndarray, np.ndarray] | None:
     """Where a frame [H, W, 3] shows the head, with a margin: that part of it, and there what `light_seen` says and
     where the head is; None if nowhere."""
     face, bary, _ = render_view(head.caster, view)
@@ -56,8 +57,9 @@ def light_in_frame(view: View, head: LitHead,
     return box, lit, share, face[box] >= 0
 
 
-def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray,
-               side: int) -> tuple[np.ndarray, np.ndarray]:
+def light_seen(
+    linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray, side: int
+) -> tuple[np.ndarray, np.ndarray]:
     """The light that the head's fit expects in a picture.
 
     Parameters
@@ -81,12 +83,14 @@ def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.nda
         share = estimate_sun_share(linear, ambient, direct, free, 1 - own, here, side)
     lit = np.maximum(bleed((ambient + share[..., None] * direct).astype(np.float32), here), 1e-4)
     if head.light.has_sun:
-        lit = lit * np.exp(remove_seams(np.log(np.maximum(linear, 1e-3) / lit), share, here, ZONE_SHARE * side,
-                                        FINE_SHARE * side))
+        lit = lit * np.exp(
+            remove_seams(np.log(np.maximum(linear, 1e-3) / lit), share, here, ZONE_SHARE * side, FINE_SHARE * side)
+        )
     return lit, share
 
 
 def _box(mask: np.ndarray, margin: int = 8) -> tuple[slice, slice]:
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    return slice(max(rows[0] - margin, 0),
-                 rows[-1] + margin + 1), slice(max(columns[0] - margin, 0), columns[-1] + margin + 1)
+    return slice(max(rows[0] - margin, 0), rows[-1] + margin + 1), slice(
+        max(columns[0] - margin, 0), columns[-1] + margin + 1
+    )

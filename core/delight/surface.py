@@ -38,8 +38,9 @@ def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
     return normals
 
 
-def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
-                   report: Reporter) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def vertex_colours(
+    head: Head, normals: np.ndarray, views: list[View], report: Reporter
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """What the views show of each vertex' colour.
 
     Parameters
@@ -80,8 +81,10 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
     seen_colours[hidden] = np.nan
     count = np.isfinite(seen_colours[..., 0]).sum(0)
     if (count > 0).sum() < 100:
-        raise Problem("The registered head is hardly visible in the selected frames.",
-                      "Click Open Report, and look at the pictures of Cameras and Head (in a terminal: report.html).")
+        raise Problem(
+            "The registered head is hardly visible in the selected frames.",
+            "Click Open Report, and look at the pictures of Cameras and Head (in a terminal: report.html).",
+        )
     colours = np.zeros((len(mesh.vertices), 3))
     colours[count > 0] = np.nanmedian(seen_colours[:, count > 0], 0)
     return colours, count, share[:, :-1].sum(1).clip(0, 1), share[:, -1]

@@ -51,22 +51,34 @@ def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
     """Has the frames of a plan answered, after everything that could forbid it was asked; the number of calls. Raises
     Problem."""
     if os.environ.get(service.OFFLINE_VARIABLE):
-        raise Problem("Blender is set to work offline, and SwitchLight is on the network: nothing was sent.",
-                      "Allow online access (Preferences, System, Network), or choose another delighter.")
+        raise Problem(
+            "Blender is set to work offline, and SwitchLight is on the network: nothing was sent.",
+            "Allow online access (Preferences, System, Network), or choose another delighter.",
+        )
     consent.require(capture, plan)
     account = Account(service.base(), service.key())
     for line in consent.lines(plan):
         report.log(line)
     left = _listening(report, lambda: balance(account))
     if left is not None and left < plan.credits:
-        raise Problem(f"{service.amount(plan.credits)} are needed, and your SwitchLight account has "
-                      f"{service.amount(left)}: nothing was sent.",
-                      f"Buy some at {service.WEBSITE}, lower Views under Reconstruction, Frames, or take small "
-                      "pictures at half the credits (--preview).")
-    report.log("SwitchLight does not say how many credits are left." if left is None
-               else f"Your account has {service.amount(left)}.")
-    return send(account, [pack_frame(capture, name, content, plan.preview) for name, content in plan.frames.items()],
-                plan.preview, report, PATIENCE)
+        raise Problem(
+            f"{service.amount(plan.credits)} are needed, and your SwitchLight account has "
+            f"{service.amount(left)}: nothing was sent.",
+            f"Buy some at {service.WEBSITE}, lower Views under Reconstruction, Frames, or take small "
+            "pictures at half the credits (--preview).",
+        )
+    report.log(
+        "SwitchLight does not say how many credits are left."
+        if left is None
+        else f"Your account has {service.amount(left)}."
+    )
+    return send(
+        account,
+        [pack_frame(capture, name, content, plan.preview) for name, content in plan.frames.items()],
+        plan.preview,
+        report,
+        PATIENCE,
+    )
 
 
 def pack_frame(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
@@ -86,12 +98,15 @@ def pack_frame(capture: Capture, name: str, content: str, preview: bool) -> Parc
     """
     path = capture.frames / name
     if path.suffix.lower() not in MEDIA_TYPES:
-        raise Problem(f"SwitchLight does not accept pictures like {name}.",
-                      "Run the stage Frames again, which writes JPEG.")
+        raise Problem(
+            f"SwitchLight does not accept pictures like {name}.", "Run the stage Frames again, which writes JPEG."
+        )
     data = path.read_bytes()
     if hash_bytes(data) != content:
-        raise Problem(f"The frame {name} changed after you agreed to send it: nothing more was sent.",
-                      "Look at the frames, and click Allow Sending again.")
+        raise Problem(
+            f"The frame {name} changed after you agreed to send it: nothing more was sent.",
+            "Look at the frames, and click Allow Sending again.",
+        )
     return Parcel(name, data, path.suffix.lower(), consent.answer(capture, content, preview))
 
 
@@ -116,9 +131,11 @@ def fitted(answer: np.ndarray, view: View) -> np.ndarray:
     """An answer [h, w, 1 to 4] as its frame, sRGB [H, W, 3]: where the service cut the background away, the frame's own
     shows. Raises Problem where it is another section."""
     if abs(answer.shape[1] / answer.shape[0] - view.width / view.height) > 0.01:
-        raise Problem(f"SwitchLight answered {view.name} with {answer.shape[1]} x {answer.shape[0]} pixels, but the "
-                      f"frame is {view.width} x {view.height}.",
-                      "The answer is kept in the capture's folder switchlight; choose another delighter.")
+        raise Problem(
+            f"SwitchLight answered {view.name} with {answer.shape[1]} x {answer.shape[0]} pixels, but the "
+            f"frame is {view.width} x {view.height}.",
+            "The answer is kept in the capture's folder switchlight; choose another delighter.",
+        )
     if answer.shape[:2] != (view.height, view.width):
         answer = images.resize(answer, view.width, view.height).reshape(view.height, view.width, -1)
     colour = answer[..., :3] if answer.shape[2] >= 3 else np.repeat(answer[..., :1], 3, 2)

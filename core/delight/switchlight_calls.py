@@ -55,8 +55,15 @@ class Account:
         return f"Account({self.base})"
 
 
-def albedo(account: Account, data: bytes, suffix: str, preview: bool, silence_s: float, call_s: float,
-           stopped: Callable[[], bool]) -> bytes:
+def albedo(
+    account: Account,
+    data: bytes,
+    suffix: str,
+    preview: bool,
+    silence_s: float,
+    call_s: float,
+    stopped: Callable[[], bool],
+) -> bytes:
     """The whole PNG that answers a picture.
 
     Parameters
@@ -89,15 +96,18 @@ def balance(account: Account, silence_s: float = 10.0) -> float | None:
     """Credits left on the account, None where the service does not say. Raises Problem where it refuses the key or
     cannot be reached at all."""
     try:
-        reply = json.loads(_answer(account, _request(account, service.CREDITS), silence_s, time.monotonic() + silence_s,
-                                   lambda: False))
+        reply = json.loads(
+            _answer(account, _request(account, service.CREDITS), silence_s, time.monotonic() + silence_s, lambda: False)
+        )
         for name in service.BALANCE:
             reply = reply[name]
         return float(reply)
     except AgainError as error:
         if not error.reached:
-            raise Problem(f"SwitchLight cannot be used now: {error.reason}. Nothing was sent.",
-                          "Check the network connection, and run again.") from None
+            raise Problem(
+                f"SwitchLight cannot be used now: {error.reason}. Nothing was sent.",
+                "Check the network connection, and run again.",
+            ) from None
     except AccountProblem:
         raise
     except (Problem, ValueError, KeyError, TypeError):
@@ -112,8 +122,8 @@ def is_whole_png(data: bytes) -> bool:
     at = 8
     while at + 12 <= len(data):
         length, kind = struct.unpack_from(">I4s", data, at)
-        body = data[at + 4:at + 8 + length]
-        if len(body) != 4 + length or data[at + 8 + length:at + 12 + length] != struct.pack(">I", zlib.crc32(body)):
+        body = data[at + 4 : at + 8 + length]
+        if len(body) != 4 + length or data[at + 8 + length : at + 12 + length] != struct.pack(">I", zlib.crc32(body)):
             return False
         if kind == b"IEND":
             return True
@@ -122,17 +132,22 @@ def is_whole_png(data: bytes) -> bool:
 
 
 def _request(account: Account, path: str, body: bytes | None = None) -> urllib.request.Request:
-    return urllib.request.Request(account.base + path, body,
-                                  {service.KEY_HEADER: account.key, "User-Agent": f"WildCap-for-Blender/{__version__}"})
+    return urllib.request.Request(
+        account.base + path, body, {service.KEY_HEADER: account.key, "User-Agent": f"WildCap-for-Blender/{__version__}"}
+    )
 
 
 def _multipart(boundary: str, data: bytes, suffix: str, fields: dict[str, str]) -> bytes:
     """The body; the picture's own name stays here, it may say who that is."""
-    parts = [f'--{boundary}\r\nContent-Disposition: form-data; name="{name}"\r\n\r\n{value}\r\n'.encode()
-             for name, value in fields.items()]
-    head = (f'--{boundary}\r\nContent-Disposition: form-data; name="{service.PICTURE_FIELD}"; '
-            f'filename="frame{suffix}"\r\n'
-            f"Content-Type: {MEDIA_TYPES[suffix]}\r\n\r\n").encode()
+    parts = [
+        f'--{boundary}\r\nContent-Disposition: form-data; name="{name}"\r\n\r\n{value}\r\n'.encode()
+        for name, value in fields.items()
+    ]
+    head = (
+        f'--{boundary}\r\nContent-Disposition: form-data; name="{service.PICTURE_FIELD}"; '
+        f'filename="frame{suffix}"\r\n'
+        f"Content-Type: {MEDIA_TYPES[suffix]}\r\n\r\n"
+    ).encode()
     return b"".join([*parts, head, data, f"\r\n--{boundary}--\r\n".encode()])
 
 
@@ -141,13 +156,15 @@ class _Stay(urllib.request.HTTPRedirectHandler):
         return None
 
 
-def _answer(account: Account, request: urllib.request.Request, silence_s: float, end: float,
-            stopped: Callable[[], bool]) -> bytes:
+def _answer(
+    account: Account, request: urllib.request.Request, silence_s: float, end: float, stopped: Callable[[], bool]
+) -> bytes:
     """The body of an answer with status 200, whole. Raises AgainError or Problem."""
     # Studios reach the internet by the proxy that their machines are set up with; this very machine is reached
     # directly.
-    opener = urllib.request.build_opener(_Stay,
-                                         *([urllib.request.ProxyHandler({})] if service.local(account.base) else []))
+    opener = urllib.request.build_opener(
+        _Stay, *([urllib.request.ProxyHandler({})] if service.local(account.base) else [])
+    )
     try:
         with opener.open(request, timeout=silence_s) as response:
             return _read(response, end, stopped)
@@ -165,13 +182,15 @@ def _answer(account: Account, request: urllib.request.Request, silence_s: float,
             ) from None
         if isinstance(error.reason, TimeoutError):
             raise AgainError("it did not answer in time") from None
-        raise AgainError(f"it cannot be reached ({getattr(error.reason, 'strerror', None) or error.reason})",
-                         reached=False) from None
+        raise AgainError(
+            f"it cannot be reached ({getattr(error.reason, 'strerror', None) or error.reason})", reached=False
+        ) from None
     except TimeoutError:
         raise AgainError("it did not answer in time") from None
     except (OSError, http.client.HTTPException) as error:
-        raise AgainError(f"the connection broke ({type(error).__name__})",
-                         spoiled=isinstance(error, http.client.IncompleteRead)) from None
+        raise AgainError(
+            f"the connection broke ({type(error).__name__})", spoiled=isinstance(error, http.client.IncompleteRead)
+        ) from None
 
 
 def _read(response, end: float, stopped: Callable[[], bool]) -> bytes:
@@ -197,15 +216,21 @@ def _refusal(account: Account, status: int, body: bytes) -> Problem | None:
     """What a refusal means; None for an answer with status 200 that says nothing."""
     said = _said(body).replace(account.key, "(the key)")
     if status == 402 or "no credit" in said.lower():
-        return AccountProblem("SwitchLight says that your account has no credits left.",
-                              f"Buy some at {service.WEBSITE}, then run again: what came is kept.")
+        return AccountProblem(
+            "SwitchLight says that your account has no credits left.",
+            f"Buy some at {service.WEBSITE}, then run again: what came is kept.",
+        )
     if status in (401, 403):
-        return AccountProblem(f"SwitchLight does not accept the key ({status}{f': {said}' if said else ''}).",
-                              f"Compare it with the one on your account's page at {service.WEBSITE}.")
+        return AccountProblem(
+            f"SwitchLight does not accept the key ({status}{f': {said}' if said else ''}).",
+            f"Compare it with the one on your account's page at {service.WEBSITE}.",
+        )
     if status != 200 or said:
-        return Problem(f"SwitchLight's answer is not as documented ({status}{f': {said}' if said else ''}).",
-                       "What came is kept. If this happens again, the service may have changed: look for a newer "
-                       "version of this extension.")
+        return Problem(
+            f"SwitchLight's answer is not as documented ({status}{f': {said}' if said else ''}).",
+            "What came is kept. If this happens again, the service may have changed: look for a newer "
+            "version of this extension.",
+        )
     return None
 
 

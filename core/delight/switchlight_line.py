@@ -67,8 +67,10 @@ def send(account: Account, parcels: list[Parcel], preview: bool, report: Reporte
         Once the calls that are under way have ended; CancelledError at once.
     """
     line = _Line(account, parcels, preview, patience)
-    threads = [threading.Thread(target=line.work, name=f"switchlight-{i}", daemon=True)
-               for i in range(min(service.MOST_AT_ONCE, len(parcels)))]
+    threads = [
+        threading.Thread(target=line.work, name=f"switchlight-{i}", daemon=True)
+        for i in range(min(service.MOST_AT_ONCE, len(parcels)))
+    ]
     try:
         for thread in threads:
             thread.start()
@@ -128,10 +130,18 @@ class _Line:
             with self._lock:
                 self.calls += 1
             try:
-                self._keep(parcel,
-                           albedo(self._account, parcel.data, parcel.suffix, self._preview, self._patience.silence_s,
-                                  self._patience.call_s,
-                                  lambda: self._cancelled))
+                self._keep(
+                    parcel,
+                    albedo(
+                        self._account,
+                        parcel.data,
+                        parcel.suffix,
+                        self._preview,
+                        self._patience.silence_s,
+                        self._patience.call_s,
+                        lambda: self._cancelled,
+                    ),
+                )
                 return
             except AgainError as error:
                 spoiled += error.spoiled
@@ -139,10 +149,12 @@ class _Line:
                 if spoiled > self._patience.spoiled:
                     break
                 self._postpone(error, attempt)
-        self._stop(Problem(f"SwitchLight did not serve the frame {parcel.name}: {last.reason}, after {attempt + 1} "
-                           "tries.",
-                           f"Run again later: the {self.done} of {self._of} answers that came are kept and are not "
-                           "paid again."))
+        self._stop(
+            Problem(
+                f"SwitchLight did not serve the frame {parcel.name}: {last.reason}, after {attempt + 1} tries.",
+                f"Run again later: the {self.done} of {self._of} answers that came are kept and are not paid again.",
+            )
+        )
 
     def _keep(self, parcel: Parcel, answer: bytes) -> None:
         """Keeps an answer that can be read as a picture. Raises AgainError for one that cannot, Problem where it cannot
@@ -158,10 +170,12 @@ class _Line:
 
     def _postpone(self, error: AgainError, attempt: int) -> None:
         """All threads leave the service alone for a while: what it asks for, and never less than our own wait."""
-        wait = min(self._patience.most_s, self._patience.first_s * 2 ** attempt) * random.uniform(0.5, 1.0)
+        wait = min(self._patience.most_s, self._patience.first_s * 2**attempt) * random.uniform(0.5, 1.0)
         if error.after_s is not None and error.after_s > self._patience.longest_s:
-            raise Problem(f"SwitchLight asks you to wait {error.after_s / 60:.0f} minutes.",
-                          "Run again then: the answers that came are kept.")
+            raise Problem(
+                f"SwitchLight asks you to wait {error.after_s / 60:.0f} minutes.",
+                "Run again then: the answers that came are kept.",
+            )
         with self._lock:
             self._not_before = max(self._not_before, time.monotonic() + max(wait, error.after_s or 0.0))
             self._reason = error.reason

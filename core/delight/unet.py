@@ -24,8 +24,13 @@ FARTHEST_LOG = 2.5  # natural log: what is left of a picture under the fitted li
 MULTIPLE_PX = 32  # of pixels, to be halved so often
 
 
-def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: np.ndarray | None = None,
-                  normal: np.ndarray | None = None, head: np.ndarray | None = None) -> tuple[np.ndarray, float]:
+def network_input(
+    srgb: np.ndarray,
+    ambient: np.ndarray | None = None,
+    sunlit: np.ndarray | None = None,
+    normal: np.ndarray | None = None,
+    head: np.ndarray | None = None,
+) -> tuple[np.ndarray, float]:
     """What the network reads of a picture. Without the head's geometry its channels are 0, and so is the last, which
     says so.
 
@@ -50,7 +55,9 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     if ambient is not None:
         for first, light in ((6, ambient), (9, sunlit)):
             rest = log - np.log(np.maximum(light, MIN_LINEAR / 4))
-            layers[first:first + 3] = (np.clip(rest, -FARTHEST_LOG, FARTHEST_LOG) * head[..., None]).transpose(2, 0, 1)
+            layers[first : first + 3] = (np.clip(rest, -FARTHEST_LOG, FARTHEST_LOG) * head[..., None]).transpose(
+                2, 0, 1
+            )
         layers[12:15] = (normal * head[..., None]).transpose(2, 0, 1)
         layers[15] = head
     return layers, middle
@@ -64,8 +71,10 @@ class DelightNet(Ladder):
         super().__init__()
         self.add_levels(widths, depths)
         self.attention = Attention(widths[-1])
-        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2,
-                                          padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
+        self.stem, self.enter = (
+            nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1),
+            nn.Conv2d(FINE, widths[0], 2, stride=2),
+        )
         self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)  # the finest level, where pictures are large, is kept thin
         self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1), nn.Conv2d(2 * FINE, 4, 3, padding=1)
         nn.init.zeros_(self.out.weight)

@@ -39,8 +39,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     mesh = delivery_plan.needs(capture, plan.what)
     checks.check_stages(capture, plan.what, settings, report)
     if settings.deliver.whole and plan.format.suffix != ".obj":
-        raise Problem(f"{plan.format.title} is written by Blender.",
-                      "Choose OBJ here, or deliver from the add-on's panel.")
+        raise Problem(
+            f"{plan.format.title} is written by Blender.", "Choose OBJ here, or deliver from the add-on's panel."
+        )
     tiles = _tiles(capture, plan, settings)
     several = len(tiles) > 1
     built_in = read_head(capture).built_in
@@ -53,8 +54,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         (folder / TEXTURES).mkdir()
         made, size = [], 0
         for i, (tile, paths) in enumerate(tiles.items()):
-            sources = maps.Sources(paths, int(settings.deliver.size), settings.deliver.roughness / 100, mean,
-                                   UNIT_M[plan.unit], regions)
+            sources = maps.Sources(
+                paths, int(settings.deliver.size), settings.deliver.roughness / 100, mean, UNIT_M[plan.unit], regions
+            )
             wanted = [picture for picture in pictures if sources.has(picture)]
             for j, picture in enumerate(wanted):
                 number = f".{tile}" if plan.numbered or several else ""
@@ -69,8 +71,13 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             wavefront.write(mesh, folder / plan.mesh, plan, made, settings.deliver.roughness / 100)
             provenance.finish(folder)
         else:
-            packing = {"name": plan.name, "mesh": plan.mesh, "several": several, "maps": made,
-                       "roughness": settings.deliver.roughness / 100}
+            packing = {
+                "name": plan.name,
+                "mesh": plan.mesh,
+                "several": several,
+                "maps": made,
+                "roughness": settings.deliver.roughness / 100,
+            }
             (folder / PACKING).write_text(json.dumps(packing, indent=1), encoding="utf-8")
     if settings.deliver.whole:
         delivery_plan.put_in_place(plan)
@@ -85,8 +92,9 @@ def _pictures(plan: DeliveryPlan, settings: Settings) -> list[MapPicture]:
         return list(SCAN_MAPS)
     base = [picture for picture in plan.preset.maps if picture.channels != ("displacement",) or plan.pictures == "exr"]
     if plan.what == "head" and settings.deliver.clean:
-        base = [MapPicture(p.name, tuple(c.replace("albedo.", "clean.") for c in p.channels), p.kind, p.slot)
-                for p in base]
+        base = [
+            MapPicture(p.name, tuple(c.replace("albedo.", "clean.") for c in p.channels), p.kind, p.slot) for p in base
+        ]
     return base + (list(HAIR) if plan.what == "head" and settings.deliver.hair else [])
 
 
@@ -98,23 +106,33 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
         files = {HEAD_TILE: {"albedo": delivery / "scan_albedo.png", "lit": delivery / "scan_lit.png"}}
     elif plan.what == "own_mesh":
         numbers = [int(path.suffixes[-2][1:]) for path in sorted(delivery.glob("own_diffuse_albedo.????.png"))]
-        files = {number
-                 or HEAD_TILE: {name: delivery / f"own_{file}{f'.{number}' if number else ''}.png" for name, file in
-                                (("albedo", "diffuse_albedo"), ("normal", "normal"), ("specular", "specular_albedo"))}
-                 for number in numbers or [0]}
+        files = {
+            number or HEAD_TILE: {
+                name: delivery / f"own_{file}{f'.{number}' if number else ''}.png"
+                for name, file in (("albedo", "diffuse_albedo"), ("normal", "normal"), ("specular", "specular_albedo"))
+            }
+            for number in numbers or [0]
+        }
     else:
         enlarged = capture.verdict(stages.by_name("upscale"), settings).state in freshness.FINISHED
         folder = capture.maps_4k if enlarged else capture.maps
-        files = {HEAD_TILE: {"albedo": folder / "diffuse_albedo.png", "normal": folder / "normal.png",
-                             "specular": folder / "specular_albedo.png", "displacement": delivery / "displacement.exr",
-                             **{name: folder / f"{name}.png" for name in ("brows", "lashes", "beard")},
-                             "clean": folder / "clean_albedo.png"}}
+        files = {
+            HEAD_TILE: {
+                "albedo": folder / "diffuse_albedo.png",
+                "normal": folder / "normal.png",
+                "specular": folder / "specular_albedo.png",
+                "displacement": delivery / "displacement.exr",
+                **{name: folder / f"{name}.png" for name in ("brows", "lashes", "beard")},
+                "clean": folder / "clean_albedo.png",
+            }
+        }
     files = {tile: {name: path for name, path in paths.items() if path.is_file()} for tile, paths in files.items()}
     if not all("albedo" in paths for paths in files.values()):
         raise Problem("This capture has no albedo for that mesh.", advise_again("transfer"))
     if plan.what == "head" and settings.deliver.clean and "clean" not in files[HEAD_TILE]:
-        raise Problem("This capture has no albedo without hair.",
-                      "Run the stage 4K Maps again, or deliver the albedo as it is.")
+        raise Problem(
+            "This capture has no albedo without hair.", "Run the stage 4K Maps again, or deliver the albedo as it is."
+        )
     return files
 
 

@@ -35,12 +35,16 @@ def check_stages(capture: Capture, kind: str, settings: Settings, report: Report
     last = stages.NAMES.index(LAST[kind])
     if kind == "head" and (capture.delivery / "displacement.exr").is_file():
         last = stages.NAMES.index("transfer")
-    for stage in stages.STAGES[:last + 1]:
+    for stage in stages.STAGES[: last + 1]:
         verdict = capture.verdict(stage, settings)
         if verdict.state == STALE:
-            raise Problem(f"The stage {stage.label} is out of date: {verdict.reason()}.",
-                          f"Click Reconstruct, or run the stage {stage.label} and those after it again, then deliver.")
+            raise Problem(
+                f"The stage {stage.label} is out of date: {verdict.reason()}.",
+                f"Click Reconstruct, or run the stage {stage.label} and those after it again, then deliver.",
+            )
         older += [stage.label] if verdict.state == OLDER else []
     if older:
-        report.log(f"Made by older code and delivered as it is: {', '.join(older)}. Run a stage again to have it made "
-                   f"by WildCap {__version__}.")
+        report.log(
+            f"Made by older code and delivered as it is: {', '.join(older)}. Run a stage again to have it made "
+            f"by WildCap {__version__}."
+        )

@@ -35,8 +35,9 @@ class Sources:
     ... -> file; `mean` is the specular map's mean on facial skin, `roughness` that of the cheeks, `regions` whether the
     UVs are those of the built-in head, whose other regions are known; `unit` the metres that 1 is."""
 
-    def __init__(self, paths: dict[str, Path], size: int, roughness: float, mean: float, unit: float = 1.0,
-                 regions: bool = False):
+    def __init__(
+        self, paths: dict[str, Path], size: int, roughness: float, mean: float, unit: float = 1.0, regions: bool = False
+    ):
         self.paths, self.roughness, self.mean, self.unit, self.regions = paths, roughness, mean, unit, regions
         stored = [images.size(path)[0] for name, path in paths.items() if name in ("albedo", "normal")]
         self.size = min([size, *stored])
@@ -73,8 +74,13 @@ class Sources:
 
     def _file(self, name: str) -> np.ndarray:
         if name not in self._read:
-            read = (images.read_linear if name in ("albedo", "clean", "lit") else images.read_normals
-                    if name == "normal" else images.read_mask)
+            read = (
+                images.read_linear
+                if name in ("albedo", "clean", "lit")
+                else images.read_normals
+                if name == "normal"
+                else images.read_mask
+            )
             self._read[name] = _sized(_square(self.paths[name], read(self.paths[name])), self.size, name == "normal")
         return self._read[name]
 
@@ -104,7 +110,7 @@ def write(picture: MapPicture, sources: Sources, path: Path, plan: DeliveryPlan)
         return
     if picture.kind == COLOUR and plan.colour == "srgb":
         for row in range(0, len(pixels), STRIP_ROWS):
-            pixels[row:row + STRIP_ROWS, :, :3] = images.linear_to_srgb(pixels[row:row + STRIP_ROWS, :, :3])
+            pixels[row : row + STRIP_ROWS, :, :3] = images.linear_to_srgb(pixels[row : row + STRIP_ROWS, :, :3])
     if pixels.shape[2] == 4:
         images.write_packed(path, pixels, bits, srgb=picture.kind == COLOUR and plan.colour == "srgb")
     elif picture.kind == COLOUR:
@@ -129,8 +135,13 @@ def _file_of(term: str) -> str:
     if term in ("0", "1"):
         return ""
     name = term.partition(".")[0]
-    return {"level": "specular", "weight": "specular", "f0": "specular", "unreal_specular": "specular",
-            "smoothness": "roughness"}.get(name, name)
+    return {
+        "level": "specular",
+        "weight": "specular",
+        "f0": "specular",
+        "unreal_specular": "specular",
+        "smoothness": "roughness",
+    }.get(name, name)
 
 
 def _stored_alike(picture: MapPicture, sources: Sources, plan: DeliveryPlan, name: str) -> bool:
@@ -150,8 +161,10 @@ def _square(path: Path, pixels: np.ndarray) -> np.ndarray:
     """The pixels [S, S(, C)] themselves. Raises Problem for a map of another shape."""
     height, width = pixels.shape[:2]
     if width != height:
-        raise Problem(f"{path} is {width} x {height}, and a map is square.",
-                      advise_remaking(path, "Run the stage that makes it again."))
+        raise Problem(
+            f"{path} is {width} x {height}, and a map is square.",
+            advise_remaking(path, "Run the stage that makes it again."),
+        )
     return pixels
 
 

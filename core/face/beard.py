@@ -16,10 +16,13 @@ from ..geometry import raster
 from ..imaging import images
 from . import template
 
-PLACES_MM = (((132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361), 16.0),
-          ((92, 165, 167, 164, 393, 391, 322), 6.5),
-          ((18, 200, 199, 201, 421, 204, 424, 202, 422, 212, 432, 57, 287), 9.0), ((127, 234, 93, 356, 454, 323), 8.0),
-          ((214, 434, 192, 416, 213, 433, 147, 376, 135, 364, 169, 394, 210, 430, 138, 367), 10.0))
+PLACES_MM = (
+    ((132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361), 16.0),
+    ((92, 165, 167, 164, 393, 391, 322), 6.5),
+    ((18, 200, 199, 201, 421, 204, 424, 202, 422, 212, 432, 57, 287), 9.0),
+    ((127, 234, 93, 356, 454, 323), 8.0),
+    ((214, 434, 192, 416, 213, 433, 147, 376, 135, 364, 169, 394, 210, 430, 138, 367), 10.0),
+)
 """MediaPipe landmarks about which a beard grows, and how far in mm: jaw, upper lip, chin, before the ears, lower
 cheeks."""
 BELOW_JAW_MM = (0.0, 14.0, -22.0), 18.0
@@ -70,9 +73,11 @@ def zone(landmarks: np.ndarray, position: np.ndarray) -> np.ndarray:
     out, size = np.zeros(coarse.shape[:2], np.float32), len(position)
     for centres, radius in near:
         for centre in centres:
-            np.maximum(out,
-                       np.clip(1.8 - ((coarse - centre.astype(np.float32)) ** 2).sum(-1) / np.float32(radius**2), 0, 1),
-                       out=out)
+            np.maximum(
+                out,
+                np.clip(1.8 - ((coarse - centre.astype(np.float32)) ** 2).sum(-1) / np.float32(radius**2), 0, 1),
+                out=out,
+            )
     bar = np.maximum.reduce([template.mask(name, size) for name in ("lips", "ears", "scalp", "nostrils", "nose")])
     return cv2.resize(out, (size, size), interpolation=cv2.INTER_LINEAR) * (1 - bar)
 
@@ -123,7 +128,8 @@ def _on_template() -> tuple[np.ndarray, np.ndarray]:
     mesh, (face, bary) = template.load(), raster.rasterize_uv(template.load(), SIZE_TEXELS)
     at, weight = template.landmarks()
     landmarks = 1000 * (mesh.vertices[mesh.faces[at]] * weight[..., None]).sum(1)
-    position = raster.bleed(raster.interpolate(1000 * mesh.vertices, mesh.faces, face, bary).astype(np.float32),
-                            face >= 0)
+    position = raster.bleed(
+        raster.interpolate(1000 * mesh.vertices, mesh.faces, face, bary).astype(np.float32), face >= 0
+    )
     width = np.sqrt(np.linalg.norm(np.cross(*(np.gradient(position, axis=axis) for axis in (0, 1))), axis=-1))
     return zone(landmarks, position), np.minimum(width, 3 * np.median(width))

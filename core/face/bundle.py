@@ -90,10 +90,16 @@ def place_by_landmarks(groups: list[dict], group_of: dict, names: list[str], pix
         poses, total = [], 0.0
         for name in names:
             group = groups[group_of[name]]
-            matrix = np.array([[focal[group_of[name]], 0, group["width"] / 2],
-                               [0, focal[group_of[name]], group["height"] / 2], [0, 0, 1.0]])
-            _, turn, shift = cv2.solvePnP(model.mean[trusted], pixels[name][trusted], matrix, None,
-                                          flags=cv2.SOLVEPNP_SQPNP)
+            matrix = np.array(
+                [
+                    [focal[group_of[name]], 0, group["width"] / 2],
+                    [0, focal[group_of[name]], group["height"] / 2],
+                    [0, 0, 1.0],
+                ]
+            )
+            _, turn, shift = cv2.solvePnP(
+                model.mean[trusted], pixels[name][trusted], matrix, None, flags=cv2.SOLVEPNP_SQPNP
+            )
             there = cv2.projectPoints(model.mean[trusted], turn, shift, matrix, None)[0][:, 0]
             total += np.median(np.linalg.norm(there - pixels[name][trusted], axis=1)) / np.ptp(pixels[name][:, 0])
             poses.append((cv2.Rodrigues(turn)[0], shift[:, 0]))
@@ -102,13 +108,20 @@ def place_by_landmarks(groups: list[dict], group_of: dict, names: list[str], pix
         if best is None or total < best[0]:
             best = total, focal, poses
     _, focal, poses = best
-    prior = np.array([group["focal_px"] or PHONE_FOCAL_SHARE * max(group["width"], group["height"])
-                      for group in groups])
-    return Bundle(np.array([r for r, _ in poses]), np.array([t for _, t in poses]), focal, prior,
-                  np.array([TOLD_SIGMA_LOG if group["focal_px"] else FOCAL_SIGMA_LOG for group in groups]),
-                  np.array([group_of[name] for name in names]),
-                  np.array([[groups[group_of[n]][side] / 2 for side in ("width", "height")] for n in names]),
-                  np.zeros(len(model.basis)), model.mean.copy())
+    prior = np.array(
+        [group["focal_px"] or PHONE_FOCAL_SHARE * max(group["width"], group["height"]) for group in groups]
+    )
+    return Bundle(
+        np.array([r for r, _ in poses]),
+        np.array([t for _, t in poses]),
+        focal,
+        prior,
+        np.array([TOLD_SIGMA_LOG if group["focal_px"] else FOCAL_SIGMA_LOG for group in groups]),
+        np.array([group_of[name] for name in names]),
+        np.array([[groups[group_of[n]][side] / 2 for side in ("width", "height")] for n in names]),
+        np.zeros(len(model.basis)),
+        model.mean.copy(),
+    )
 
 
 def adjust(bundle: Bundle, observations: Observations, rounds: int = 15) -> Bundle:
@@ -133,8 +146,11 @@ def adjust(bundle: Bundle, observations: Observations, rounds: int = 15) -> Bund
 def _sigma_px(bundle: Bundle, observations: Observations) -> np.ndarray:
     """Expected deviation of each observation [M] in pixels: a landmark's is a length on the head."""
     depth = np.maximum(bundle.local(observations.camera, observations.point)[:, 2], 0.05)
-    return np.where(observations.point < len(template_landmarks().mean),
-                    SIGMA_M * bundle.focal[bundle.lens[observations.camera]] / depth, bundle.feature_px)
+    return np.where(
+        observations.point < len(template_landmarks().mean),
+        SIGMA_M * bundle.focal[bundle.lens[observations.camera]] / depth,
+        bundle.feature_px,
+    )
 
 
 def _weights(bundle: Bundle, observations: Observations) -> np.ndarray:
@@ -156,15 +172,16 @@ def _priors(bundle: Bundle) -> tuple[np.ndarray, np.ndarray]:
     """Residuals of the landmarks against the head of the identity space [468, 3], and of the logarithms of the focal
     lengths [G], in deviations."""
     model = template_landmarks()
-    offsets = (bundle.points[:len(model.mean)] - model.shape(bundle.coefficients)) / OFFSET_M
+    offsets = (bundle.points[: len(model.mean)] - model.shape(bundle.coefficients)) / OFFSET_M
     return offsets, np.log(bundle.focal / bundle.focal_prior) / bundle.focal_spread
 
 
 def _cost(bundle: Bundle, observations: Observations, weights: np.ndarray) -> float:
     offset, focal = _priors(bundle)
     error = ((bundle.project(observations.camera, observations.point) - observations.pixel) ** 2).sum(1)
-    return float(weights @ error + (offset**2).sum() * _offset_weight() + (bundle.coefficients**2).sum()
-                 + (focal**2).sum())
+    return float(
+        weights @ error + (offset**2).sum() * _offset_weight() + (bundle.coefficients**2).sum() + (focal**2).sum()
+    )
 
 
 def _offset_weight() -> float:
@@ -201,8 +218,11 @@ def _step(bundle: Bundle, observations: Observations, weights: np.ndarray, dampi
     np.add.at(v, observations.point, np.einsum("mia,mib->mab", by_point * heavy, by_point))
     np.add.at(h, observations.point, np.einsum("mia,mi->ma", by_point * heavy, residual))
     w = np.zeros((count, 3, shared))
-    np.add.at(w, (observations.point[:, None, None], np.arange(3)[None, :, None], columns[:, None, :]),
-              np.einsum("mia,mib->mab", by_point * heavy, by_camera))
+    np.add.at(
+        w,
+        (observations.point[:, None, None], np.arange(3)[None, :, None], columns[:, None, :]),
+        np.einsum("mia,mib->mab", by_point * heavy, by_camera),
+    )
 
     offset, focal_off = _priors(bundle)
     tail, strength = slice(6 * views + groups, shared), _offset_weight() / OFFSET_M**2
@@ -225,9 +245,15 @@ def _step(bundle: Bundle, observations: Observations, weights: np.ndarray, dampi
     reduced = u - w.reshape(-1, shared).T @ folded.reshape(-1, shared)
     step = -np.linalg.solve(reduced, g - np.einsum("pis,pi->s", folded, h))
     points = bundle.points - np.einsum("pij,pj->pi", inverse, h) - folded @ step
-    turns = step[:6 * views].reshape(views, 6)
-    rotations = np.array([cv2.Rodrigues(turn[:3])[0] @ rotation
-                          for turn, rotation in zip(turns, bundle.rotations, strict=True)])
-    return replace(bundle, rotations=rotations, translations=bundle.translations + turns[:, 3:], points=points,
-                   focal=bundle.focal * np.exp(np.clip(step[lenses], -0.3, 0.3)),
-                   coefficients=bundle.coefficients + step[tail])
+    turns = step[: 6 * views].reshape(views, 6)
+    rotations = np.array(
+        [cv2.Rodrigues(turn[:3])[0] @ rotation for turn, rotation in zip(turns, bundle.rotations, strict=True)]
+    )
+    return replace(
+        bundle,
+        rotations=rotations,
+        translations=bundle.translations + turns[:, 3:],
+        points=points,
+        focal=bundle.focal * np.exp(np.clip(step[lenses], -0.3, 0.3)),
+        coefficients=bundle.coefficients + step[tail],
+    )

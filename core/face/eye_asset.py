@@ -46,7 +46,7 @@ def load() -> EyeAsset:
     lids = z["seam"] > 0
     number = np.full(count + len(copies) + len(z["kind"]), -1)  # of the file's vertices here
     number[:count] = np.arange(count)
-    number[count:count + len(copies)] = np.where(lids, count + np.cumsum(lids) - 1, copies)
+    number[count : count + len(copies)] = np.where(lids, count + np.cumsum(lids) - 1, copies)
     first, parts = count + len(copies), z["parts"] * step
     socket = np.flatnonzero((z["kind"] == SOFT) & (parts[:, 2] > -0.02))
     number[first + socket] = count + lids.sum() + np.arange(len(socket))

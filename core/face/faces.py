@@ -25,8 +25,10 @@ put when the lids close."""
 BROW, CHIN, NOSE = 9, 152, 1
 LIP_LINE = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 409, 270, 269, 267, 0, 37, 39, 40, 185)
 BROW_LINES = ((276, 283, 282, 295, 285, 336, 296, 334, 293, 300), (46, 53, 52, 65, 55, 107, 66, 105, 63, 70))
-EYE_LINES = ((263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466),
-             (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246))
+EYE_LINES = (
+    (263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466),
+    (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246),
+)
 """Closed outlines in landmarks; of brows and lids the person's left and right."""
 EYE_CROP_EYE_WIDTHS = 2.3
 """Side of the square that the eye network is shown, in distances between the eye's corners."""
@@ -35,8 +37,12 @@ NEAR_DEG, FAR_DEG = 50.0, 25.0
 it."""
 AS_OPEN_SHARE = 0.3
 """Share by which an eye's opening may differ from its usual one: a blink, or a look down, beyond."""
-DATA_FILES = ("weights/face_nets/face_detection_short_range.tflite", "weights/face_nets/face_landmark.tflite",
-              "weights/face_nets/iris_landmark.tflite", "weights/face_nets/selfie_segmentation.tflite")
+DATA_FILES = (
+    "weights/face_nets/face_detection_short_range.tflite",
+    "weights/face_nets/face_landmark.tflite",
+    "weights/face_nets/iris_landmark.tflite",
+    "weights/face_nets/selfie_segmentation.tflite",
+)
 _SHORT_RANGE, _LANDMARK, _EYE, _SEGMENTATION = (Path(__file__).resolve().parents[1] / name for name in DATA_FILES)
 
 
@@ -158,8 +164,12 @@ def _find_eye(image: np.ndarray, face: Face, corners: tuple[int, int], mirrored:
         marks[:, 0] = 64 - marks[:, 0]
     marks = (marks - to_crop[:, 2]) @ np.linalg.inv(to_crop[:, :2]).T
     contour = marks[:16]  # 9 below from the outer corner to the inner one, 7 above
-    return Eye(contour[[0, *range(9, 16), 8]], contour[:9], marks[16],
-               float(np.linalg.norm(marks[17:] - marks[16], axis=1).mean()))
+    return Eye(
+        contour[[0, *range(9, 16), 8]],
+        contour[:9],
+        marks[16],
+        float(np.linalg.norm(marks[17:] - marks[16], axis=1).mean()),
+    )
 
 
 def segment_person(srgb: np.ndarray) -> np.ndarray:
@@ -177,11 +187,12 @@ def _detect_regions(image: np.ndarray, margin: float) -> list[tuple]:
     side = max(height, width) * (1 + 2 * margin)
     scale = 128 / side
     move = np.array([[scale, 0, 64 - scale * width / 2], [0, scale, 64 - scale * height / 2]], np.float32)
-    shrunk = cv2.resize(image, (max(1, round(width * scale)), max(1, round(height * scale))),
-                        interpolation=cv2.INTER_AREA)
+    shrunk = cv2.resize(
+        image, (max(1, round(width * scale)), max(1, round(height * scale))), interpolation=cv2.INTER_AREA
+    )
     square = np.zeros((128, 128, 3), np.float32)
     top, left = (128 - shrunk.shape[0]) // 2, (128 - shrunk.shape[1]) // 2
-    square[top:top + shrunk.shape[0], left:left + shrunk.shape[1]] = shrunk
+    square[top : top + shrunk.shape[0], left : left + shrunk.shape[1]] = shrunk
     scores, boxes = _run(_SHORT_RANGE, square * 2 - 1)
     scores, boxes = scores.reshape(-1), boxes.reshape(-1, 16)
     sure = scores > 0  # logit of 0.5
@@ -198,8 +209,9 @@ def _detect_regions(image: np.ndarray, margin: float) -> list[tuple]:
         right_eye, left_eye = box[4:6], box[6:8]
         angle = np.arctan2(*(left_eye - right_eye)[::-1])
         x, y = (box[:2] - move[:, 2]) / scale
-        regions.append((weight[best] * box[2] * _centrality(x, y, width, height),
-                        (x, y, 1.5 * max(box[2], box[3]) / scale, angle)))
+        regions.append(
+            (weight[best] * box[2] * _centrality(x, y, width, height), (x, y, 1.5 * max(box[2], box[3]) / scale, angle))
+        )
         boxes, weight = boxes[distance >= 0.7], weight[distance >= 0.7]
     return [region for _, region in sorted(regions, key=lambda scored: -scored[0])]
 
@@ -281,5 +293,7 @@ def _net(path: Path):
         # by content: OpenCV may not open a path with accents
         return cv2.dnn.readNetFromTFLite(np.fromfile(path, np.uint8))
     except cv2.error as error:
-        raise Problem(f"OpenCV {cv2.__version__} cannot read the network {path.name}.",
-                      "Click Install Solver again: it brings the OpenCV that can.") from error
+        raise Problem(
+            f"OpenCV {cv2.__version__} cannot read the network {path.name}.",
+            "Click Install Solver again: it brings the OpenCV that can.",
+        ) from error

@@ -55,8 +55,9 @@ def band(srgb: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
     grey = np.ascontiguousarray(srgb @ np.float32([0.299, 0.587, 0.114]), np.float32)
     if scale < 0.8:  # what the warp would alias
         grey = cv2.GaussianBlur(grey, (0, 0), 0.4 * float(np.sqrt(1 / scale**2 - 1)))
-    return cv2.warpAffine(grey, from_centres(move), (WIDTH_PX, HEIGHT_PX), flags=cv2.INTER_LINEAR,
-                          borderMode=cv2.BORDER_REPLICATE)
+    return cv2.warpAffine(
+        grey, from_centres(move), (WIDTH_PX, HEIGHT_PX), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
 
 
 def describe(strip: np.ndarray) -> np.ndarray:

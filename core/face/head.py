@@ -65,8 +65,10 @@ class Head:
     def unfold(self, size: int) -> Unfolded:
         face, bary = self.raster(size)
         inside = face >= 0
-        points, normals = (raster.interpolate(attribute, self.mesh.faces, face[inside], bary[inside])
-                           for attribute in (self.mesh.vertices, self.normals))
+        points, normals = (
+            raster.interpolate(attribute, self.mesh.faces, face[inside], bary[inside])
+            for attribute in (self.mesh.vertices, self.normals)
+        )
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), SHORTEST)
         return Unfolded(self, face, bary, _shared(points), _shared(normals))
 
@@ -125,9 +127,14 @@ def read_filmed_head(capture: Capture) -> Head:
     opened = meshes.read_obj(capture.head_open)
     if not lids.belongs_to(opened, head.mesh):  # another head.obj was put beside it
         return head
-    return FilmedHead(head.mesh, opened,
-                      [lids.place_ball(side, np.array(eye.centre), eye.radius, np.array(eye.gaze)).mesh
-                       for side, eye in enumerate(read_eyes(capture))])
+    return FilmedHead(
+        head.mesh,
+        opened,
+        [
+            lids.place_ball(side, np.array(eye.centre), eye.radius, np.array(eye.gaze)).mesh
+            for side, eye in enumerate(read_eyes(capture))
+        ],
+    )
 
 
 class FilmedHead(Head):
@@ -137,9 +144,10 @@ class FilmedHead(Head):
 
     def __init__(self, closed: Mesh, opened: Mesh, balls: list[Mesh]):
         """closed: the head; opened: the same with its lids open, and its sockets; balls: the eyeballs."""
-        faces = _shared(opened.faces[:len(closed.faces)])
-        super().__init__(replace(closed, vertices=_shared(opened.vertices), faces=faces),
-                         meshes.joined([opened, *balls]))
+        faces = _shared(opened.faces[: len(closed.faces)])
+        super().__init__(
+            replace(closed, vertices=_shared(opened.vertices), faces=faces), meshes.joined([opened, *balls])
+        )
 
 
 def _shared(array: np.ndarray) -> np.ndarray:

@@ -41,5 +41,9 @@ def template_landmarks() -> TemplateLandmarks:
         return (vertex_values[..., mesh.faces[face], :] * bary[..., None]).sum(-2)
 
     normals = at(meshes.vertex_normals(mesh))
-    return TemplateLandmarks(at(mesh.vertices), at(template.identity()).astype(np.float64),
-                             normals / np.linalg.norm(normals, axis=1, keepdims=True), template.landmark_weights())
+    return TemplateLandmarks(
+        at(mesh.vertices),
+        at(template.identity()).astype(np.float64),
+        normals / np.linalg.norm(normals, axis=1, keepdims=True),
+        template.landmark_weights(),
+    )

@@ -52,12 +52,14 @@ def open_lids(head: Mesh, openness: float, gaze: np.ndarray) -> OpenHead:
     """head: a closed head in the template's topology; openness in [0, 1]: 0 shut, 1 as far as MakeHuman opens them;
     gaze [2]: degrees that both eyes turn to the person's left and up."""
     turn = turn_by(np.radians(gaze))
-    return open_around(head, tuple(place_ball(side, *carry_ball(head, side), turn @ FORWARD) for side in (0, 1)),
-                       (openness, openness))
+    return open_around(
+        head, tuple(place_ball(side, *carry_ball(head, side), turn @ FORWARD) for side in (0, 1)), (openness, openness)
+    )
 
 
-def open_around(head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: tuple[float, float],
-                shift: np.ndarray | float = 0.0) -> OpenHead:
+def open_around(
+    head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: tuple[float, float], shift: np.ndarray | float = 0.0
+) -> OpenHead:
     """The closed head with its lids open around given eyeballs.
 
     Parameters
@@ -113,8 +115,9 @@ def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -
     unit = eye_asset.load()
     mesh, (x, y, z, size) = unit.ball_meshes[side], unit.balls[side]
     vertices = centre + (mesh.vertices - [x, y, z]) @ turn_towards(gaze).T * (radius / size)
-    return PosedEyeball(np.asarray(centre, np.float64), float(radius), np.asarray(gaze, np.float64),
-                        mesh.moved(vertices))
+    return PosedEyeball(
+        np.asarray(centre, np.float64), float(radius), np.asarray(gaze, np.float64), mesh.moved(vertices)
+    )
 
 
 @cache
@@ -124,8 +127,9 @@ def corners() -> tuple[tuple[int, int], tuple[int, int]]:
     unit, head = eye_asset.load(), template.load()
     faces = head.faces.copy()
     faces[unit.corners[:, 0], unit.corners[:, 1]] = unit.corners[:, 2]
-    return tuple(tuple(_shared_neighbour(faces, upper[end], lower[end]) for end in (-1, 0))
-                 for upper, lower in unit.rims)
+    return tuple(
+        tuple(_shared_neighbour(faces, upper[end], lower[end]) for end in (-1, 0)) for upper, lower in unit.rims
+    )
 
 
 def _shared_neighbour(faces: np.ndarray, upper: int, lower: int) -> int:
@@ -193,7 +197,7 @@ def belongs_to(opened: Mesh, head: Mesh) -> bool:
         return False
     for rows, _ in unit.opens:
         moving[rows[rows < len(moving)]] = True
-    return bool(np.abs(opened.vertices[:len(moving)] - head.vertices)[~moving].max() < SAME_M)
+    return bool(np.abs(opened.vertices[: len(moving)] - head.vertices)[~moving].max() < SAME_M)
 
 
 def push_out(points: np.ndarray, ball: PosedEyeball) -> np.ndarray:
@@ -229,7 +233,7 @@ def _skin(unit: EyeAsset, head: Mesh, vertices: np.ndarray) -> Mesh:
     faces[unit.corners[:, 0], unit.corners[:, 1]] = unit.corners[:, 2]
     uv_of = np.zeros((len(vertices), 2))
     uv_of[faces] = head.uvs[head.face_uvs]
-    uv_of[-len(unit.uvs):] = unit.uvs
+    uv_of[-len(unit.uvs) :] = unit.uvs
     uvs = np.concatenate([head.uvs, uv_of[unit.faces].reshape(-1, 2)])
     face_uvs = np.concatenate([head.face_uvs, len(head.uvs) + np.arange(3 * len(unit.faces)).reshape(-1, 3)])
     return replace(head, vertices=vertices, faces=np.concatenate([faces, unit.faces]), uvs=uvs, face_uvs=face_uvs)

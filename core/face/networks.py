@@ -51,8 +51,9 @@ class Ladder(nn.Module):
                 x = self.halve[level](x)
         x = self.look_at_all(x)
         for level in reversed(range(len(self.halve))):
-            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear",
-                                                     align_corners=False)
+            x = kept[level] + functional.interpolate(
+                self.narrow[level](x), scale_factor=2, mode="bilinear", align_corners=False
+            )
             x = self.up[level](x)
         return x
 

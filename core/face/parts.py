@@ -99,9 +99,14 @@ def put_back(crop: np.ndarray, move: np.ndarray, shape: tuple[int, ...], beyond:
     -------
     float32 [H, W].
     """
-    return cv2.warpAffine(np.ascontiguousarray(crop, np.float32), from_centres(move), (shape[1], shape[0]),
-                          borderMode=cv2.BORDER_CONSTANT,
-                          flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderValue=beyond)
+    return cv2.warpAffine(
+        np.ascontiguousarray(crop, np.float32),
+        from_centres(move),
+        (shape[1], shape[0]),
+        borderMode=cv2.BORDER_CONSTANT,
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderValue=beyond,
+    )
 
 
 def from_centres(move: np.ndarray) -> np.ndarray:

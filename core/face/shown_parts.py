@@ -21,9 +21,11 @@ def read_parts(capture: Capture, size: int) -> np.ndarray | None:
         return None
     parts = images.read_data(capture.texture_parts)
     if parts.shape[2] != len(GROWTHS):
-        raise Problem(f"{capture.texture_parts} has {parts.shape[2]} channels, and the parts of a face that grow hair "
-                      f"are {len(GROWTHS)}.",
-                      advise_again("texture"))
+        raise Problem(
+            f"{capture.texture_parts} has {parts.shape[2]} channels, and the parts of a face that grow hair "
+            f"are {len(GROWTHS)}.",
+            advise_again("texture"),
+        )
     return images.resize(parts, size, size).clip(0, 1)
 
 

@@ -61,8 +61,15 @@ class SkinSurface:
         return ((points - foot) * normal).sum(1), normal
 
 
-def grow(roots: Roots, length: np.ndarray, lift: np.ndarray, skin: SkinSurface, pull: np.ndarray, clearance: np.ndarray,
-         steps: int) -> np.ndarray:
+def grow(
+    roots: Roots,
+    length: np.ndarray,
+    lift: np.ndarray,
+    skin: SkinSurface,
+    pull: np.ndarray,
+    clearance: np.ndarray,
+    steps: int,
+) -> np.ndarray:
     """Hairs that leave the skin along their roots' directions and bend on the way.
 
     Parameters
@@ -115,8 +122,14 @@ def clumped(points: np.ndarray, group_size: int, strength: float, rng: np.random
     return points * (1 - share) + points[leader] * share
 
 
-def waved(points: np.ndarray, at: np.ndarray, amplitude: float, wavelength_mm: float, rng: np.random.Generator,
-          alone: float = 0.35) -> np.ndarray:
+def waved(
+    points: np.ndarray,
+    at: np.ndarray,
+    amplitude: float,
+    wavelength_mm: float,
+    rng: np.random.Generator,
+    alone: float = 0.35,
+) -> np.ndarray:
     """Hairs that bend aside, neighbours alike.
 
     Parameters

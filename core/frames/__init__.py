@@ -48,8 +48,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     or no motion."""
     path = capture.source
     if path is None or not (path.is_dir() or path.is_file()):
-        raise Problem(f"There is no video or folder of photographs at {str(path)!r}." if path
-                      else "No video was chosen.", "Choose a video of the face, or a folder of photographs.")
+        raise Problem(
+            f"There is no video or folder of photographs at {str(path)!r}." if path else "No video was chosen.",
+            "Choose a video of the face, or a folder of photographs.",
+        )
     photographs = path.is_dir()
     read = read_photographs if photographs else read_video
     pictures = read(path, settings.frames.max_frames, settings.frames.long_side, report)
@@ -85,8 +87,9 @@ def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameR
         thumbnails.append(images.resize(picture.srgb.mean(-1), 32, 32))
         contents.append(content_of(picture.srgb))
         glasses.append(sureness(picture.srgb, face) if face else float("nan"))
-        report.progress(READING_SHARE * picture.done, picture.of,
-                        f"frame {len(records)}, {'face found' if face else 'no face'}")
+        report.progress(
+            READING_SHARE * picture.done, picture.of, f"frame {len(records)}, {'face found' if face else 'no face'}"
+        )
     return records, np.array(thumbnails), contents, glasses
 
 
@@ -112,16 +115,21 @@ def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Fa
     """`last` tells where the head is in a frame of a film, more or less, where no face is found."""
     near = _box_of_head(picture, face, last)
     return FrameRecord(
-        name=name, video_frame=picture.index, time_s=None if picture.time_s is None else round(picture.time_s, 4),
+        name=name,
+        video_frame=picture.index,
+        time_s=None if picture.time_s is None else round(picture.time_s, 4),
         source=picture.source,
         size=(picture.srgb.shape[1], picture.srgb.shape[0]),
-        sharpness=round(sharpness(picture.srgb, near), 5), selected=False,
+        sharpness=round(sharpness(picture.srgb, near), 5),
+        selected=False,
         face_box=tuple(round(x, 1) for x in face.box) if face else None,
         face_score=round(face.score, 4) if face else 0.0,
-        yaw_deg=round(face.yaw_deg, 1) if face else None, focal_px=picture.focal_px,
+        yaw_deg=round(face.yaw_deg, 1) if face else None,
+        focal_px=picture.focal_px,
         **examine(picture.srgb, near),
         eyes_open=tuple(round(x, 3) for x in faces.eye_openness(picture.srgb, face)) if face else None,
-        other_face=round(rival, 3))
+        other_face=round(rival, 3),
+    )
 
 
 def _box_of_head(picture: Picture, face: faces.Face | None, last: faces.Face | None) -> tuple | None:
@@ -134,8 +142,9 @@ def _box_of_head(picture: Picture, face: faces.Face | None, last: faces.Face | N
     return (x.min(), y.min(), x.max() + 1, y.max() + 1) if len(x) else None
 
 
-def _drop_blurred(records: list[FrameRecord], contents: list,
-                  folder: Path) -> tuple[list[FrameRecord], list, list[str]]:
+def _drop_blurred(
+    records: list[FrameRecord], contents: list, folder: Path
+) -> tuple[list[FrameRecord], list, list[str]]:
     """Without the frames that are blurred by comparison, whose files go too; and their names."""
     bad = blurred(records)
     dropped = [r.name for r, out in zip(records, bad, strict=True) if out]
@@ -176,15 +185,18 @@ def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
 
 def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photographs: bool) -> None:
     if len(records) < FEWEST_FRAMES and not photographs:
-        raise Problem(f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be "
-                      "built from.",
-                      "Film the face for 5 to 30 seconds while you walk half around it; if the file may be damaged, "
-                      "copy it again.")
+        raise Problem(
+            f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be built from.",
+            "Film the face for 5 to 30 seconds while you walk half around it; if the file may be damaged, "
+            "copy it again.",
+        )
     if not any(r.face_box for r in records):
         raise Problem("No face was found in any frame.", FIND_FACE)
     if len(records) > 1 and np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL_DIFFERENCE:
-        raise Problem("All frames show the same picture: the camera did not move.",
-                      "Let the person sit still and move the camera from one ear around the face to the other.")
+        raise Problem(
+            "All frames show the same picture: the camera did not move.",
+            "Let the person sit still and move the camera from one ear around the face to the other.",
+        )
 
 
 def _report(capture: Capture, records: list[FrameRecord], dropped: list[str], report: Reporter) -> None:
@@ -215,5 +227,5 @@ def _contact_sheet(pictures: list[np.ndarray], columns: int = 8, width: int = 16
     for i, picture in enumerate(pictures):
         small = images.resize(picture, width, round(width * picture.shape[0] / picture.shape[1]))
         y, x = i // columns * height, i % columns * width
-        sheet[y:y + small.shape[0], x:x + width] = small
+        sheet[y : y + small.shape[0], x : x + width] = small
     return sheet

@@ -26,10 +26,13 @@ KNEE_LINEAR = 0.8
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear Rec. 709 (ITU-R BT.709)
 LUMINANCE_2020 = np.array([0.2627, 0.6780, 0.0593], np.float32)  # of linear Rec. 2020 (ITU-R BT.2020)
 TO_REC709 = {
-    REC2020: np.array([[1.660491, -0.587641, -0.072850], [-0.124550, 1.132900, -0.008349],
-                       [-0.018151, -0.100579, 1.118730]], np.float32),
-    P3: np.array([[1.224940, -0.224940, 0.0], [-0.042057, 1.042057, 0.0], [-0.019638, -0.078636, 1.098274]],
-                 np.float32),
+    REC2020: np.array(
+        [[1.660491, -0.587641, -0.072850], [-0.124550, 1.132900, -0.008349], [-0.018151, -0.100579, 1.118730]],
+        np.float32,
+    ),
+    P3: np.array(
+        [[1.224940, -0.224940, 0.0], [-0.042057, 1.042057, 0.0], [-0.019638, -0.078636, 1.098274]], np.float32
+    ),
 }
 
 ADOBE_GAMMA = 563 / 256
@@ -57,8 +60,11 @@ def to_srgb(signal: np.ndarray, transfer: int, primaries: int) -> np.ndarray:
     HDR whose primaries are not told is Rec. 2020, as BT.2100 has it.
     """
     if transfer not in (HLG, PQ):
-        return (signal if primaries not in TO_REC709
-                else images.linear_to_srgb(into_gamut(images.srgb_to_linear(signal) @ TO_REC709[primaries].T)))
+        return (
+            signal
+            if primaries not in TO_REC709
+            else images.linear_to_srgb(into_gamut(images.srgb_to_linear(signal) @ TO_REC709[primaries].T))
+        )
     light = hlg_light(signal) if transfer == HLG else pq_light(signal)
     if primaries != REC709:
         light = light @ TO_REC709.get(primaries, TO_REC709[REC2020]).T

@@ -53,16 +53,21 @@ def content_of(srgb: np.ndarray) -> Content:
     grey = np.clip(small @ np.array([0.299, 0.587, 0.114], np.float32) * 255, 0, 255).astype(np.uint8)
     points, descriptors = _sift().detectAndCompute(grey, None)
     if not points:
-        return Content(np.zeros((0, 128), np.uint8), np.zeros((0, 3), np.float32), np.zeros((0, 2), np.float32),
-                       np.zeros(0, bool))
+        return Content(
+            np.zeros((0, 128), np.uint8), np.zeros((0, 3), np.float32), np.zeros((0, 2), np.float32), np.zeros(0, bool)
+        )
     x, y = np.array([p.pt for p in points]).round().astype(int).T
     x, y = np.clip(x, 0, small.shape[1] - 1), np.clip(y, 0, small.shape[0] - 1)
     mean = cv2.blur(images.srgb_to_linear(small), (SPOT_PX, SPOT_PX))[y, x]
     whole = np.ones((SPOT_PX, SPOT_PX), np.uint8)
     fair = (cv2.dilate(small.max(-1), whole)[y, x] < 0.97) & (mean.min(-1) > 0.004)
     person = faces.segment_person(small)[y, x] > 0.5
-    return Content(descriptors.astype(np.uint8)[fair], np.log(np.maximum(mean, 1e-5))[fair],
-                   np.stack([x, y], 1)[fair].astype(np.float32), person[fair])
+    return Content(
+        descriptors.astype(np.uint8)[fair],
+        np.log(np.maximum(mean, 1e-5))[fair],
+        np.stack([x, y], 1)[fair].astype(np.float32),
+        person[fair],
+    )
 
 
 @dataclass(frozen=True)
@@ -92,15 +97,16 @@ def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
             link = compare(contents[i], contents[i + step])
             if link is None:
                 continue
-            turning[i:i + step] |= link.shading
-            if link.shading or (link.person and turning[i:i + step].any()):
+            turning[i : i + step] |= link.shading
+            if link.shading or (link.person and turning[i : i + step].any()):
                 link = Link(np.zeros(3), DOUBT_WEIGHT * link.weight)
             pairs.append((i, i + step))
             links.append(link)
     if not links:
         return np.ones((count, 3))
-    levels = _levels(count, np.array(pairs), np.array([link.gain for link in links]),
-                     np.array([link.weight for link in links]))
+    levels = _levels(
+        count, np.array(pairs), np.array([link.gain for link in links]), np.array([link.weight for link in links])
+    )
     levels -= np.median(levels, axis=0)
     return np.exp(-levels) if np.ptp(levels, axis=0).max() > STEADY_LOG else np.ones((count, 3))
 
@@ -120,15 +126,20 @@ def compare(a: Content, b: Content) -> Link | None:
         return Link(*common[:2])
     common = _common(ratio[person], place[person])
     if common is None:
-        return (Link(np.zeros(3), float(person.sum()), True, True) if _slanted(ratio[person].mean(1), place[person])
-                else None)
+        return (
+            Link(np.zeros(3), float(person.sum()), True, True)
+            if _slanted(ratio[person].mean(1), place[person])
+            else None
+        )
     return Link(*common[:2], True, common[2])
 
 
 def _matches(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Indices into descriptors [n, 128] and [m, 128] of those that are each other's nearest, and near."""
-    unit = [d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1)
-            for d in (a.astype(np.float32), b.astype(np.float32))]
+    unit = [
+        d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1)
+        for d in (a.astype(np.float32), b.astype(np.float32))
+    ]
     likeness = unit[0] @ unit[1].T
     there, back = likeness.argmax(1), likeness.argmax(0)
     first = np.flatnonzero((back[there] == np.arange(len(a))) & (likeness.max(1) > 0.9))
@@ -181,8 +192,9 @@ def _levels(count: int, pairs: np.ndarray, ratios: np.ndarray, weights: np.ndarr
     from scipy.sparse.linalg import spsolve
 
     links = len(pairs)
-    draw = coo_matrix((np.repeat([-1.0, 1.0], links), (np.tile(np.arange(links), 2), pairs.T.ravel())),
-                      shape=(links, count)).tocsr()
+    draw = coo_matrix(
+        (np.repeat([-1.0, 1.0], links), (np.tile(np.arange(links), 2), pairs.T.ravel())), shape=(links, count)
+    ).tocsr()
     chain = diags([-np.ones(count - 1), np.ones(count - 1)], [0, 1], shape=(count - 1, count))
     # frames without links follow their neighbours
     hold = 1e-3 * (chain.T @ chain) + 1e-9 * diags([np.ones(count)], [0])

@@ -35,5 +35,7 @@ def judge(sureness: Sequence[float], no_glasses: bool, report: Reporter) -> None
             "Film without glasses. If there are none, switch on No Glasses in the settings of Frames (--set "
             "frames.no_glasses=true).",
         )
-    report.finding(f"The person may wear glasses: {(told > LIKELY_LOG_ODDS).sum()} of {len(told)} frames look like it.",
-                   "Film without glasses: they bend what lies behind them, and rims are built into the head.")
+    report.finding(
+        f"The person may wear glasses: {(told > LIKELY_LOG_ODDS).sum()} of {len(told)} frames look like it.",
+        "Film without glasses: they bend what lies behind them, and rims are built into the head.",
+    )

@@ -46,11 +46,14 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
     if not pictures:
         if unread:
             raise Problem(f"The photographs in {folder.name} are {kinds} files, which cannot be read.", AS_JPEG)
-        raise Problem(f"There are no photographs in {folder}.",
-                      "Choose a folder with JPEG, HEIC, PNG, TIFF or WebP pictures of the face, or a video.")
+        raise Problem(
+            f"There are no photographs in {folder}.",
+            "Choose a folder with JPEG, HEIC, PNG, TIFF or WebP pictures of the face, or a video.",
+        )
     if unread:
-        report.finding(f"{len(unread)} {kinds} files were left out beside {len(pictures)} photographs that can be "
-                       "read.", AS_JPEG)
+        report.finding(
+            f"{len(unread)} {kinds} files were left out beside {len(pictures)} photographs that can be read.", AS_JPEG
+        )
     chosen, left_out, unknown = evenly(len(pictures), most), {}, {}
     for done, index in enumerate(chosen, 1):
         path = pictures[index]
@@ -69,13 +72,18 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
         full = full if srgb is None else srgb
         srgb = fit(full, long_side)
         focal_px = None if focal is None else round(focal / DIAGONAL_35MM * math.hypot(*srgb.shape[:2]), 2)
-        yield Picture(srgb, int(index), None, path.name, focal_px, done, len(chosen),
-                      full if full.shape != srgb.shape else None)
+        yield Picture(
+            srgb, int(index), None, path.name, focal_px, done, len(chosen), full if full.shape != srgb.shape else None
+        )
     if len(left_out) == len(chosen):
         raise Problem(f"None of the photographs in {folder.name} could be read.", next(iter(left_out.values())))
     for profile, names in unknown.items():
-        report.finding(f"The colours of {name_some(names)} are taken for sRGB, and their profile is {profile}.",
-                       "Export them in sRGB, Display P3 or Adobe RGB.")
+        report.finding(
+            f"The colours of {name_some(names)} are taken for sRGB, and their profile is {profile}.",
+            "Export them in sRGB, Display P3 or Adobe RGB.",
+        )
     if left_out:
-        report.finding(f"{len(left_out)} of {len(chosen)} photographs could not be read: {name_some(list(left_out))}.",
-                       next(iter(left_out.values())))
+        report.finding(
+            f"{len(left_out)} of {len(chosen)} photographs could not be read: {name_some(list(left_out))}.",
+            next(iter(left_out.values())),
+        )

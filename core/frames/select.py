@@ -19,7 +19,7 @@ def inside_box(srgb: np.ndarray, box: tuple | None) -> np.ndarray:
     """The part of a picture in a box; its middle where there is none."""
     height, width = srgb.shape[:2]
     x0, y0, x1, y1 = box or (width / 4, height / 4, 3 * width / 4, 3 * height / 4)
-    return srgb[max(0, int(y0)):max(1, int(y1)), max(0, int(x0)):max(1, int(x1))]
+    return srgb[max(0, int(y0)) : max(1, int(y1)), max(0, int(x0)) : max(1, int(x1))]
 
 
 def sharpness(srgb: np.ndarray, box: tuple | None) -> float:

@@ -70,17 +70,28 @@ def read_video(path: Path, most: int, long_side: int, report: Reporter) -> Itera
                 report.log("The video is HDR; its highlights are compressed into sRGB.")
             turns, mirrored = orientation(frame)
             if not given and mirrored:
-                report.finding("The video is marked to be shown as in a mirror, as selfie cameras do; it was "
-                               "flipped back, so that left is left again.",
-                               "If moles end up on the wrong side, switch off the mirroring of the front camera, or "
-                               "film with the back camera.")
+                report.finding(
+                    "The video is marked to be shown as in a mirror, as selfie cameras do; it was "
+                    "flipped back, so that left is left again.",
+                    "If moles end up on the wrong side, switch off the mirroring of the front camera, or "
+                    "film with the back camera.",
+                )
             size = fitted(frame.width * (stream.sample_aspect_ratio or 1), frame.height, long_side)
             given += 1
-            yield Picture(np.ascontiguousarray(np.rot90(_srgb(frame, size, transfer, primaries), turns)), number,
-                          frame.time, "", None, number + 1, len(index.times))
+            yield Picture(
+                np.ascontiguousarray(np.rot90(_srgb(frame, size, transfer, primaries), turns)),
+                number,
+                frame.time,
+                "",
+                None,
+                number + 1,
+                len(index.times),
+            )
     if given < 0.9 * len(wanted):
-        report.finding(f"Only {given} of {len(wanted)} frames could be read; the file seems damaged or cut off.",
-                       "Copy the video again from the phone.")
+        report.finding(
+            f"Only {given} of {len(wanted)} frames could be read; the file seems damaged or cut off.",
+            "Copy the video again from the phone.",
+        )
 
 
 @dataclass(frozen=True)
@@ -151,8 +162,9 @@ def _index(path: Path, report: Reporter) -> _Index:
     return _Index(np.array(sorted(times)), np.array(sorted(keys), int))
 
 
-def _frames(container, stream, index: _Index, frame_numbers: np.ndarray,
-            report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
+def _frames(
+    container, stream, index: _Index, frame_numbers: np.ndarray, report: Reporter
+) -> Iterator[tuple[int, av.VideoFrame]]:
     """The frames of these numbers, or where one is lost the next that can be decoded, with their numbers."""
     for starts, numbers in _stretches(index, frame_numbers):
         targets = list(numbers)
@@ -167,8 +179,9 @@ def _frames(container, stream, index: _Index, frame_numbers: np.ndarray,
                 break
 
 
-def _from(container, stream, index: _Index, starts: list[int], first: int,
-          report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
+def _from(
+    container, stream, index: _Index, starts: list[int], first: int, report: Reporter
+) -> Iterator[tuple[int, av.VideoFrame]]:
     """All frames with their numbers from one of `starts` on, the first of them from which frame `first` is not missed:
     in a transport stream a jump lands behind where it was to. From where the container is, if there are no starts."""
     for left, start in zip(range(len(starts))[::-1], starts, strict=True):
@@ -185,8 +198,10 @@ def _from(container, stream, index: _Index, starts: list[int], first: int,
 
 def _numbered(container, stream, index: _Index, report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
     for count, frame in enumerate(_decode(container, stream, report)):
-        yield (int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None
-               else count), frame
+        yield (
+            (int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None else count),
+            frame,
+        )
 
 
 def _stretches(index: _Index, frame_numbers: np.ndarray) -> list[tuple[list[int], list[int]]]:
@@ -198,7 +213,7 @@ def _stretches(index: _Index, frame_numbers: np.ndarray) -> list[tuple[list[int]
         if i and begin[i] <= begin[i - 1] + 1:
             stretches[-1][1].append(number)
         else:
-            starts = index.keys[max(begin[i] - STARTS + 1, 0):begin[i] + 1][::-1] if begin[i] > 0 else []
+            starts = index.keys[max(begin[i] - STARTS + 1, 0) : begin[i] + 1][::-1] if begin[i] > 0 else []
             stretches.append(([int(start) for start in starts], [number]))
     return stretches
 
@@ -223,8 +238,13 @@ def _srgb(frame: av.VideoFrame, size: tuple[int, int], transfer: int, primaries:
     full = frame.color_range == FULL_RANGE
     # Unless told, swscale takes Rec. 601 for every matrix, and a phone's Rec. 709 skin turns greenish; and full-range
     # values for the narrow range
-    how = {"width": size[0], "height": size[1], "interpolation": EXACT if plain else EXACT_16,
-           "src_colorspace": _matrix(frame, transfer, primaries), "dst_colorspace": "DEFAULT"}
+    how = {
+        "width": size[0],
+        "height": size[1],
+        "interpolation": EXACT if plain else EXACT_16,
+        "src_colorspace": _matrix(frame, transfer, primaries),
+        "dst_colorspace": "DEFAULT",
+    }
     if full:
         how |= {"src_color_range": FULL_RANGE, "dst_color_range": FULL_RANGE}
     if plain:

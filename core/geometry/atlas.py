@@ -37,13 +37,18 @@ def unwrap(mesh: Mesh, size: int, gap_px: int = 2) -> Mesh:
     packing.padding, packing.bilinear = gap_px, True
     # a fixed resolution would leave room for a third of the texels
     packing.texels_per_unit = size * np.sqrt(FILLED_SHARE / _areas(mesh).sum())
-    atlas.add_mesh(np.ascontiguousarray(mesh.vertices - mesh.vertices.mean(0), np.float32),
-                   np.ascontiguousarray(mesh.faces, np.uint32))
+    atlas.add_mesh(
+        np.ascontiguousarray(mesh.vertices - mesh.vertices.mean(0), np.float32),
+        np.ascontiguousarray(mesh.faces, np.uint32),
+    )
     atlas.generate(charts, packing)
     _, faces, uvs = atlas[0]
     side = max(atlas.width, atlas.height)  # the packed area is no square, texels are
-    mapped = replace(mesh, uvs=np.asarray(uvs, np.float64) * [atlas.width / side, atlas.height / side],
-                     face_uvs=np.asarray(faces, np.int64))
+    mapped = replace(
+        mesh,
+        uvs=np.asarray(uvs, np.float64) * [atlas.width / side, atlas.height / side],
+        face_uvs=np.asarray(faces, np.int64),
+    )
     mirrored = _double_areas(mapped.uvs[mapped.face_uvs]).sum() < 0
     return replace(mapped, uvs=np.abs([0, float(mirrored)] - mapped.uvs))
 

@@ -52,8 +52,15 @@ class Source:
         self.tangent, self.hand = surfaces.tangents(self.mesh)
 
 
-def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick: Callable[[float], None],
-           painted: np.ndarray | None = None) -> TexelPartners:
+def places(
+    target: Mesh,
+    tile,
+    source: Source,
+    size: int,
+    farthest: float,
+    tick: Callable[[float], None],
+    painted: np.ndarray | None = None,
+) -> TexelPartners:
     """Partners of the texels of a tile of the target's UVs.
 
     Parameters
@@ -108,11 +115,12 @@ def bake(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     out = np.empty((*at.covered.shape, *image.shape[2:]), np.float32)
     low, high = image.min(), image.max()
     for row in range(0, len(out), STRIP_ROWS):
-        uv = np.nan_to_num(at.uv[row:row + STRIP_ROWS])
+        uv = np.nan_to_num(at.uv[row : row + STRIP_ROWS])
         x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
         # cubic overshoots at edges
-        out[row:row + STRIP_ROWS] = np.clip(cv2.remap(image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE),
-                                            low, high)
+        out[row : row + STRIP_ROWS] = np.clip(
+            cv2.remap(image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), low, high
+        )
     return bled(out, at)
 
 
@@ -125,7 +133,7 @@ def bake_normals(packed: np.ndarray, at: TexelPartners) -> np.ndarray:
     """
     out = bake(packed, at)
     for row in range(0, len(out), STRIP_ROWS):
-        rows = np.s_[row:row + STRIP_ROWS]
+        rows = np.s_[row : row + STRIP_ROWS]
         vectors = out[rows] * 2 - 1
         turn, known = at.turn[rows], at.known[rows]
         x, y = vectors[..., 0].copy(), vectors[..., 1] * np.where(at.mirrored[rows], -1, 1)
@@ -146,8 +154,9 @@ def bled(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     near = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5) <= margin + 1
     small = min(512, len(image))
     weight = images.resize(known.astype(np.float32), small, small)
-    mean = images.resize(np.where(known[..., None], image.reshape(*known.shape, -1), 0).astype(np.float32), small,
-                         small).reshape(small, small, -1)
+    mean = images.resize(
+        np.where(known[..., None], image.reshape(*known.shape, -1), 0).astype(np.float32), small, small
+    ).reshape(small, small, -1)
     smooth = cv2.resize(_continued(mean, weight), known.shape[::-1], interpolation=cv2.INTER_LINEAR)
     smooth = smooth.reshape(image.shape)
     nearest = raster.bleed(image, known)
@@ -163,8 +172,9 @@ def _continued(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     smaller = cv2.resize(weighted, half, interpolation=cv2.INTER_AREA)
     down = smaller.reshape(*half[::-1], -1), cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
     gain = np.minimum(4 * down[1], 1) / np.maximum(down[1], 1e-6)  # one known texel of four is enough
-    coarse = cv2.resize(_continued(down[0] * gain[..., None], down[1] * gain), weight.shape[::-1],
-                        interpolation=cv2.INTER_LINEAR)
+    coarse = cv2.resize(
+        _continued(down[0] * gain[..., None], down[1] * gain), weight.shape[::-1], interpolation=cv2.INTER_LINEAR
+    )
     return (weighted + coarse.reshape(weighted.shape) * (1 - weight[..., None])).astype(np.float32)
 
 
@@ -181,12 +191,14 @@ def _rows(mesh: Mesh, size: int) -> tuple[np.ndarray, np.ndarray]:
     return np.floor(v.min(1)) - 1, np.ceil(v.max(1)) + 1
 
 
-def _turn(source: Source, face: np.ndarray, bary: np.ndarray, t: np.ndarray, b: np.ndarray,
-          n: np.ndarray) -> np.ndarray:
+def _turn(
+    source: Source, face: np.ndarray, bary: np.ndarray, t: np.ndarray, b: np.ndarray, n: np.ndarray
+) -> np.ndarray:
     """Angles [N] from the target's tangent t to the source's at face, bary, towards b; the source's normal is first
     taken to the target's n [N, 3] by the smallest rotation."""
-    tangent, _, normal = surfaces.frames(source.surface.normals, source.mesh.faces, source.tangent, source.hand, face,
-                                         bary)
+    tangent, _, normal = surfaces.frames(
+        source.surface.normals, source.mesh.faces, source.tangent, source.hand, face, bary
+    )
     lean = (tangent * n).sum(1, keepdims=True) / np.maximum(1 + (normal * n).sum(1, keepdims=True), 1e-6)
     tangent = tangent - lean * (normal + n)
     return np.arctan2((tangent * b).sum(1), (tangent * t).sum(1))

@@ -37,8 +37,11 @@ def pictures_of(capture: Capture, folder: str, kind: str) -> list[tuple[View, Pa
 
 def delit_views(capture: Capture) -> list[tuple[View, Path]]:
     """The registered views that were delit, with what came out."""
-    return [(view, path) for view in read_views(capture)
-            if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
+    return [
+        (view, path)
+        for view in read_views(capture)
+        if (path := (capture.delit / view.name).with_suffix(".png")).is_file()
+    ]
 
 
 def read_picture(path: Path, view: View, kind: str) -> np.ndarray:
@@ -68,13 +71,16 @@ def check_shape(path: Path, image: np.ndarray, view: View, kind: str) -> None:
     """
     height, width = image.shape[:2]
     if abs(width / height - view.width / view.height) > 0.01 or width * MOST_REDUCTION < view.width:
-        raise Problem(f"{path} is {width} x {height}, but its frame is {view.width} x {view.height}.",
-                      f"{kind.title()} pictures are made from the frames in the capture's frames folder, without "
-                      "cropping or turning them.")
+        raise Problem(
+            f"{path} is {width} x {height}, but its frame is {view.width} x {view.height}.",
+            f"{kind.title()} pictures are made from the frames in the capture's frames folder, without "
+            "cropping or turning them.",
+        )
 
 
-def match_pictures(views: list[View], video_frames: dict[str, int], path: Path, kind: str = "delit",
-                   folder_chosen: bool = True) -> list[tuple[View, Path]]:
+def match_pictures(
+    views: list[View], video_frames: dict[str, int], path: Path, kind: str = "delit", folder_chosen: bool = True
+) -> list[tuple[View, Path]]:
     """Each registered view with its picture, in frame order.
 
     Parameters
@@ -91,19 +97,26 @@ def match_pictures(views: list[View], video_frames: dict[str, int], path: Path, 
         Where there is no such folder, or none of its pictures belongs to a registered frame.
     """
     if not folder_chosen or not path.is_dir():
-        raise Problem(f"There is no folder {str(path)!r} with {kind} pictures." if folder_chosen
-                      else f"No folder of {kind} pictures was chosen.",
-                      "Choose the folder that holds them, named like the frames of the capture.")
+        raise Problem(
+            f"There is no folder {str(path)!r} with {kind} pictures."
+            if folder_chosen
+            else f"No folder of {kind} pictures was chosen.",
+            "Choose the folder that holds them, named like the frames of the capture.",
+        )
     pictures = sorted(p for p in path.iterdir() if p.suffix.lower() in KINDS and not p.name.startswith("."))
     by_stem = {p.stem: p for p in pictures}
     by_number = {int(p.stem): p for p in pictures if p.stem.isascii() and p.stem.isdigit()}
     named = [(view, by_stem[Path(view.name).stem]) for view in views if Path(view.name).stem in by_stem]
-    numbered = [(view, by_number[video_frames[view.name]]) for view in views
-                if video_frames.get(view.name) in by_number]
+    numbered = [
+        (view, by_number[video_frames[view.name]]) for view in views if video_frames.get(view.name) in by_number
+    ]
     # not mixed: 00009.jpg may be frame 9 of the capture or of the video, but not both
     pairs = max(named, numbered, key=len)
     if not pairs:
-        raise Problem(f"None of the {len(pictures)} pictures in {path} belongs to a registered frame.",
-                      f"Name them like the frames (for example {Path(views[0].name).stem}.png)." if views
-                      else advise_again("cameras"))
+        raise Problem(
+            f"None of the {len(pictures)} pictures in {path} belongs to a registered frame.",
+            f"Name them like the frames (for example {Path(views[0].name).stem}.png)."
+            if views
+            else advise_again("cameras"),
+        )
     return pairs

@@ -20,8 +20,24 @@ MOST_PLY_BYTES = 2 << 30
 """A scan of 50 million triangles; as arrays of doubles and of long integers it takes about three times its size."""
 FARTHEST_UNITS = 1e9
 """In whatever units; a head in micrometres has 3e5. What lies farther off is damage, and its volume would overflow."""
-SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2, "int": 4,
-         "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4, "double": 8, "float64": 8}
+SIZES = {
+    "char": 1,
+    "uchar": 1,
+    "int8": 1,
+    "uint8": 1,
+    "short": 2,
+    "ushort": 2,
+    "int16": 2,
+    "uint16": 2,
+    "int": 4,
+    "uint": 4,
+    "int32": 4,
+    "uint32": 4,
+    "float": 4,
+    "float32": 4,
+    "double": 8,
+    "float64": 8,
+}
 """Bytes of PLY's types."""
 MOST_HEADER_BYTES = 1 << 16
 """A PLY's header is a line per property; one that has not ended by then is none."""
@@ -63,8 +79,11 @@ def find_fault(vertices: np.ndarray, faces: np.ndarray, uvs: np.ndarray | None, 
         if coordinates is not None and (coordinates.ndim != 2 or coordinates.shape[1] != width):
             return f"not every {what} has {width} numbers"
         # false for NaN, too
-        sound = coordinates is None or not coordinates.size or (
-            coordinates.min() >= -FARTHEST_UNITS and coordinates.max() <= FARTHEST_UNITS)
+        sound = (
+            coordinates is None
+            or not coordinates.size
+            or (coordinates.min() >= -FARTHEST_UNITS and coordinates.max() <= FARTHEST_UNITS)
+        )
         if not sound:
             return f"it has a {what} of values that are no numbers (NaN), infinite or beyond {FARTHEST_UNITS:g}"
     for indices, count, what in ((faces, len(vertices), "vertex"), (face_uvs, 0 if uvs is None else len(uvs), "UV")):

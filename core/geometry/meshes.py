@@ -18,8 +18,10 @@ from ..contract.messages import Problem
 from ..contract.stages import advise_remaking
 from .mesh_checks import MOST_OBJ_BYTES, MOST_PLY_BYTES, check_ply, damaged, find_fault, open_mesh
 
-OWN_OBJ = re.compile(r"((?:v(?: -?[0-9]+\.[0-9]+){3}\n)++)((?:vt(?: -?[0-9]+\.[0-9]+){2}\n)++)"
-                     r"((?:f(?: [0-9]{1,9}/[0-9]{1,9}){3}\n)++)")
+OWN_OBJ = re.compile(
+    r"((?:v(?: -?[0-9]+\.[0-9]+){3}\n)++)((?:vt(?: -?[0-9]+\.[0-9]+){2}\n)++)"
+    r"((?:f(?: [0-9]{1,9}/[0-9]{1,9}){3}\n)++)"
+)
 """What `write_obj` makes of a mesh with UVs."""
 
 
@@ -45,8 +47,10 @@ class Mesh:
 def joined(meshes: list[Mesh]) -> Mesh:
     """Several meshes as one, without UVs; the triangles of the first come first."""
     first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]),
-                np.concatenate([mesh.faces + k for mesh, k in zip(meshes, first, strict=True)]))
+    return Mesh(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + k for mesh, k in zip(meshes, first, strict=True)]),
+    )
 
 
 def vertex_uvs(mesh: Mesh) -> np.ndarray:
@@ -104,8 +108,12 @@ def read_obj(path: Path) -> Mesh:
         raise Problem(f"{path} holds no faces.", "Choose an OBJ file with a mesh in it.")
     has_uvs = len(uvs) > 0 and min(map(min, face_uvs)) >= 0
     try:
-        mesh = Mesh(np.array(vertices, np.float64).reshape(-1, 3), np.array(faces, np.int64),
-                    np.array(uvs, np.float64) if has_uvs else None, np.array(face_uvs, np.int64) if has_uvs else None)
+        mesh = Mesh(
+            np.array(vertices, np.float64).reshape(-1, 3),
+            np.array(faces, np.int64),
+            np.array(uvs, np.float64) if has_uvs else None,
+            np.array(face_uvs, np.int64) if has_uvs else None,
+        )
     except (ValueError, OverflowError) as error:
         raise damaged(Path(path), str(error)) from error
     return _unfolded(_sound(Path(path), mesh), np.array(polygons))
@@ -116,8 +124,9 @@ def read_obj_vertices(path: Path) -> np.ndarray:
     path = Path(path)
     text = open_mesh(path, MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
     try:
-        vertices = np.array([line.split()[1:4] for line in text.splitlines() if line.startswith("v ")],
-                            np.float64).reshape(-1, 3)
+        vertices = np.array(
+            [line.split()[1:4] for line in text.splitlines() if line.startswith("v ")], np.float64
+        ).reshape(-1, 3)
     except ValueError as error:
         raise damaged(path, str(error)) from error
     if fault := find_fault(vertices, np.zeros((0, 3), np.int64), None, None):
@@ -132,8 +141,9 @@ def write_obj(path: Path, mesh: Mesh) -> None:
     lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in mesh.vertices]
     if mesh.uvs is not None:
         lines += [f"vt {u:.6f} {v:.6f}" for u, v in mesh.uvs]
-        lines += [f"f {a}/{i} {b}/{j} {c}/{k}"
-                  for (a, b, c), (i, j, k) in zip(mesh.faces + 1, mesh.face_uvs + 1, strict=True)]
+        lines += [
+            f"f {a}/{i} {b}/{j} {c}/{k}" for (a, b, c), (i, j, k) in zip(mesh.faces + 1, mesh.face_uvs + 1, strict=True)
+        ]
     else:
         lines += [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
     with replacing(path) as temporary:
@@ -154,8 +164,15 @@ def read_ply(path: Path, or_points: bool = False) -> Mesh:
         # what is empty has neither
         points, faces = (getattr(loaded, name, np.zeros((0, 3))) for name in ("vertices", "faces"))
         mesh = Mesh(np.asarray(points, np.float64).reshape(-1, 3), np.asarray(faces, np.int64))
-    except (ValueError, LookupError, TypeError, AttributeError, OverflowError, struct.error,
-            NotImplementedError) as error:
+    except (
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        OverflowError,
+        struct.error,
+        NotImplementedError,
+    ) as error:
         raise damaged(path, str(error).splitlines()[0][:100] if str(error) else type(error).__name__) from error
     if not len(mesh.faces) and not or_points:
         raise damaged(path, "it holds no faces")
@@ -173,11 +190,15 @@ def write_ply(path: Path, mesh: Mesh) -> None:
 
 def write_points(path: Path, points: np.ndarray) -> None:
     """Points [N, 3] without faces as a binary PLY, atomically."""
-    header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float "
-              "y\nproperty float z\n")
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float "
+        "y\nproperty float z\n"
+    )
     with replacing(path) as temporary:
-        temporary.write_bytes(f"{header}element face 0\nproperty list uchar int vertex_indices\nend_header\n".encode()
-                              + points.astype("<f4").tobytes())
+        temporary.write_bytes(
+            f"{header}element face 0\nproperty list uchar int vertex_indices\nend_header\n".encode()
+            + points.astype("<f4").tobytes()
+        )
 
 
 def _sound(path: Path, mesh: Mesh) -> Mesh:
@@ -192,10 +213,13 @@ def _check_written(path: Path, mesh: Mesh) -> None:
     if not fault and not len(mesh.faces):
         fault = "it has no faces"
     if fault:
-        raise Problem(f"{path} was not written: {fault}.",
-                      advise_remaking(Path(path),
-                                      "Run again, and if it stays, report it with the logs of this capture. Finished "
-                                      "stages are kept."))
+        raise Problem(
+            f"{path} was not written: {fault}.",
+            advise_remaking(
+                Path(path),
+                "Run again, and if it stays, report it with the logs of this capture. Finished stages are kept.",
+            ),
+        )
 
 
 def _read_own(text: str) -> Mesh | None:
@@ -204,8 +228,10 @@ def _read_own(text: str) -> Mesh | None:
     written = OWN_OBJ.fullmatch(text)
     if written is None:
         return None
-    vertices, uvs = (np.array(list(map(float, block.replace(key, "").split()))).reshape(-1, width)
-                     for block, key, width in ((written[1], "v", 3), (written[2], "vt", 2)))
+    vertices, uvs = (
+        np.array(list(map(float, block.replace(key, "").split()))).reshape(-1, width)
+        for block, key, width in ((written[1], "v", 3), (written[2], "vt", 2))
+    )
     corners = np.array(list(map(int, written[3].replace("f", "").replace("/", " ").split())), np.int64) - 1
     if corners.min() < 0:
         return None  # an index from zero: the other reader tells its line
@@ -218,8 +244,10 @@ def _corner(word: str, vertices: int, uvs: int, corner_of: dict[str, tuple[int, 
     `vertices` and `uvs` have been read so far, from which negative numbers count back. Raises ValueError for what is
     none."""
     vertex, uv = (word.split("/") + [""])[:2]
-    indices = [int(text) - 1 if not text.startswith("-") else int(text) + count
-               for text, count in ((vertex, vertices), (uv or "0", uvs))]
+    indices = [
+        int(text) - 1 if not text.startswith("-") else int(text) + count
+        for text, count in ((vertex, vertices), (uv or "0", uvs))
+    ]
     if indices[0] < 0 or uv and indices[1] < 0:
         raise ValueError(word)
     if "-" not in word:
@@ -242,15 +270,16 @@ def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
     hollow = np.logical_or.reduceat((across * np.repeat(whole, counts, 0)).sum(1) < 0, starts)
     faces, face_uvs = mesh.faces.copy(), None if mesh.face_uvs is None else mesh.face_uvs.copy()
     for start, count in zip(starts[hollow], counts[hollow], strict=True):
-        own = np.s_[start:start + count]
+        own = np.s_[start : start + count]
         for turn in range(1, count + 2):
             ring = np.roll(np.arange(count + 2), -turn)
             fan = np.stack([np.full(count, ring[0]), ring[1:-1], ring[2:]], 1)
             corners = np.append(mesh.faces[own, 1], mesh.faces[start + count - 1, 2])
             corners = np.concatenate([mesh.faces[start, :1], corners])[fan]
             p = mesh.vertices[corners]
-            if ((np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) * whole[np.searchsorted(starts, start)]).sum(1)
-                > 0).all():
+            if (
+                (np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) * whole[np.searchsorted(starts, start)]).sum(1) > 0
+            ).all():
                 faces[own] = corners
                 if face_uvs is not None:
                     around = [mesh.face_uvs[start, :1], mesh.face_uvs[own, 1], mesh.face_uvs[start + count - 1, 2:]]

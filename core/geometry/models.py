@@ -18,8 +18,11 @@ import pycolmap
 
 from ..contract.regular_files import require_regular
 
-PARAMS = {int(number): len(pycolmap.Camera.create_from_model_id(0, number, 1.0, 1, 1).params)
-          for name, number in pycolmap.CameraModelId.__members__.items() if name != "INVALID"}
+PARAMS = {
+    int(number): len(pycolmap.Camera.create_from_model_id(0, number, 1.0, 1, 1).params)
+    for name, number in pycolmap.CameraModelId.__members__.items()
+    if name != "INVALID"
+}
 """How many parameters each camera model has, by its number."""
 MOST_MODEL_BYTES = 1 << 30
 """Of one file, binary or text; a model of 300 frames has 0.1 GB, and pycolmap takes about five times a file's size."""
@@ -112,13 +115,18 @@ def read_model(folder: Path) -> pycolmap.Reconstruction:
         pose = pose_of(image) if image.has_pose else None
         if image.camera_id not in model.cameras:
             raise ValueError(f"the camera of {image.name} is missing")
-        if pose is not None and not (np.isfinite(pose.rotation.quat).all() and np.isfinite(pose.translation).all()
-                                     and np.any(pose.rotation.quat)):
+        if pose is not None and not (
+            np.isfinite(pose.rotation.quat).all() and np.isfinite(pose.translation).all() and np.any(pose.rotation.quat)
+        ):
             raise ValueError(f"the pose of {image.name} is no place")
     for number, camera in model.cameras.items():
         lengths = [camera.params[i] for i in camera.focal_length_idxs()]
-        if not (0 < camera.width <= LONGEST_SIDE_PX and 0 < camera.height <= LONGEST_SIDE_PX
-                and np.isfinite(camera.params).all() and min(lengths) > 0):
+        if not (
+            0 < camera.width <= LONGEST_SIDE_PX
+            and 0 < camera.height <= LONGEST_SIDE_PX
+            and np.isfinite(camera.params).all()
+            and min(lengths) > 0
+        ):
             raise ValueError(f"the lens of camera {number} makes no sense")
     return model
 

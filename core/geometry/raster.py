@@ -53,8 +53,9 @@ def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> 
     return face, bary
 
 
-def _texels(triangles: np.ndarray, low: np.ndarray, high: np.ndarray
-            ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _texels(
+    triangles: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """All texels of the boxes [N, 2] of triangles [N], one box after the other: triangle, column and row of each, some
     TEXELS_AT_ONCE at a time."""
     sides = high - low + 1
@@ -95,8 +96,9 @@ def bleed(image: np.ndarray, valid: np.ndarray) -> np.ndarray:
     meets no black seam."""
     if valid.all() or not valid.any():
         return image
-    _, labels = cv2.distanceTransformWithLabels((~valid).astype(np.uint8), cv2.DIST_L2, 5,
-                                                labelType=cv2.DIST_LABEL_PIXEL)
+    _, labels = cv2.distanceTransformWithLabels(
+        (~valid).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
     nearest = np.zeros(labels.max() + 1, np.int64)
     nearest[labels[valid]] = np.flatnonzero(valid)
     return image.reshape(-1, *image.shape[2:])[nearest[labels]]
@@ -116,7 +118,8 @@ class RayCaster:
         face, bary, distance = np.full(count, -1), np.zeros((count, 3)), np.full(count, np.inf)
         if count:
             triangle, ray, location = self._intersector.intersects_id(
-                origins, directions, multiple_hits=False, return_locations=True)
+                origins, directions, multiple_hits=False, return_locations=True
+            )
             face[ray] = triangle
             bary[ray] = trimesh.triangles.points_to_barycentric(self.mesh.vertices[self.mesh.faces[triangle]], location)
             distance[ray] = np.linalg.norm(location - origins[ray], axis=1)
@@ -127,8 +130,9 @@ class RayCaster:
         return self._intersector.intersects_any(origins, directions) if len(directions) else np.zeros(0, bool)
 
 
-def visible_from(caster: RayCaster, points: np.ndarray, normals: np.ndarray, centre: np.ndarray,
-                 offset: float = 5e-4) -> np.ndarray:
+def visible_from(
+    caster: RayCaster, points: np.ndarray, normals: np.ndarray, centre: np.ndarray, offset: float = 5e-4
+) -> np.ndarray:
     """Whether surface points face a place and nothing lies between.
 
     Parameters
@@ -175,16 +179,25 @@ def _box(mesh: Mesh, view: View, width: int, height: int) -> tuple[slice, slice]
     low, high = (edge * [width / view.width, height / view.height] for edge in (pixels.min(0), pixels.max(0)))
     margin = BENT_SIDE_SHARE * (width + height)
     (left, top), (right, bottom) = np.floor(low - margin), np.ceil(high + margin)
-    return tuple(slice(int(np.clip(first, 0, size)), int(np.clip(end, 0, size)))
-                 for first, end, size in ((top, bottom, height), (left, right, width)))
+    return tuple(
+        slice(int(np.clip(first, 0, size)), int(np.clip(end, 0, size)))
+        for first, end, size in ((top, bottom, height), (left, right, width))
+    )
 
 
 def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Bilinear values of [H, W(, C)] at pixels [N, 2] (pixel centres at +0.5; clamped at the border)."""
     xy = (np.asarray(pixels, np.float32) - 0.5).reshape(-1, 1, 2)
-    out = [cv2.remap(np.ascontiguousarray(image, np.float32), xy[i:i + 32000, :, 0], xy[i:i + 32000, :, 1],
-                     cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-           for i in range(0, len(xy), 32000)]  # cv2.remap takes fewer than 32767 rows
+    out = [
+        cv2.remap(
+            np.ascontiguousarray(image, np.float32),
+            xy[i : i + 32000, :, 0],
+            xy[i : i + 32000, :, 1],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+        for i in range(0, len(xy), 32000)
+    ]  # cv2.remap takes fewer than 32767 rows
     return np.concatenate(out)[:, 0] if out else np.zeros((0, *image.shape[2:]), np.float32)
 
 

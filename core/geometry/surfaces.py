@@ -39,8 +39,9 @@ class Surface:
         self._tree = cKDTree(corners.mean(1))
         self._caster = RayCaster(mesh)
 
-    def find_partners(self, points: np.ndarray, normals: np.ndarray, farthest: float,
-                      cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
+    def find_partners(
+        self, points: np.ndarray, normals: np.ndarray, farthest: float, cosine: float = 0.3
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The partners of points on another surface.
 
         Parameters
@@ -61,8 +62,9 @@ class Surface:
         face[missed], bary[missed] = self.find_nearest(points[missed], normals[missed], farthest, cosine)
         return face, bary
 
-    def cast_rays(self, origins: np.ndarray, directions: np.ndarray, normals: np.ndarray,
-                  cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def cast_rays(
+        self, origins: np.ndarray, directions: np.ndarray, normals: np.ndarray, cosine: float = 0.3
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """First hits of rays, without those where the surface does not face the way of `normals`.
 
         Parameters
@@ -79,8 +81,9 @@ class Surface:
         face, bary, distance = self._caster.first_hits(origins, directions)
         return np.where(self._agree(face, bary, normals, cosine), face, -1), bary, distance
 
-    def find_nearest(self, points: np.ndarray, normals: np.ndarray, farthest: float,
-                     cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
+    def find_nearest(
+        self, points: np.ndarray, normals: np.ndarray, farthest: float, cosine: float = 0.3
+    ) -> tuple[np.ndarray, np.ndarray]:
         """As `find_partners`, by distance alone.
 
         Parameters
@@ -150,14 +153,19 @@ def _divided(corners: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarra
         a, b, c = (corners[two, (turn + k) % 3] for k in range(3))
         p, q = middle[two][at, turn], middle[two][at, (turn + 1) % 3]
         by_aq = (((a - q) ** 2).sum(1) <= ((p - c) ** 2).sum(1))[:, None, None]
-        thirds = np.concatenate([np.stack([p, b, q], 1),
-                                 np.where(by_aq, np.stack([a, p, q], 1), np.stack([a, p, c], 1)),
-                                 np.where(by_aq, np.stack([a, q, c], 1), np.stack([p, q, c], 1))])
+        thirds = np.concatenate(
+            [
+                np.stack([p, b, q], 1),
+                np.where(by_aq, np.stack([a, p, q], 1), np.stack([a, p, c], 1)),
+                np.where(by_aq, np.stack([a, q, c], 1), np.stack([p, q, c], 1)),
+            ]
+        )
         (a, b, c), (p, q, r) = corners[three].swapaxes(0, 1), middle[three].swapaxes(0, 1)
         fourths = np.stack([a, p, r, p, b, q, r, q, c, p, q, r], 1).reshape(-1, 3, 3)
         corners = np.concatenate([corners[none], halves, thirds, fourths])
-        parent = np.concatenate([parent[none], np.repeat(parent[one], 2), np.tile(parent[two], 3),
-                                 np.repeat(parent[three], 4)])
+        parent = np.concatenate(
+            [parent[none], np.repeat(parent[one], 2), np.tile(parent[two], 3), np.repeat(parent[three], 4)]
+        )
 
 
 def welded(mesh: Mesh, tolerance: float = 1e-6) -> tuple[Mesh, np.ndarray]:
@@ -201,17 +209,21 @@ def tangents(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     _, group = np.unique(key, axis=0, return_inverse=True)
     group = group.ravel()
     total = np.zeros((group.max() + 1, 3))
-    np.add.at(total, group,
-              np.repeat(along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-20), 3, 0)
-              * _angles(corners).reshape(-1, 1))
+    np.add.at(
+        total,
+        group,
+        np.repeat(along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-20), 3, 0)
+        * _angles(corners).reshape(-1, 1),
+    )
     normal = vertex_normals(mesh)[mesh.faces.ravel()]
     tangent = total[group]
     tangent -= (tangent * normal).sum(1, keepdims=True) * normal
     return (tangent / np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-20)).reshape(-1, 3, 3), hand
 
 
-def frames(normals: np.ndarray, faces: np.ndarray, tangent: np.ndarray, hand: np.ndarray, face: np.ndarray,
-           bary: np.ndarray):
+def frames(
+    normals: np.ndarray, faces: np.ndarray, tangent: np.ndarray, hand: np.ndarray, face: np.ndarray, bary: np.ndarray
+):
     """Tangent, bitangent and normal at samples of a mesh.
 
     Parameters

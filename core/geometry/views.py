@@ -83,13 +83,18 @@ def read_points(capture: Capture) -> tuple[np.ndarray, np.ndarray]:
     """The points [N, 3] in metres that were matched between the frames, and unit mean directions [N, 3] to the cameras
     that saw them. Raises Problem."""
     model = _read_model(capture)
-    centres = {number: np.asarray(image.projection_center()) for number, image in model.images.items()
-               if image.has_pose}
+    centres = {
+        number: np.asarray(image.projection_center()) for number, image in model.images.items() if image.has_pose
+    }
     places = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3)
     towards = np.zeros_like(places)
     for i, point in enumerate(model.points3D.values()):
-        seen = np.array([centres[element.image_id] for element in point.track.elements
-                         if element.image_id in centres]).reshape(-1, 3) - places[i]
+        seen = (
+            np.array(
+                [centres[element.image_id] for element in point.track.elements if element.image_id in centres]
+            ).reshape(-1, 3)
+            - places[i]
+        )
         towards[i] = (seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)).sum(0)
     return places, towards / np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
 
@@ -106,8 +111,16 @@ def read_views(capture: Capture, selected_only: bool = False) -> list[View]:
         if not image.has_pose:
             continue
         pose = pose_of(image)
-        views.append(View(image.name, capture.frames / image.name, model.cameras[image.camera_id],
-                          pose.rotation.matrix(), np.array(pose.translation), frame.selected))
+        views.append(
+            View(
+                image.name,
+                capture.frames / image.name,
+                model.cameras[image.camera_id],
+                pose.rotation.matrix(),
+                np.array(pose.translation),
+                frame.selected,
+            )
+        )
     return views
 
 
@@ -118,6 +131,5 @@ def _read_model(capture: Capture) -> pycolmap.Reconstruction:
         if strange:
             raise ValueError(f"{strange[0]!r} is no name of a frame")
     except (OSError, ValueError) as error:
-        raise Problem(f"The cameras of this capture cannot be read ({error}).",
-                      advise_again("frames")) from error
+        raise Problem(f"The cameras of this capture cannot be read ({error}).", advise_again("frames")) from error
     return model

@@ -30,20 +30,24 @@ def open_picture(path: Path) -> oiio.ImageInput:
     MOST_PICTURE_BYTES."""
     image = oiio.ImageInput.open(str(path)) if Path(path).is_file() else None  # a pipe would be waited for without end
     if image is None:
-        raise Problem(f"{path} is not a picture that can be read ({_words(oiio.geterror())}).",
-                      advise_remaking(path, SAVE_ANEW))
+        raise Problem(
+            f"{path} is not a picture that can be read ({_words(oiio.geterror())}).", advise_remaking(path, SAVE_ANEW)
+        )
     spec = image.spec()
     if min(spec.width, spec.height, spec.nchannels) < 1 or spec.depth > 1 or spec.deep:
         image.close()
-        raise Problem(f"{path} is not a two-dimensional picture: it has {spec.width} x {spec.height} x "
-                      f"{spec.depth} pixels.",
-                      advise_remaking(path, SAVE_ANEW))
+        raise Problem(
+            f"{path} is not a two-dimensional picture: it has {spec.width} x {spec.height} x {spec.depth} pixels.",
+            advise_remaking(path, SAVE_ANEW),
+        )
     # what is grey becomes R, G, B with those who want colours
     if 4 * spec.width * spec.height * max(spec.nchannels, 3) > MOST_PICTURE_BYTES:
         image.close()
-        raise Problem(f"{path} has {spec.width} x {spec.height} pixels, which would take more than "
-                      f"{MOST_PICTURE_BYTES >> 30} GB of memory.",
-                      advise_remaking(path, "Make it smaller: no texture here is larger than 8192 x 8192."))
+        raise Problem(
+            f"{path} has {spec.width} x {spec.height} pixels, which would take more than "
+            f"{MOST_PICTURE_BYTES >> 30} GB of memory.",
+            advise_remaking(path, "Make it smaller: no texture here is larger than 8192 x 8192."),
+        )
     return image
 
 
@@ -69,10 +73,12 @@ def check_written(path: Path, pixels: np.ndarray, half: bool) -> None:
     fault = find_fault(pixels, MOST_HALF_FLOAT if half else MOST_VALUE_CD_M2)
     if fault:
         path = final_name(path)
-        raise Problem(f"{path} was not written: it would hold {fault}.",
-                      advise_remaking(path,
-                                      "Run again, and if it stays, report it with the logs of this capture. Finished "
-                                      "stages are kept."))
+        raise Problem(
+            f"{path} was not written: it would hold {fault}.",
+            advise_remaking(
+                path, "Run again, and if it stays, report it with the logs of this capture. Finished stages are kept."
+            ),
+        )
 
 
 def find_fault(pixels: np.ndarray, most: float) -> str:

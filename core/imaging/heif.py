@@ -46,8 +46,10 @@ def read_pixels(path: Path, most_bytes: int) -> np.ndarray:
     picture = _opened(path)
     width, height = picture.size
     if 12 * width * height > most_bytes:
-        raise Problem(f"{path} has {width} x {height} pixels, which would take more than {most_bytes >> 30} GB of "
-                      "memory.", "Make it smaller.")
+        raise Problem(
+            f"{path} has {width} x {height} pixels, which would take more than {most_bytes >> 30} GB of memory.",
+            "Make it smaller.",
+        )
     try:
         pixels = np.asarray(picture)
     except (ValueError, EOFError, SyntaxError, RuntimeError, OSError) as error:
@@ -80,7 +82,7 @@ def read_exif(path: Path) -> dict[int, float]:
 def parse_exif(block: bytes) -> dict[int, float]:
     """Tag -> number, of the first folder and of EXIF's own; what is damaged is passed over."""
     start = 6 if block.startswith(b"Exif\0\0") else 0
-    order = {b"II": "<", b"MM": ">"}.get(block[start:start + 2])
+    order = {b"II": "<", b"MM": ">"}.get(block[start : start + 2])
     tags: dict[int, float] = {}
     try:
         folders = [struct.unpack_from(order + "I", block, start + 4)[0]] if order else []
@@ -118,9 +120,10 @@ def _opened(path: Path):
     try:
         import pillow_heif
     except ImportError as error:
-        raise Problem(f"{Path(path).name} is a HEIC picture, and the package pillow-heif that reads them is not "
-                      "installed.",
-                      "Click Install Solver under Setup, or export the pictures as JPEG.") from error
+        raise Problem(
+            f"{Path(path).name} is a HEIC picture, and the package pillow-heif that reads them is not installed.",
+            "Click Install Solver under Setup, or export the pictures as JPEG.",
+        ) from error
     try:
         return pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
     except (ValueError, EOFError, SyntaxError, RuntimeError, OSError) as error:
@@ -128,5 +131,6 @@ def _opened(path: Path):
 
 
 def _unreadable(path: Path, error: Exception) -> Problem:
-    return Problem(f"{path} is not a picture that can be read ({str(error).rstrip('.') or type(error).__name__}).",
-                   EXPORT)
+    return Problem(
+        f"{path} is not a picture that can be read ({str(error).rstrip('.') or type(error).__name__}).", EXPORT
+    )

@@ -25,12 +25,25 @@ from ..contract.stages import advise_remaking
 from . import heif
 from .checks import MOST_PICTURE_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
 
-EXIF = {heif.FOCAL_LENGTH: "FocalLength", heif.FOCAL_35MM: "FocalLengthIn35mmFilm",
-        heif.PLANE_RESOLUTION: "FocalPlaneXResolution",
-        heif.PLANE_UNIT: "FocalPlaneResolutionUnit", heif.WIDTH: "PixelXDimension", heif.HEIGHT: "PixelYDimension"}
+EXIF = {
+    heif.FOCAL_LENGTH: "FocalLength",
+    heif.FOCAL_35MM: "FocalLengthIn35mmFilm",
+    heif.PLANE_RESOLUTION: "FocalPlaneXResolution",
+    heif.PLANE_UNIT: "FocalPlaneResolutionUnit",
+    heif.WIDTH: "PixelXDimension",
+    heif.HEIGHT: "PixelYDimension",
+}
 """EXIF's tags -> what OpenImageIO calls them."""
-TURNS = {1: (False, 1, 1), 2: (False, 1, -1), 3: (False, -1, -1), 4: (False, -1, 1), 5: (True, 1, 1), 6: (True, 1, -1),
-         7: (True, -1, -1), 8: (True, -1, 1)}
+TURNS = {
+    1: (False, 1, 1),
+    2: (False, 1, -1),
+    3: (False, -1, -1),
+    4: (False, -1, 1),
+    5: (True, 1, 1),
+    6: (True, 1, -1),
+    7: (True, -1, -1),
+    8: (True, -1, 1),
+}
 """EXIF orientation -> how it comes upright: whether rows become columns, then the order of rows and of columns.
 (OpenImageIO's reorient mistakes 5 for 7.)"""
 
@@ -137,8 +150,11 @@ def read_focal_35mm(path: Path) -> float | None:
     told = {tag: spec.getattribute(f"Exif:{name}") for tag, name in EXIF.items()}
     image.close()
     # a manual lens tells 0/0
-    return heif.focal_35mm({tag: float(value) for tag, value in told.items()
-                            if isinstance(value, int | float) and np.isfinite(value)}, spec.width, spec.height)
+    return heif.focal_35mm(
+        {tag: float(value) for tag, value in told.items() if isinstance(value, int | float) and np.isfinite(value)},
+        spec.width,
+        spec.height,
+    )
 
 
 def read_profile(path: Path) -> str:
@@ -164,12 +180,21 @@ def write_packed(path: Path, channels: np.ndarray, bits: int = 8, srgb: bool = F
     bits : of a PNG
     srgb : whether the first three are colours encoded so
     """
-    _write(path, channels,
-           _Encoding("half" if is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True))
+    _write(
+        path,
+        channels,
+        _Encoding("half" if is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True),
+    )
 
 
-def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, small: bool = False,
-               check: Callable[[], None] = _never) -> None:
+def write_srgb(
+    path: Path,
+    srgb: np.ndarray,
+    bits: int = 8,
+    quality: int = 92,
+    small: bool = False,
+    check: Callable[[], None] = _never,
+) -> None:
     """A picture to PNG (8 or 16 bit) or JPEG (8 bit), atomically.
 
     Parameters
@@ -198,8 +223,9 @@ def write_linear(path: Path, linear: np.ndarray, small: bool = False, check: Cal
     _write(path, linear, _Encoding("half" if is_linear(path) else "uint16", "lin_srgb", small=small), check)
 
 
-def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False,
-               check: Callable[[], None] = _never) -> None:
+def write_data(
+    path: Path, data: np.ndarray, bits: int = 8, small: bool = False, check: Callable[[], None] = _never
+) -> None:
     """Data to PNG, or to a half-float EXR, atomically; no colour space.
 
     Parameters
@@ -268,8 +294,9 @@ def _write_rows(output: oiio.ImageOutput, pixels: np.ndarray, check: Callable[[]
     """Whether all rows could be written. A map of 4096 takes seconds, so `check` is asked in between."""
     for row in range(0, len(pixels), ROWS_BETWEEN_CHECKS):
         check()
-        if not output.write_scanlines(row, min(row + ROWS_BETWEEN_CHECKS, len(pixels)), 0,
-                                      pixels[row:row + ROWS_BETWEEN_CHECKS]):
+        if not output.write_scanlines(
+            row, min(row + ROWS_BETWEEN_CHECKS, len(pixels)), 0, pixels[row : row + ROWS_BETWEEN_CHECKS]
+        ):
             return False
     return True
 

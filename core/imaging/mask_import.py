@@ -33,9 +33,11 @@ def import_mask(capture: Capture, picture: Path) -> Path:
     width, height = _texture_size(capture)
     across, down = mask.shape[1] / width, mask.shape[0] / height
     if max(across, down) > MOST_STRETCH_RATIO * min(across, down):
-        raise Problem(f"{picture} is {mask.shape[1]} x {mask.shape[0]}, but the texture is {width} x {height}: it "
-                      "would be stretched.",
-                      "Paint the mask on the capture's texture.png, without cropping it.")
+        raise Problem(
+            f"{picture} is {mask.shape[1]} x {mask.shape[0]}, but the texture is {width} x {height}: it "
+            "would be stretched.",
+            "Paint the mask on the capture's texture.png, without cropping it.",
+        )
     if mask.shape != (height, width):
         mask = images.resize(mask, width, height)
     mask_history.keep(capture, capture.shadow_mask)

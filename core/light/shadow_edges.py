@@ -41,8 +41,9 @@ class Edge:
     colour: np.ndarray
 
 
-def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float,
-          check: Callable[[], None] = lambda: None) -> Edge:
+def place(
+    light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float, check: Callable[[], None] = lambda: None
+) -> Edge:
     """The edge of the shadow under a rough mask. Deeper inside the mask than an edge is looked for and its penumbra may
     reach, INWARD_TEXELS + BAND_TEXELS, alpha is never lowered.
 
@@ -59,8 +60,9 @@ def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: flo
     if not inside.any() or inside.all():
         return nothing
     box = _box(inside, (OUTWARD_TEXELS + 3 * WINDOW_TEXELS) / texel)
-    edge = _place(np.clip(light[box], 0, 4).astype(np.float32), painted[box], weight[box].astype(np.float32), texel,
-                  check)
+    edge = _place(
+        np.clip(light[box], 0, 4).astype(np.float32), painted[box], weight[box].astype(np.float32), texel, check
+    )
     if edge is None:
         return nothing
     alpha, sure, colour = edge
@@ -69,8 +71,9 @@ def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: flo
     return whole
 
 
-def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float,
-           check: Callable[[], None]) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+def _place(
+    light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float, check: Callable[[], None]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     depth = signed_distance(painted > 0.5) * texel  # negative inside
     dark = _segmented(light.mean(-1), painted > 0.5, depth, weight, texel)
     if not dark.any() or dark.all():
@@ -96,8 +99,9 @@ def penumbra(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
     return t * t * (3 - 2 * t)
 
 
-def _segmented(light: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight: np.ndarray,
-               texel: float) -> np.ndarray:
+def _segmented(
+    light: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight: np.ndarray, texel: float
+) -> np.ndarray:
     """bool [h, w]: the dark side. Both sides' local means and the sides themselves follow each other; deep inside the
     mask all is dark."""
     sigma, smooth = WINDOW_TEXELS / texel, max(2.0 / texel, 0.6)
@@ -110,16 +114,18 @@ def _segmented(light: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight:
             means.append(_blur(light * share, sigma) / np.maximum(_blur(share, sigma), 1e-4))
         lit, shaded = means
         gap = lit - shaded
-        odds = np.where(gap > 0.02, ((lit + shaded) / 2 - light) / np.maximum(gap, 0.05),
-                        np.where(dark > 0.5, 0.5, -0.5))
+        odds = np.where(
+            gap > 0.02, ((lit + shaded) / 2 - light) / np.maximum(gap, 0.05), np.where(dark > 0.5, 0.5, -0.5)
+        )
         known = np.maximum(weight, 0.02)
         odds = _blur(np.clip(odds, -0.5, 0.5) * known, smooth) / np.maximum(_blur(known, smooth), 1e-4)
         dark = np.where(free, odds > 0, inside).astype(np.float32)
     return dark > 0.5
 
 
-def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray, texel: float,
-             check: Callable[[], None]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _profile(
+    light: np.ndarray, distance: np.ndarray, weight: np.ndarray, texel: float, check: Callable[[], None]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Place [h, w] and width [h, w] of the penumbra along the edge, in the window about each texel, and the step's
     height [h, w, 3] there.
 
@@ -151,8 +157,10 @@ def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray, texel:
     shape = penumbra(distance - shift, np.maximum(width, 0.7 * texel)).astype(np.float32)
     m = _blur(weight * shape, sigma) / total
     spread = np.maximum(_blur(weight * shape**2, sigma) / total - m**2, 1e-3)
-    steps = [(_blur(weight * shape * c, sigma) / total - m * (_blur(weight * c, sigma) / total)) / spread
-             for c in np.moveaxis(light, -1, 0)]
+    steps = [
+        (_blur(weight * shape * c, sigma) / total - m * (_blur(weight * c, sigma) / total)) / spread
+        for c in np.moveaxis(light, -1, 0)
+    ]
     return shift, width, -np.stack(steps, -1)
 
 
@@ -176,8 +184,9 @@ def _ramp(x: np.ndarray, low: float, high: float) -> np.ndarray:
 def signed_distance(inside: np.ndarray) -> np.ndarray:
     """Texels to the border of a region, negative inside it; the border runs between texels."""
     outside = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5)
-    return np.where(inside, 0.5 - cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5),
-                    outside - 0.5).astype(np.float32)
+    return np.where(inside, 0.5 - cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5), outside - 0.5).astype(
+        np.float32
+    )
 
 
 def _blur(image: np.ndarray, sigma: float) -> np.ndarray:

@@ -20,8 +20,13 @@ def ambient_occlusion(transfer: np.ndarray) -> np.ndarray:
     return np.clip(UNIFORM * transfer[..., 0], 0, 1)
 
 
-def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,
-                      step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
+def radiance_transfer(
+    caster: RayCaster,
+    points: np.ndarray,
+    normals: np.ndarray,
+    rays: int = 128,
+    step: Callable[[int, int], None] = lambda done, of: None,
+) -> np.ndarray:
     """Irradiance / pi at surface points from the radiance of each orthonormal harmonic (spherical_harmonics.py),
     occluded by the mesh.
 
@@ -45,8 +50,9 @@ def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray
             step(i, rays)
         cosine = normals @ direction
         facing = np.flatnonzero(cosine > 0)
-        free = facing[~caster.blocked(points[facing] + 1e-3 * normals[facing],
-                                      np.repeat(direction[None], len(facing), 0))]
+        free = facing[
+            ~caster.blocked(points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0))
+        ]
         transfer[free] += cosine[free, None] * basis[i] * (4 / rays)
     return transfer
 
@@ -54,6 +60,6 @@ def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray
 def fibonacci_sphere(count: int) -> np.ndarray:
     """Evenly spread unit directions [count, 3]."""
     i = np.arange(count) + 0.5
-    z, angle = 1 - 2 * i / count, np.pi * (1 + 5 ** 0.5) * i
+    z, angle = 1 - 2 * i / count, np.pi * (1 + 5**0.5) * i
     r = np.sqrt(1 - z * z)
     return np.stack([r * np.cos(angle), r * np.sin(angle), z], -1)

@@ -24,8 +24,10 @@ ORTHONORMAL: Bands = (sqrt(1 / (4 * pi)), sqrt(3 / (4 * pi)), sqrt(15 / (4 * pi)
 LAMBERT: Bands = (1.0, 2 / 3, 1 / 4)
 """What a Lambertian surface makes of each band of the radiance around it: irradiance over pi (Ramamoorthi and Hanrahan
 2001, where it is A_l over pi)."""
-GAMMA_BANDS: Bands = tuple(y * pi * lambert * scale
-                           for y, lambert, scale in zip(ORTHONORMAL, LAMBERT, (1.0, sqrt(3), 2 * sqrt(2)), strict=True))
+GAMMA_BANDS: Bands = tuple(
+    y * pi * lambert * scale
+    for y, lambert, scale in zip(ORTHONORMAL, LAMBERT, (1.0, sqrt(3), 2 * sqrt(2)), strict=True)
+)
 """The parameterisation of gamma in the authors' code: the irradiance pi, 2 pi / 3, pi / 4 of orthonormal radiance, and
 its bands once more times 1, sqrt 3 and 2 sqrt 2. Together pi, 2 pi / sqrt 3 and pi / sqrt 2."""
 UNIFORM = 1 / ORTHONORMAL[0]

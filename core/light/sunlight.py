@@ -74,9 +74,14 @@ class _SkinPoints:
     weights: np.ndarray
 
 
-def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
-              reaches: Callable[[np.ndarray], np.ndarray], weights: np.ndarray,
-              step: Callable[[int, int], None] = lambda done, of: None) -> tuple[Light, np.ndarray, np.ndarray]:
+def fit_light(
+    colours: np.ndarray,
+    normals: np.ndarray,
+    transfer: np.ndarray,
+    reaches: Callable[[np.ndarray], np.ndarray],
+    weights: np.ndarray,
+    step: Callable[[int, int], None] = lambda done, of: None,
+) -> tuple[Light, np.ndarray, np.ndarray]:
     """The light that explains the colours of skin.
 
     Parameters
@@ -111,8 +116,11 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
                 best, best_direction = fitted, direction
     if best[0] - none[0] <= MIN_SUN_GAIN * weights.sum():
         best, best_direction = none, np.array([0.0, 0.0, 1.0])
-    cosine, visible = ((np.maximum(normals @ best_direction, 0), reaches(best_direction)) if best is not none
-                       else (np.zeros(len(colours)),) * 2)
+    cosine, visible = (
+        (np.maximum(normals @ best_direction, 0), reaches(best_direction))
+        if best is not none
+        else (np.zeros(len(colours)),) * 2
+    )
     _, environment, sun, reached, inlier, _ = _expectation_maximisation(skin, cosine, visible, best[5], iterations=30)
     ambient = transfer @ environment
     return Light(environment, best_direction, sun, AMBIENT_FLOOR_SHARE * np.median(ambient, 0)), reached, inlier
@@ -123,8 +131,9 @@ def log_likelihood(residual: np.ndarray) -> np.ndarray:
     red, green, blue = (residual[..., k] for k in range(3))  # a mean over an axis of three takes several times as long
     common = (red + green + blue) / 3
     chroma = (red - common) ** 2 + (green - common) ** 2 + (blue - common) ** 2
-    return (-0.5 * (3 * common ** 2 / LUMINANCE_SIGMA_LOG ** 2 + chroma / CHROMA_SIGMA_LOG ** 2)
-            - np.log(LUMINANCE_SIGMA_LOG * CHROMA_SIGMA_LOG ** 2 * (2 * np.pi) ** 1.5))
+    return -0.5 * (3 * common**2 / LUMINANCE_SIGMA_LOG**2 + chroma / CHROMA_SIGMA_LOG**2) - np.log(
+        LUMINANCE_SIGMA_LOG * CHROMA_SIGMA_LOG**2 * (2 * np.pi) ** 1.5
+    )
 
 
 def _around(direction: np.ndarray, spread: float) -> np.ndarray:
@@ -133,13 +142,15 @@ def _around(direction: np.ndarray, spread: float) -> np.ndarray:
     side /= np.linalg.norm(side)
     up = np.cross(direction, side)
     angles = np.arange(DIRECTIONS_AROUND // 2) * 4 * np.pi / DIRECTIONS_AROUND
-    rings = [direction + np.tan(spread * r) * (np.cos(a) * side + np.sin(a) * up) for r in (0.5, 1.0)
-             for a in angles + r]
+    rings = [
+        direction + np.tan(spread * r) * (np.cos(a) * side + np.sin(a) * up) for r in (0.5, 1.0) for a in angles + r
+    ]
     return np.array([d / np.linalg.norm(d) for d in rings])
 
 
-def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np.ndarray, start=None,
-                              iterations: int = 12):
+def _expectation_maximisation(
+    skin: _SkinPoints, cosine: np.ndarray, visible: np.ndarray, start=None, iterations: int = 12
+):
     """-> (log likelihood, environment [9, 3], sun colour [3], reached [N], inlier [N], responsibilities to start
     another fit from)."""
     log, colours, transfer, weights = skin.log, skin.colours, skin.transfer, skin.weights
@@ -156,8 +167,9 @@ def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np
     for _ in range(iterations):
         environment, sun = np.zeros((9, 3)), np.zeros(3)
         for k in range(3):
-            environment[:, k], sun[k] = _weighted_fit(transfer, cosine, colours[:, k] / scale[k], lit, inlier * weights,
-                                                      has_sun, spread)
+            environment[:, k], sun[k] = _weighted_fit(
+                transfer, cosine, colours[:, k] / scale[k], lit, inlier * weights, has_sun, spread
+            )
         environment, sun = environment * scale, sun * scale
         ambient = transfer @ environment
         ambient = np.maximum(ambient, AMBIENT_FLOOR_SHARE * np.median(ambient, 0))
@@ -175,8 +187,9 @@ def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np
         shares = np.exp(terms - peak)
         total = shares.sum(0)
         lit, inlier = shares[0] / np.maximum(shares[0] + shares[1], 1e-30), 1 - shares[2] / total
-        spread = np.average(lit * (in_sun**2).mean(1) + (1 - lit) * (in_shade**2).mean(1),
-                            weights=inlier * weights + 1e-9)
+        spread = np.average(
+            lit * (in_sun**2).mean(1) + (1 - lit) * (in_shade**2).mean(1), weights=inlier * weights + 1e-9
+        )
     return float(((peak + np.log(total)) * weights).sum()), environment, sun, lit, inlier, (lit, inlier, spread)
 
 

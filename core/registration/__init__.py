@@ -70,8 +70,15 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     subject = _subject(landmarks.with_artists(landmarks.onto_surface(face_marks, views, surface), given), report)
     photographs = read_frames(capture).kind == PHOTOGRAPHS
     try:
-        head = _by_scan(capture, settings, views, surface, subject,
-                        quality.LEAST_SHARE_OF_PHOTOGRAPHS if photographs else quality.LEAST_FOLLOWED_SHARE, report)
+        head = _by_scan(
+            capture,
+            settings,
+            views,
+            surface,
+            subject,
+            quality.LEAST_SHARE_OF_PHOTOGRAPHS if photographs else quality.LEAST_FOLLOWED_SHARE,
+            report,
+        )
         if photographs:
             quality.tell_draft(report, views, head)
     except quality.Unlike as problem:
@@ -113,8 +120,9 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     placed = _as_bust(model.mesh, fitted.pose.apply(model.mesh.vertices))
     aligned = _as_bust(model.mesh, fitted.pose.apply(model.shape(fitted.coefficients)))
     head = model.mesh.moved(_finished(placed, aligned, fitted.vertices, report))
-    quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), face_marks,
-                    subject.follow)
+    quality.figures(
+        report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), face_marks, subject.follow
+    )
     quality.report_views(report, fitted, views, head)
     quality.judge_views(head, fitted)
     quality.tell_draft(report, views, head)
@@ -123,8 +131,16 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
 
 def _shown(capture: Capture, views: list[View], subject: Subject, report: Reporter) -> unscanned.ShownByViews:
     """What these views show of a head that no scan tells of."""
-    seen = np.max([subject.follow, *(strength * _per_vertex(subject.model.mesh, template.mask(name, 512))
-                                     for name, strength in VIEW_WEIGHTS.items())], axis=0)
+    seen = np.max(
+        [
+            subject.follow,
+            *(
+                strength * _per_vertex(subject.model.mesh, template.mask(name, 512))
+                for name, strength in VIEW_WEIGHTS.items()
+            ),
+        ],
+        axis=0,
+    )
     points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)
     return unscanned.ShownByViews(views, subject.landmarks, subject.trust, points, seen)
 
@@ -139,8 +155,15 @@ def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, repo
     return unscanned.Points(points.places[share <= hair.HAIR_SHARE], points.towards[share <= hair.HAIR_SHARE])
 
 
-def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject,
-             least_share: float, report: Reporter) -> meshes.Mesh:
+def _by_scan(
+    capture: Capture,
+    settings: Settings,
+    views: list[View],
+    surface: meshes.Mesh,
+    subject: Subject,
+    least_share: float,
+    report: Reporter,
+) -> meshes.Mesh:
     face_marks, model = subject.landmarks, subject.model
     follow, shaped, trust = subject.follow, subject.shaped, subject.trust
     report.progress(10, STEPS, "placing the head")
@@ -159,8 +182,9 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     signed, _ = scan.match(vertices, meshes.vertex_normals(model.mesh.moved(vertices)), nonrigid.FAR_M)
     on_scan = np.isfinite(signed) & (follow > 0.5)
     chosen = [view for view in views if view.selected] or views
-    vertices = unscanned.beyond_scan(model, vertices, on_scan, _shown(capture, chosen, subject, report), report,
-                                     0.6 * STEPS, 0.9 * STEPS)
+    vertices = unscanned.beyond_scan(
+        model, vertices, on_scan, _shown(capture, chosen, subject, report), report, 0.6 * STEPS, 0.9 * STEPS
+    )
     placed, aligned = _as_bust(model.mesh, pose.apply(model.mesh.vertices)), _as_bust(model.mesh, start)
     vertices = _finished(placed, aligned, vertices, report)
 
@@ -181,15 +205,17 @@ def _as_bust(mesh: meshes.Mesh, vertices: np.ndarray) -> meshes.Mesh:
 def _finished(placed: meshes.Mesh, aligned: meshes.Mesh, vertices: np.ndarray, report: Reporter) -> np.ndarray:
     """Vertices [V, 3] with the neck's edge in a plane, on a smooth outline and without folds. Smoothing a fold near the
     edge bends it again: it is levelled once more where that folds nothing and turns no triangle over."""
-    vertices = intersections.mended(placed, bust.level_edge(placed, vertices),
-                                    lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
+    vertices = intersections.mended(
+        placed, bust.level_edge(placed, vertices), lambda done: report.progress(90 + done, STEPS, "smoothing folds")
+    )
     levelled = bust.level_edge(placed, vertices)
     turned = intersections.flipped(aligned, levelled).sum() > intersections.flipped(aligned, vertices).sum()
     return vertices if turned or intersections.wrong(placed, levelled).any() else levelled
 
 
-def _finish(capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject,
-            report: Reporter) -> None:
+def _finish(
+    capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject, report: Reporter
+) -> None:
     face_marks = subject.landmarks
     remove_file(capture.head_open)
     remove_file(capture.eyes)
@@ -200,14 +226,22 @@ def _finish(capture: Capture, settings: Settings, views: list[View], head: meshe
         meshes.write_obj(capture.head_open, seen.opened.skin)
         write_eyes(capture, *seen.records())
         eyeballs.figures(report, seen)
-        images.write_srgb(capture.picture("registration", "eyes"),
-                          drawing.eyes_overlay(views, face_marks, looks, seen.opened))
+        images.write_srgb(
+            capture.picture("registration", "eyes"), drawing.eyes_overlay(views, face_marks, looks, seen.opened)
+        )
     meshes.write_obj(capture.head, head)
     write_json(capture.landmarks, landmarks.to_json(face_marks))
-    own_template.run(capture, settings, head,
-                     own_template.BuiltIn(subject.model, subject.follow, subject.shaped, subject.hold), report)
-    images.write_srgb(capture.picture("registration", "wireframe"),
-                      drawing.overlay(drawing.three_views(views, face_marks), head, face_marks))
+    own_template.run(
+        capture,
+        settings,
+        head,
+        own_template.BuiltIn(subject.model, subject.follow, subject.shaped, subject.hold),
+        report,
+    )
+    images.write_srgb(
+        capture.picture("registration", "wireframe"),
+        drawing.overlay(drawing.three_views(views, face_marks), head, face_marks),
+    )
 
 
 def load_model() -> alignment.HeadModel:

@@ -65,8 +65,9 @@ def similarity(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> S
     return Similarity(float(scale), rotation, b - scale * rotation @ a)
 
 
-def fit_landmarks(model: HeadModel, points: np.ndarray, trust: np.ndarray,
-                  rounds: int = 12) -> tuple[Similarity, np.ndarray]:
+def fit_landmarks(
+    model: HeadModel, points: np.ndarray, trust: np.ndarray, rounds: int = 12
+) -> tuple[Similarity, np.ndarray]:
     """Lays the model's landmarks over points.
 
     Parameters
@@ -92,8 +93,15 @@ def fit_landmarks(model: HeadModel, points: np.ndarray, trust: np.ndarray,
     return pose, coefficients
 
 
-def fit_scan(model: HeadModel, pose: Similarity, coefficients: np.ndarray, points: np.ndarray, trust: np.ndarray,
-             scan: Scan, shaped: np.ndarray) -> tuple[Similarity, np.ndarray]:
+def fit_scan(
+    model: HeadModel,
+    pose: Similarity,
+    coefficients: np.ndarray,
+    points: np.ndarray,
+    trust: np.ndarray,
+    scan: Scan,
+    shaped: np.ndarray,
+) -> tuple[Similarity, np.ndarray]:
     """As `fit_landmarks`, with point-to-plane distances of the vertices to a scan.
 
     Parameters
@@ -117,9 +125,10 @@ def fit_scan(model: HeadModel, pose: Similarity, coefficients: np.ndarray, point
         reach = np.interp(step, [0, SCAN_ROUNDS - 1], [0.030, 0.010])
         signed, scan_normals = scan.match(vertices[index], normals, 1.5 * reach)
         weight = trimmed(signed, reach) * shaped[index]
-        weight *= min(1.0, INDEPENDENT_COUNTS["scan"] / max(weight.sum(), 1)) / SCAN_SIGMA_M ** 2
-        pose, coefficients = _step(model, pose, coefficients, points, trust,
-                                   (index, np.nan_to_num(signed), scan_normals, weight))
+        weight *= min(1.0, INDEPENDENT_COUNTS["scan"] / max(weight.sum(), 1)) / SCAN_SIGMA_M**2
+        pose, coefficients = _step(
+            model, pose, coefficients, points, trust, (index, np.nan_to_num(signed), scan_normals, weight)
+        )
     return pose, coefficients
 
 
@@ -135,7 +144,7 @@ def _step(model, pose, coefficients, points, trust, planes=None) -> tuple[Simila
     at = pose.apply(model.at_landmarks(model.shape(coefficients)))[known]
     residual = points[known] - at
     error = np.linalg.norm(residual, axis=1)
-    weights = weights / (1 + (error / (2.5 * LANDMARK_SIGMA_M)) ** 2) / LANDMARK_SIGMA_M ** 2
+    weights = weights / (1 + (error / (2.5 * LANDMARK_SIGMA_M)) ** 2) / LANDMARK_SIGMA_M**2
     weights = weights * min(1.0, INDEPENDENT_COUNTS["landmarks"] / len(weights))
     basis = model.at_landmarks(model.identity)[:, known] @ turn  # [K, N, 3]
     jacobian = _jacobian(at, pose.translation, basis).reshape(-1, 7 + len(coefficients))

@@ -62,8 +62,9 @@ def _smooth(border: np.ndarray) -> np.ndarray:
     increments *= 2 * np.pi / increments.sum()
     placed = way * np.append(0, np.cumsum(increments[:-1]))
     placed += np.angle(np.exp(1j * (angle - placed)).mean())
-    waves = np.concatenate([[np.ones(len(border))], *([np.cos(k * placed), np.sin(k * placed)]
-                                                      for k in range(1, HARMONICS + 1))]).T
+    waves = np.concatenate(
+        [[np.ones(len(border))], *([np.cos(k * placed), np.sin(k * placed)] for k in range(1, HARMONICS + 1))]
+    ).T
     length = np.linalg.norm(np.roll(border, -1, 0) - np.roll(border, 1, 0), axis=1)[:, None] ** 0.5
     smooth = waves @ np.linalg.lstsq(length * waves, length[:, 0] * radius, rcond=None)[0]
     return middle + (smooth * np.cos(placed))[:, None] * axes[0] + (smooth * np.sin(placed))[:, None] * axes[1]

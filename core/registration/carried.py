@@ -22,8 +22,9 @@ ROUND_RADIUS_SHARE = 0.06
 """Deviation from a sphere, as a share of its radius, below which a part is a ball."""
 
 
-def carry_along(start: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray,
-                report: Reporter) -> np.ndarray:
+def carry_along(
+    start: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray, report: Reporter
+) -> np.ndarray:
     """The final vertices of a mesh whose skin was fitted: eyes, teeth and other parts go along.
 
     Parameters
@@ -77,14 +78,14 @@ def field(places: np.ndarray, shift: np.ndarray, at: np.ndarray, report: Reporte
     out = np.empty_like(at)
     for i in range(0, len(at), 4000):
         report.progress(i, len(at), "carrying eyes, teeth and other parts along")
-        out[i:i + 4000] = continued(at[i:i + 4000])
+        out[i : i + 4000] = continued(at[i : i + 4000])
     return out
 
 
 def _centres(start: np.ndarray, skin: np.ndarray, other_parts: np.ndarray) -> np.ndarray:
     """Vertices of the skin that carry the rest: those nearest to the other parts, and an even choice of all."""
     distance, _ = cKDTree(start[other_parts]).query(start[skin])
-    near = skin[np.argsort(distance, kind="stable")[:MOST_CENTRES // 2]]
+    near = skin[np.argsort(distance, kind="stable")[: MOST_CENTRES // 2]]
     even = skin[np.linspace(0, len(skin) - 1, MOST_CENTRES // 2).astype(int)]
     return np.union1d(near, even)
 
@@ -92,7 +93,7 @@ def _centres(start: np.ndarray, skin: np.ndarray, other_parts: np.ndarray) -> np
 def _is_ball(points: np.ndarray) -> bool:
     """Whether points lie on most of a sphere."""
     system = np.column_stack([2 * points, np.ones(len(points))])
-    solution, *_ = np.linalg.lstsq(system, (points ** 2).sum(1), rcond=None)
+    solution, *_ = np.linalg.lstsq(system, (points**2).sum(1), rcond=None)
     centre = solution[:3]
     distance = np.linalg.norm(points - centre, axis=1)
     radius = np.median(distance)

@@ -53,8 +53,9 @@ def joined(constraints: list[Constraints]) -> Constraints:
     return Constraints(*(np.concatenate([getattr(part, f.name) for part in constraints]) for f in fields(Constraints)))
 
 
-def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], landmarks: Landmarks, trust: np.ndarray,
-                   reach: float) -> Constraints:
+def from_landmarks(
+    model: HeadModel, vertices: np.ndarray, views: list[View], landmarks: Landmarks, trust: np.ndarray, reach: float
+) -> Constraints:
     """Two constraints per view and landmark that is seen squarely enough. A single view does not tell depths, so there
     each landmark is also held, loosely, to the depth that it was lifted to.
 
@@ -88,12 +89,14 @@ def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], la
         side /= np.linalg.norm(side, axis=1, keepdims=True)
         robust = weight[index] / (1 + (miss**2).sum(1) / reach**2) ** 2
         for direction in (side, np.cross(rays[index], side)):
-            parts.append(Constraints(corners[index], model.landmark_bary[index], direction, (miss * direction).sum(1),
-                                     robust))
+            parts.append(
+                Constraints(corners[index], model.landmark_bary[index], direction, (miss * direction).sum(1), robust)
+            )
         if len(landmarks.images) == 1:
             deeper = ((landmarks.points[index] - at[index]) * rays[index]).sum(1)
-            parts.append(Constraints(corners[index], model.landmark_bary[index], rays[index], deeper,
-                                     DEPTH_SHARE * robust))
+            parts.append(
+                Constraints(corners[index], model.landmark_bary[index], rays[index], deeper, DEPTH_SHARE * robust)
+            )
     return joined(parts)
 
 

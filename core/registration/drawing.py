@@ -42,8 +42,13 @@ def overlay(views: list[View], mesh: Mesh, landmarks: Landmarks, height: int = 6
     return np.hstack([_one(view, mesh, caster, normals, edges, landmarks, height) for view in views])
 
 
-def eyes_overlay(views: list[View], landmarks: Landmarks, looks: tuple[list[EyeLook], list[EyeLook]], opened: OpenHead,
-                 side: int = 300) -> np.ndarray:
+def eyes_overlay(
+    views: list[View],
+    landmarks: Landmarks,
+    looks: tuple[list[EyeLook], list[EyeLook]],
+    opened: OpenHead,
+    side: int = 300,
+) -> np.ndarray:
     """Both eyes in three frames, with the edges of the head's lids (green), a ring near the iris' edge (blue) and where
     the reader saw ball and iris end (red).
 
@@ -60,8 +65,12 @@ def eyes_overlay(views: list[View], landmarks: Landmarks, looks: tuple[list[EyeL
     [3 side, 2 side, 3], sRGB: the right eye, then the left one.
     """
     shares = [{one.view.name: one.shares for one in seen} for seen in looks]
-    return np.vstack([np.hstack([_eye(view, shares[which].get(view.name), opened, which, side) for which in (1, 0)])
-                      for view in three_views(views, landmarks)])
+    return np.vstack(
+        [
+            np.hstack([_eye(view, shares[which].get(view.name), opened, which, side) for which in (1, 0)])
+            for view in three_views(views, landmarks)
+        ]
+    )
 
 
 def _eye(view: View, shares: EyeShares | None, opened: OpenHead, eye: int, side: int) -> np.ndarray:
@@ -82,7 +91,7 @@ def _eye(view: View, shares: EyeShares | None, opened: OpenHead, eye: int, side:
     for rim in opened.rims[eye]:
         drawn(view.project(opened.skin.vertices[rim])[0], (0.2, 1.0, 0.3))
     iris = ball.mesh.vertices[np.abs(2 * np.linalg.norm(ball.mesh.uvs - 0.5, axis=1) - RIM_UV) < 0.04]
-    for x, y in ((view.project(iris)[0] - middle) * scale + side / 2 - 0.5):
+    for x, y in (view.project(iris)[0] - middle) * scale + side / 2 - 0.5:
         cv2.circle(canvas, (round(x), round(y)), 1, (0.2, 0.6, 1.0), -1, cv2.LINE_AA)
     for share in () if shares is None else (shares.ball, shares.iris):
         there = cv2.resize(share, None, fx=PX_PER_CROP_PX, fy=PX_PER_CROP_PX, interpolation=cv2.INTER_LINEAR) > 0.5
@@ -108,11 +117,11 @@ def _one(view, mesh, caster, normals, edges, landmarks, height):
     seen = raster.visible_from(caster, mesh.vertices, normals, view.centre)
     shown = edges[seen[edges].all(1)]
     shift = 4  # cv2 draws with fractional pixels as fixed-point integers
-    lines = np.round((pixels[shown] * scale - 0.5) * 2 ** shift).astype(np.int32)
+    lines = np.round((pixels[shown] * scale - 0.5) * 2**shift).astype(np.int32)
     layer = canvas.copy()
     cv2.polylines(layer, list(lines), False, (0.2, 0.9, 1.0), 1, cv2.LINE_AA, shift)
     canvas = 0.55 * canvas + 0.45 * layer
     marks, used = landmarks.images.get(view.name, (np.zeros((0, 2)), np.zeros(0, bool)))
-    for x, y in np.round((marks[used] * scale - 0.5) * 2 ** shift).astype(int):
+    for x, y in np.round((marks[used] * scale - 0.5) * 2**shift).astype(int):
         cv2.circle(canvas, (int(x), int(y)), 1 << shift, (1.0, 0.85, 0.1), -1, cv2.LINE_AA, shift)
     return canvas

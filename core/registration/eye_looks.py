@@ -56,8 +56,9 @@ def look(views: list[View], landmarks: Landmarks, report: Reporter) -> tuple[lis
 
 def _names_of(views: list[View], found: Landmarks, side: int) -> set[str]:
     """The views whose look at one eye is usable."""
-    names = [view.name for view in views if view.name in found.eyes
-             and found.images[view.name][1][list(CORNERS[side])].any()]
+    names = [
+        view.name for view in views if view.name in found.eyes and found.images[view.name][1][list(CORNERS[side])].any()
+    ]
     # the right eye stands first there
     chosen = usable([(found.eyes[name][0], found.eyes[name][2 - side]) for name in names], side)
     return {names[i] for i in chosen}

@@ -47,16 +47,27 @@ class OpenEyes:
 
     def records(self) -> tuple[Eyeball, Eyeball]:
         """The left and the right eye as eyes.json keeps them."""
+
         def rounded(vector):
             return tuple(round(float(x), 6) for x in vector)
+
         posed = zip(self.opened.balls, self.openness, self.iris_radius, self.measured, strict=True)
-        return tuple(Eyeball(rounded(ball.centre), round(ball.radius, 6), rounded(ball.gaze), round(openness, 3),
-                             round(float(np.nan_to_num(iris)), 6), views)
-                     for ball, openness, iris, views in posed)
+        return tuple(
+            Eyeball(
+                rounded(ball.centre),
+                round(ball.radius, 6),
+                rounded(ball.gaze),
+                round(openness, 3),
+                round(float(np.nan_to_num(iris)), 6),
+                views,
+            )
+            for ball, openness, iris, views in posed
+        )
 
 
-def mark_rims(looks: tuple[list[EyeLook], list[EyeLook]], head: Mesh, opening: float,
-              report: Reporter) -> tuple[LidMarks | None, LidMarks | None]:
+def mark_rims(
+    looks: tuple[list[EyeLook], list[EyeLook]], head: Mesh, opening: float, report: Reporter
+) -> tuple[LidMarks | None, LidMarks | None]:
     """The edges of the left and the right lids, as far as the views tell of them.
 
     Parameters
@@ -71,8 +82,9 @@ def mark_rims(looks: tuple[list[EyeLook], list[EyeLook]], head: Mesh, opening: f
 
 
 def figures(report: Reporter, eyes: OpenEyes) -> None:
-    for name, ball, radius, views, openness in zip(SIDES, eyes.opened.balls, eyes.iris_radius, eyes.measured,
-                                                   eyes.openness, strict=True):
+    for name, ball, radius, views, openness in zip(
+        SIDES, eyes.opened.balls, eyes.iris_radius, eyes.measured, eyes.openness, strict=True
+    ):
         report.figure(f"{name}_eye_views", views)
         report.figure(f"{name}_eye_openness", round(openness, 2))
         report.figure(f"{name}_eyeball_radius_mm", round(1e3 * ball.radius, 2))
@@ -96,8 +108,13 @@ def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: floa
         if rim is not None:
             shift += _towards_rims(opened, side, rim)
     radius = np.array([rim.iris_radius if rim is not None else np.nan for rim in rims])
-    return OpenEyes(head, lids.open_around(head, balls, openness, shift), openness, radius,
-                    tuple(rim.views if rim is not None else 0 for rim in rims))
+    return OpenEyes(
+        head,
+        lids.open_around(head, balls, openness, shift),
+        openness,
+        radius,
+        tuple(rim.views if rim is not None else 0 for rim in rims),
+    )
 
 
 def _with_corners(head: Mesh, rims: tuple) -> Mesh:
@@ -106,8 +123,9 @@ def _with_corners(head: Mesh, rims: tuple) -> Mesh:
     for rim, (outer, inner) in zip(rims, lids.corners(), strict=True):
         if rim is not None:
             for corner, aim in ((outer, rim.upper[0]), (inner, rim.upper[-1])):
-                near = np.exp(-0.5
-                              * (np.linalg.norm(head.vertices - head.vertices[corner], axis=1) / CORNER_REACH_M) ** 2)
+                near = np.exp(
+                    -0.5 * (np.linalg.norm(head.vertices - head.vertices[corner], axis=1) / CORNER_REACH_M) ** 2
+                )
                 vertices += near[:, None] * (aim - head.vertices[corner])
     return replace(head, vertices=vertices)
 
@@ -126,16 +144,24 @@ def _place(head: Mesh, side: int, lid_marks: LidMarks | None) -> lids.PosedEyeba
         far, front_far = np.linalg.norm(out, axis=1), np.linalg.norm(ahead)
         # where a ring of the iris' radius lies on the ball
         front = np.sqrt(max(radius**2 - lid_marks.iris_radius**2, 1e-9))
-        rows = np.concatenate([
-            np.column_stack([-out / far[:, None], -np.ones(len(out))]) / RIM_SIGMA_M,
-            np.append(-ahead / front_far, -radius / front)[None] / IRIS_SIGMA_M,
-            np.column_stack([-np.eye(3)[[0, 2]] / front_far, [0, 0]]) / GAZE_SIGMA_RAD,
-            np.column_stack([np.diag(1 / CENTRE_SIGMA_M), np.zeros(3)]),
-            np.array([[0, 0, 0, 1 / (RADIUS_SIGMA_SHARE * size)]]),
-        ])
-        left = np.concatenate([(radius + off - far) / RIM_SIGMA_M, [(front - front_far) / IRIS_SIGMA_M],
-                               -ahead[[0, 2]] / front_far / GAZE_SIGMA_RAD, (start - centre) / CENTRE_SIGMA_M,
-                               [(size - radius) / (RADIUS_SIGMA_SHARE * size)]])
+        rows = np.concatenate(
+            [
+                np.column_stack([-out / far[:, None], -np.ones(len(out))]) / RIM_SIGMA_M,
+                np.append(-ahead / front_far, -radius / front)[None] / IRIS_SIGMA_M,
+                np.column_stack([-np.eye(3)[[0, 2]] / front_far, [0, 0]]) / GAZE_SIGMA_RAD,
+                np.column_stack([np.diag(1 / CENTRE_SIGMA_M), np.zeros(3)]),
+                np.array([[0, 0, 0, 1 / (RADIUS_SIGMA_SHARE * size)]]),
+            ]
+        )
+        left = np.concatenate(
+            [
+                (radius + off - far) / RIM_SIGMA_M,
+                [(front - front_far) / IRIS_SIGMA_M],
+                -ahead[[0, 2]] / front_far / GAZE_SIGMA_RAD,
+                (start - centre) / CENTRE_SIGMA_M,
+                [(size - radius) / (RADIUS_SIGMA_SHARE * size)],
+            ]
+        )
         step = np.linalg.lstsq(rows, left, rcond=None)[0]
         centre, radius = centre + step[:3], radius + step[3]
     ahead = lid_marks.iris - centre
@@ -172,7 +198,7 @@ def _openness(head: Mesh, balls: tuple, side: int, lid_marks: LidMarks | None, o
         upper, lower = (opened.skin.vertices[rim] for rim in opened.rims[side])
         if lid_marks is None:
             outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
-            height = np.sort(np.linalg.norm(upper - lower, axis=1))[-len(upper) // 3:].mean()
+            height = np.sort(np.linalg.norm(upper - lower, axis=1))[-len(upper) // 3 :].mean()
             miss.append(abs(height / np.linalg.norm(outer - inner) - opening))
         else:
             miss.append(np.abs((_aims(opened, side, 0, lid_marks) - upper)[:, 2]).mean())

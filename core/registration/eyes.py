@@ -15,8 +15,36 @@ FRONTAL_DEG = 25.0
 OPEN_RATIO = 0.22
 """Height over width of the opening beyond which an eye counts as open, by the narrower one of a frame: the network
 marks two rims on closed lids as well, so nobody's opening is 0."""
-LID_MARKS = (246, 161, 160, 159, 158, 157, 173, 7, 163, 144, 145, 153, 154, 155, 466, 388, 387, 386, 385, 384, 398, 249,
-             390, 373, 374, 380, 381, 382)
+LID_MARKS = (
+    246,
+    161,
+    160,
+    159,
+    158,
+    157,
+    173,
+    7,
+    163,
+    144,
+    145,
+    153,
+    154,
+    155,
+    466,
+    388,
+    387,
+    386,
+    385,
+    384,
+    398,
+    249,
+    390,
+    373,
+    374,
+    380,
+    381,
+    382,
+)
 """MediaPipe's landmarks on the rims of the lids, corners left out: those stay put when an eye closes."""
 
 

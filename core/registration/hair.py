@@ -34,16 +34,23 @@ def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) ->
     report : takes the share that goes
     """
     normals, caster = vertex_normals(scan), raster.RayCaster(scan)
-    share = hidden_share(scan.vertices, normals, views, head, report,
-                         lambda view: raster.visible_from(caster, scan.vertices, normals, view.centre, offset=0.002))
+    share = hidden_share(
+        scan.vertices,
+        normals,
+        views,
+        head,
+        report,
+        lambda view: raster.visible_from(caster, scan.vertices, normals, view.centre, offset=0.002),
+    )
     hidden = np.nan_to_num(share) > HAIR_SHARE
     kept = ~hidden[scan.faces].any(1)
     report.figure("hair_in_scan_percent", round(100 * float(1 - kept.mean()), 1))
     return Mesh(scan.vertices, scan.faces[kept]) if LEAST_LEFT_SHARE < kept.mean() < 1 else scan
 
 
-def hidden_share(points: np.ndarray, normals: np.ndarray, views: list[View], head: Mesh, report: Reporter,
-                 visible=None) -> np.ndarray:
+def hidden_share(
+    points: np.ndarray, normals: np.ndarray, views: list[View], head: Mesh, report: Reporter, visible=None
+) -> np.ndarray:
     """The mean share of hair and cloth before points, over the views that face them.
 
     Parameters

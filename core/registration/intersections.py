@@ -102,5 +102,6 @@ def _graph(mesh: Mesh) -> sparse.csr_matrix:
     """[V, V] with 1 along edges."""
     a, b = mesh.faces[:, [0, 1, 2]].ravel(), mesh.faces[:, [1, 2, 0]].ravel()
     count = len(mesh.vertices)
-    return (sparse.coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (count, count)).tocsr()
-            > 0).astype(np.float64)
+    return (sparse.coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (count, count)).tocsr() > 0).astype(
+        np.float64
+    )

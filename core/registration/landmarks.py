@@ -56,16 +56,20 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
             detections.append((view, face.landmarks[:, :2] * scale))
             seen[view.name] = (face.yaw_deg, *(eye.scaled(scale) for eye in faces.find_eyes(srgb, face)))
     if len(detections) < min(3 if len(chosen) > FEW_VIEWS else 2, len(chosen)):
-        raise Problem(f"A face was found in only {len(detections)} of the {len(chosen)} frames that were looked at.",
-                      "Film the face larger, in better light and from the front too, then start again from the video.")
+        raise Problem(
+            f"A face was found in only {len(detections)} of the {len(chosen)} frames that were looked at.",
+            "Film the face larger, in better light and from the front too, then start again from the video.",
+        )
     lifted = triangulate([view for view, _ in detections], np.stack([pixels for _, pixels in detections]))
     if not np.isfinite(lifted.points).any():  # a single view, or several from one side
         lifted = lift_alone(*min(detections, key=lambda pair: abs(seen[pair[0].name][0])))
     # another person's eyes say nothing, nor does what the net guesses of a profile
     kept = {name: seen[name] for name, (_, used) in lifted.images.items() if used.any()}
-    return replace(lifted,
-                   opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in kept.values()]),
-                   eyes=kept)
+    return replace(
+        lifted,
+        opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in kept.values()]),
+        eyes=kept,
+    )
 
 
 def spread(views: list[View], count: int) -> list[View]:
@@ -80,7 +84,7 @@ def spread(views: list[View], count: int) -> list[View]:
     wanted = np.linspace(azimuth[order[0]], azimuth[order[-1]], count)
     picked = {int(order[np.abs(azimuth[order] - angle).argmin()]) for angle in wanted}
     rest = [i for i in np.linspace(0, len(views) - 1, count).astype(int) if i not in picked]
-    return [views[i] for i in sorted([*picked, *rest[:count - len(picked)]])]
+    return [views[i] for i in sorted([*picked, *rest[: count - len(picked)]])]
 
 
 def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Landmarks:
@@ -96,10 +100,10 @@ def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Land
         facing = _facing(points, origins)
         width = max(3 * np.median(errors[facing > 0]), 1.0) if (facing > 0).any() else 5.0
         # the first rounds: least absolute
-        robust = 1 / np.maximum(errors, 0.5) if step < 3 else (width ** 2 / (width ** 2 + errors ** 2)) ** 2
+        robust = 1 / np.maximum(errors, 0.5) if step < 3 else (width**2 / (width**2 + errors**2)) ** 2
         distance = np.linalg.norm(origins - points[:, None], axis=-1)
         sure = np.where(np.isfinite(errors), robust, 0)
-        weights = sure * np.maximum(facing, 1e-4) * _view_trust(errors, facing) / distance ** 2
+        weights = sure * np.maximum(facing, 1e-4) * _view_trust(errors, facing) / distance**2
         points = _nearest_to_rays(origins, rays, weights)
     errors = _errors(views, points, pixels)
     facing = _facing(points, origins)
@@ -109,8 +113,9 @@ def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Land
     trust = np.where(lifted, np.minimum(used.sum(1) / 4, 1) / (1 + (typical / width) ** 2), 0)
     points[~lifted] = np.nan
     median = float(np.median(errors[used])) if used.any() else float("nan")
-    return Landmarks(points, trust, median,
-                     {v.name: (p, used[:, i]) for i, (v, p) in enumerate(zip(views, pixels, strict=True))})
+    return Landmarks(
+        points, trust, median, {v.name: (p, used[:, i]) for i, (v, p) in enumerate(zip(views, pixels, strict=True))}
+    )
 
 
 def lift_alone(view: View, pixels: np.ndarray) -> Landmarks:
@@ -121,8 +126,9 @@ def lift_alone(view: View, pixels: np.ndarray) -> Landmarks:
     across, size = np.eye(3) - np.outer(view.axis, view.axis), 1.0
     for _ in range(3):  # what lies nearer or farther looks larger or smaller
         points = view.centre + rays * ((size * mean - view.centre) * rays).sum(1, keepdims=True)
-        size = float(np.linalg.norm((points - points.mean(0)) @ across)
-                     / np.linalg.norm((mean - mean.mean(0)) @ across))
+        size = float(
+            np.linalg.norm((points - points.mean(0)) @ across) / np.linalg.norm((mean - mean.mean(0)) @ across)
+        )
     used = _facing(points, np.repeat(view.centre[None, None], len(points), 0))[:, 0] > 0
     return Landmarks(points, np.where(used, 0.25, 0.0), 0.0, {view.name: (pixels, used)})
 
@@ -153,8 +159,9 @@ def onto_surface(landmarks: Landmarks, views: list[View], mesh: Mesh, farthest: 
         weights.append(used * near * _facing(landmarks.points, origins[:, None])[:, 0] ** 2)
     hits, weights = np.stack(hits, 1), np.stack(weights, 1)  # [468, V, 3], [468, V]
     total = weights.sum(1)
-    points = np.where((total > 0)[:, None], (hits * weights[..., None]).sum(1) / np.maximum(total, 1e-9)[:, None],
-                      landmarks.points)
+    points = np.where(
+        (total > 0)[:, None], (hits * weights[..., None]).sum(1) / np.maximum(total, 1e-9)[:, None], landmarks.points
+    )
     for _ in range(8):  # towards the geometric median: one view's slip does not count
         robust = weights / np.maximum(np.linalg.norm(hits - points[:, None], axis=-1), 5e-4)
         mean = (hits * robust[..., None]).sum(1) / np.maximum(robust.sum(1), 1e-9)[:, None]
@@ -173,8 +180,10 @@ def with_artists(landmarks: Landmarks, placed: Mapping[int, tuple]) -> Landmarks
 def to_json(landmarks: Landmarks) -> dict:
     """What landmarks.json holds: points by index in metres, and by frame the pixels they were lifted from."""
     points = {str(i): [round(float(x), 6) for x in p] for i, p in enumerate(landmarks.points) if np.isfinite(p).all()}
-    seen = {name: {str(i): [round(float(x), 2) for x in pixels[i]] for i in np.flatnonzero(used)}
-            for name, (pixels, used) in landmarks.images.items()}
+    seen = {
+        name: {str(i): [round(float(x), 2) for x in pixels[i]] for i in np.flatnonzero(used)}
+        for name, (pixels, used) in landmarks.images.items()
+    }
     return {"points": points, "images": seen}
 
 

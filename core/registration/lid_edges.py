@@ -28,8 +28,9 @@ SPARED_POINTS = 2
 pixel."""
 
 
-def fit_edges(looks: list[EyeLook], expected: list[np.ndarray], upper: np.ndarray, lower: np.ndarray,
-              centre: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def fit_edges(
+    looks: list[EyeLook], expected: list[np.ndarray], upper: np.ndarray, lower: np.ndarray, centre: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
     """The upper and the lower edge [N, 3], both from the outer corner to the inner one, that fit what all views show.
 
     Parameters
@@ -76,10 +77,10 @@ def fit_edges(looks: list[EyeLook], expected: list[np.ndarray], upper: np.ndarra
             told |= here
         matrix = stiff.copy()
         for i in range(count):
-            matrix[3 * i:3 * i + 3, 3 * i:3 * i + 3] += blocks[i]
+            matrix[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += blocks[i]
         points = points + np.linalg.solve(matrix, right.ravel() - stiff @ (points - start).ravel()).reshape(count, 3)
     closed = np.concatenate([points, points[:1]])
-    return points[:corner + 1], closed[corner:][::-1], float(told[asks].mean())
+    return points[: corner + 1], closed[corner:][::-1], float(told[asks].mean())
 
 
 def _borders(look: EyeLook, ball: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

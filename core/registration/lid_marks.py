@@ -73,13 +73,14 @@ def mark(looks: list[EyeLook], opened: lids.OpenHead, side: int, report: Reporte
     return LidMarks(_spread(upper), _spread(lower), iris, radius, len(looks))
 
 
-def _all_expected(looks: list[EyeLook], opened: lids.OpenHead, side: int, shift: np.ndarray,
-                  report: Reporter) -> list[np.ndarray]:
+def _all_expected(
+    looks: list[EyeLook], opened: lids.OpenHead, side: int, shift: np.ndarray, report: Reporter
+) -> list[np.ndarray]:
     """For each look the ball's share [SIDE, SIDE] of the crop's pixels as a head shows it that is moved by `shift`
     [3]."""
     parts = [mesh.moved(mesh.vertices + shift) for mesh in (opened.skin, opened.balls[side].mesh)]
     caster, first = raster.RayCaster(joined(parts)), len(opened.skin.faces)
-    y, x = (np.mgrid[0:SIDE_PX * RAYS_PER_SIDE, 0:SIDE_PX * RAYS_PER_SIDE] + 0.5) / RAYS_PER_SIDE
+    y, x = (np.mgrid[0 : SIDE_PX * RAYS_PER_SIDE, 0 : SIDE_PX * RAYS_PER_SIDE] + 0.5) / RAYS_PER_SIDE
     expected = []
     for one in looks:
         report.check()

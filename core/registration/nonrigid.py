@@ -49,8 +49,15 @@ class LandmarkTargets:
     fixed: np.ndarray | None = None
 
 
-def fit(model: HeadModel, start: np.ndarray, scan: Scan, follow: np.ndarray, targets: LandmarkTargets, iterations: int,
-        progress: Callable[[float], None] = lambda share: None) -> np.ndarray:
+def fit(
+    model: HeadModel,
+    start: np.ndarray,
+    scan: Scan,
+    follow: np.ndarray,
+    targets: LandmarkTargets,
+    iterations: int,
+    progress: Callable[[float], None] = lambda share: None,
+) -> np.ndarray:
     """A head drawn onto a scan. Nothing is known of what the mesh is but these arrays.
 
     Parameters
@@ -97,12 +104,16 @@ def fit(model: HeadModel, start: np.ndarray, scan: Scan, follow: np.ndarray, tar
         blind = 1 - follow * np.isfinite(signed)
         bending = np.maximum(length, BLIND_M * blind) ** 4
         pull = PULL + (BLIND_PULL - PULL) * (1 - follow)
-        matrix = (sparse.diags(area * (data + pull)) + marks.T @ sparse.diags(pin) @ marks
-                  + laplacian.T @ sparse.diags(bending / area) @ laplacian)
+        matrix = (
+            sparse.diags(area * (data + pull))
+            + marks.T @ sparse.diags(pin) @ marks
+            + laplacian.T @ sparse.diags(bending / area) @ laplacian
+        )
         right = (area * data)[:, None] * (aim - start) + marks.T @ (pin[:, None] * (at + miss - marks @ start))
         # positive definite, so no pivoting: with it the factors fill up and take fifty times as long
-        vertices = start + splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                                options={"SymmetricMode": True}).solve(right)
+        vertices = start + splu(
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        ).solve(right)
     return vertices
 
 
@@ -136,5 +147,6 @@ def anchors(model: HeadModel) -> sparse.csr_matrix:
     """[468, V]: takes vertices to landmarks."""
     corners = model.mesh.faces[model.landmark_face]
     rows = np.repeat(np.arange(len(corners)), 3)
-    return sparse.coo_matrix((model.landmark_bary.ravel(), (rows, corners.ravel())),
-                             (len(corners), len(model.mesh.vertices))).tocsr()
+    return sparse.coo_matrix(
+        (model.landmark_bary.ravel(), (rows, corners.ravel())), (len(corners), len(model.mesh.vertices))
+    ).tocsr()

@@ -39,8 +39,10 @@ def read(chosen: str, report: Reporter) -> OwnMesh:
     """Reads an OBJ or a folder. Raises Problem for what is no head mesh."""
     path = Path(chosen)
     if not path.exists():
-        raise Problem(f"There is no head mesh at {path}.",
-                      "Choose an OBJ file or a folder of shapes under Head Mesh, or the built-in head alone.")
+        raise Problem(
+            f"There is no head mesh at {path}.",
+            "Choose an OBJ file or a folder of shapes under Head Mesh, or the built-in head alone.",
+        )
     neutral, others = _folder(path) if path.is_dir() else (path, [])
     mesh = meshes.read_obj(neutral)
     _check(mesh, neutral)
@@ -49,9 +51,11 @@ def read(chosen: str, report: Reporter) -> OwnMesh:
         report.progress(i, len(others), f"reading the shape {other.stem}")
         positions = _positions(other)
         if positions.shape != mesh.vertices.shape:
-            raise Problem(f"The shape {other.name} has {len(positions)} vertices, the neutral mesh {neutral.name} has "
-                          f"{len(mesh.vertices)}.",
-                          "Leave in the folder only shapes of the same mesh, in the same vertex order.")
+            raise Problem(
+                f"The shape {other.name} has {len(positions)} vertices, the neutral mesh {neutral.name} has "
+                f"{len(mesh.vertices)}.",
+                "Leave in the folder only shapes of the same mesh, in the same vertex order.",
+            )
         scale = 1.0 if _is_identity(other) else EXPRESSION_SIGMA
         shapes.append(((positions - mesh.vertices) * scale).astype(np.float32))
     return OwnMesh(mesh, np.array(shapes, np.float32).reshape(-1, *mesh.vertices.shape), neutral)
@@ -72,15 +76,18 @@ def with_usable_uvs(own: OwnMesh, skin: np.ndarray, allowed: bool, size: int) ->
     Problem
         Saying what is wrong with its UVs, unless a new atlas is allowed.
     """
-    skin_mesh = replace(own.mesh, faces=own.mesh.faces[skin],
-                        face_uvs=None if own.mesh.face_uvs is None else own.mesh.face_uvs[skin])
+    skin_mesh = replace(
+        own.mesh, faces=own.mesh.faces[skin], face_uvs=None if own.mesh.face_uvs is None else own.mesh.face_uvs[skin]
+    )
     wrong = atlas.faults(skin_mesh)
     if not wrong:
         return own, "the artist's"
     if not allowed:
-        raise Problem(f"Maps cannot be baked into the UVs of {own.path.name}. {' '.join(wrong)}",
-                      "Unwrap the mesh in your modelling program, or switch on New Atlas under Reconstruction, Head "
-                      "Mesh (--new-atlas).")
+        raise Problem(
+            f"Maps cannot be baked into the UVs of {own.path.name}. {' '.join(wrong)}",
+            "Unwrap the mesh in your modelling program, or switch on New Atlas under Reconstruction, Head "
+            "Mesh (--new-atlas).",
+        )
     return replace(own, mesh=atlas.unwrap(own.mesh, size)), "a new atlas"
 
 
@@ -107,8 +114,9 @@ def write(path: Path, own: OwnMesh, vertices: np.ndarray) -> None:
             if uv_lines:
                 lines, uv_lines = [*lines, *uv_lines], []
             count = len(words) - 3
-            lines += _polygons(own.mesh.faces[triangle:triangle + count] + 1,
-                               own.mesh.face_uvs[triangle:triangle + count] + 1)
+            lines += _polygons(
+                own.mesh.faces[triangle : triangle + count] + 1, own.mesh.face_uvs[triangle : triangle + count] + 1
+            )
             triangle += count
         elif key not in ("vn", "mtllib") and (kept or key != "vt"):
             lines.append(line)
@@ -135,10 +143,12 @@ def _folder(folder: Path) -> tuple[Path, list[Path]]:
         if len(neutral) == 1:
             shapes = sorted((p for p in objs if p != neutral[0]), key=lambda p: (not _is_identity(p), _numbers(p)))
             expressions = sum(not _is_identity(p) for p in shapes)
-            identities = shapes[:len(shapes) - expressions][:max(MOST_SHAPES - expressions, MOST_SHAPES // 2)]
-            return neutral[0], [*identities, *shapes[len(shapes) - expressions:]][:MOST_SHAPES]
-    raise Problem(f"{folder} holds no head mesh: there is not exactly one OBJ with 'neutral' in its name.",
-                  "Choose a folder with a neutral mesh and its shapes, or one OBJ file.")
+            identities = shapes[: len(shapes) - expressions][: max(MOST_SHAPES - expressions, MOST_SHAPES // 2)]
+            return neutral[0], [*identities, *shapes[len(shapes) - expressions :]][:MOST_SHAPES]
+    raise Problem(
+        f"{folder} holds no head mesh: there is not exactly one OBJ with 'neutral' in its name.",
+        "Choose a folder with a neutral mesh and its shapes, or one OBJ file.",
+    )
 
 
 def _is_identity(path: Path) -> bool:
@@ -154,8 +164,9 @@ def _positions(path: Path) -> np.ndarray:
     try:
         return meshes.read_obj_vertices(path)
     except Problem as problem:
-        raise Problem(f"The shape {path.name} cannot be read: {problem.problem}",
-                      "Export it again, or take it out of the folder.") from problem
+        raise Problem(
+            f"The shape {path.name} cannot be read: {problem.problem}", "Export it again, or take it out of the folder."
+        ) from problem
 
 
 def _check(mesh: Mesh, path: Path) -> None:
@@ -164,11 +175,17 @@ def _check(mesh: Mesh, path: Path) -> None:
     if np.ptp(mesh.vertices, axis=0).min() <= 0:
         raise Problem(f"{path.name} is flat.", "Export it again as OBJ.")
     if not LEAST_VERTICES <= count <= MOST_VERTICES:
-        raise Problem(f"{path.name} has {count} vertices.",
-                      f"Choose a head with {LEAST_VERTICES} to {MOST_VERTICES} vertices, neither a primitive nor a "
-                      "sculpt at its highest level.")
+        raise Problem(
+            f"{path.name} has {count} vertices.",
+            f"Choose a head with {LEAST_VERTICES} to {MOST_VERTICES} vertices, neither a primitive nor a "
+            "sculpt at its highest level.",
+        )
 
 
 def _same_uvs(a: Mesh, b: Mesh) -> bool:
-    return (a.uvs is not None and b.uvs is not None and np.array_equal(a.uvs, b.uvs)
-            and np.array_equal(a.face_uvs, b.face_uvs))
+    return (
+        a.uvs is not None
+        and b.uvs is not None
+        and np.array_equal(a.uvs, b.uvs)
+        and np.array_equal(a.face_uvs, b.face_uvs)
+    )

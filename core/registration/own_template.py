@@ -94,16 +94,19 @@ def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report:
     own, uvs = own_mesh.with_usable_uvs(own, fitted.skin, settings.registration.new_atlas, settings.transfer.size)
     own_mesh.write(capture.own_head, own, fitted.vertices)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], fitted.skin, [0]])))
-    write_json(capture.own_head_skin,
-               {"template": own.path.name, "uvs": uvs, "skin_triangles": edges.reshape(-1, 2).tolist()})
+    write_json(
+        capture.own_head_skin, {"template": own.path.name, "uvs": uvs, "skin_triangles": edges.reshape(-1, 2).tolist()}
+    )
     report.figure("own_template", Path(settings.registration.template).stem)
     report.figure("own_shapes", len(own.shapes))
     report.figure("own_uvs", uvs)
     report.figure("own_to_head_median_mm", round(1e3 * float(np.median(fitted.distances)), 3))
     report.figure("own_to_head_p95_mm", round(1e3 * float(np.percentile(fitted.distances, 95)), 3))
     report.figure("own_flipped_triangles", fitted.flipped)
-    images.write_srgb(capture.picture("registration", "own_template"),
-                      _drawn(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]))
+    images.write_srgb(
+        capture.picture("registration", "own_template"),
+        _drawn(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]),
+    )
 
 
 def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> FittedTemplate:
@@ -153,9 +156,15 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     if eyes:
         trust[list(LID_MARKS)] = 0
     start = _matched(model, placed.apply(model.shape(coefficients)), follow, head, ours, report)
-    vertices = nonrigid.fit(model, start, dense, follow,
-                            nonrigid.LandmarkTargets(target, SLIGHT_TRUST_SHARE * trust, ours.hold), ITERATIONS,
-                            lambda share: report.progress(0.5 + 0.5 * share, 1, "fitting the head to the scan"))
+    vertices = nonrigid.fit(
+        model,
+        start,
+        dense,
+        follow,
+        nonrigid.LandmarkTargets(target, SLIGHT_TRUST_SHARE * trust, ours.hold),
+        ITERATIONS,
+        lambda share: report.progress(0.5 + 0.5 * share, 1, "fitting the head to the scan"),
+    )
     final = skin.moved(vertices)
     drawn = follow > 0.5
     distances = dense.distances(vertices[drawn], vertex_normals(final)[drawn], 0.01)
@@ -164,8 +173,13 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     everything = carried.carry_along(everything, label, used, vertices, report)
     counterpart = np.zeros(len(whole.vertices), bool)
     counterpart[used] = _has_counterpart(final, surface)
-    return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances,
-                          nonrigid.flipped_triangles(skin.moved(start), final), pictures)
+    return FittedTemplate(
+        everything[index],
+        counterpart[whole.faces].any(1),
+        distances,
+        nonrigid.flipped_triangles(skin.moved(start), final),
+        pictures,
+    )
 
 
 def _has_counterpart(fitted: Mesh, surface: surfaces.Surface) -> np.ndarray:
@@ -178,13 +192,16 @@ def _has_counterpart(fitted: Mesh, surface: surfaces.Surface) -> np.ndarray:
 def _require_laid(own: own_mesh.OwnMesh, distances: np.ndarray, drawn: int) -> None:
     """Raises Problem where fewer than half of the `drawn` vertices have a distance [N] to the head, or it is large."""
     if len(distances) < 0.5 * drawn or not len(distances) or np.median(distances) > 0.002:
-        raise Problem(f"{own.path.name} could not be laid over the head.",
-                      "Choose a head in a neutral pose with its mouth closed, or use the built-in head alone, "
-                      "which is not affected.")
+        raise Problem(
+            f"{own.path.name} could not be laid over the head.",
+            "Choose a head in a neutral pose with its mouth closed, or use the built-in head alone, "
+            "which is not affected.",
+        )
 
 
-def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn,
-             report: Reporter) -> np.ndarray:
+def _matched(
+    model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn, report: Reporter
+) -> np.ndarray:
     """The placed skin [V, 3], each vertex taken to the place on the head that it has on the built-in head laid over it.
 
     Between landmarks two faces say little about which point is which; the built-in head's identity space says it: it is
@@ -196,13 +213,19 @@ def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, 
     cover, points = Scan(Mesh(fine, faces)), model.at_landmarks(start)
     pose, coefficients = alignment.fit_landmarks(ours.model, points, model.landmark_weight)
     trust = SLIGHT_TRUST_SHARE * model.landmark_weight
-    pose, coefficients = alignment.fit_scan(ours.model, pose, coefficients, points, trust, cover,
-                                            np.maximum(ours.shaped, 0.7))
+    pose, coefficients = alignment.fit_scan(
+        ours.model, pose, coefficients, points, trust, cover, np.maximum(ours.shaped, 0.7)
+    )
     targets = nonrigid.LandmarkTargets(points, trust, ours.hold)
-    over = nonrigid.fit(ours.model, pose.apply(ours.model.shape(coefficients)), cover,
-                        np.maximum(ours.follow, 0.5 * ours.shaped), targets,
-                        COVER_ITERATIONS,
-                        lambda share: report.progress(0.5 * share, 1, "fitting the head to the scan"))
+    over = nonrigid.fit(
+        ours.model,
+        pose.apply(ours.model.shape(coefficients)),
+        cover,
+        np.maximum(ours.follow, 0.5 * ours.shaped),
+        targets,
+        COVER_ITERATIONS,
+        lambda share: report.progress(0.5 * share, 1, "fitting the head to the scan"),
+    )
     known = np.flatnonzero(follow > 0.1)
     source = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M)
     face, bary = source.find_nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
@@ -211,8 +234,13 @@ def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, 
     return start + carried.field(start[known], shift, start, report)
 
 
-def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficients: np.ndarray,
-            surface: surfaces.Surface, eyes: bool) -> np.ndarray:
+def _follow(
+    model: alignment.HeadModel,
+    placed: alignment.Similarity,
+    coefficients: np.ndarray,
+    surface: surfaces.Surface,
+    eyes: bool,
+) -> np.ndarray:
     """How far each vertex of the placed skin is drawn to the head [V] in [0, 1]."""
     at = model.mesh.moved(placed.apply(model.shape(coefficients)))
     normals = vertex_normals(at)
@@ -232,8 +260,9 @@ def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficien
 
 def _rim(mesh: Mesh) -> np.ndarray:
     """The vertices [N, 3] on open edges."""
-    edges, count = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0,
-                             return_counts=True)
+    edges, count = np.unique(
+        np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True
+    )
     return mesh.vertices[np.unique(edges[count == 1])]
 
 
@@ -284,7 +313,12 @@ def _drawn(head: Mesh, own: Mesh, picture: np.ndarray, size: int = 480) -> np.nd
     for mesh, yaw in ((head, 0), (own, 0), (own, 50)):
         moved = mesh.moved(mesh.vertices - middle)
         view = render_landmarks.view_from(yaw, 5, size, 0.30)
-        shots.append(render_landmarks.shaded(raster.RayCaster(moved),
-                                             vertex_normals(surfaces.welded(moved)[0])[surfaces.welded(moved)[1]],
-                                             np.tile(render_landmarks.SKIN, (len(mesh.vertices), 1)), view))
+        shots.append(
+            render_landmarks.shaded(
+                raster.RayCaster(moved),
+                vertex_normals(surfaces.welded(moved)[0])[surfaces.welded(moved)[1]],
+                np.tile(render_landmarks.SKIN, (len(mesh.vertices), 1)),
+                view,
+            )
+        )
     return np.hstack(shots)

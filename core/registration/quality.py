@@ -70,16 +70,23 @@ def figures(report: Reporter, model: HeadModel, fit: HeadFit, landmarks: Landmar
     report.figure("eye_opening", round(landmarks.opening, 2) if np.isfinite(landmarks.opening) else None)
     report.figure("identity_norm", round(float(np.linalg.norm(fit.coefficients)), 2))
     report.figure("head_to_scan_median_mm", round(1e3 * float(np.median(distances)), 3) if len(distances) else None)
-    report.figure("head_to_scan_p90_mm",
-                  round(1e3 * float(np.percentile(distances, 90)), 3) if len(distances) else None)
+    report.figure(
+        "head_to_scan_p90_mm", round(1e3 * float(np.percentile(distances, 90)), 3) if len(distances) else None
+    )
     report.figure("face_with_scan_percent", round(100 * len(distances) / max(int((follow > 0.5).sum()), 1), 1))
     report.figure("flipped_triangles", int(flipped(fit.aligned, head.vertices).sum()))
     report.figure("intersecting_triangles", len(intersecting(head.vertices, head.faces)))
     report.figure("uv_stretch_p95", round(float(np.percentile(stretched, 95)), 2))
 
 
-def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follow: np.ndarray,
-          least_share: float = LEAST_FOLLOWED_SHARE) -> None:
+def judge(
+    report: Reporter,
+    head: Mesh,
+    scan: Scan,
+    distances: np.ndarray,
+    follow: np.ndarray,
+    least_share: float = LEAST_FOLLOWED_SHARE,
+) -> None:
     """Whether the fit holds; the report is told which side of the face the scan does not show.
 
     Parameters
@@ -98,22 +105,27 @@ def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follo
     """
     wanted = follow > 0.5
     if len(distances) < least_share * wanted.sum():
-        raise Unlike(f"The head could not be laid over the scan of the face: only "
-                     f"{100 * len(distances) / wanted.sum():.0f} % of the face is in the scan.",
-                      "Look at the scan's picture in the report; film again slower, in an arc from ear to ear, with "
-                      "the whole face in view.")
+        raise Unlike(
+            f"The head could not be laid over the scan of the face: only "
+            f"{100 * len(distances) / wanted.sum():.0f} % of the face is in the scan.",
+            "Look at the scan's picture in the report; film again slower, in an arc from ear to ear, with "
+            "the whole face in view.",
+        )
     if np.median(distances) > FARTHEST_M:
-        raise Unlike(f"The head could not be laid over the scan of the face: it stays {1e3 * np.median(distances):.0f} "
-                     "mm away from it.",
-                      "Look at the scan's picture in the report: where it is no face, film again with the head kept "
-                      "still and hair and hands off the face.")
+        raise Unlike(
+            f"The head could not be laid over the scan of the face: it stays {1e3 * np.median(distances):.0f} "
+            "mm away from it.",
+            "Look at the scan's picture in the report: where it is no face, film again with the head kept "
+            "still and hair and hands off the face.",
+        )
     signed, _ = scan.match(head.vertices, vertex_normals(head), 0.01)
     for name, where in _sides(head, wanted).items():
         shown = float(np.isfinite(signed[where]).mean())
         if shown < LEAST_SHOWN_SHARE:
-            report.finding(f"The scan shows only {100 * shown:.0f} % of {name}; the rest was guessed from the shape of "
-                           "heads.",
-                           f"Film once more and bring {name} well into view, in sharp frames.")
+            report.finding(
+                f"The scan shows only {100 * shown:.0f} % of {name}; the rest was guessed from the shape of heads.",
+                f"Film once more and bring {name} well into view, in sharp frames.",
+            )
 
 
 def report_views(report: Reporter, fitted, views: list[View], head: Mesh) -> None:
@@ -136,10 +148,12 @@ def judge_views(head: Mesh, fitted) -> None:
     """Raises Problem where a head does not fit what the views show."""
     x = head.vertices[:, 0]
     if not fitted.miss_m["landmarks"] < MOST_MISS_WIDTH_SHARE * np.ptp(x):
-        raise Problem(f"The head could not be laid over the face in these pictures: its features miss by "
-                      f"{1e3 * fitted.miss_m['landmarks']:.0f} mm.",
-                      "Use pictures of one still face, neither cropped nor mirrored; or import cameras that another "
-                      "program has solved.")
+        raise Problem(
+            f"The head could not be laid over the face in these pictures: its features miss by "
+            f"{1e3 * fitted.miss_m['landmarks']:.0f} mm.",
+            "Use pictures of one still face, neither cropped nor mirrored; or import cameras that another "
+            "program has solved.",
+        )
 
 
 def tell_draft(report: Reporter, views: list[View], head: Mesh) -> None:
@@ -147,10 +161,11 @@ def tell_draft(report: Reporter, views: list[View], head: Mesh) -> None:
     apart = views_apart(views, head)
     if apart < WANTED_VIEWS:
         sides = "one side" if apart < 2 else f"{apart} sides that are at least {APART_DEG:.0f} degrees apart"
-        report.finding(f"This head is a draft: its pictures show the face from {sides} only, and its depth is "
-                       "mostly guessed.",
-                       "Show the face from the front and from each side, about 40 degrees around: these are the least "
-                       "for a likeness.")
+        report.finding(
+            f"This head is a draft: its pictures show the face from {sides} only, and its depth is mostly guessed.",
+            "Show the face from the front and from each side, about 40 degrees around: these are the least "
+            "for a likeness.",
+        )
 
 
 def views_apart(views: list[View], head: Mesh) -> int:
@@ -174,6 +189,9 @@ def _sides(head: Mesh, face_vertices: np.ndarray) -> dict[str, np.ndarray]:
     """Parts of the face as the person has them: bool [V] each."""
     x, _, z = head.vertices.T
     middle, low, high = np.median(x[face_vertices]), *np.percentile(z[face_vertices], [15, 85])
-    return {"the right side of the face": face_vertices & (x < middle - 0.02),
-            "the left side of the face": face_vertices & (x > middle + 0.02),
-            "the chin": face_vertices & (z < low), "the forehead": face_vertices & (z > high)}
+    return {
+        "the right side of the face": face_vertices & (x < middle - 0.02),
+        "the left side of the face": face_vertices & (x > middle + 0.02),
+        "the chin": face_vertices & (z < low),
+        "the forehead": face_vertices & (z > high),
+    }

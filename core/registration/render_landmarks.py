@@ -94,7 +94,7 @@ def _find_pose(mesh: Mesh, report: Reporter | None) -> Pose:
     best, turns = (0.0, None), _turns()
     for first in range(0, len(turns), 4):  # the four ways to face, with one way up
         for window in range(len(_windows(extents))):
-            for turn in turns[first:first + 4]:
+            for turn in turns[first : first + 4]:
                 if report is not None:
                     report.progress(first, len(turns), "finding out which way the artist's mesh looks")
                 windows = _windows(np.abs(turn @ extents))
@@ -121,8 +121,9 @@ def _windows(sides: np.ndarray) -> list[tuple[float, float]]:
     return windows + [(max(0.5 * sides[2] - 0.42 * side, 0.0), side) for side in smaller]
 
 
-def _look(caster: raster.RayCaster, normals: np.ndarray, turn: np.ndarray, centre: np.ndarray,
-          extent: float) -> tuple[float, Pose] | None:
+def _look(
+    caster: raster.RayCaster, normals: np.ndarray, turn: np.ndarray, centre: np.ndarray, extent: float
+) -> tuple[float, Pose] | None:
     """How sure an upright face is seen in a square of side `extent` around `centre` [3], and where it is."""
     front = view_from(0, 0, FIRST_SIDE_PX, extent)
     rotation = front.rotation @ turn
@@ -181,8 +182,9 @@ def view_from(yaw: float, pitch: float, size: int, extent: float) -> View:
     towards = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
     right = np.array([np.cos(yaw), np.sin(yaw), 0])
     rotation = np.stack([right, np.cross(-towards, right), -towards])
-    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=size, height=size,
-                             params=[FOCAL_SIDES * size, size / 2, size / 2])
+    camera = pycolmap.Camera(
+        model="SIMPLE_PINHOLE", width=size, height=size, params=[FOCAL_SIDES * size, size / 2, size / 2]
+    )
     return View("render", Path(), camera, rotation, -rotation @ (towards * extent * FOCAL_SIDES), False)
 
 
@@ -220,15 +222,22 @@ def _painted(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     for outline, colour in ((LIP_LINE, LIPS), *((line, BROWS) for line in faces.BROW_LINES)):
         polygon = points[list(outline)][:, [0, 2]].astype(np.float32)
         if np.isfinite(polygon).all():
-            near = np.flatnonzero(front & (mesh.vertices[:, [0, 2]] >= polygon.min(0)).all(1)
-                                  & (mesh.vertices[:, [0, 2]] <= polygon.max(0)).all(1))
-            inside = [cv2.pointPolygonTest(polygon, (float(mesh.vertices[v, 0]), float(mesh.vertices[v, 2])), False)
-                      >= 0 for v in near]
+            near = np.flatnonzero(
+                front
+                & (mesh.vertices[:, [0, 2]] >= polygon.min(0)).all(1)
+                & (mesh.vertices[:, [0, 2]] <= polygon.max(0)).all(1)
+            )
+            inside = [
+                cv2.pointPolygonTest(polygon, (float(mesh.vertices[v, 0]), float(mesh.vertices[v, 2])), False) >= 0
+                for v in near
+            ]
             colours[near[np.array(inside, bool)]] = colour
     return colours
 
 
 def _no_face() -> Problem:
-    return Problem("No face was found on your head mesh, seen from any side.",
-                   "Choose an OBJ of a head in a neutral pose, without hair or glasses over the face, or use the "
-                   "built-in head alone.")
+    return Problem(
+        "No face was found on your head mesh, seen from any side.",
+        "Choose an OBJ of a head in a neutral pose, without hair or glasses over the face, or use the "
+        "built-in head alone.",
+    )

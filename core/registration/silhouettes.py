@@ -99,8 +99,13 @@ def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray,
     away, step = _borders(outline, pixels[vertices] * scale, outward / np.maximum(length, 1e-9), reach)
     good = np.isfinite(away) & (np.abs(away) * per_px < reach_m)
     corners = np.repeat(vertices[good, None], 3, 1)
-    return Constraints(corners, np.tile([1.0, 0.0, 0.0], (good.sum(), 1)), direction[good], (away * per_px)[good],
-                       (follow[vertices] * step)[good])
+    return Constraints(
+        corners,
+        np.tile([1.0, 0.0, 0.0], (good.sum(), 1)),
+        direction[good],
+        (away * per_px)[good],
+        (follow[vertices] * step)[good],
+    )
 
 
 def edges_of(mesh: Mesh) -> np.ndarray:
@@ -134,14 +139,21 @@ def _borders(outline: Outline, at: np.ndarray, outward: np.ndarray, reach: float
     width = 4
     steps = np.arange(-np.ceil(reach) - width, np.ceil(reach) + width + 1)
     where = at[:, None] - 0.5 + outward[:, None] * steps[:, None]
-    skin, person = (cv2.remap(image, where[..., 0].astype(np.float32), where[..., 1].astype(np.float32),
-                              cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-                    for image in (outline.skin, outline.person))
+    skin, person = (
+        cv2.remap(
+            image,
+            where[..., 0].astype(np.float32),
+            where[..., 1].astype(np.float32),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+        for image in (outline.skin, outline.person)
+    )
     total = np.cumsum(np.pad(skin, ((0, 0), (1, 0))), 1)
-    inside = (total[:, width:-width] - total[:, :-2 * width]) / width
-    outside = (total[:, 2 * width:] - total[:, width:-width]) / width
+    inside = (total[:, width:-width] - total[:, : -2 * width]) / width
+    outside = (total[:, 2 * width :] - total[:, width:-width]) / width
     change, places = inside - outside, steps[width:] - 0.5  # a border lies between two samples
-    places = places[:change.shape[1]]
+    places = places[: change.shape[1]]
     beyond = int(np.ceil(COARSE_PX * outline.scale))
     index = np.arange(change.shape[1]) + width
     out = person[:, np.minimum(index + beyond, len(steps) - 1)] < 0.5

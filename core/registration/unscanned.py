@@ -93,11 +93,15 @@ class _ViewConstraints:
     def of(self, mesh: Mesh, reach: float) -> dict[str, Constraints]:
         """By kind, for a head as it lies now. reach: metres by which a point or outline may lie off."""
         shown = self.evidence
-        return {"landmarks": from_landmarks(self.model, mesh.vertices, shown.views, shown.landmarks, shown.trust,
-                                            max(reach, 0.006)),
-                "points": from_points(mesh, shown.follow, shown.points.places, shown.points.towards, reach),
-                "outlines": joined([silhouettes.compare(outline, mesh, self.edges, shown.follow, reach)
-                                    for outline in self.outlines])}
+        return {
+            "landmarks": from_landmarks(
+                self.model, mesh.vertices, shown.views, shown.landmarks, shown.trust, max(reach, 0.006)
+            ),
+            "points": from_points(mesh, shown.follow, shown.points.places, shown.points.towards, reach),
+            "outlines": joined(
+                [silhouettes.compare(outline, mesh, self.edges, shown.follow, reach) for outline in self.outlines]
+            ),
+        }
 
 
 def fit(model: HeadModel, evidence: ShownByViews, report: Reporter, first: float, steps: float) -> FittedHead:
@@ -117,8 +121,9 @@ def fit(model: HeadModel, evidence: ShownByViews, report: Reporter, first: float
     landmarks = evidence.landmarks
     pose, coefficients = fit_landmarks(model, landmarks.points, evidence.trust)
     start = model.mesh.moved(pose.apply(model.shape(coefficients)))
-    constraints = _view_constraints(model, start, evidence, lambda share, what: report.progress(
-        first + 0.4 * (steps - first) * share, steps, what))
+    constraints = _view_constraints(
+        model, start, evidence, lambda share, what: report.progress(first + 0.4 * (steps - first) * share, steps, what)
+    )
     parts: dict[str, Constraints] = {}
     for step in range(ROUNDS):
         report.progress(first + (steps - first) * (0.4 + 0.3 * step / ROUNDS), steps, "finding the nearest head")
@@ -137,13 +142,24 @@ def fit(model: HeadModel, evidence: ShownByViews, report: Reporter, first: float
 
     vertices = _relaxed(model, vertices, lambda mesh: constraints.of(mesh, REACH_M[1]), landmarks, tell)
     parts = constraints.of(model.mesh.moved(vertices), REACH_M[1])
-    return FittedHead(pose, coefficients, vertices, {name: len(ties) for name, ties in parts.items()},
-                      {name: float(np.median(np.abs(ties.distance))) if len(ties) else float("nan")
-                       for name, ties in parts.items()})
+    return FittedHead(
+        pose,
+        coefficients,
+        vertices,
+        {name: len(ties) for name, ties in parts.items()},
+        {name: float(np.median(np.abs(ties.distance))) if len(ties) else float("nan") for name, ties in parts.items()},
+    )
 
 
-def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, evidence: ShownByViews, report: Reporter,
-                first: float, steps: float) -> np.ndarray:
+def beyond_scan(
+    model: HeadModel,
+    vertices: np.ndarray,
+    on_scan: np.ndarray,
+    evidence: ShownByViews,
+    report: Reporter,
+    first: float,
+    steps: float,
+) -> np.ndarray:
     """A head that lies on a scan, where the scan ends drawn towards what the views show: jaw, temples and ears are seen
     as outlines and matched points long before a dense surface of them can be measured.
 
@@ -160,8 +176,12 @@ def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, evi
     -------
     Vertices [V, 3].
     """
-    all_of_it = _view_constraints(model, model.mesh.moved(vertices), evidence, lambda share, what: report.progress(
-        first + 0.8 * (steps - first) * share, steps, what))
+    all_of_it = _view_constraints(
+        model,
+        model.mesh.moved(vertices),
+        evidence,
+        lambda share, what: report.progress(first + 0.8 * (steps - first) * share, steps, what),
+    )
     constraints = replace(all_of_it, evidence=replace(evidence, follow=np.where(on_scan, 0, evidence.follow)))
 
     def tell(step: int) -> None:
@@ -173,8 +193,9 @@ def beyond_scan(model: HeadModel, vertices: np.ndarray, on_scan: np.ndarray, evi
     return _relaxed(model, vertices, told, evidence.landmarks, tell, np.where(on_scan, HELD_PULL, PULL))
 
 
-def _view_constraints(model: HeadModel, start: Mesh, evidence: ShownByViews,
-                      tell: Callable[[float, str], None]) -> _ViewConstraints:
+def _view_constraints(
+    model: HeadModel, start: Mesh, evidence: ShownByViews, tell: Callable[[float, str], None]
+) -> _ViewConstraints:
     """With the outlines of the views' pictures, which are found about the head `start`; tell(share done, what)."""
     outlines, views = [], evidence.views
     for i, view in enumerate(views):
@@ -184,8 +205,9 @@ def _view_constraints(model: HeadModel, start: Mesh, evidence: ShownByViews,
     return _ViewConstraints(model, evidence, outlines, silhouettes.edges_of(model.mesh))
 
 
-def _relaxed(model: HeadModel, start: np.ndarray, constraints, landmarks: Landmarks, tick,
-             pull: np.ndarray | float = PULL) -> np.ndarray:
+def _relaxed(
+    model: HeadModel, start: np.ndarray, constraints, landmarks: Landmarks, tick, pull: np.ndarray | float = PULL
+) -> np.ndarray:
     """Vertices [V, 3]: thin-plate displacements of `start`, stiff to soft; constraints(mesh) -> {kind: Constraints}."""
     area, laplacian = nonrigid.operators(model.mesh.moved(start))
     bending = (laplacian.T @ sparse.diags(1 / area) @ laplacian).tocsr()
@@ -199,8 +221,9 @@ def _relaxed(model: HeadModel, start: np.ndarray, constraints, landmarks: Landma
             if not len(ties):
                 continue
             weight = ties.weight * min(MOST_AREA_M2, AREA_M2[name] / max(ties.weight.sum(), 1e-9))
-            picked = sparse.coo_matrix((ties.bary.ravel(), (np.repeat(np.arange(len(ties)), 3), ties.corners.ravel())),
-                                       (len(ties), len(start))).tocsr()
+            picked = sparse.coo_matrix(
+                (ties.bary.ravel(), (np.repeat(np.arange(len(ties)), 3), ties.corners.ravel())), (len(ties), len(start))
+            ).tocsr()
             matrix = matrix + picked.T @ sparse.diags(weight) @ picked
             aim = picked @ (vertices - start) + ties.direction * ties.distance[:, None]
             right += picked.T @ (weight[:, None] * aim)
@@ -208,7 +231,8 @@ def _relaxed(model: HeadModel, start: np.ndarray, constraints, landmarks: Landma
             pins = sparse.diags(np.where(landmarks.by_artist, nonrigid.PUT_AREA_M2, 0.0))
             matrix = matrix + anchors.T @ pins @ anchors
             right += anchors.T @ (pins @ (np.nan_to_num(landmarks.points) - anchors @ start))
-        solver = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                      options={"SymmetricMode": True})
+        solver = splu(
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
         vertices = start + solver.solve(right)
     return vertices

@@ -41,8 +41,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         views, sharpness, settings.scan.pairs, settings.scan.voxel_mm / 1000, HEAD_BOX_M, report
     )
     if fused is not None and by_splats:
-        fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX_M,
-                                     settings.compute_device, report)
+        fused, maps = splats.measure(
+            fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX_M, settings.compute_device, report
+        )
     if fused is None or len(fused.mesh.faces) < 1000:
         _without_surface(capture, report)
         report.figure("seconds", round(time.monotonic() - started, 1))
@@ -59,9 +60,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.figure("left_right_disagreement_px", round(float(np.nanmedian([seen.disagreement for seen in maps])), 3))
     report.figure("seconds", round(time.monotonic() - started, 1))
     if fused.disagreeing > MOST_DISAGREEING_SHARE:
-        report.finding(f"The frames disagree about {100 * fused.disagreeing:.0f} % of the surface; it was left out of "
-                       "the scan.",
-                       "Film again with the head kept still, the hair tied back and nothing shiny on the skin.")
+        report.finding(
+            f"The frames disagree about {100 * fused.disagreeing:.0f} % of the surface; it was left out of the scan.",
+            "Film again with the head kept still, the hair tied back and nothing shiny on the skin.",
+        )
     images.write_srgb(capture.picture("scan", "surface"), _draw(mesh, views))
 
 
@@ -72,10 +74,12 @@ def _without_surface(capture: Capture, report: Reporter) -> None:
     remove_file(capture.picture("scan", "surface"))
     report.figure("method", "none")
     report.figure("points", len(points))
-    report.finding("No surface of the head could be measured from these frames. The head is fitted to the face's "
-                   "features, outlines and what matches alone.",
-                   "For a closer likeness take sharper pictures that lie closer together, every ten degrees around the "
-                   "face, in good light.")
+    report.finding(
+        "No surface of the head could be measured from these frames. The head is fitted to the face's "
+        "features, outlines and what matches alone.",
+        "For a closer likeness take sharper pictures that lie closer together, every ten degrees around the "
+        "face, in good light.",
+    )
 
 
 def _draw(mesh: meshes.Mesh, views: list[View], height: int = 480) -> np.ndarray:

@@ -49,8 +49,9 @@ class Fused:
     floating: float
 
 
-def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float,
-         tick: Callable[[int], None] = lambda done: None) -> Fused | None:
+def fuse(
+    maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[int], None] = lambda done: None
+) -> Fused | None:
     """The surface of depth maps. A map counts with the square of its baseline over its distance: heads are matched at
     one size, so that from twice as far the same angle measures depth as finely.
 
@@ -93,8 +94,11 @@ def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float,
     for axis in range(3):
         known &= np.roll(known, -1, axis)
     surface = _surface(field, known, low, voxel)
-    return (None if surface is None
-            else Fused(surface[0], float((at_surface & ~agreeing).sum() / max(at_surface.sum(), 1)), surface[1]))
+    return (
+        None
+        if surface is None
+        else Fused(surface[0], float((at_surface & ~agreeing).sum() / max(at_surface.sum(), 1)), surface[1])
+    )
 
 
 def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel: float) -> np.ndarray:
@@ -103,8 +107,9 @@ def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel
     for seen in maps:
         y, x = np.nonzero(np.isfinite(seen.depth[::2, ::2]))
         z = seen.depth[::2, ::2][y, x]
-        local = np.stack([(2 * x + 0.5 + seen.origin[0]) * z / seen.focal,
-                          (2 * y + 0.5 + seen.origin[1]) * z / seen.focal, z], -1)
+        local = np.stack(
+            [(2 * x + 0.5 + seen.origin[0]) * z / seen.focal, (2 * y + 0.5 + seen.origin[1]) * z / seen.focal, z], -1
+        )
         cell = np.floor((local @ seen.rotation + seen.centre - low) / (voxel * BLOCK_VOXELS)).astype(int)
         cell = cell[((cell >= 0) & (cell < shape)).all(1)]
         occupied[tuple(cell.T)] = True
@@ -116,12 +121,13 @@ def _integrate(depth_map: DepthMap, points: np.ndarray, voxel: float, precision:
     the voxels [3, N] or just behind."""
     cosine = _cosine(depth_map)
     for first in range(0, points.shape[1], VOXELS_AT_ONCE):
-        chunk = np.s_[:, first:first + VOXELS_AT_ONCE]
+        chunk = np.s_[:, first : first + VOXELS_AT_ONCE]
         _integrate_part(depth_map, cosine, points[chunk], voxel, precision, sums[chunk])
 
 
-def _integrate_part(depth_map: DepthMap, cosine: np.ndarray, points: np.ndarray, voxel: float, precision: float,
-                    sums: np.ndarray) -> None:
+def _integrate_part(
+    depth_map: DepthMap, cosine: np.ndarray, points: np.ndarray, voxel: float, precision: float, sums: np.ndarray
+) -> None:
     local = depth_map.rotation.astype(np.float32) @ (points - depth_map.centre.astype(np.float32)[:, None])
     u = np.floor(depth_map.focal * local[0] / local[2] - depth_map.origin[0]).astype(np.int32)
     v = np.floor(depth_map.focal * local[1] / local[2] - depth_map.origin[1]).astype(np.int32)
@@ -133,8 +139,9 @@ def _integrate_part(depth_map: DepthMap, cosine: np.ndarray, points: np.ndarray,
     near = np.isfinite(gap) & (gap > -reach) & (facing > 0.2)
     index, value = inside[near], np.minimum(gap[near] / reach, 1)
     share = facing[near] ** 2
-    for row, term in zip(sums, (share, precision * share, precision * share * value, precision * share * value**2),
-                         strict=True):
+    for row, term in zip(
+        sums, (share, precision * share, precision * share * value, precision * share * value**2), strict=True
+    ):
         row[index] += term
 
 
@@ -160,8 +167,9 @@ def _cosine(depth_map: DepthMap) -> np.ndarray:
     across[:, 1:-1], down[1:-1] = points[:, 2:] - points[:, :-2], points[2:] - points[:-2]
     normal = np.cross(across, down)
     with np.errstate(invalid="ignore", divide="ignore"):
-        cosine = np.abs(normal[..., 0] * rays[..., 0] + normal[..., 1] * rays[..., 1] + normal[..., 2]
-                        * rays[..., 2]) / (lengths(normal) * lengths(rays))
+        cosine = np.abs(
+            normal[..., 0] * rays[..., 0] + normal[..., 1] * rays[..., 1] + normal[..., 2] * rays[..., 2]
+        ) / (lengths(normal) * lengths(rays))
     return np.nan_to_num(cosine, nan=0.0)
 
 

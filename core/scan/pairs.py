@@ -15,8 +15,9 @@ LEAST_ACROSS = 0.7
 sees little but the same picture larger."""
 
 
-def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int,
-                 baselines: tuple = BASELINES_DEG) -> list[tuple[int, int]]:
+def choose_pairs(
+    centres: np.ndarray, sharpness: np.ndarray, count: int, baselines: tuple = BASELINES_DEG
+) -> list[tuple[int, int]]:
     """Pairs of cameras, spread over the directions they look from. Wider or narrower baselines are taken only where the
     best range leaves a direction without a pair.
 

@@ -39,12 +39,16 @@ class Round:
 
 
 NEAR_DEG, WIDE_DEG = ((6.0, 12.0), (2.5, 14.0), (1.5, 30.0)), ((13.0, 24.0), (9.0, 30.0))
-ROUNDS = (Round(((0.6, BASELINES_DEG),), 0.5, 2.0), Round(((0.6, NEAR_DEG),), 0.7, 1.4),
-          Round(((0.4, NEAR_DEG), (0.6, WIDE_DEG)), 1.0, 1.0))
+ROUNDS = (
+    Round(((0.6, BASELINES_DEG),), 0.5, 2.0),
+    Round(((0.6, NEAR_DEG),), 0.7, 1.4),
+    Round(((0.4, NEAR_DEG), (0.6, WIDE_DEG)), 1.0, 1.0),
+)
 
 
-def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, box: np.ndarray,
-            report: Reporter) -> tuple[Fused | None, list[DepthMap]]:
+def measure(
+    views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, box: np.ndarray, report: Reporter
+) -> tuple[Fused | None, list[DepthMap]]:
     """The surface by stereo, coarse to fine.
 
     Parameters
@@ -61,12 +65,19 @@ def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, 
     The surface, None where there is none, and the last round's depth maps.
     """
     centres = np.array([view.centre for view in views])
-    plans = [[pair for share, baselines in now.sorts
-              for pair in choose_pairs(centres, sharpness, max(2, round(share * pairs)), baselines)] for now in ROUNDS]
+    plans = [
+        [
+            pair
+            for share, baselines in now.sorts
+            for pair in choose_pairs(centres, sharpness, max(2, round(share * pairs)), baselines)
+        ]
+        for now in ROUNDS
+    ]
     steps = sum(2 * len(plan) * now.scale**2 for plan, now in zip(plans, ROUNDS, strict=True))
     done, guide, fused, maps = 0.0, None, None, []
     mask = _remembering()
     for plan, now in zip(plans, ROUNDS, strict=True):
+
         def tick(share: float, text: str, start: float = done, unit: float = now.scale**2) -> None:
             report.progress(start + unit * share, steps, text)
 
@@ -82,13 +93,24 @@ def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, 
         if result is None:
             break
         fused, maps, guide = result, seen if guide else [], raster.RayCaster(result.mesh)
-        box = np.stack([np.maximum(box[0], result.mesh.vertices.min(0) - MARGIN_M),
-                        np.minimum(box[1], result.mesh.vertices.max(0) + MARGIN_M)])
+        box = np.stack(
+            [
+                np.maximum(box[0], result.mesh.vertices.min(0) - MARGIN_M),
+                np.minimum(box[1], result.mesh.vertices.max(0) + MARGIN_M),
+            ]
+        )
     return fused, maps
 
 
-def _match(views: list[View], plan: list, scale: float, box: np.ndarray, guide: raster.RayCaster | None, mask: Callable,
-           tick: Callable) -> list[DepthMap]:
+def _match(
+    views: list[View],
+    plan: list,
+    scale: float,
+    box: np.ndarray,
+    guide: raster.RayCaster | None,
+    mask: Callable,
+    tick: Callable,
+) -> list[DepthMap]:
     pictures, maps = {}, []
     for done, pair in enumerate(sorted(plan)):
         tick(done, f"matching pair {done + 1} of {len(plan)}")
@@ -99,8 +121,15 @@ def _match(views: list[View], plan: list, scale: float, box: np.ndarray, guide: 
                 picture = views[i].read()
                 pictures[i] = picture, mask(i, picture)
         a, b = pair
-        seen = match_pair(views[a], views[b], (pictures[a][0], pictures[b][0]), (pictures[a][1], pictures[b][1]), box,
-                          scale * _scale(views[a]), guide)
+        seen = match_pair(
+            views[a],
+            views[b],
+            (pictures[a][0], pictures[b][0]),
+            (pictures[a][1], pictures[b][1]),
+            box,
+            scale * _scale(views[a]),
+            guide,
+        )
         if seen is not None:
             maps.append(seen)
     return maps

@@ -57,10 +57,11 @@ def use_splats(method: str, device: str) -> bool:
     """Whether the scan is to be made by splats. Raises Problem where they were asked for and cannot run."""
     ready = device == "cuda" and torch.cuda.is_available() and importlib.util.find_spec("gsplat") is not None
     if method == "splats" and not ready:
-        raise Problem("Gaussian splatting needs the device cuda, an NVIDIA GPU and the package gsplat, and one of them "
-                      "is missing.",
-                      "Set the scan's method to auto or stereo; or install requirements/cuda.txt and choose the device "
-                      "cuda.")
+        raise Problem(
+            "Gaussian splatting needs the device cuda, an NVIDIA GPU and the package gsplat, and one of them "
+            "is missing.",
+            "Set the scan's method to auto or stereo; or install requirements/cuda.txt and choose the device cuda.",
+        )
     return ready and method != "stereo"
 
 
@@ -71,8 +72,9 @@ def gsplats() -> Callable:
     return rasterization_2dgs
 
 
-def measure(start: Mesh, views: list[View], voxel: float, box: np.ndarray, device: str,
-            report: Reporter) -> tuple[Fused | None, list[DepthMap]]:
+def measure(
+    start: Mesh, views: list[View], voxel: float, box: np.ndarray, device: str, report: Reporter
+) -> tuple[Fused | None, list[DepthMap]]:
     """The surface that surfels trained on all views show.
 
     Parameters
@@ -97,8 +99,14 @@ def measure(start: Mesh, views: list[View], voxel: float, box: np.ndarray, devic
     return fuse(maps, box, voxel, lambda done: report.progress(STEPS, STEPS, "fusing depth")), maps
 
 
-def train(start: Mesh, photographs: list[UndistortedFrame], rasterize: Callable, device: str = "cuda",
-          steps: int = STEPS, tick: Callable[[int, float], None] = lambda step, loss: None) -> list[DepthMap]:
+def train(
+    start: Mesh,
+    photographs: list[UndistortedFrame],
+    rasterize: Callable,
+    device: str = "cuda",
+    steps: int = STEPS,
+    tick: Callable[[int, float], None] = lambda step, loss: None,
+) -> list[DepthMap]:
     """Trains surfels until they look like the photographs.
 
     Parameters
@@ -136,8 +144,9 @@ def _photograph(view: View) -> UndistortedFrame:
     focal, origin = view.camera.mean_focal_length(), -np.array([view.width, view.height]) / 2
     picture = view.read()
     person = faces.segment_person(picture) > 0.5
-    shown, mask = warp(view, picture, person, view.rotation, focal, origin,
-                       np.zeros((view.height, view.width), np.float32))
+    shown, mask = warp(
+        view, picture, person, view.rotation, focal, origin, np.zeros((view.height, view.width), np.float32)
+    )
     return UndistortedFrame(shown.astype(np.float32) / 255, mask, view.rotation, view.centre, focal, origin)
 
 
@@ -150,12 +159,17 @@ def _surfels(mesh: Mesh, photographs: list[UndistortedFrame], device: str) -> di
     half = np.concatenate([1 + normals[:, 2:], -normals[:, 1:2], normals[:, :1], np.zeros((len(normals), 1))], 1)
     half[normals[:, 2] < -0.9999] = (0, 1, 0, 0)
     scales = np.stack([WIDTH_SPACINGS * spacing, WIDTH_SPACINGS * spacing, np.full_like(spacing, 1e-5)], 1)
-    start = {"means": mesh.vertices, "quats": half / np.linalg.norm(half, axis=1, keepdims=True),
-             "log_scales": np.log(np.maximum(scales, 1e-6)),
-             "logits": np.full(len(normals), 3.0),
-             "colours": torch.logit(torch.tensor(_colours(mesh, normals, photographs)), 0.02).numpy()}
-    return {name: torch.tensor(np.asarray(value), dtype=torch.float32, device=device, requires_grad=True)
-            for name, value in start.items()}
+    start = {
+        "means": mesh.vertices,
+        "quats": half / np.linalg.norm(half, axis=1, keepdims=True),
+        "log_scales": np.log(np.maximum(scales, 1e-6)),
+        "logits": np.full(len(normals), 3.0),
+        "colours": torch.logit(torch.tensor(_colours(mesh, normals, photographs)), 0.02).numpy(),
+    }
+    return {
+        name: torch.tensor(np.asarray(value), dtype=torch.float32, device=device, requires_grad=True)
+        for name, value in start.items()
+    }
 
 
 def _colours(mesh: Mesh, normals: np.ndarray, photographs: list[UndistortedFrame]) -> np.ndarray:
@@ -176,15 +190,24 @@ def _render(surfels: dict[str, Tensor], p: UndistortedFrame, rasterize: Callable
     pose = torch.eye(4, device=device)
     pose[:3, :3] = torch.tensor(p.rotation, dtype=torch.float32)
     pose[:3, 3] = torch.tensor(-p.rotation @ p.centre, dtype=torch.float32)
-    pinhole = torch.tensor([[p.focal, 0, -p.origin[0]], [0, p.focal, -p.origin[1]], [0, 0, 1]], dtype=torch.float32,
-                           device=device)
+    pinhole = torch.tensor(
+        [[p.focal, 0, -p.origin[0]], [0, p.focal, -p.origin[1]], [0, 0, 1]], dtype=torch.float32, device=device
+    )
     height, width = p.mask.shape
     colours, alpha, normals, depth_normals, distortion, _, _ = rasterize(
-        means=surfels["means"], quats=surfels["quats"], scales=surfels["log_scales"].exp(),
+        means=surfels["means"],
+        quats=surfels["quats"],
+        scales=surfels["log_scales"].exp(),
         opacities=surfels["logits"].sigmoid(),
         # [1, N, 3]: with a depth channel gsplat wants the colours per camera
         colors=surfels["colours"].sigmoid()[None],
-        viewmats=pose[None], Ks=pinhole[None], width=width, height=height, render_mode="RGB+ED", distloss=True)
+        viewmats=pose[None],
+        Ks=pinhole[None],
+        width=width,
+        height=height,
+        render_mode="RGB+ED",
+        distloss=True,
+    )
     depth_normals = depth_normals.reshape(height, width, 3)  # gsplat drops the camera's axis here
     return colours[0, ..., :3], colours[0, ..., 3:], alpha[0], distortion[0], normals[0], depth_normals
 
@@ -220,5 +243,12 @@ def _ssim(a: Tensor, b: Tensor, window: int = 7) -> Tensor:
 
 def _depth_map(rendered: tuple, p: UndistortedFrame) -> DepthMap:
     depth, alpha = (x[..., 0].cpu().numpy() for x in rendered[1:3])
-    return DepthMap(p.rotation, p.centre, p.focal, p.origin,
-                    np.where((alpha > LEAST_ALPHA) & p.mask, depth, np.nan).astype(np.float32), 1.0, float("nan"))
+    return DepthMap(
+        p.rotation,
+        p.centre,
+        p.focal,
+        p.origin,
+        np.where((alpha > LEAST_ALPHA) & p.mask, depth, np.nan).astype(np.float32),
+        1.0,
+        float("nan"),
+    )

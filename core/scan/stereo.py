@@ -49,8 +49,15 @@ class DepthMap:
     disagreement: float
 
 
-def match_pair(first: View, second: View, pictures: tuple, masks: tuple, box: np.ndarray, scale: float = 1.0,
-               guide: RayCaster | None = None) -> DepthMap | None:
+def match_pair(
+    first: View,
+    second: View,
+    pictures: tuple,
+    masks: tuple,
+    box: np.ndarray,
+    scale: float = 1.0,
+    guide: RayCaster | None = None,
+) -> DepthMap | None:
     """Depth seen from one of two views. The baseline may have any direction in the picture.
 
     Parameters
@@ -82,13 +89,19 @@ def match_pair(first: View, second: View, pictures: tuple, masks: tuple, box: np
     # the right picture reaches `count` pixels further left
     width, height = np.ceil(high - low).astype(int) + (count, 0)
     origin = np.floor(low) - (count, 0)
-    expected, seen = _expected(guide, (first.centre, second.centre), rotation, focal, origin, (height, width),
-                               length) if guide else (
-        np.full((height, width), np.floor(farthest), np.float32), np.ones((height, width), bool))
+    expected, seen = (
+        _expected(guide, (first.centre, second.centre), rotation, focal, origin, (height, width), length)
+        if guide
+        else (np.full((height, width), np.floor(farthest), np.float32), np.ones((height, width), bool))
+    )
     # a pixel of the second picture lies where the guide expects it, less the smallest disparity that is looked for
     least = -count // 2 if guide else 0
-    move = cv2.warpAffine(expected, np.float32([[1, 0, least], [0, 1, 0]]), (width, height),
-                          borderMode=cv2.BORDER_REPLICATE) + least
+    move = (
+        cv2.warpAffine(
+            expected, np.float32([[1, 0, least], [0, 1, 0]]), (width, height), borderMode=cv2.BORDER_REPLICATE
+        )
+        + least
+    )
     a, mask_a = warp(first, pictures[0], masks[0], rotation, focal, origin, np.zeros_like(move))
     b, mask_b = warp(second, pictures[1], masks[1], rotation, focal, origin, move)
     mask_a &= seen
@@ -99,41 +112,63 @@ def match_pair(first: View, second: View, pictures: tuple, masks: tuple, box: np
     disparity, disagreement = _match(a, b, mask_a, mask_b, count, stiffness)
     disparity = np.where(disparity > 0, disparity + least, np.nan)
     x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-    total = disparity + cv2.remap(expected, x - np.nan_to_num(disparity).astype(np.float32), y, cv2.INTER_LINEAR,
-                                  borderMode=cv2.BORDER_REPLICATE)
+    total = disparity + cv2.remap(
+        expected, x - np.nan_to_num(disparity).astype(np.float32), y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
     depth = np.where(total > 0, focal * length / total, np.nan).astype(np.float32)
     if not np.isfinite(depth).any():
         return None
     return DepthMap(rotation, first.centre, focal, origin, depth, length, disagreement)
 
 
-def _expected(guide: RayCaster, centres: tuple, rotation: np.ndarray, focal: float, origin: np.ndarray, shape: tuple,
-              length: float) -> tuple:
+def _expected(
+    guide: RayCaster,
+    centres: tuple,
+    rotation: np.ndarray,
+    focal: float,
+    origin: np.ndarray,
+    shape: tuple,
+    length: float,
+) -> tuple:
     """The guide's disparities float32 [H, W] in the first rectified picture, carried on beyond its rim, and bool [H, W]
     where the second sees them, too."""
     disparity, known = _disparities(guide, centres[0], rotation, focal, origin, shape, length)
     behind = np.array([disparity[known].mean(), 0]) if known.any() else np.zeros(2)
     other, other_known = _disparities(guide, centres[1], rotation, focal, origin - np.round(behind), shape, length)
     x, y = np.meshgrid(np.arange(shape[1], dtype=np.float32), np.arange(shape[0], dtype=np.float32))
-    there = cv2.remap(other, x - disparity + np.round(behind[0]).astype(np.float32), y, cv2.INTER_LINEAR,
-                      borderMode=cv2.BORDER_REPLICATE)
+    there = cv2.remap(
+        other,
+        x - disparity + np.round(behind[0]).astype(np.float32),
+        y,
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
     near = cv2.dilate(known.astype(np.uint8), np.ones((2 * RIM_PX + 1,) * 2, np.uint8)) > 0
     return disparity, near & (np.abs(there - disparity) < HIDDEN_PX)
 
 
-def _disparities(guide: RayCaster, centre: np.ndarray, rotation: np.ndarray, focal: float, origin: np.ndarray,
-                 shape: tuple, length: float) -> tuple:
+def _disparities(
+    guide: RayCaster,
+    centre: np.ndarray,
+    rotation: np.ndarray,
+    focal: float,
+    origin: np.ndarray,
+    shape: tuple,
+    length: float,
+) -> tuple:
     """The guide's disparities float32 [H, W], each pixel off it given its nearest one's, and bool [H, W] where it
     is."""
-    y, x = np.mgrid[0:shape[0]:GUIDE_STEP_PX, 0:shape[1]:GUIDE_STEP_PX]
+    y, x = np.mgrid[0 : shape[0] : GUIDE_STEP_PX, 0 : shape[1] : GUIDE_STEP_PX]
     rays = np.stack([(x.ravel() + 0.5 + origin[0]) / focal, (y.ravel() + 0.5 + origin[1]) / focal, np.ones(x.size)], -1)
     norms = np.linalg.norm(rays, axis=1)
     _, _, distance = guide.first_hits(np.repeat(centre[None], len(rays), 0), (rays / norms[:, None]) @ rotation)
     known = np.isfinite(distance).reshape(x.shape)
     disparity = bleed((focal * length / (distance / norms)).reshape(x.shape).astype(np.float32), known)
-    fy, fx = np.mgrid[0:shape[0], 0:shape[1]].astype(np.float32) / GUIDE_STEP_PX
-    return (cv2.remap(disparity, fx, fy, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
-            cv2.remap(known.astype(np.uint8), fx, fy, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0)
+    fy, fx = np.mgrid[0 : shape[0], 0 : shape[1]].astype(np.float32) / GUIDE_STEP_PX
+    return (
+        cv2.remap(disparity, fx, fy, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
+        cv2.remap(known.astype(np.uint8), fx, fy, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0,
+    )
 
 
 def _rectify(baseline: np.ndarray, axis: np.ndarray) -> np.ndarray:
@@ -144,8 +179,15 @@ def _rectify(baseline: np.ndarray, axis: np.ndarray) -> np.ndarray:
     return np.stack([x, np.cross(z, x), z])
 
 
-def warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarray, focal: float, origin: np.ndarray,
-         move: np.ndarray) -> tuple:
+def warp(
+    view: View,
+    picture: np.ndarray,
+    mask: np.ndarray,
+    rotation: np.ndarray,
+    focal: float,
+    origin: np.ndarray,
+    move: np.ndarray,
+) -> tuple:
     """A view through the rectified camera. Lens distortion is taken out on the way.
 
     Parameters
@@ -165,7 +207,7 @@ def warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarray
     step = 4  # the lens's map is smooth: computed on a grid, then interpolated
     height, width = move.shape
     first, last = int(np.floor(min(0, -move.max()))), int(np.ceil(width + max(0, -move.min())))
-    y, x = np.mgrid[0:height + step:step, first:last + step:step].astype(np.float64)
+    y, x = np.mgrid[0 : height + step : step, first : last + step : step].astype(np.float64)
     rays = np.stack([(x + 0.5 + origin[0]) / focal, (y + 0.5 + origin[1]) / focal, np.ones_like(x)], -1)
     local = rays.reshape(-1, 3) @ rotation @ view.rotation.T
     local[:, 2] = np.maximum(local[:, 2], 1e-3)
@@ -173,18 +215,30 @@ def warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarray
     fy, fx = np.mgrid[0:height, 0:width].astype(np.float32)
     maps = cv2.remap(pixels, (fx - move - first) / step, fy / step, cv2.INTER_LINEAR)
     warped = cv2.remap(picture, maps[..., 0], maps[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    inside = cv2.remap(mask.astype(np.uint8), maps[..., 0], maps[..., 1], cv2.INTER_NEAREST,
-                       borderMode=cv2.BORDER_CONSTANT)
+    inside = cv2.remap(
+        mask.astype(np.uint8), maps[..., 0], maps[..., 1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT
+    )
     return np.round(np.clip(warped, 0, 1) * 255).astype(np.uint8), inside > 0
 
 
-def _match(a: np.ndarray, b: np.ndarray, mask_a: np.ndarray, mask_b: np.ndarray, count: int,
-           stiffness: float) -> tuple[np.ndarray, float]:
+def _match(
+    a: np.ndarray, b: np.ndarray, mask_a: np.ndarray, mask_b: np.ndarray, count: int, stiffness: float
+) -> tuple[np.ndarray, float]:
     """Disparities float32 [H, W] of `a` into `b` (0: unknown) and the median disagreement of the two directions."""
     penalty = round(2 * 3 * BLOCK_PX**2 * stiffness)  # a quarter of what is usual: stronger ones flatten the nose
-    matcher = cv2.StereoSGBM_create(0, count, BLOCK_PX, P1=penalty, P2=4 * penalty, disp12MaxDiff=-1, preFilterCap=31,
-                                    uniquenessRatio=0, speckleWindowSize=0, speckleRange=0,
-                                    mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY)
+    matcher = cv2.StereoSGBM_create(
+        0,
+        count,
+        BLOCK_PX,
+        P1=penalty,
+        P2=4 * penalty,
+        disp12MaxDiff=-1,
+        preFilterCap=31,
+        uniquenessRatio=0,
+        speckleWindowSize=0,
+        speckleRange=0,
+        mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    )
     back = cv2.ximgproc.createRightMatcher(matcher)
     left, right = matcher.compute(a, b), back.compute(b, a)
     wls = cv2.ximgproc.createDisparityWLSFilter(matcher)

@@ -60,17 +60,33 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     whole = read_filmed_head(capture)
     width = images.size(capture.texture)[0]
     head = whole.unfold(min(WORKING_SIZE, width))
-    transfer = radiance_transfer(whole.caster, whole.mesh.vertices, whole.normals, SKY_RAYS,
-                                 lambda done, of: report.progress(done, 4 * of, "Casting rays at the sky"))
+    transfer = radiance_transfer(
+        whole.caster,
+        whole.mesh.vertices,
+        whole.normals,
+        SKY_RAYS,
+        lambda done, of: report.progress(done, 4 * of, "Casting rays at the sky"),
+    )
     evidence = _evidence(capture, head, ambient_occlusion(transfer))
     source = source_of(capture, settings)
     seen = np.zeros_like(evidence.judged)
     if source == "texture":
-        seen = out_of_sun(evidence.filmed, transfer, head, evidence.judged, evidence.skin > 0.5,
-                          settings.shadow_mask.sensitivity, report)
+        seen = out_of_sun(
+            evidence.filmed,
+            transfer,
+            head,
+            evidence.judged,
+            evidence.skin > 0.5,
+            settings.shadow_mask.sensitivity,
+            report,
+        )
     elif source:
-        seen = over_brows(lift_shadows(head, *shadow_frames(capture, settings, source), report), evidence.bare,
-                          evidence.brows) > 0.5
+        seen = (
+            over_brows(
+                lift_shadows(head, *shadow_frames(capture, settings, source), report), evidence.bare, evidence.brows
+            )
+            > 0.5
+        )
     report.progress(7, 8, "Looking for shadows in the texture")
     proposal = propose(evidence, seen, settings.shadow_mask.sensitivity, settings.shadow_mask.dilate_px)
     images.write_data(capture.shadow_mask_auto, np.clip(images.resize(proposal.mask, width, width), 0, 1))
@@ -105,8 +121,9 @@ def propose(evidence: ShadowEvidence, in_frames: np.ndarray, sensitivity: float,
     bare, judged, skin = evidence.bare, evidence.judged, evidence.skin
     texture = still_dark(evidence.texture, evidence.normals, judged, skin > 0.5, sensitivity)
     mask = tidy((in_frames & bare) | texture, bare, dilate_px * len(bare) / 1024)
-    mask, edges = snapped(mask, evidence.filmed, evidence.normals,
-                          np.where(bare, 0.2 + 0.8 * skin, 0).astype(np.float32))
+    mask, edges = snapped(
+        mask, evidence.filmed, evidence.normals, np.where(bare, 0.2 + 0.8 * skin, 0).astype(np.float32)
+    )
     luminance = np.log(np.maximum(evidence.texture.mean(-1), 2e-3))
     occlusion = baked_occlusion(luminance, evidence.visible, np.where(judged, skin, 0) * (1 - mask))
     return Proposal(
@@ -114,8 +131,9 @@ def propose(evidence: ShadowEvidence, in_frames: np.ndarray, sensitivity: float,
     )
 
 
-def still_dark(texture: np.ndarray, normals: np.ndarray, judged: np.ndarray, skin: np.ndarray,
-               sensitivity: float) -> np.ndarray:
+def still_dark(
+    texture: np.ndarray, normals: np.ndarray, judged: np.ndarray, skin: np.ndarray, sensitivity: float
+) -> np.ndarray:
     """Shadow that stayed in a delit texture.
 
     Parameters
@@ -143,13 +161,17 @@ def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> ShadowEv
     """visible [V]: the sky's share that reaches the head's vertices."""
     size = len(head.face)
     texture = images.resize(images.read_linear(capture.texture), size, size)
-    filmed = (images.resize(images.read_linear(capture.texture_filmed), size, size) if capture.texture_filmed.is_file()
-              else texture)
+    filmed = (
+        images.resize(images.read_linear(capture.texture_filmed), size, size)
+        if capture.texture_filmed.is_file()
+        else texture
+    )
     confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size)
     # on a head of another topology, or with other UVs, everything is face and skin
     built_in = head.head.built_in
-    face, skin = (template.mask(name, size) if built_in else np.ones((size, size), np.float32)
-                  for name in ("face", "skin"))
+    face, skin = (
+        template.mask(name, size) if built_in else np.ones((size, size), np.float32) for name in ("face", "skin")
+    )
     brows = template.mask("brows", size) if built_in else np.zeros_like(skin)
     scalp = template.mask("scalp", size) if built_in else np.zeros_like(skin)
     for name in UNLIKE_SKIN if built_in else ():
@@ -187,8 +209,10 @@ def _leave_figures(
         [proposal.frames, proposal.texture, proposal.occlusion / max(float(proposal.occlusion.max()), 0.25)], -1
     ).astype(np.float32)
     tinted = 0.55 * filmed + 0.45 * shown
-    images.write_srgb(capture.picture("shadow_mask", "filmed__red_in_frames_green_in_texture_blue_occlusion__proposal"),
-                      np.hstack([filmed, tinted, np.repeat(proposal.mask[..., None], 3, -1)]))
+    images.write_srgb(
+        capture.picture("shadow_mask", "filmed__red_in_frames_green_in_texture_blue_occlusion__proposal"),
+        np.hstack([filmed, tinted, np.repeat(proposal.mask[..., None], 3, -1)]),
+    )
 
 
 def share_on_edges(mask: np.ndarray, edges: np.ndarray) -> float:

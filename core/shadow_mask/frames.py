@@ -55,11 +55,13 @@ def shadow_frames(capture: Capture, settings: Settings, source: str) -> tuple[in
     threshold = THRESHOLD + 0.5 * (0.5 - settings.shadow_mask.sensitivity)
     if source == "softened":
         pairs = pictures_of(capture, settings.shadow_mask.softened, source)
-        return len(pairs), ((view,
-                             filtered(softening(view.read(), read_picture(path, view, source)),
-                                      threshold)) for view, path in pairs)
-    views = [(view, path) for view in read_views(capture)
-             if (path := shadow_path(capture.delit / "shadow", view)).is_file()]
+        return len(pairs), (
+            (view, filtered(softening(view.read(), read_picture(path, view, source)), threshold))
+            for view, path in pairs
+        )
+    views = [
+        (view, path) for view in read_views(capture) if (path := shadow_path(capture.delit / "shadow", view)).is_file()
+    ]
     return len(views), ((view, filtered(images.read_mask(path), threshold)) for view, path in views)
 
 

@@ -45,8 +45,12 @@ def lift_shadows(head: Unfolded, count: int, masks: Iterable[tuple[View, np.ndar
             (cosine > GRAZING_COSINE) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
         )
         seen = seen[visible_from(head.caster, head.points[seen], head.normals[seen], view.centre)]
-        inner = np.clip(sample(_silhouette_distance(head.caster, view), pixels[seen])
-                        / (EDGE_SIDE_SHARE * max(view.width, view.height)), 0.02, 1)
+        inner = np.clip(
+            sample(_silhouette_distance(head.caster, view), pixels[seen])
+            / (EDGE_SIDE_SHARE * max(view.width, view.height)),
+            0.02,
+            1,
+        )
         trust = cosine[seen] ** 2 * inner
         total[seen] += trust * sample(mask, pixels[seen])
         weight[seen] += trust

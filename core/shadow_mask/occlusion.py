@@ -39,8 +39,10 @@ def baked_occlusion(luminance: np.ndarray, visible: np.ndarray, skin: np.ndarray
     darker, deeper = over_free(luminance) - luminance, hidden - over_free(hidden)  # against the free skin around
     sigma = WINDOW_SIDE_SHARE * size
     total = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-3)
-    together, squares, others = (cv2.GaussianBlur((weight * a * b).astype(np.float32), (0, 0), sigma) / total
-                                 for a, b in ((deeper, darker), (deeper, deeper), (darker, darker)))
+    together, squares, others = (
+        cv2.GaussianBlur((weight * a * b).astype(np.float32), (0, 0), sigma) / total
+        for a, b in ((deeper, darker), (deeper, deeper), (darker, darker))
+    )
     agreement = together / np.sqrt(np.maximum(squares * others, 1e-8))
     # of the occlusion, what the texture shows
     shown = np.clip(together / np.maximum(squares, 1e-3), 0, 1) * np.maximum(deeper, 0)

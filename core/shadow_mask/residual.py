@@ -23,8 +23,9 @@ FIRST_STEPS_LOG = (-0.4, -0.8, -1.3)  # darkenings that the fit starts from, nat
 LIKELIEST_SHARE = 0.35
 
 
-def find_shadow(colours: np.ndarray, normals: np.ndarray,
-                skin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def find_shadow(
+    colours: np.ndarray, normals: np.ndarray, skin: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Linear texture colours [N, 3], unit normals [N, 3], bool [N]: plain skin to fit on.
 
     Returns the log odds [N] that a texel is in shadow (-12 everywhere if there is none), its residual [N, 3] against
@@ -63,15 +64,20 @@ def _expectation_maximisation(log, basis, step, iterations, fixed=False):
     ridge = np.diag([0.0, *[2e-3] * 3, *[2e-2] * 5]) * count
     for _ in range(iterations):
         weighted = basis * inlier[:, None]
-        smooth = np.linalg.solve(weighted.T @ basis + ridge + 1e-9 * np.eye(9),
-                                 weighted.T @ (log - dark[:, None] * step))
+        smooth = np.linalg.solve(
+            weighted.T @ basis + ridge + 1e-9 * np.eye(9), weighted.T @ (log - dark[:, None] * step)
+        )
         residual = log - basis @ smooth
         if not fixed:
             step = (residual * (dark * inlier)[:, None]).sum(0) / max((dark * inlier).sum(), 1e-6)
-        terms = np.stack([np.log(share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual - step),
-                          # [3, N]
-                          np.log1p(-share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual),
-                          np.full(count, np.log(OUTLIER_SHARE) - 3 * np.log(OUTLIER_RANGE_LOG))])
+        terms = np.stack(
+            [
+                np.log(share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual - step),
+                # [3, N]
+                np.log1p(-share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual),
+                np.full(count, np.log(OUTLIER_SHARE) - 3 * np.log(OUTLIER_RANGE_LOG)),
+            ]
+        )
         peak = terms.max(0)
         shares = np.exp(terms - peak)
         dark = np.zeros(count) if fixed else shares[0] / np.maximum(shares[0] + shares[1], 1e-30)

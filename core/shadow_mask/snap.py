@@ -10,8 +10,9 @@ from ..light.shadow_edges import place
 from .residual import smooth_basis
 
 
-def snapped(mask: np.ndarray, filmed: np.ndarray, normals: np.ndarray,
-            weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def snapped(
+    mask: np.ndarray, filmed: np.ndarray, normals: np.ndarray, weight: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """A mask laid on the shadow's edges.
 
     Parameters

@@ -24,8 +24,15 @@ OFF_M = 1e-3  # how far rays start off the surface
 SUNLIT_PROBABILITIES = 0.05, 0.65
 
 
-def out_of_sun(filmed: np.ndarray, transfer: np.ndarray, head: Unfolded, judged: np.ndarray, skin: np.ndarray,
-               sensitivity: float, report: Reporter) -> np.ndarray:
+def out_of_sun(
+    filmed: np.ndarray,
+    transfer: np.ndarray,
+    head: Unfolded,
+    judged: np.ndarray,
+    skin: np.ndarray,
+    sensitivity: float,
+    report: Reporter,
+) -> np.ndarray:
     """Texels that the sun does not reach.
 
     Parameters
@@ -48,9 +55,14 @@ def out_of_sun(filmed: np.ndarray, transfer: np.ndarray, head: Unfolded, judged:
     if len(drawn) < FEWEST_TEXELS:
         return np.zeros_like(judged)
     drawn = drawn[:: max(1, len(drawn) // FIT_TEXELS)]
-    light, _, _ = fit_light(colours[drawn], head.normals[drawn], at[drawn], lambda sun: _sees(head, drawn, sun),
-                            np.ones(len(drawn)),
-                            lambda done, of: report.progress(2 * of + 3 * done, 8 * of, "Fitting the light"))
+    light, _, _ = fit_light(
+        colours[drawn],
+        head.normals[drawn],
+        at[drawn],
+        lambda sun: _sees(head, drawn, sun),
+        np.ones(len(drawn)),
+        lambda done, of: report.progress(2 * of + 3 * done, 8 * of, "Fitting the light"),
+    )
     if not light.has_sun:
         return np.zeros_like(judged)
     log, ambient = np.log(np.maximum(colours, 1e-4)), light.ambient(at)
@@ -66,6 +78,7 @@ def _sees(head: Unfolded, texels: np.ndarray, sun: np.ndarray) -> np.ndarray:
     """[N] 0 or 1: whether the head leaves the sun visible from these of its covered texels."""
     facing = texels[head.normals[texels] @ sun > 0]
     free = np.zeros(len(head.points))
-    free[facing] = ~head.caster.blocked(head.points[facing] + OFF_M * head.normals[facing],
-                                        np.repeat(sun[None], len(facing), 0))
+    free[facing] = ~head.caster.blocked(
+        head.points[facing] + OFF_M * head.normals[facing], np.repeat(sun[None], len(facing), 0)
+    )
     return free[texels]

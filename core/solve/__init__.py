@@ -68,8 +68,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         # the split knows its places on the built-in head
         evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), free_recipe(recipe)
     _check_often(prior, report)
-    edited = (solve_edited(capture, head, settings, recipe, prior, evidence, report) if settings.edited_part
-              and elsewhere is None else None)
+    edited = (
+        solve_edited(capture, head, settings, recipe, prior, evidence, report)
+        if settings.edited_part and elsewhere is None
+        else None
+    )
     if edited is not None:
         iris.measure_irises(capture, head, edited[0].diffuse, report)
         tell_skin_tone(edited[1], settings, report)
@@ -81,22 +84,42 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     tell_skin_tone(tone, settings, report)
     others = read_others(capture, settings, report)
     report.progress(0, recipe.steps, "telling skin from light and laying the mask on the shadow's edges")
-    start = initial.start_solve(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, others,
-                                initial.Callbacks(witness, report.check))
+    start = initial.start_solve(
+        prior,
+        evidence,
+        tone,
+        evidence.cell_side(options.grid_cells),
+        recipe,
+        others,
+        initial.Callbacks(witness, report.check),
+    )
     if others and not start.recipe.linear:
-        report.log("The other captures were not used: they help where a delighter has left a faint light, on the "
-                   "built-in head, by the default recipe.")
+        report.log(
+            "The other captures were not used: they help where a delighter has left a faint light, on the "
+            "built-in head, by the default recipe."
+        )
     denoiser = prior.of_tone(start.tone)
     report.figure("marks_kept_from_light", len(start.marks))
-    images.write_srgb(capture.picture("solve", "edges_and_marks"),
-                      drawing.draw_edges_and_marks(evidence, start.alpha, start.marks))
+    images.write_srgb(
+        capture.picture("solve", "edges_and_marks"), drawing.draw_edges_and_marks(evidence, start.alpha, start.marks)
+    )
     stored = capture.checkpoints / "solve.safetensors"
     state = _sampled(capture, settings, start, denoiser, stored, _key(evidence, settings, start), report)
     result = maps.finish_maps(state, evidence, start)
-    solution = Solution(state.denoised, state.lights, evidence.alpha, start.alpha, start.tone, result.gain,
-                        start.exposure, start.local, start.recipe.linear > 0)
-    delivered = (result if elsewhere is None
-                 else elsewhere.returned(result, known, state.lights, start.exposure, start.tone))
+    solution = Solution(
+        state.denoised,
+        state.lights,
+        evidence.alpha,
+        start.alpha,
+        start.tone,
+        result.gain,
+        start.exposure,
+        start.local,
+        start.recipe.linear > 0,
+    )
+    delivered = (
+        result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
+    )
     maps.write_maps(capture, delivered, solution, conditions)
     iris.measure_irises(capture, head, delivered.diffuse, report)
     comparison.write_comparison(capture, known, delivered.diffuse)
@@ -105,8 +128,15 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     stored.unlink(missing_ok=True)
 
 
-def _sampled(capture: Capture, settings: Settings, start: initial.Start, denoiser: ConditionedPrior, stored: Path,
-             key: str, report: Reporter) -> State:
+def _sampled(
+    capture: Capture,
+    settings: Settings,
+    start: initial.Start,
+    denoiser: ConditionedPrior,
+    stored: Path,
+    key: str,
+    report: Reporter,
+) -> State:
     """The last state of the walk, on the processor; goes on from the checkpoint `stored` where that is of this run,
     which `key` stands for."""
     state, seen = start.state, {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
@@ -148,6 +178,7 @@ def recipe_of(settings: Settings, prior: Prior) -> Recipe:
 def _check_often(prior: Prior, report: Reporter) -> None:
     """Lets a cancel stop the run between two blocks of the network, forward and backward: one step on a large map takes
     seconds."""
+
     def after(module, inputs, output):
         report.check()
         if output.requires_grad:
@@ -161,9 +192,21 @@ def _check_often(prior: Prior, report: Reporter) -> None:
 def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
     """Stands for everything a run's bytes depend on."""
     digest, o = hashlib.blake2b(digest_size=16), start.observations[1]
-    for values in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, start.tone.tensor,
-                   start.state.lights.glob, start.local, start.reference, start.alpha, o.texture, o.trust, o.restraint,
-                   o.missing):
+    for values in (
+        evidence.texture,
+        evidence.weight,
+        evidence.alpha,
+        evidence.normal,
+        start.tone.tensor,
+        start.state.lights.glob,
+        start.local,
+        start.reference,
+        start.alpha,
+        o.texture,
+        o.trust,
+        o.restraint,
+        o.missing,
+    ):
         digest.update(torch.as_tensor(values).numpy().tobytes())
     digest.update(repr(start.recipe).encode())
     digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.compute_device]).encode())
@@ -179,8 +222,10 @@ def _leave_figures(capture: Capture, evidence: Evidence, solved_maps: maps.Maps,
     error = images.linear_to_srgb(explained) - images.linear_to_srgb(texture)
     mean_square = float((error**2 * weight).sum() / max(3 * weight.sum(), 1e-6))
     report.figure("residual_psnr_db", round(-10 * np.log10(max(mean_square, 1e-10)), 1))
-    report.figure("mask_share_of_face_percent",
-                  round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1))
+    report.figure(
+        "mask_share_of_face_percent",
+        round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1),
+    )
     side = min(evidence.size, REFERENCE_TEXELS // 2)
     small = [
         images.resize(image, side, side)
@@ -194,5 +239,7 @@ def _leave_figures(capture: Capture, evidence: Evidence, solved_maps: maps.Maps,
         np.repeat(solved_maps.specular[..., None], 3, 2),
         np.repeat(solved_maps.confidence[..., None], 3, 2),
     ]
-    images.write_srgb(capture.picture("solve", "normal_specular_confidence"),
-                      np.hstack([images.resize(image, side, side) for image in aux]))
+    images.write_srgb(
+        capture.picture("solve", "normal_specular_confidence"),
+        np.hstack([images.resize(image, side, side) for image in aux]),
+    )

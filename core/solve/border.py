@@ -54,8 +54,9 @@ def measure_missing_light(light: torch.Tensor, alpha: torch.Tensor, weight: torc
     return torch.from_numpy(share.clip(0, MAX_MISSING_SHARE).astype(np.float32))
 
 
-def measure_border_steps(log_light: np.ndarray, alpha: np.ndarray, weight: np.ndarray,
-                         texel: float) -> tuple[np.ndarray, np.ndarray]:
+def measure_border_steps(
+    log_light: np.ndarray, alpha: np.ndarray, weight: np.ndarray, texel: float
+) -> tuple[np.ndarray, np.ndarray]:
     """By how much the light's logarithm is larger inside of M than outside, at the places of M's border.
 
     Parameters

@@ -46,8 +46,7 @@ class Solution:
 def write_solution(path: Path, solution: Solution, conditions: dict[str, str]) -> None:
     """`conditions` are mask_edit's: under others this state is of no use."""
     lights = {"glob": solution.lights.glob, "grid": solution.lights.grid, "chroma": solution.lights.chroma}
-    tensors = {name: getattr(solution, name)
-               for name in ("denoised", "painted", "alpha", "gain", "local")} | lights
+    tensors = {name: getattr(solution, name) for name in ("denoised", "painted", "alpha", "gain", "local")} | lights
     tensors["tone"] = solution.tone.tensor
     tensors["settled"] = torch.tensor(solution.settled)
     tensors["exposure"] = torch.tensor(solution.exposure, dtype=torch.float64)
@@ -65,16 +64,25 @@ def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
         lights = Lights(*(tensors.pop(name) for name in ("glob", "grid", "chroma")))
         tone = SkinTone.from_linear(tensors.pop("tone"), EARLIER)
-        return Solution(lights=lights, tone=tone, exposure=tensors.pop("exposure").item(),
-                        settled=bool(tensors.pop("settled")), **tensors)
+        return Solution(
+            lights=lights,
+            tone=tone,
+            exposure=tensors.pop("exposure").item(),
+            settled=bool(tensors.pop("settled")),
+            **tensors,
+        )
     except (OSError, SafetensorError, KeyError, TypeError, ValueError):
         return None
 
 
 def write_state(path: Path, state: State, key: str) -> None:
     """Stores a state; `key` stands for everything its future depends on."""
-    tensors = {"denoised": state.denoised, "glob": state.lights.glob, "grid": state.lights.grid,
-               "chroma": state.lights.chroma}
+    tensors = {
+        "denoised": state.denoised,
+        "glob": state.lights.glob,
+        "grid": state.lights.grid,
+        "chroma": state.lights.chroma,
+    }
     if state.x is not None:
         tensors["x"] = state.x
     tensors["step"] = torch.tensor(state.step)
@@ -90,9 +98,7 @@ def read_state(path: Path, key: str) -> State | None:
             metadata = file.metadata() or {}
             if metadata.get("key") != key:
                 return None
-            tensors: dict[str,
-                          torch.Tensor] = {name: file.get_tensor(name)
-                                           for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
+            tensors: dict[str, torch.Tensor] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
         moments = [tensors[f"moment{k}"] for k in range(sum(name.startswith("moment") for name in tensors))]
         lights = Lights(tensors["glob"], tensors["grid"], tensors["chroma"])
         return State(int(tensors["step"]), tensors.get("x"), tensors["denoised"], lights, moments)
@@ -109,5 +115,6 @@ def _save(path: Path, tensors: dict[str, torch.Tensor], metadata: dict[str, str]
             # which tells the system's error in words alone: "No space left on device (os error 28)"
             code_match = re.search(r"os error (\d+)", str(error))
             number = int(code_match[1]) if code_match else 0
-            raise (OSError(0, str(error), str(path), number) if os.name == "nt"
-                   else OSError(number, str(error), str(path))) from error
+            raise (
+                OSError(0, str(error), str(path), number) if os.name == "nt" else OSError(number, str(error), str(path))
+            ) from error

@@ -30,8 +30,9 @@ def write_comparison(capture: Capture, evidence: Evidence, albedo: np.ndarray) -
             if path.is_file():
                 texture = images.read_linear(path)
                 small = images.resize(texture, evidence.size, evidence.size)
-                images.write_srgb(folder / name,
-                                  images.linear_to_srgb(texture * (goal / max(_mean(small, weight), 1e-6))))
+                images.write_srgb(
+                    folder / name, images.linear_to_srgb(texture * (goal / max(_mean(small, weight), 1e-6)))
+                )
 
 
 def _mean(linear: np.ndarray, weight: np.ndarray) -> float:

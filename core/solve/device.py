@@ -46,14 +46,17 @@ def prove() -> Proof:
         try:
             result, seconds = run_pass(device)
         except Exception as error:  # whatever a driver says: the CPU is there
-            reasons.append(f"{device} does not run the network ({type(error).__name__}: "
-                           f"{str(error).partition(chr(10))[0][:120].rstrip('.')}).")
+            reasons.append(
+                f"{device} does not run the network ({type(error).__name__}: "
+                f"{str(error).partition(chr(10))[0][:120].rstrip('.')})."
+            )
             continue
         if not torch.isfinite(result).all() or (result - expected).abs().max() > MAX_DIFFERENCE:
             reasons.append(f"{device} computes something else than the CPU.")
         elif seconds >= cpu_s:
-            reasons.append(f"{device} is slower than the CPU: {seconds:.2f} s against {cpu_s:.2f} s for one pass of "
-                           "the network.")
+            reasons.append(
+                f"{device} is slower than the CPU: {seconds:.2f} s against {cpu_s:.2f} s for one pass of the network."
+            )
         else:
             return Proof(device, f"{device} takes {seconds:.2f} s for one pass of the network, the CPU {cpu_s:.2f} s.")
     return Proof("cpu", " ".join(reasons))
@@ -61,8 +64,11 @@ def prove() -> Proof:
 
 def list_devices() -> list[str]:
     """The devices that PyTorch names, beside the CPU."""
-    return [name for name, there in (("cuda", torch.cuda.is_available()), ("mps", torch.backends.mps.is_available()))
-            if there]
+    return [
+        name
+        for name, there in (("cuda", torch.cuda.is_available()), ("mps", torch.backends.mps.is_available()))
+        if there
+    ]
 
 
 def run_pass(device: str) -> tuple[torch.Tensor, float]:
@@ -78,7 +84,7 @@ def run_pass(device: str) -> tuple[torch.Tensor, float]:
         started = time.perf_counter()
         x = noisy.clone().requires_grad_(True)
         denoised = prior(x, 1.0, coords)
-        gradient, = torch.autograd.grad((denoised * weights).sum(), x)
+        (gradient,) = torch.autograd.grad((denoised * weights).sum(), x)
         result = torch.cat([denoised.detach(), gradient], 1).cpu()  # which waits for the device
         seconds = time.perf_counter() - started
     return result, seconds

@@ -13,8 +13,13 @@ from .prior import ConditionedPrior
 WHOLE_MAP = slice(None), slice(None)
 
 
-def restore_maps(prior: ConditionedPrior, denoised: torch.Tensor, coords: torch.Tensor, seed: int,
-                 region: tuple[slice, slice] = WHOLE_MAP) -> torch.Tensor:
+def restore_maps(
+    prior: ConditionedPrior,
+    denoised: torch.Tensor,
+    coords: torch.Tensor,
+    seed: int,
+    region: tuple[slice, slice] = WHOLE_MAP,
+) -> torch.Tensor:
     """The map with the normals and specular that are expected of its albedo.
 
     Parameters
@@ -29,6 +34,7 @@ def restore_maps(prior: ConditionedPrior, denoised: torch.Tensor, coords: torch.
     -------
     As `denoised`.
     """
-    noise = torch.randn(1, denoised.shape[1], *coords.shape[-2:],
-                        generator=torch.Generator().manual_seed(seed)).to(denoised.device)
+    noise = torch.randn(1, denoised.shape[1], *coords.shape[-2:], generator=torch.Generator().manual_seed(seed)).to(
+        denoised.device
+    )
     return prior.respond(denoised, coords[(..., *region)], noise[(..., *region)])

@@ -30,8 +30,13 @@ def draw_edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[M
         cv2.drawContours(shown, contours, -1, colour, 1)
     scale = side / evidence.size
     for mark in marks:
-        cv2.circle(shown, (round(mark.column * scale), round(mark.row * scale)),
-                   max(4, round(2.2 * mark.radius * scale)), MARK_RGB, 1)
+        cv2.circle(
+            shown,
+            (round(mark.column * scale), round(mark.row * scale)),
+            max(4, round(2.2 * mark.radius * scale)),
+            MARK_RGB,
+            1,
+        )
     return np.hstack([shown, np.repeat(np.clip(small, 0, 1)[..., None], 3, 2)])
 
 
@@ -45,7 +50,9 @@ def draw_loss_curve(losses: list[tuple[int, float]], steps: int) -> np.ndarray:
     for decade in range(int(np.ceil(low)), int(np.floor(high)) + 1):
         row = round((high - decade) / (high - low) * (height - 1))
         picture[row] = 0.3
-    points = [(round((step - 1) / max(steps - 1, 1) * (width - 1)), round((high - value) / (high - low) * (height - 1)))
-              for (step, _), value in zip(losses, log_losses, strict=True)]
+    points = [
+        (round((step - 1) / max(steps - 1, 1) * (width - 1)), round((high - value) / (high - low) * (height - 1)))
+        for (step, _), value in zip(losses, log_losses, strict=True)
+    ]
     cv2.polylines(picture, [np.array(points, np.int32)], False, LAID_RGB, 2, cv2.LINE_AA)
     return picture

@@ -14,8 +14,9 @@ from ..light.shadow_edges import place
 from .evidence import Evidence
 
 
-def snap_to_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor,
-                  check: Callable[[], None] = lambda: None) -> Evidence:
+def snap_to_edges(
+    evidence: Evidence, light: torch.Tensor, weight: torch.Tensor, check: Callable[[], None] = lambda: None
+) -> Evidence:
     """The evidence with `place`'s alpha for its own. What is protected stays out of M.
 
     Parameters
@@ -25,8 +26,13 @@ def snap_to_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor,
     weight : [S, S] in [0, 1], how far a texel tells of light
     check : may raise to cancel
     """
-    edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), (weight * evidence.covered).numpy(),
-                 evidence.texel, check)
+    edge = place(
+        light.permute(1, 2, 0).numpy(),
+        evidence.alpha.numpy(),
+        (weight * evidence.covered).numpy(),
+        evidence.texel,
+        check,
+    )
     alpha = torch.from_numpy(edge.alpha) * (1 - evidence.protected) * evidence.covered
     return replace(
         evidence, alpha=alpha, edge=torch.from_numpy(edge.on_edge), shadow_colour=tuple(edge.colour.tolist())

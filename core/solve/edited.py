@@ -26,8 +26,9 @@ from .window import Window, find_window, solve_inside
 from .witnesses import confirm_marks
 
 
-def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence,
-                 report: Reporter) -> tuple[maps.Maps, SkinTone] | None:
+def solve_edited(
+    capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, report: Reporter
+) -> tuple[maps.Maps, SkinTone] | None:
     """The maps with the edited part new, as they are now in maps/, and the skin tone. Without an edit the maps stay as
     they are.
 
@@ -57,11 +58,20 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     near = torch.zeros_like(evidence.alpha)
     if window is not None:
         near[window.inside] = 1
-    start = initial.start_again(prior, evidence, earlier, cell, recipe, near,
-                                initial.Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size),
-                                                  report.check))
-    solution = (earlier if window is None
-                else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, window, report))
+    start = initial.start_again(
+        prior,
+        evidence,
+        earlier,
+        cell,
+        recipe,
+        near,
+        initial.Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size), report.check),
+    )
+    solution = (
+        earlier
+        if window is None
+        else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, window, report)
+    )
     state = State(0, None, solution.denoised, solution.lights)
     result = maps.finish_maps(state, evidence, start, solution.gain)
     if window is None:
@@ -74,7 +84,14 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     return result, earlier.tone
 
 
-def _sampled(settings: Settings, prior: ConditionedPrior, evidence: Evidence, earlier: Solution, start: initial.Start,
-             window: Window, report: Reporter) -> Solution:
+def _sampled(
+    settings: Settings,
+    prior: ConditionedPrior,
+    evidence: Evidence,
+    earlier: Solution,
+    start: initial.Start,
+    window: Window,
+    report: Reporter,
+) -> Solution:
     denoised, lights = solve_inside(prior, start.observations, earlier, window, start.recipe, settings.seed, report)
     return replace(earlier, denoised=denoised, lights=lights, painted=evidence.alpha, alpha=start.alpha)

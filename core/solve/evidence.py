@@ -95,13 +95,18 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     texture = images.read_linear(capture.texture)
     confidence = images.read_data(capture.texture_confidence)[..., 0]
     if texture.shape[:2] != confidence.shape or texture.shape[0] != texture.shape[1]:
-        raise Problem(f"{capture.texture} is {texture.shape[1]} x {texture.shape[0]} pixels and "
-                      f"{capture.texture_confidence.name} {confidence.shape[1]} x "
-                      f"{confidence.shape[0]}: both have to be square and of one size.", advise_again("texture"))
+        raise Problem(
+            f"{capture.texture} is {texture.shape[1]} x {texture.shape[0]} pixels and "
+            f"{capture.texture_confidence.name} {confidence.shape[1]} x "
+            f"{confidence.shape[0]}: both have to be square and of one size.",
+            advise_again("texture"),
+        )
     confidence, texture = np.clip(confidence, 0, 1), np.clip(texture, 0, None)
     if confidence.max() < 1e-3:
-        raise Problem("No texel of the texture was seen by any frame.",
-                      "Run the stage Cameras again and those after it, and look at the report.")
+        raise Problem(
+            "No texel of the texture was seen by any frame.",
+            "Run the stage Cameras again and those after it, and look at the report.",
+        )
     hidden = read_hidden_skin(capture, size)
     seen, bearded = _sized(confidence, size), np.maximum(_sized(beard.seen_in(texture, confidence), size), hidden)
     # what nobody saw must not darken its neighbours
@@ -114,29 +119,42 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     normal = raster.bleed(head.interpolate(head.normals, size), covered)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     mask, added = _shadow_mask(capture, size)
-    protected = (_sized(images.read_mask(capture.protect_mask), size) if capture.protect_mask.is_file()
-                 else np.zeros_like(mask))
+    protected = (
+        _sized(images.read_mask(capture.protect_mask), size) if capture.protect_mask.is_file() else np.zeros_like(mask)
+    )
     alpha = soften_mask(mask) * (1 - protected)
     skin = template.mask("skin", size) * template.mask("face", size)
     skin = skin * (1 - template.mask("eyes", size)) * (1 - bearded)
     weight = np.where(covered, np.clip(seen / FULL_CONFIDENCE, 0, 1), 0)
-    tensors = [np.ascontiguousarray(a, np.float32)
-               for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
-    unlike_skin = np.maximum.reduce([template.mask(name, size)
-                                     for name in ("brows", "lips", "eyes", "nostrils", "scalp")])
+    tensors = [
+        np.ascontiguousarray(a, np.float32)
+        for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))
+    ]
+    unlike_skin = np.maximum.reduce(
+        [template.mask(name, size) for name in ("brows", "lips", "eyes", "nostrils", "scalp")]
+    )
     bare = (1 - unlike_skin) * (1 - bearded)
     trust = np.minimum(1 - (1 - FEATURE_TRUST) * unlike_skin, 1 - (1 - BEARD_TRUST) * bearded)
-    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32))
-             for a in (skin, bare, trust, protected, np.zeros_like(alpha),
-                       _brightness(capture, texture, skin * weight > 0.5))]
+    parts = [
+        torch.from_numpy(np.ascontiguousarray(a, np.float32))
+        for a in (
+            skin,
+            bare,
+            trust,
+            protected,
+            np.zeros_like(alpha),
+            _brightness(capture, texture, skin * weight > 0.5),
+        )
+    ]
     return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, added=torch.from_numpy(added))
 
 
 def _brightness(capture: Capture, texture: np.ndarray, skin: np.ndarray) -> np.ndarray:
     """[S, S]: how bright the frames show a texel, over its median where `skin`; of the delit texture where no other is
     there."""
-    filmed = (_sized(images.read_linear(capture.texture_filmed), len(skin)) if capture.texture_filmed.is_file()
-              else texture)
+    filmed = (
+        _sized(images.read_linear(capture.texture_filmed), len(skin)) if capture.texture_filmed.is_file() else texture
+    )
     brightness = filmed.mean(2)
     return brightness / max(np.median(brightness[skin]) if skin.any() else brightness.mean(), 1e-6)
 
@@ -157,8 +175,9 @@ def soften_mask(mask: np.ndarray) -> np.ndarray:
     return np.clip((faded - 0.02) / 0.96, 0, 1)
 
 
-def make_observations(evidence: Evidence, exposure: float, cell: float, multiple: int,
-                      recipe: Recipe) -> dict[int, Observation]:
+def make_observations(
+    evidence: Evidence, exposure: float, cell: float, multiple: int, recipe: Recipe
+) -> dict[int, Observation]:
     """The evidence as the sampler takes it, per coarsening factor. Maps coarser than a quarter of REFERENCE_TEXELS are
     left out: the prior has not seen them.
 
@@ -185,16 +204,20 @@ def make_observations(evidence: Evidence, exposure: float, cell: float, multiple
         support = cv2.dilate(inside, np.ones((5, 5)))  # M and two texels around it
         ring = (support > 0) & ((inside == 0) if recipe.hard_mask else (alpha.numpy() < 0.5))
         ring &= edge.numpy() < 0.5  # a border that lies on a shadow's edge shall not be seamless
-        modulation = (torch.from_numpy(support.astype(np.float32)) if recipe.hard_mask
-                      else alpha + recipe.open * (1 - alpha) * (1 - protected))
+        modulation = (
+            torch.from_numpy(support.astype(np.float32))
+            if recipe.hard_mask
+            else alpha + recipe.open * (1 - alpha) * (1 - protected)
+        )
         whole = size * REFERENCE_TEXELS // extent.side
         top, left = (start * whole // REFERENCE_TEXELS for start in (extent.top, extent.left))
         coords = make_coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
         restraint = 1.0 if evidence.added is None else 1 - torch.from_numpy(_sized(evidence.added.numpy(), size))
         missing = 0.0 if evidence.missing is None else torch.from_numpy(_sized(evidence.missing.numpy(), size))
-        levels[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size,
-                                     restraint, missing)
+        levels[factor] = Observation(
+            texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, restraint, missing
+        )
     return levels
 
 
@@ -214,5 +237,6 @@ def _sized(image: np.ndarray, size: int) -> np.ndarray:
     if image.shape[:2] == (size, size):
         return image
     shrinks = size < image.shape[0]
-    return cv2.resize(np.ascontiguousarray(image), (size, size),
-                      interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    return cv2.resize(
+        np.ascontiguousarray(image), (size, size), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+    )

@@ -55,8 +55,15 @@ class Callbacks:
 NOBODY = Callbacks()
 
 
-def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe: Recipe,
-                other_captures: Sequence[Evidence] = (), callbacks: Callbacks = NOBODY) -> Start:
+def start_solve(
+    prior: Prior,
+    evidence: Evidence,
+    tone: SkinTone,
+    cell: float,
+    recipe: Recipe,
+    other_captures: Sequence[Evidence] = (),
+    callbacks: Callbacks = NOBODY,
+) -> Start:
     """All that a run begins with.
 
     Parameters
@@ -79,12 +86,23 @@ def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, r
     exposure = match_exposure(albedo_of(x_ref), evidence.texture, lit)
     trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
     weight = trusted * (1 - evidence.alpha) if recipe.fitted else lit  # one even light is best told by skin
-    lights = fit_first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal,
-                              weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
+    lights = fit_first_lights(
+        evidence.texture * exposure,
+        albedo_of(x_ref),
+        evidence.normal,
+        weight if weight.sum() >= 1 else trusted,
+        grid_cells(cell),
+        recipe,
+    )
     local = torch.zeros(3, 1, 1)
     if recipe.linear:
-        told = split_captures([make_shapes(each, albedo_of(make_reference(prior, tone, each, recipe.reference)))
-                               for each in (evidence, *other_captures)], check=callbacks.check)
+        told = split_captures(
+            [
+                make_shapes(each, albedo_of(make_reference(prior, tone, each, recipe.reference)))
+                for each in (evidence, *other_captures)
+            ],
+            check=callbacks.check,
+        )
         light = told.light(evidence.normal)
         if weighted_deviation(light.log(), lit) < recipe.linear:
             recipe = settle_recipe(recipe)
@@ -93,16 +111,24 @@ def start_solve(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, r
             # to the split the light's level and the traits' mean look alike; but the tone is the mean of the skin
             beneath = evidence.texture * exposure / (light * enlarge_field(local, evidence.size).exp())
             light = light * (mean_tone(beneath, lit) / mean_tone(albedo_of(x_ref), lit))[:, None, None]
-            lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal),
-                                              evidence.skin * evidence.weight, 1e-3)
+            lights.glob = fit_around_constant(
+                light, torch.ones_like(light), shading_basis(evidence.normal), evidence.skin * evidence.weight, 1e-3
+            )
         else:
             recipe = free_recipe(recipe)
     begun = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
     return _laid_out(prior, evidence, begun, cell, callbacks)
 
 
-def start_again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, recipe: Recipe, near: torch.Tensor,
-                callbacks: Callbacks = NOBODY) -> Start:
+def start_again(
+    prior: Prior,
+    evidence: Evidence,
+    earlier: Solution,
+    cell: float,
+    recipe: Recipe,
+    near: torch.Tensor,
+    callbacks: Callbacks = NOBODY,
+) -> Start:
     """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and its mask but for the
     edit's surroundings.
 
@@ -118,20 +144,35 @@ def start_again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float
     """
     x_ref = make_reference(prior, earlier.tone, evidence, recipe.reference)
     recipe = settle_recipe(recipe) if earlier.settled else free_recipe(recipe)
-    begun = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {},
-                  State(0, None, earlier.denoised, earlier.lights), local=earlier.local)
+    begun = Start(
+        earlier.tone,
+        recipe,
+        x_ref,
+        earlier.exposure,
+        evidence.alpha,
+        {},
+        State(0, None, earlier.denoised, earlier.lights),
+        local=earlier.local,
+    )
     return _laid_out(prior, evidence, begun, cell, callbacks, lambda alpha: torch.lerp(earlier.alpha, alpha, near))
 
 
-def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float, callbacks: Callbacks,
-              mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha) -> Start:
+def _laid_out(
+    prior: Prior,
+    evidence: Evidence,
+    begun: Start,
+    cell: float,
+    callbacks: Callbacks,
+    mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha,
+) -> Start:
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
     recipe = begun.recipe
     evidence = replace(evidence, texture=evidence.texture / enlarge_field(begun.local, evidence.size).exp())
     light = find_remaining_light(evidence, begun)
     if recipe.sharp_edges:
-        evidence = snap_to_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust),
-                                 callbacks.check)
+        evidence = snap_to_edges(
+            evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust), callbacks.check
+        )
     evidence = replace(evidence, alpha=mask(evidence.alpha))
     if recipe.faint:
         told = evidence.weight * evidence.trust * evidence.bare
@@ -139,8 +180,12 @@ def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float, callb
     marks: list[Mark] = []
     if recipe.protect_marks:
         evidence, marks = protect_marks(evidence, callbacks.witness)
-    return replace(begun, alpha=evidence.alpha, marks=tuple(marks),
-                   observations=make_observations(evidence, begun.exposure, cell, prior.multiple, recipe))
+    return replace(
+        begun,
+        alpha=evidence.alpha,
+        marks=tuple(marks),
+        observations=make_observations(evidence, begun.exposure, cell, prior.multiple, recipe),
+    )
 
 
 def find_remaining_light(evidence: Evidence, begun: Start) -> torch.Tensor:
@@ -157,8 +202,10 @@ def weigh_lit_skin(evidence: Evidence) -> torch.Tensor:
     if lit.sum() < 1:  # everything on the face is masked: the least evil is to trust it all
         lit = evidence.skin * evidence.weight
     if lit.sum() < 1:
-        raise Problem("No facial skin was seen in the texture.",
-                      "Look at the texture in the report; film the face from the front and from both sides.")
+        raise Problem(
+            "No facial skin was seen in the texture.",
+            "Look at the texture in the report; film the face from the front and from both sides.",
+        )
     return lit
 
 
@@ -208,8 +255,9 @@ def make_reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) 
 
     def unexplained(face: torch.Tensor) -> float:
         light = fit_first_lights(evidence.texture, albedo_of(face), evidence.normal, weight, (1, 1), OURS).glob
-        return float((((evidence.texture - albedo_of(face) * torch.einsum("ck,khw->chw", light, basis))
-                       * weight) ** 2).sum())
+        return float(
+            (((evidence.texture - albedo_of(face) * torch.einsum("ck,khw->chw", light, basis)) * weight) ** 2).sum()
+        )
 
     return min((tint_face(skin, tone.tensor, evidence.skin) for skin in prior.references), key=unexplained)
 
@@ -231,8 +279,14 @@ def make_uniform_skin(tone: torch.Tensor, size: int) -> torch.Tensor:
     return out
 
 
-def fit_first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor,
-                     cells: tuple[int, int], recipe: Recipe) -> Lights:
+def fit_first_lights(
+    texture: torch.Tensor,
+    albedo: torch.Tensor,
+    normal: torch.Tensor,
+    weight: torch.Tensor,
+    cells: tuple[int, int],
+    recipe: Recipe,
+) -> Lights:
     """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light),
     or the constant light; V zero.
 

@@ -73,8 +73,9 @@ def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Rep
         report.figure(f"{side}_iris_srgb", [round(float(v), 3) for v in images.linear_to_srgb(np.array(colour))])
 
 
-def measure_both_irises(views: list[View], head: Head, eyes: tuple[Eyeball, Eyeball], albedo: np.ndarray,
-                 report: Reporter) -> tuple[Colour, Colour] | None:
+def measure_both_irises(
+    views: list[View], head: Head, eyes: tuple[Eyeball, Eyeball], albedo: np.ndarray, report: Reporter
+) -> tuple[Colour, Colour] | None:
     """The linear albedo of the left and of the right iris; None where no frame shows either.
 
     Parameters
@@ -101,8 +102,9 @@ def even_colours(left: Colour, right: Colour) -> tuple[Colour, Colour]:
     return even, even
 
 
-def measure_iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray,
-                        report: Reporter) -> Colour | None:
+def measure_iris_colour(
+    views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray, report: Reporter
+) -> Colour | None:
     """The albedo of an iris, by the median over it and the frames that face it most.
 
     Parameters
@@ -133,8 +135,9 @@ def measure_iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, 
     return tuple(round(float(v), 4) for v in np.clip(np.median(colours, 0), 0.001, 1)) if colours else None
 
 
-def find_iris_pixels(view: View, eye: Eyeball, shares: EyeShares,
-                     shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+def find_iris_pixels(
+    view: View, eye: Eyeball, shares: EyeShares, shape: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
     """The pixels that show the iris between pupil and rim: where an eyeball has it, and the reader saw it.
 
     Parameters
@@ -152,7 +155,7 @@ def find_iris_pixels(view: View, eye: Eyeball, shares: EyeShares,
     (middle,), (depth,) = view.project(np.array(eye.centre)[None])
     reach = 1.5 * eye.radius * view.camera.mean_focal_length() / depth
     low, high = (np.clip(np.round((middle + off) * shrink), 0, shape[1::-1]).astype(int) for off in (-reach, reach))
-    rows, columns = (grid.ravel() for grid in np.mgrid[low[1]:high[1], low[0]:high[0]])
+    rows, columns = (grid.ravel() for grid in np.mgrid[low[1] : high[1], low[0] : high[0]])
     pixels = np.stack([columns, rows], 1) + 0.5
     rays, gaze = view.rays(pixels / shrink), np.array(eye.gaze)
     disc = np.array(eye.centre) + np.sqrt(max(eye.radius**2 - eye.iris_radius**2, 0.0)) * gaze
@@ -172,8 +175,9 @@ def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarr
     return rows, np.maximum(raster.sample_uv(albedo, uvs[rows]), 1e-3)
 
 
-def _in_frame(view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray,
-              skin_albedo: np.ndarray) -> np.ndarray | None:
+def _in_frame(
+    view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray, skin_albedo: np.ndarray
+) -> np.ndarray | None:
     """The iris' albedo [3] by one frame; None where that does not show it, or not enough of the skin around."""
     frame = view.read()
     linear, whole = images.srgb_to_linear(frame), frame.max(-1)

@@ -37,8 +37,10 @@ MAX_DISTANCE_M = 0.012
 """Farthest that the two fitted heads may lie apart."""
 FADE_TEXELS = 24.0
 """Texels of a 1024 map over which the solved maps end where the window does."""
-REMEDY = ("Choose ICT-FaceKit's folder with the neutral mesh under Reconstruction, Head Mesh (in a terminal: "
-          "--template) and run the stage Head again, or leave the prior empty to use ours.")
+REMEDY = (
+    "Choose ICT-FaceKit's folder with the neutral mesh under Reconstruction, Head Mesh (in a terminal: "
+    "--template) and run the stage Head again, or leave the prior empty to use ours."
+)
 
 
 @dataclass(frozen=True)
@@ -54,19 +56,24 @@ class Layout:
         """Our prior's mean face in the window [7, C, C]."""
         face = to_picture(self.face)
         normal = 2 * baking.bake_normals(face[..., 3:6] / 2 + 0.5, self.there) - 1
-        return _planes(np.dstack([baking.bake(face[..., :3], self.there), normal,
-                                  baking.bake(face[..., 6], self.there)]))
+        return _planes(
+            np.dstack([baking.bake(face[..., :3], self.there), normal, baking.bake(face[..., 6], self.there)])
+        )
 
     def evidence(self, e: Evidence, boxes: bool) -> Evidence:
         """The evidence in the window; with `boxes` the tone, the texture and M count within the released masks' bounds
         alone."""
         weight = self._there(e.weight) * torch.from_numpy(self.there.known)
-        changes = {f.name: self._there(getattr(e, f.name)) for f in fields(e)
-                   if isinstance(getattr(e, f.name), torch.Tensor)}
-        changes |= {"texture": self._there(e.texture * e.weight) / self._there(e.weight).clamp_min(1e-4),
-                    "weight": weight, "extent": WINDOW,
-                    "normal": torch.nn.functional.normalize(changes["normal"], dim=0),
-                    "covered": torch.from_numpy(self.there.known)}
+        changes = {
+            f.name: self._there(getattr(e, f.name)) for f in fields(e) if isinstance(getattr(e, f.name), torch.Tensor)
+        }
+        changes |= {
+            "texture": self._there(e.texture * e.weight) / self._there(e.weight).clamp_min(1e-4),
+            "weight": weight,
+            "extent": WINDOW,
+            "normal": torch.nn.functional.normalize(changes["normal"], dim=0),
+            "covered": torch.from_numpy(self.there.known),
+        }
         if boxes:
             tone, face, shadow = (_box(box, len(weight)) for box in (TONE_BOX, FACE_BOX, SHADOW_BOX))
             changes |= {"skin": tone, "weight": weight * face, "alpha": changes["alpha"] * shadow}
@@ -98,11 +105,14 @@ class Layout:
         normal = joined(baking.bake_normals(solved.normal, self.back), to_picture(mean[3:6]) / 2 + 0.5) * 2 - 1
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
         confidence = np.where(self.back.known, inside * baking.bake(solved.confidence, self.back), 0)
-        return replace(solved, diffuse=joined(baking.bake(solved.diffuse, self.back), to_picture(seen)),
-                       normal=(normal / 2 + 0.5).astype(np.float32),
-                       specular=joined(baking.bake(solved.specular, self.back), ((mean[6] + 1) / 2).numpy()),
-                       shading=joined(baking.bake(solved.shading, self.back), to_picture(light)),
-                       confidence=confidence.astype(np.float32))
+        return replace(
+            solved,
+            diffuse=joined(baking.bake(solved.diffuse, self.back), to_picture(seen)),
+            normal=(normal / 2 + 0.5).astype(np.float32),
+            specular=joined(baking.bake(solved.specular, self.back), ((mean[6] + 1) / 2).numpy()),
+            shading=joined(baking.bake(solved.shading, self.back), to_picture(light)),
+            confidence=confidence.astype(np.float32),
+        )
 
     def _inside(self) -> np.ndarray:
         """[S, S]: 1 within the window's reach, falling to 0 at its border. Small holes, as in the folds of lids and
@@ -121,8 +131,9 @@ class Layout:
         u, v = self.there.uv[known].T
         upright = len(u) > 2 and np.corrcoef(u, column[known])[0, 1] > 0.7 and np.corrcoef(v, -row[known])[0, 1] > 0.7
         box = _box(TONE_BOX, len(known)).numpy() > 0
-        return bool(upright and self.back.known[facial > 0.5].mean() > 0.8
-                    and baking.bake(facial, self.there)[box].mean() > 0.5)
+        return bool(
+            upright and self.back.known[facial > 0.5].mean() > 0.8 and baking.bake(facial, self.there)[box].mean() > 0.5
+        )
 
     def _there(self, maps: torch.Tensor) -> torch.Tensor:
         """A map [S, S] or [C, S, S] of the built-in UVs in the window."""
@@ -162,20 +173,28 @@ def fit_layout(capture: Capture, head: Head, e: Evidence, prior: Prior, report: 
     for first, end in runs:
         skin[first:end] = True
     skin &= (atlas.tiles(own) == 0).all(1)
-    strange = Problem(f"The UVs of the fitted template {template} are not those the authors' prior was trained in.",
-                      REMEDY)
+    strange = Problem(
+        f"The UVs of the fitted template {template} are not those the authors' prior was trained in.", REMEDY
+    )
     if not skin.any():
         raise strange
     ours = load()
-    layout = make_layout(head.mesh, own, skin, e.size, ours.mean_face,
-                         lambda done: report.progress(done, 100, "laying the prior's UVs over the head"))
+    layout = make_layout(
+        head.mesh,
+        own,
+        skin,
+        e.size,
+        ours.mean_face,
+        lambda done: report.progress(done, 100, "laying the prior's UVs over the head"),
+    )
     if not layout.fits(e.skin.numpy()):
         raise strange
     return layout, prior.with_face(layout.mean_face())
 
 
-def make_layout(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor,
-                tick: Callable[[float], None]) -> Layout:
+def make_layout(
+    head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor, tick: Callable[[float], None]
+) -> Layout:
     """The layout of a mesh that lies on the head, for maps of size x size.
 
     Parameters
@@ -189,7 +208,7 @@ def make_layout(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int
     """
     there = baking.places(own, (0, 0), baking.Source(head), size, MAX_DISTANCE_M, tick, skin)
     top, left, side = (v * size // REFERENCE_TEXELS for v in (WINDOW.top, WINDOW.left, WINDOW.side))
-    window = np.s_[top:top + side, left:left + side]
+    window = np.s_[top : top + side, left : left + side]
     there = baking.TexelPartners(there.uv[window], there.turn[window], there.mirrored[window], there.covered[window])
     source = baking.Source(replace(own, faces=own.faces[skin], face_uvs=own.face_uvs[skin]))
     back = baking.places(head, (0, 0), source, size, MAX_DISTANCE_M, tick)
@@ -200,8 +219,10 @@ def make_layout(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int
 
 def _box(box: Box, side: int) -> torch.Tensor:
     """[side, side]: 1 in a box of the 1024 map, seen in the window."""
-    top, bottom, left, right = (round((v - start) * side / WINDOW.side)
-                                for v, start in zip(box, (WINDOW.top,) * 2 + (WINDOW.left,) * 2, strict=True))
+    top, bottom, left, right = (
+        round((v - start) * side / WINDOW.side)
+        for v, start in zip(box, (WINDOW.top,) * 2 + (WINDOW.left,) * 2, strict=True)
+    )
     inside = torch.zeros(side, side)
     inside[top:bottom, left:right] = 1
     return inside

@@ -17,8 +17,15 @@ PHASE_PARAMETERS = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1
 """Which of Lights.parameters() a phase moves."""
 
 
-def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, step: int, steps: int,
-                  loss: Callable | None = None) -> None:
+def update_lights(
+    state: State,
+    denoised: torch.Tensor,
+    o: Observation,
+    recipe: Recipe,
+    step: int,
+    steps: int,
+    loss: Callable | None = None,
+) -> None:
     """The light updates that belong to one sampling step, in place: none, one or several of the phase that this step is
     in.
 
@@ -80,8 +87,9 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
         seam = total_variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
         loss = loss + recipe.seam * brightness / o.texel * seam
     if recipe.faint:
-        restraint, missing = (value[o.shader.box] if isinstance(value, torch.Tensor) else value
-                              for value in (o.restraint, o.missing))
+        restraint, missing = (
+            value[o.shader.box] if isinstance(value, torch.Tensor) else value for value in (o.restraint, o.missing)
+        )
         gone = missing * o.shader.box_alpha * o.shader.main(lights)[(slice(None), *o.shader.box)].detach()
         loss = loss + recipe.faint * brightness * (restraint * (local + gone) ** 2).sum()
     if recipe.smooth:
@@ -96,14 +104,22 @@ def total_variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     return (image.diff(dim=1).abs() * weight[1:]).sum() + (image.diff(dim=2).abs() * weight[:, 1:]).sum()
 
 
-def _adam(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, moving: tuple[int, ...], before: int,
-          loss: Callable) -> None:
+def _adam(
+    state: State,
+    denoised: torch.Tensor,
+    o: Observation,
+    recipe: Recipe,
+    moving: tuple[int, ...],
+    before: int,
+    loss: Callable,
+) -> None:
     """One step of Adam on the parameters `moving`, the `before`+1st of its phase, with an exponentially decaying
     rate."""
     lights = state.lights.requires_grad_(True)
     parameters = lights.parameters()
-    gradients = torch.autograd.grad(loss(lights, denoised, o, recipe), [parameters[k] for k in moving],
-                                    allow_unused=True)
+    gradients = torch.autograd.grad(
+        loss(lights, denoised, o, recipe), [parameters[k] for k in moving], allow_unused=True
+    )
     lights.requires_grad_(False)
     if not state.moments:
         state.moments = [torch.zeros_like(p) for p in parameters for _ in range(2)]

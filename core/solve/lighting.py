@@ -64,8 +64,14 @@ class Shader:
         self.empty = len(rows) == 0
         # local light exists only where M does: everything about it is computed on M's bounding box, one texel wider for
         # the ring's differences
-        self.box = (slice(0, 1), slice(0, 1)) if self.empty else tuple(
-            slice(max(int(i[0]) - 3, 0), min(int(i[-1]) + 4, size)) for i, size in ((rows, height), (columns, width)))
+        self.box = (
+            (slice(0, 1), slice(0, 1))
+            if self.empty
+            else tuple(
+                slice(max(int(i[0]) - 3, 0), min(int(i[-1]) + 4, size))
+                for i, size in ((rows, height), (columns, width))
+            )
+        )
         self.up_rows = interpolation_matrix(cells[0], height, bilinear).to(normal)[self.box[0]]  # [h', h]
         self.up_columns = interpolation_matrix(cells[1], width, bilinear).to(normal)[self.box[1]]  # [w', w]
         self.box_basis = self.basis[(slice(None), *self.box)]
@@ -74,8 +80,9 @@ class Shader:
     def to(self, device: torch.device | str) -> Shader:
         """The same shader on another device."""
         moved = copy.copy(self)
-        moved.__dict__.update({name: value.to(device) for name, value in vars(self).items()
-                               if isinstance(value, torch.Tensor)})
+        moved.__dict__.update(
+            {name: value.to(device) for name, value in vars(self).items() if isinstance(value, torch.Tensor)}
+        )
         return moved
 
     def part(self, rows: slice, columns: slice, cells: tuple[slice, slice]) -> Shader:
@@ -132,8 +139,9 @@ def interpolation_matrix(cells: int, texels: int, bilinear: bool = False) -> tor
     return torch.from_numpy(matrix).float()
 
 
-def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor,
-               ridge: float = 1e-3) -> torch.Tensor:
+def fit_global(
+    texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor, ridge: float = 1e-3
+) -> torch.Tensor:
     """gamma^g that minimises sum weight^2 (texture - albedo * shading)^2 in closed form.
 
     Parameters
@@ -160,8 +168,9 @@ def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor,
     return torch.stack(out).float()
 
 
-def fit_around_constant(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor,
-                        ridge: float) -> torch.Tensor:
+def fit_around_constant(
+    texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor, ridge: float
+) -> torch.Tensor:
     """`fit_global`, but what no normal sees, and what `ridge` holds back, is drawn to the even light that gives the
     texture's mean colour.
 

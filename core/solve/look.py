@@ -107,7 +107,7 @@ def weigh_skin(size: int, shadow: np.ndarray) -> np.ndarray:
     skin = template.mask("skin", size) * template.mask("face", size)
     for name in ("lips", "brows", "eyes", "nostrils"):
         skin = skin * (1 - template.mask(name, size))
-    skin[round(size * (1 - BEARD_TOP_V)):] = 0
+    skin[round(size * (1 - BEARD_TOP_V)) :] = 0
     shadow = cv2.dilate(images.resize(shadow.astype(np.float32), size, size), np.ones((3, 3)))
     return skin * np.clip(1 - 3 * shadow, 0, 1)  # half a shadow is none of the skin's own brightness either
 
@@ -129,8 +129,9 @@ def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) 
     return np.maximum(there @ light, 1e-4)
 
 
-def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.ndarray,
-          normals: np.ndarray) -> np.ndarray:
+def _seen(
+    view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
     """Linear colours [N, 3] of surface points in an sRGB frame, nan where it does not see them or is burnt out."""
     colours = np.full((len(points), 3), np.nan)
     facing = np.flatnonzero(find_visible(view, caster, points, normals))

@@ -71,8 +71,14 @@ def finish_maps(state: State, evidence: Evidence, start: Start, gain: torch.Tens
     specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
     each = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], seen)  # the mean face is of the tone already
     delivered = to_picture((diffuse * each).clamp(MIN_ALBEDO, 1))
-    return Maps(delivered, specular, to_picture(normal), to_picture(shading / each),
-                estimate_confidence(evidence, delivered), gain)
+    return Maps(
+        delivered,
+        specular,
+        to_picture(normal),
+        to_picture(shading / each),
+        estimate_confidence(evidence, delivered),
+        gain,
+    )
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
@@ -84,8 +90,13 @@ def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, resca
     return (tone ** (1 / gamma) / mean_tone(diffuse ** (1 / gamma), weight)).pow(gamma).clamp(0.2, 5.0)
 
 
-def write_maps(capture: Capture, maps: Maps, solution: Solution, conditions: dict[str, str],
-               only: tuple[slice, slice] | None = None) -> None:
+def write_maps(
+    capture: Capture,
+    maps: Maps,
+    solution: Solution,
+    conditions: dict[str, str],
+    only: tuple[slice, slice] | None = None,
+) -> None:
     """The folder maps/, whole or not at all, with what a later solve of a part goes on from.
 
     Parameters
@@ -96,6 +107,7 @@ def write_maps(capture: Capture, maps: Maps, solution: Solution, conditions: dic
     conditions : mask_edit's
     only : rows and columns that are new; the others keep the values that their files have
     """
+
     def put(write: Callable, name: str, image: np.ndarray, **options) -> None:
         if only is not None:
             before = images.read_data(capture.maps / name)

@@ -60,8 +60,9 @@ class _Blob:
     stands_out: bool
 
 
-def protect_marks(evidence: Evidence,
-                  witness: Callable[[list[Mark]], list[Mark]] = list) -> tuple[Evidence, list[Mark]]:
+def protect_marks(
+    evidence: Evidence, witness: Callable[[list[Mark]], list[Mark]] = list
+) -> tuple[Evidence, list[Mark]]:
     """The evidence with no trust in what the marks inside M say of light, and those marks; `witness` leaves the ones
     that the views confirm."""
     if not (evidence.alpha > 0).any():
@@ -69,8 +70,11 @@ def protect_marks(evidence: Evidence,
     feature = cv2.blur(1 - evidence.trust.numpy(), (2 * round(FEATURE_MARGIN_TEXELS / evidence.texel) + 1,) * 2)
     where = (evidence.skin.numpy() > 0.5) & (evidence.weight.numpy() > 0.5) & (feature < 0.02)
     alpha, taken = evidence.alpha.numpy(), np.array(evidence.shadow_colour)
-    marks = [mark for mark in find_marks(evidence.texture.permute(1, 2, 0).numpy(), where, evidence.texel)
-             if alpha[round(mark.row), round(mark.column)] > 0.05 and is_unlike_shadow(mark, taken)]
+    marks = [
+        mark
+        for mark in find_marks(evidence.texture.permute(1, 2, 0).numpy(), where, evidence.texel)
+        if alpha[round(mark.row), round(mark.column)] > 0.05 and is_unlike_shadow(mark, taken)
+    ]
     marks = witness(marks)
     cover = torch.from_numpy(draw_cover(marks, evidence.size, evidence.texel))
     return replace(evidence, trust=evidence.trust * (1 - cover)), marks
@@ -84,8 +88,11 @@ def find_marks(texture: np.ndarray, skin: np.ndarray, texel: float) -> list[Mark
     log = np.log(np.maximum(texture, 1e-3)).astype(np.float32)
     log = raster.bleed(log, skin)  # so that the border of what is not skin is no blob
     candidates = _blobs(log.mean(-1), skin, texel)
-    measured = [mark for blob in candidates if blob.stands_out
-                and (mark := _measured(log, blob.row, blob.column, blob.radius)) is not None]
+    measured = [
+        mark
+        for blob in candidates
+        if blob.stands_out and (mark := _measured(log, blob.row, blob.column, blob.radius)) is not None
+    ]
     measured.sort(key=lambda mark: -mark.contrast)
     kept: list[Mark] = []
     for mark in measured:
@@ -140,8 +147,10 @@ def _blobs(log_luminance: np.ndarray, skin: np.ndarray, texel: float) -> list[_B
     stands_out = (stack > 0.7 * MIN_CONTRAST_LOG) & (stack > STANDING_OUT_RATIO * np.stack(usual))
     is_blob = (stack >= around) & (stack > LIKE_SHARE * MIN_CONTRAST_LOG) & (np.stack(compact) > MIN_COMPACTNESS)
     peaks = np.nonzero(is_blob & skin[None])
-    return [_Blob(r, c, radii[k], float(stack[k, r, c]), bool(stands_out[k, r, c]))
-            for k, r, c in zip(*(i.tolist() for i in peaks), strict=True)]
+    return [
+        _Blob(r, c, radii[k], float(stack[k, r, c]), bool(stands_out[k, r, c]))
+        for k, r, c in zip(*(i.tolist() for i in peaks), strict=True)
+    ]
 
 
 def _usual(image: np.ndarray, reach: float) -> np.ndarray:
@@ -149,9 +158,14 @@ def _usual(image: np.ndarray, reach: float) -> np.ndarray:
     return cv2.blur(image, (2 * round(reach) + 1,) * 2, borderType=cv2.BORDER_REPLICATE)
 
 
-_CURVATURES = tuple(np.array(k, np.float32) for k in (
-    [[0, 0, 0], [1, -2, 1], [0, 0, 0]], [[0, 1, 0], [0, -2, 0], [0, 1, 0]],
-    [[0.25, 0, -0.25], [0, 0, 0], [-0.25, 0, 0.25]]))
+_CURVATURES = tuple(
+    np.array(k, np.float32)
+    for k in (
+        [[0, 0, 0], [1, -2, 1], [0, 0, 0]],
+        [[0, 1, 0], [0, -2, 0], [0, 1, 0]],
+        [[0.25, 0, -0.25], [0, 0, 0], [-0.25, 0, 0.25]],
+    )
+)
 
 
 def _measured(log: np.ndarray, row: int, column: int, radius: float) -> Mark | None:
@@ -159,13 +173,14 @@ def _measured(log: np.ndarray, row: int, column: int, radius: float) -> Mark | N
     reach = int(np.ceil(2.7 * radius + 1))
     if min(row, column) < reach or max(row, column) >= len(log) - reach:
         return None
-    patch = log[row - reach:row + reach + 1, column - reach:column + reach + 1]
-    y, x = np.mgrid[-reach:reach + 1, -reach:reach + 1]
+    patch = log[row - reach : row + reach + 1, column - reach : column + reach + 1]
+    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
     distance, sector = np.hypot(x, y), np.floor((np.arctan2(y, x) / (2 * np.pi) % 1) * SECTORS).astype(int)
     disc = np.median(patch[distance <= max(0.6 * radius, 0.5)], 0)
     ring = (distance > 1.5 * radius + 0.5) & (distance <= max(2.5 * radius, 1.5 * radius + 2))
-    sides = np.stack([np.median(patch[ring & (sector == k)], 0) for k in range(SECTORS)
-                      if (ring & (sector == k)).any()])
+    sides = np.stack(
+        [np.median(patch[ring & (sector == k)], 0) for k in range(SECTORS) if (ring & (sector == k)).any()]
+    )
     change = disc - np.median(sides, 0)
     contrast = -change.mean()
     if contrast < MIN_CONTRAST_LOG or (sides.mean(-1) - disc.mean()).min() < MIN_SURROUNDED_SHARE * contrast:
@@ -179,5 +194,10 @@ def _apart(a: Mark, b: Mark | _Blob) -> float:
 
 def _alone(mark: Mark, blobs: list[_Blob], reach: float) -> bool:
     """Not one of a crowd."""
-    return sum(2 * mark.radius < _apart(mark, other) < reach and other.strength > LIKE_SHARE * mark.contrast
-               for other in blobs) <= MAX_NEIGHBOURS
+    return (
+        sum(
+            2 * mark.radius < _apart(mark, other) < reach and other.strength > LIKE_SHARE * mark.contrast
+            for other in blobs
+        )
+        <= MAX_NEIGHBOURS
+    )

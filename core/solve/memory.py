@@ -24,13 +24,19 @@ from .sampler import Sampler
 
 # glibc's name for it, and the bytes from which on memory is asked of the system and given back to it
 MMAP_THRESHOLD, MMAP_BYTES = -3, 8 << 20
-RETRY_MESSAGE = ("There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is "
-                 "slower and gives the same maps.")
+RETRY_MESSAGE = (
+    "There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is "
+    "slower and gives the same maps."
+)
 
 
-def sample_within_memory(sampler: Sampler, observations: dict[int, Observation], state: State,
-                         on_step: Callable[[State, int], None] = lambda state, steps: None,
-                         log: Callable[[str], None] = lambda text: None) -> State:
+def sample_within_memory(
+    sampler: Sampler,
+    observations: dict[int, Observation],
+    state: State,
+    on_step: Callable[[State, int], None] = lambda state, steps: None,
+    log: Callable[[str], None] = lambda text: None,
+) -> State:
     """`Sampler.sample`, of a prior, to the same bytes whether it had to fall back or not.
 
     Parameters

@@ -34,8 +34,9 @@ class Condition:
     spread: torch.Tensor | None = None
 
 
-def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: Condition,
-            levels: torch.Tensor | None = None) -> torch.Tensor:
+def denoise(
+    network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: Condition, levels: torch.Tensor | None = None
+) -> torch.Tensor:
     """D(x; sigma): the preconditioned denoiser. Only the network itself runs in low precision.
 
     Parameters
@@ -98,10 +99,12 @@ class UNet(nn.Module):
         self.low_memory = False  # keeps a fifth of what the gradient needs, and computes the rest again
         self.multiple = patch_size * 2 ** (len(depths) - 1 - skip_stages)
         self.timestep_embed = Fourier(mapping_out)
-        self.mapping_cond = (nn.Linear(layout.mapping_cond_dim, mapping_out, bias=False) if layout.mapping_cond_dim
-                             else None)
-        self.mapping = nn.Sequential(nn.Linear(mapping_out, mapping_out), nn.GELU(),
-                                     nn.Linear(mapping_out, mapping_out), nn.GELU())
+        self.mapping_cond = (
+            nn.Linear(layout.mapping_cond_dim, mapping_out, bias=False) if layout.mapping_cond_dim else None
+        )
+        self.mapping = nn.Sequential(
+            nn.Linear(mapping_out, mapping_out), nn.GELU(), nn.Linear(mapping_out, mapping_out), nn.GELU()
+        )
         outer = channels[max(0, skip_stages - 1)]
         self.proj_in = nn.Conv2d((layout.data_channels + layout.condition_channels) * patch_size**2, outer, 1)
         self.proj_out = nn.Conv2d(outer, layout.data_channels * patch_size**2 + layout.has_variance, 1)
@@ -111,10 +114,26 @@ class UNet(nn.Module):
         for level, (depth, width) in enumerate(zip(depths, channels, strict=True)):
             above = channels[max(0, level - 1)]
             deepest, halved = level == len(depths) - 1, level > skip_stages
-            down.append(_block(layout, [above] + [width] * (depth - 1), width, width, attention[level],
-                               first=Down() if halved else nn.Identity()))
-            up.append(_block(layout, [width if deepest else 2 * width] + [width] * (depth - 1), width, above,
-                             attention[level], last=Up() if halved else nn.Identity()))
+            down.append(
+                _block(
+                    layout,
+                    [above] + [width] * (depth - 1),
+                    width,
+                    width,
+                    attention[level],
+                    first=Down() if halved else nn.Identity(),
+                )
+            )
+            up.append(
+                _block(
+                    layout,
+                    [width if deepest else 2 * width] + [width] * (depth - 1),
+                    width,
+                    above,
+                    attention[level],
+                    last=Up() if halved else nn.Identity(),
+                )
+            )
         self.u_net = nn.ModuleDict({"d_blocks": nn.ModuleList(down), "u_blocks": nn.ModuleList(up[::-1])})
 
     def lower(self, dtype: torch.dtype) -> UNet:
@@ -123,12 +142,14 @@ class UNet(nn.Module):
             module.to(dtype=dtype, memory_format=MEMORY_FORMAT)
         return self
 
-    def forward(self, x: torch.Tensor, sigma: torch.Tensor,
-                mapping_condition: torch.Tensor | None = None) -> torch.Tensor:
+    def forward(
+        self, x: torch.Tensor, sigma: torch.Tensor, mapping_condition: torch.Tensor | None = None
+    ) -> torch.Tensor:
         height, width = x.shape[-2:]
         if height % self.multiple or width % self.multiple:
-            raise ValueError(f"The network takes maps whose sides are multiples of {self.multiple}, not {width} x "
-                             f"{height}.")
+            raise ValueError(
+                f"The network takes maps whose sides are multiples of {self.multiple}, not {width} x {height}."
+            )
         mapped = self.timestep_embed(sigma.log() / 4)
         if mapping_condition is not None:
             mapped = mapped + self.mapping_cond(mapping_condition)
@@ -138,18 +159,25 @@ class UNet(nn.Module):
             x = functional.pixel_unshuffle(x, self.patch_size)
         x = self.proj_in(x.contiguous(memory_format=MEMORY_FORMAT))
         skips = []
-        for blocks in self.u_net["d_blocks"][self.skip_stages:]:
+        for blocks in self.u_net["d_blocks"][self.skip_stages :]:
             x = run_layers(blocks, x, mapped, self.low_memory)
             skips.append(x)
-        for level, blocks in enumerate(self.u_net["u_blocks"][:len(skips)]):
+        for level, blocks in enumerate(self.u_net["u_blocks"][: len(skips)]):
             skip = skips.pop()
             x = run_layers(blocks, x if level == 0 else torch.cat([x, skip], 1), mapped, self.low_memory)
         x = self.proj_out(x)[:, :-1] if self.has_variance else self.proj_out(x)
         return functional.pixel_shuffle(x, self.patch_size) if self.patch_size > 1 else x
 
 
-def _block(layout: UNetLayout, inputs: list[int], width: int, out: int, attention: bool,
-           first: nn.Module | None = None, last: nn.Module | None = None) -> nn.ModuleList:
+def _block(
+    layout: UNetLayout,
+    inputs: list[int],
+    width: int,
+    out: int,
+    attention: bool,
+    first: nn.Module | None = None,
+    last: nn.Module | None = None,
+) -> nn.ModuleList:
     """Residual blocks (inputs[i] -> width, the last one -> out), each followed by attention if asked for; resampling
     first or last."""
     mapping, norm = layout.mapping_out, layout.norm

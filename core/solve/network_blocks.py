@@ -44,10 +44,14 @@ class Residual(nn.Module):
 
     def __init__(self, mapping: int, c_in: int, width: int, c_out: int, norm: str):
         super().__init__()
-        self.main = nn.ModuleDict({"0": Norm(mapping, c_in, max(1, c_in // 32), norm),
-                                   "2": nn.Conv2d(c_in, width, 3, padding=1),
-                                   "4": Norm(mapping, width, max(1, width // 32), norm),
-                                   "6": nn.Conv2d(width, c_out, 3, padding=1)})
+        self.main = nn.ModuleDict(
+            {
+                "0": Norm(mapping, c_in, max(1, c_in // 32), norm),
+                "2": nn.Conv2d(c_in, width, 3, padding=1),
+                "4": Norm(mapping, width, max(1, width // 32), norm),
+                "6": nn.Conv2d(width, c_out, 3, padding=1),
+            }
+        )
         self.skip = nn.Conv2d(c_in, c_out, 1, bias=False) if c_in != c_out else nn.Identity()
         nn.init.zeros_(self.main["6"].weight)
         nn.init.zeros_(self.main["6"].bias)
@@ -102,8 +106,18 @@ class Shaped(torch.autograd.Function):
         (x, mapped), (norm, convolution) = ctx.saved_tensors, ctx.layers
         # of its input only the shape counts, which is x's
         input_gradient, *_ = torch.ops.aten.convolution_backward(
-            gradient, x, convolution.weight, None, convolution.stride, convolution.padding, convolution.dilation,
-            False, [0, 0], 1, [True, False, False])
+            gradient,
+            x,
+            convolution.weight,
+            None,
+            convolution.stride,
+            convolution.padding,
+            convolution.dilation,
+            False,
+            [0, 0],
+            1,
+            [True, False, False],
+        )
         for rows in norm.strips(x):
             with torch.enable_grad():
                 strip = x[:, :, rows].detach().requires_grad_()
@@ -172,8 +186,9 @@ class Down(nn.Module):
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=MEMORY_FORMAT)
         kernel = (2 - (torch.arange(4, device=x.device) - 1.5).abs()).to(x.dtype) / 4
-        return functional.conv2d(x, torch.outer(kernel, kernel).expand(x.shape[1], 1, 4, 4), stride=2,
-                                 groups=x.shape[1])
+        return functional.conv2d(
+            x, torch.outer(kernel, kernel).expand(x.shape[1], 1, 4, 4), stride=2, groups=x.shape[1]
+        )
 
 
 class Up(nn.Module):

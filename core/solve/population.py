@@ -76,13 +76,19 @@ def estimate_from_white(front: np.ndarray, white: np.ndarray) -> SkinTone:
     """The tone behind the colour of skin that faces the front, linear [3], where the measured colour of a white surface
     that faces as the face does is `white` [3]."""
     people = read_population()
-    weight = _posterior(people, people.even, OVER_WHITE_ROWS, to_coordinates(front) - to_coordinates(white),
-                        np.square(MEASURED_SIGMA_LOG))
+    weight = _posterior(
+        people,
+        people.even,
+        OVER_WHITE_ROWS,
+        to_coordinates(front) - to_coordinates(white),
+        np.square(MEASURED_SIGMA_LOG),
+    )
     return _expect(people.tones, weight, WHITE_POINT, MIN_SIGMA_L)
 
 
-def _posterior(people: Population, prior: np.ndarray, rows: slice, coordinates: np.ndarray,
-               variance: np.ndarray | float = 0.0) -> np.ndarray:
+def _posterior(
+    people: Population, prior: np.ndarray, rows: slice, coordinates: np.ndarray, variance: np.ndarray | float = 0.0
+) -> np.ndarray:
     """The probability [N] of each tone under a prior [N], where these rows of the model show `coordinates` [3];
     `variance` [3] is added to the model's own."""
     of_tones = to_coordinates(people.tones + SHEEN_REFLECTANCE)
@@ -100,8 +106,9 @@ def _posterior(people: Population, prior: np.ndarray, rows: slice, coordinates: 
 def to_coordinates(linear: np.ndarray) -> np.ndarray:
     """Linear colours [..., 3] -> ln luminance, ln R/G, ln B/G [..., 3]."""
     log = np.log(np.maximum(linear, 1e-4))
-    return np.stack([np.log(np.maximum(linear @ LUMINANCE_WEIGHTS, 1e-4)), log[..., 0] - log[..., 1],
-                     log[..., 2] - log[..., 1]], -1)
+    return np.stack(
+        [np.log(np.maximum(linear @ LUMINANCE_WEIGHTS, 1e-4)), log[..., 0] - log[..., 1], log[..., 2] - log[..., 1]], -1
+    )
 
 
 def to_lab(linear: np.ndarray) -> np.ndarray:
@@ -133,8 +140,13 @@ def read_population() -> Population:
         tones.append(colours * (luminance / (colours @ LUMINANCE_WEIGHTS))[:, None])
         share.append(stored["share"] * red_weight * blue_weight)
         even.append(np.full(len(ratios), red_weight * blue_weight / len(ratios)))
-    return Population(*map(np.concatenate, (tones, share, even)), stored["slope"], stored["offset"],
-                      stored["covariance"], float(stored["colour_sigma_l"]))
+    return Population(
+        *map(np.concatenate, (tones, share, even)),
+        stored["slope"],
+        stored["offset"],
+        stored["covariance"],
+        float(stored["colour_sigma_l"]),
+    )
 
 
 def _expect(tones: np.ndarray, weight: np.ndarray, source: str, least_sigma_l: float) -> SkinTone:
@@ -144,5 +156,6 @@ def _expect(tones: np.ndarray, weight: np.ndarray, source: str, least_sigma_l: f
     linear = from_lab(mean)
     error = weight @ color.deltaE_ciede2000(lab, np.broadcast_to(mean, lab.shape))
     deviation = np.hypot(np.sqrt(weight @ np.square(lab[:, 0] - mean[0])), MIN_SIGMA_L)
-    return SkinTone.from_linear(linear, source, deviation=float(max(deviation, least_sigma_l)), error=float(error),
-                                group=name_group(linear))
+    return SkinTone.from_linear(
+        linear, source, deviation=float(max(deviation, least_sigma_l)), error=float(error), group=name_group(linear)
+    )

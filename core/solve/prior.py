@@ -43,8 +43,14 @@ class Prior:
 
     centred, sigmas, one_scale = True, None, False
 
-    def __init__(self, network: UNet, octaves: int = 0, mean_face: torch.Tensor | None = None,
-                 spread: torch.Tensor | None = None, references: torch.Tensor | None = None):
+    def __init__(
+        self,
+        network: UNet,
+        octaves: int = 0,
+        mean_face: torch.Tensor | None = None,
+        spread: torch.Tensor | None = None,
+        references: torch.Tensor | None = None,
+    ):
         self.network = network.eval().requires_grad_(False)
         self.octaves, self.mean_face, self.spread, self.references = octaves, mean_face, spread, references
         self.multiple = network.multiple
@@ -57,8 +63,9 @@ class Prior:
     def to(self, device: torch.device | str) -> Prior:
         """Moves the network, in place, and all that `condition_at` reads."""
         self.network.to(device)
-        self.mean_face, self.spread = (None if tensor is None else tensor.to(device)
-                                       for tensor in (self.mean_face, self.spread))
+        self.mean_face, self.spread = (
+            None if tensor is None else tensor.to(device) for tensor in (self.mean_face, self.spread)
+        )
         return self
 
     def of_tone(self, tone: SkinTone) -> ConditionedPrior:
@@ -76,11 +83,13 @@ class Prior:
         blind = torch.zeros(1, device=self.device) if self.network.mapping_cond.in_features == 5 else None
         return make_condition(coords, self.octaves, self.mean_face, self.spread, tone, blind)
 
-    def _respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor,
-                 tone: torch.Tensor | None) -> torch.Tensor:
+    def _respond(
+        self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor, tone: torch.Tensor | None
+    ) -> torch.Tensor:
         """`ConditionedPrior.respond` for a skin of tone [1, 3]."""
-        known = make_condition(coords, self.octaves, self.mean_face, self.spread, tone,
-                               blind=torch.ones(1, device=self.device))
+        known = make_condition(
+            coords, self.octaves, self.mean_face, self.spread, tone, blind=torch.ones(1, device=self.device)
+        )
         levels = torch.tensor([CLEAR_SIGMA] * 3 + [BLIND_SIGMA] * 4, device=self.device)[None, :, None, None]
         x = torch.where(levels < BLIND_SIGMA, maps, known.mean) + levels * noise
         out = denoise(self.network, x, torch.full((1,), CLEAR_SIGMA, device=self.device), known, levels)
@@ -123,8 +132,9 @@ class ReleasedPrior(Prior):
 
     centred, one_scale = False, True
 
-    def __init__(self, network: UNet, kind: str, octaves: int, sigmas: tuple[float, float] | None,
-                 noise: torch.Tensor | None):
+    def __init__(
+        self, network: UNet, kind: str, octaves: int, sigmas: tuple[float, float] | None, noise: torch.Tensor | None
+    ):
         super().__init__(network, octaves)
         self.kind, self.sigmas, self.noise = kind, sigmas, noise
 
@@ -137,16 +147,18 @@ class ReleasedPrior(Prior):
     def check(self) -> None:
         """Raises Problem where it loads but cannot sample."""
         if self.kind == "noise" and self.noise is None:
-            raise Problem("This prior is conditioned on a fixed random map, which is not in its folder.",
-                          f"Save the map it was trained with beside ckpt.pth as {released.NOISE_FILE}, float32 of "
-                          "shape 3, S, S.")
+            raise Problem(
+                "This prior is conditioned on a fixed random map, which is not in its folder.",
+                f"Save the map it was trained with beside ckpt.pth as {released.NOISE_FILE}, float32 of shape 3, S, S.",
+            )
 
     def of_tone(self, tone: SkinTone | None = None) -> ConditionedPrior:
         """It takes no tone: the same for everybody."""
         return ConditionedPrior(self, None)
 
-    def _respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor,
-                 tone: torch.Tensor | None) -> torch.Tensor:
+    def _respond(
+        self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor, tone: torch.Tensor | None
+    ) -> torch.Tensor:
         """The maps as they are: a released prior was not taught to answer in one evaluation."""
         return maps
 
@@ -173,8 +185,14 @@ def unpack_maps(levels: torch.Tensor, limits: torch.Tensor) -> torch.Tensor:
     return limits[:, 0, None, None] + levels.float() / 255 * (limits[:, 1] - limits[:, 0])[:, None, None]
 
 
-def make_condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor,
-                   tone: torch.Tensor, blind: torch.Tensor | None) -> Condition:
+def make_condition(
+    coords: torch.Tensor,
+    octaves: int,
+    mean_face: torch.Tensor,
+    spread: torch.Tensor,
+    tone: torch.Tensor,
+    blind: torch.Tensor | None,
+) -> Condition:
     """What our network is told of maps.
 
     Parameters
@@ -190,15 +208,17 @@ def make_condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, 
     mapping = torch.cat([texel.log2()[:, None], tone.clamp_min(1e-3).log() / 2 + 0.6], 1)  # logarithms of about -1 to 1
     if blind is not None:
         mapping = torch.cat([mapping, blind.to(mapping)[:, None]], 1)
-    return Condition(positional_encoding(coords, octaves), mapping, mean_at(mean_face, coords, tone),
-                     scale[:, :, None, None])
+    return Condition(
+        positional_encoding(coords, octaves), mapping, mean_at(mean_face, coords, tone), scale[:, :, None, None]
+    )
 
 
 def mean_at(mean_face: torch.Tensor, coords: torch.Tensor, tone: torch.Tensor) -> torch.Tensor:
     """The mean face of skins of tone [N, 3] at coords [N, 2, H, W]: x's seven channels [N, 7, H, W]."""
     grid = coords.permute(0, 2, 3, 1)
-    mean = torch.nn.functional.grid_sample(mean_face.expand(len(coords), -1, -1, -1), grid, align_corners=False,
-                                           padding_mode="border")
+    mean = torch.nn.functional.grid_sample(
+        mean_face.expand(len(coords), -1, -1, -1), grid, align_corners=False, padding_mode="border"
+    )
     return torch.cat([2 * mean[:, :3] * tone[:, :, None, None] - 1, mean[:, 3:]], 1)
 
 
@@ -215,8 +235,9 @@ def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = 
         try:
             prior = _load_ours(path)
         except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
-            raise Problem(f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).",
-                          "Install the extension again.") from error
+            raise Problem(
+                f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).", "Install the extension again."
+            ) from error
     prior.network.lower(dtype or fast_dtype(device))
     return prior.to(device)
 
@@ -239,10 +260,22 @@ def build_network(config: dict) -> UNet:
     model, cond = config["model"], config.get("cond", {})
     channels = {"coord": 2, "posenc": 2 + 4 * int(cond.get("pos_enc_freq", 0)), "noise": 3}[cond.get("type", "coord")]
     augmented = 9 if model.get("augment_wrapper", True) else 0
-    return UNet(UNetLayout(model["input_channels"], channels, model["mapping_out"], model["depths"], model["channels"],
-                           model.get("self_attn_depths"), model.get("patch_size", 1),
-                           augmented + model.get("mapping_cond_dim", 0), model.get("sigma_data", 1.0),
-                           model.get("norm", "group"), model.get("skip_stages", 0), model.get("has_variance", False)))
+    return UNet(
+        UNetLayout(
+            model["input_channels"],
+            channels,
+            model["mapping_out"],
+            model["depths"],
+            model["channels"],
+            model.get("self_attn_depths"),
+            model.get("patch_size", 1),
+            augmented + model.get("mapping_cond_dim", 0),
+            model.get("sigma_data", 1.0),
+            model.get("norm", "group"),
+            model.get("skip_stages", 0),
+            model.get("has_variance", False),
+        )
+    )
 
 
 def make_coordinates(size: int, rows: slice, columns: slice, centred: bool = True) -> torch.Tensor:
@@ -269,10 +302,12 @@ def _load_ours(path: Path) -> Prior:
     shipped_files.require_whole(path)
     card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     with safe_open(path, "pt") as file:
-        tensors = {name: file.get_tensor(name).float()
-                   for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    mean_face, spread, references = (tensors.pop("mean_face"), tensors.pop("spread"),
-                                     unpack_maps(tensors.pop("references"), tensors.pop("references_range")))
+        tensors = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
+    mean_face, spread, references = (
+        tensors.pop("mean_face"),
+        tensors.pop("spread"),
+        unpack_maps(tensors.pop("references"), tensors.pop("references_range")),
+    )
     network = build_network(card)
     network.load_state_dict(tensors)
     return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, references)
@@ -285,10 +320,17 @@ def _load_released(folder: Path) -> ReleasedPrior:
         network.load_state_dict(state)
     except RuntimeError as error:
         first = str(error).strip().splitlines()[1:2] or [str(error)]
-        raise Problem(f"{folder / 'ckpt.pth'} does not fit the config.json beside it ({first[0].strip()}).",
-                      released.CHOOSE) from error
+        raise Problem(
+            f"{folder / 'ckpt.pth'} does not fit the config.json beside it ({first[0].strip()}).", released.CHOOSE
+        ) from error
     model, cond = config["model"], config["cond"]
-    sigmas = ((float(model["sigma_min"]), float(model["sigma_max"])) if {"sigma_min", "sigma_max"} <= set(model)
-              else None)
-    return ReleasedPrior(network, cond["type"], cond.get("pos_enc_freq", 0) if cond["type"] == "posenc" else 0, sigmas,
-                         released.read_noise(folder))
+    sigmas = (
+        (float(model["sigma_min"]), float(model["sigma_max"])) if {"sigma_min", "sigma_max"} <= set(model) else None
+    )
+    return ReleasedPrior(
+        network,
+        cond["type"],
+        cond.get("pos_enc_freq", 0) if cond["type"] == "posenc" else 0,
+        sigmas,
+        released.read_noise(folder),
+    )

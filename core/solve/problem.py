@@ -37,9 +37,14 @@ class Observation:
 
     def to(self, device: torch.device | str) -> Observation:
         """The same observation on another device."""
-        return replace(self,
-                       **{f.name: value.to(device) for f in fields(self)
-                          if isinstance(value := getattr(self, f.name), torch.Tensor | Shader)})
+        return replace(
+            self,
+            **{
+                f.name: value.to(device)
+                for f in fields(self)
+                if isinstance(value := getattr(self, f.name), torch.Tensor | Shader)
+            },
+        )
 
 
 @dataclass
@@ -56,8 +61,13 @@ class State:
     def to(self, device: torch.device | str) -> State:
         """The same state on another device."""
         x = None if self.x is None else self.x.to(device)
-        return State(self.step, x, self.denoised.to(device), self.lights.to(device),
-                     [moment.to(device) for moment in self.moments])
+        return State(
+            self.step,
+            x,
+            self.denoised.to(device),
+            self.lights.to(device),
+            [moment.to(device) for moment in self.moments],
+        )
 
 
 def albedo(denoised: torch.Tensor) -> torch.Tensor:
@@ -65,8 +75,9 @@ def albedo(denoised: torch.Tensor) -> torch.Tensor:
     return (denoised[0, :3] + 1) / 2
 
 
-def photometric_loss(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, weight: torch.Tensor,
-                     blur: bool = False) -> torch.Tensor:
+def photometric_loss(
+    denoised: torch.Tensor, shading: torch.Tensor, o: Observation, weight: torch.Tensor, blur: bool = False
+) -> torch.Tensor:
     """L_pho: the weighted sum of squares over the map (paper, equation 1).
 
     Parameters
@@ -92,7 +103,7 @@ def rms_residual(state: State, observations: dict[int, Observation]) -> float:
 
 def blur_maps(image: torch.Tensor, sigma: float = 0.8) -> torch.Tensor:
     """[3, H, W] under a 3 x 3 Gaussian, reflected at the border: the released code compares textures through it."""
-    line = torch.exp(-torch.arange(-1.0, 2.0, device=image.device) ** 2 / (2 * sigma**2))
+    line = torch.exp(-(torch.arange(-1.0, 2.0, device=image.device) ** 2) / (2 * sigma**2))
     line = line / line.sum()
     padded = functional.pad(image[:, None], (1, 1, 1, 1), mode="reflect")
     return functional.conv2d(padded, torch.outer(line, line)[None, None])[:, 0]

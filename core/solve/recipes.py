@@ -87,8 +87,19 @@ class Recipe:
 OURS = Recipe()
 
 # What neither the paper nor the released code has is off in both.
-_PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, sharp_edges=False, protect_marks=False,
-                 trusting=True, tv=0.1, seam=0.0, smooth=0.0, linear=0.0)
+_PLAIN = replace(
+    OURS,
+    coarse=(),
+    hard_mask=True,
+    one_chroma=False,
+    sharp_edges=False,
+    protect_marks=False,
+    trusting=True,
+    tv=0.1,
+    seam=0.0,
+    smooth=0.0,
+    linear=0.0,
+)
 
 RECIPES = {
     "wildcap": OURS,
@@ -101,12 +112,32 @@ RECIPES = {
     # L_TV                squared, of gamma                            L1, of the shading on the ring
     # V read              bilinear                                     cubic
     # skin tone           by x_0^ref alone                             rescaled in sRGB at the end
-    "paper": replace(_PLAIN, steps=600, reference="nearest", preserving=True, clip="none", phases=(("both", 0.0, 1.0),),
-                     updates=600, tv_of_gamma=True, bilinear=True, rescale="none"),
-    "released": replace(_PLAIN, steps=599, start=0.599, reference="uniform", clip="decade", candidates=20, blur=True,
-                        fitted=False,
-                        phases=(("main", 0.0, 101 / 599), ("grid", 101 / 599, 301 / 599)), updates=1, rescale="srgb",
-                        released_boxes=True),
+    "paper": replace(
+        _PLAIN,
+        steps=600,
+        reference="nearest",
+        preserving=True,
+        clip="none",
+        phases=(("both", 0.0, 1.0),),
+        updates=600,
+        tv_of_gamma=True,
+        bilinear=True,
+        rescale="none",
+    ),
+    "released": replace(
+        _PLAIN,
+        steps=599,
+        start=0.599,
+        reference="uniform",
+        clip="decade",
+        candidates=20,
+        blur=True,
+        fitted=False,
+        phases=(("main", 0.0, 101 / 599), ("grid", 101 / 599, 301 / 599)),
+        updates=1,
+        rescale="srgb",
+        released_boxes=True,
+    ),
 }
 
 

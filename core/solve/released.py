@@ -25,8 +25,10 @@ NOISE_FILE = "noise.npy"
 square."""
 MOST_NOISE_SIDE = 8192
 """Texels: twice the side of the largest UV square that is solved."""
-CHOOSE = ("Choose the folder with the authors' config.json and ckpt.pth, as they released them, or leave the prior "
-          "empty to use ours.")
+CHOOSE = (
+    "Choose the folder with the authors' config.json and ckpt.pth, as they released them, or leave the prior "
+    "empty to use ours."
+)
 
 
 def read_config(folder: Path) -> dict:
@@ -36,17 +38,30 @@ def read_config(folder: Path) -> dict:
     try:
         config = read_json(path)
         given, cond = dict(config["model"]), dict(config.get("cond") or {})
-        model = {"type": "image_v1", "patch_size": 1, "augment_wrapper": True, "skip_stages": 0, "mapping_cond_dim": 0,
-                 "cross_cond_dim": 0, "has_variance": False, "sigma_data": 1.0, **given}
+        model = {
+            "type": "image_v1",
+            "patch_size": 1,
+            "augment_wrapper": True,
+            "skip_stages": 0,
+            "mapping_cond_dim": 0,
+            "cross_cond_dim": 0,
+            "has_variance": False,
+            "sigma_data": 1.0,
+            **given,
+        }
         if model["type"] != "image_v1":
-            raise Problem(f"{path} describes a model of type {model['type']}, which cannot be run here; image_v1 can.",
-                          CHOOSE)
+            raise Problem(
+                f"{path} describes a model of type {model['type']}, which cannot be run here; image_v1 can.", CHOOSE
+            )
         if model["input_channels"] != DATA_CHANNELS:
-            raise Problem(f"The prior in {folder} models {model['input_channels']} channels.",
-                          f"Choose one of {DATA_CHANNELS}: diffuse albedo (3), normal (3), specular albedo (1).")
+            raise Problem(
+                f"The prior in {folder} models {model['input_channels']} channels.",
+                f"Choose one of {DATA_CHANNELS}: diffuse albedo (3), normal (3), specular albedo (1).",
+            )
         if model["cross_cond_dim"] and any(model.get("cross_attn_depths") or ()):
-            raise Problem(f"The prior in {folder} needs a second input through cross attention, which is not known "
-                          "here.", CHOOSE)
+            raise Problem(
+                f"The prior in {folder} needs a second input through cross attention, which is not known here.", CHOOSE
+            )
         levels = len(model["depths"])
         attention = model.get("self_attn_depths") or model["depths"]
         if not len(model["channels"]) == len(attention) == levels > model["skip_stages"] >= 0:
@@ -75,12 +90,17 @@ def read_weights(folder: Path) -> dict[str, torch.Tensor]:
     except FileNotFoundError as error:
         raise Problem(f"{folder} holds no ckpt.pth.", CHOOSE) from error
     except Exception as error:  # a damaged or hostile file can make the reader fail in any way
-        raise Problem(f"{path} cannot be read as weights: it is damaged, or holds more than weights "
-                      f"({type(error).__name__}). Nothing in it was run.",
-                      "Download it again from the authors' page.") from error
+        raise Problem(
+            f"{path} cannot be read as weights: it is damaged, or holds more than weights "
+            f"({type(error).__name__}). Nothing in it was run.",
+            "Download it again from the authors' page.",
+        ) from error
     state = state.get("model_ema", state) if isinstance(state, dict) else None
-    of_tensors = isinstance(state, dict) and state and all(
-        isinstance(name, str) and isinstance(value, torch.Tensor) for name, value in state.items())
+    of_tensors = (
+        isinstance(state, dict)
+        and state
+        and all(isinstance(name, str) and isinstance(value, torch.Tensor) for name, value in state.items())
+    )
     if not of_tensors:
         raise Problem(f"{path} holds no state dict of a network.", CHOOSE)
     return {name: value.float() for name, value in state.items()}
@@ -96,8 +116,9 @@ def read_noise(folder: Path) -> torch.Tensor | None:
         # mapped: a header that promises more than the file holds takes no memory
         stored = np.lib.format.open_memmap(require_regular(path), mode="r")
     except (OSError, ValueError, EOFError) as error:
-        raise Problem(f"{path} cannot be read ({error}).",
-                      "Save the map again with numpy, as float32 of shape 3, S, S.") from error
+        raise Problem(
+            f"{path} cannot be read ({error}).", "Save the map again with numpy, as float32 of shape 3, S, S."
+        ) from error
     shape = stored.shape
     if (
         len(shape) != 3
@@ -107,8 +128,10 @@ def read_noise(folder: Path) -> torch.Tensor | None:
         or stored.dtype.kind != "f"
         or not np.isfinite(noise := stored.astype(np.float32)).all()
     ):
-        raise Problem(f"{path} has the shape {shape}, or holds values that are not numbers.",
-                      "Save the map of the whole UV square, of shape 3, S, S.")
+        raise Problem(
+            f"{path} has the shape {shape}, or holds values that are not numbers.",
+            "Save the map of the whole UV square, of shape 3, S, S.",
+        )
     return torch.from_numpy(noise)[None]
 
 
@@ -116,5 +139,10 @@ def _harmless() -> list:
     """Beside tensors, what training programs leave in a checkpoint: numbers of numpy, and command line options."""
     scalar = np.float64(0).__reduce__()[0]
     kinds = [type(np.dtype(name)) for name in ("float64", "float32", "int64", "int32", "bool")]
-    return [argparse.Namespace, np.dtype, (scalar, "numpy.core.multiarray.scalar"),
-            (scalar, "numpy._core.multiarray.scalar"), *kinds]
+    return [
+        argparse.Namespace,
+        np.dtype,
+        (scalar, "numpy.core.multiarray.scalar"),
+        (scalar, "numpy._core.multiarray.scalar"),
+        *kinds,
+    ]

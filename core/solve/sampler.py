@@ -27,9 +27,11 @@ from .recipes import Recipe
 def seed_noise(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Callable]:
     """The noise of a run: step -> draw(*shape), standard normal, drawn on the device. It depends on (seed, step,
     device) alone, so a run continued from a stored state gives the same bytes."""
+
     def of_step(step: int) -> Callable:
         generator = torch.Generator(device).manual_seed(1_000_003 * seed + step)
         return lambda *shape: torch.randn(shape, generator=generator, device=device)
+
     return of_step
 
 
@@ -48,8 +50,12 @@ class Sampler:
     impose_known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x
     fit: Callable[..., None] = update_lights
 
-    def sample(self, observations: dict[int, Observation], state: State,
-               on_step: Callable[[State, int], None] = lambda state, steps: None) -> State:
+    def sample(
+        self,
+        observations: dict[int, Observation],
+        state: State,
+        on_step: Callable[[State, int], None] = lambda state, steps: None,
+    ) -> State:
         """Samples from `state` to the end and returns the final state; `denoised` is the solved map, `lights` theta.
 
         `observations` maps a coarsening factor to what is known at that size. Raises Problem when the numbers leave all
@@ -69,9 +75,10 @@ class Sampler:
                 state.moments = [moment * grown ** (1 + k % 2) for k, moment in enumerate(state.moments)]
             self.step(o, state, (s, sigmas[i + 1]), steps, draw)
             if not state.x.abs().max() <= 1e3 * (1 + s):  # nor where it is no number
-                raise Problem(f"The solver diverged at step {i + 1} of {steps}.",
-                              "Check that the texture and the mask are those of this head, or choose the proximal "
-                              "guidance.")
+                raise Problem(
+                    f"The solver diverged at step {i + 1} of {steps}.",
+                    "Check that the texture and the mask are those of this head, or choose the proximal guidance.",
+                )
             on_step(state, steps)
         return state
 
@@ -109,8 +116,15 @@ class Sampler:
             state.x = x_prime if s_up == 0 else self._noised(x_prime, x, (s_up, s_down / s), o, state.lights, draw)
         state.denoised, state.step = guided, state.step + 1
 
-    def _noised(self, mean: torch.Tensor, x: torch.Tensor, shares: tuple[float, float], o: Observation, lights: Lights,
-                draw: Callable) -> torch.Tensor:
+    def _noised(
+        self,
+        mean: torch.Tensor,
+        x: torch.Tensor,
+        shares: tuple[float, float],
+        o: Observation,
+        lights: Lights,
+        draw: Callable,
+    ) -> torch.Tensor:
         """x_{t-1}: the mean with fresh noise; of several draws the one whose rendering is nearest to where x_t's should
         go (diffusion proximal posterior sampling, as in the released code). shares: the level of the fresh noise, and
         the share of x_t's noise that the step keeps."""
@@ -131,7 +145,7 @@ def noise_schedule(recipe: Recipe) -> list[float]:
     """Noise levels: the last `steps` of Karras' sequence (rho 7) whose length makes them the share `start` of it, then
     0."""
     count = max(recipe.steps, round(recipe.steps / recipe.start))
-    return karras_sigmas(count, recipe.sigma_min, recipe.sigma_max)[-recipe.steps - 1:]
+    return karras_sigmas(count, recipe.sigma_min, recipe.sigma_max)[-recipe.steps - 1 :]
 
 
 def karras_sigmas(count: int, sigma_min: float, sigma_max: float) -> list[float]:
@@ -159,8 +173,9 @@ def clip_gradient(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
     return gradient
 
 
-def proximal_step(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, s: float,
-                  residual: float) -> torch.Tensor:
+def proximal_step(
+    denoised: torch.Tensor, shading: torch.Tensor, o: Observation, s: float, residual: float
+) -> torch.Tensor:
     """The map nearest to `denoised` that explains the texture: per texel, in closed form (Zhu et al. 2023).
 
     Parameters
@@ -190,6 +205,7 @@ def _factor(s: float, recipe: Recipe, observations: dict[int, Observation]) -> i
 def _resized(maps: torch.Tensor, height: int, width: int) -> torch.Tensor:
     if maps.shape[-2:] == (height, width):
         return maps
-    rows, columns = (interpolation_matrix(old, new).to(maps)
-                     for old, new in zip(maps.shape[-2:], (height, width), strict=True))
+    rows, columns = (
+        interpolation_matrix(old, new).to(maps) for old, new in zip(maps.shape[-2:], (height, width), strict=True)
+    )
     return rows @ maps @ columns.T

@@ -32,17 +32,24 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     expected = json.loads(EXPECTED_FILE.read_text(encoding="utf-8"))
     least = expected["mean_db"] - MAX_DEVIATIONS * expected["deviation_db"]
     score, seconds = measure(capture, settings, report)
-    for name, value in (("score_db", round(score, 2)), ("expected_db", round(least, 2)),
-                        ("seconds", round(seconds, 1))):
+    for name, value in (
+        ("score_db", round(score, 2)),
+        ("expected_db", round(least, 2)),
+        ("seconds", round(seconds, 1)),
+    ):
         report.figure(name, value)
     where = settings.compute_device
     if not score >= least:
-        raise Problem(f"The sample head, solved again on {where}, comes only to {score:.2f} dB of the shipped one: "
-                      f"{least:.2f} dB or more were expected.",
-                      "Click Remove Solver and Install Solver again; if that does not help, Save Report and send it "
-                      "with a question.")
-    report.log(f"The sample head was solved again on {where} in {seconds:.0f} s: {score:.2f} dB from the shipped one, "
-               f"{least:.2f} dB or more were expected.")
+        raise Problem(
+            f"The sample head, solved again on {where}, comes only to {score:.2f} dB of the shipped one: "
+            f"{least:.2f} dB or more were expected.",
+            "Click Remove Solver and Install Solver again; if that does not help, Save Report and send it "
+            "with a question.",
+        )
+    report.log(
+        f"The sample head was solved again on {where} in {seconds:.0f} s: {score:.2f} dB from the shipped one, "
+        f"{least:.2f} dB or more were expected."
+    )
 
 
 def measure(capture: Capture, settings: Settings, report: Reporter) -> tuple[float, float]:

@@ -34,10 +34,13 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.progress(1, 2, "looking for the shadow's edges")
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
     tone = read_given_tone(settings.solve.skin_tone) or estimate_from_texture(evidence)
-    start = initial.start_solve(prior, evidence, tone, CELL_TEXELS, recipe,
-                                callbacks=initial.Callbacks(check=report.check))
+    start = initial.start_solve(
+        prior, evidence, tone, CELL_TEXELS, recipe, callbacks=initial.Callbacks(check=report.check)
+    )
     snapped = np.clip(images.resize(start.alpha.numpy(), width, height), 0, 1)
     images.write_data(capture.shadow_mask_edges, snapped)
     painted = images.resize(evidence.alpha.numpy(), width, height)
-    report.figure("moved_percent_of_mask",
-                  round(100 * float(np.abs(snapped - painted).sum() / max(float(painted.sum()), 1e-6)), 1))
+    report.figure(
+        "moved_percent_of_mask",
+        round(100 * float(np.abs(snapped - painted).sum() / max(float(painted.sum()), 1e-6)), 1),
+    )

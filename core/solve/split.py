@@ -148,13 +148,16 @@ class Covariances:
     def covariance(self, scales: Scales, axis: int) -> np.ndarray:
         """Of all parts together, along an axis."""
         sizes = np.square(AXIS_DEVIATIONS[axis] * np.array(tuple(scales)))
-        parts = sum(size * component
-                    for size, component in zip(sizes, (self.traits, self.light, self.local, self.noise), strict=True))
+        parts = sum(
+            size * component
+            for size, component in zip(sizes, (self.traits, self.light, self.local, self.noise), strict=True)
+        )
         return parts + LEVEL_DEVIATION**2 * self.level + 1e-6 * np.eye(*self.level.shape)
 
 
-def split_captures(captures: list[Shapes], typical: Scales = TYPICAL_SCALES,
-                   check: Callable[[], None] = lambda: None) -> Split:
+def split_captures(
+    captures: list[Shapes], typical: Scales = TYPICAL_SCALES, check: Callable[[], None] = lambda: None
+) -> Split:
     """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the
     scales' prior. `check` may raise to cancel."""
     fewer = len(captures) ** -0.5
@@ -196,9 +199,13 @@ def place_cells(count: int) -> tuple[np.ndarray, np.ndarray]:
 def join_seen(captures: list[Cells]) -> tuple[Places, np.ndarray]:
     """All cells that were observed, and their values [K, 3]."""
     own = np.repeat(np.arange(len(captures)), [len(cells.observed) for cells in captures])
-    return Places(*(np.concatenate([getattr(cells, name)[cells.observed] for cells in captures])
-                    for name in ("places", "normal", "varied")), own), \
-        np.concatenate([cells.log_ratio for cells in captures])
+    return Places(
+        *(
+            np.concatenate([getattr(cells, name)[cells.observed] for cells in captures])
+            for name in ("places", "normal", "varied")
+        ),
+        own,
+    ), np.concatenate([cells.log_ratio for cells in captures])
 
 
 def model_covariances(rows: Places, columns: Places) -> Covariances:
@@ -207,17 +214,23 @@ def model_covariances(rows: Places, columns: Places) -> Covariances:
     apart = np.linalg.norm(rows.at[:, None] - columns.at[None], axis=-1)
     mirrored = np.linalg.norm(rows.at[:, None] * [-1, 1, 1] - columns.at[None], axis=-1)
     # higher where a place is its own mirror image
-    variances = [1 + MIRROR_CORRELATION * np.exp(-2 * np.abs(places.at[:, 0]) / TRAIT_REACH_M)
-                 for places in (rows, columns)]
+    variances = [
+        1 + MIRROR_CORRELATION * np.exp(-2 * np.abs(places.at[:, 0]) / TRAIT_REACH_M) for places in (rows, columns)
+    ]
     traits = np.exp(-apart / TRAIT_REACH_M) + MIRROR_CORRELATION * np.exp(-mirrored / TRAIT_REACH_M)
     traits *= np.multiply.outer(rows.varied, columns.varied) / np.sqrt(np.multiply.outer(*variances))
     light = (SH_SCALE**2 * sh_basis(rows.normal) * ORDER_DEVIATIONS**2) @ sh_basis(columns.normal).T
-    return Covariances(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same,
-                       np.exp(-apart / NOISE_REACH_M) * same, same)
+    return Covariances(
+        traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same, np.exp(-apart / NOISE_REACH_M) * same, same
+    )
 
 
-def find_scales(together: Covariances, log_ratio: np.ndarray, typical: Scales = TYPICAL_SCALES,
-                check: Callable[[], None] = lambda: None) -> Scales:
+def find_scales(
+    together: Covariances,
+    log_ratio: np.ndarray,
+    typical: Scales = TYPICAL_SCALES,
+    check: Callable[[], None] = lambda: None,
+) -> Scales:
     """The most probable scales, by a search along one of them after the other.
 
     Parameters
@@ -240,8 +253,9 @@ def find_scales(together: Covariances, log_ratio: np.ndarray, typical: Scales = 
     return best
 
 
-def log_probability(together: Covariances, log_ratio: np.ndarray, scales: Scales,
-                    typical: Scales = TYPICAL_SCALES) -> float:
+def log_probability(
+    together: Covariances, log_ratio: np.ndarray, scales: Scales, typical: Scales = TYPICAL_SCALES
+) -> float:
     """Of the observed ratios under the scales, and of the scales themselves, but for a constant.
 
     Parameters
@@ -251,8 +265,9 @@ def log_probability(together: Covariances, log_ratio: np.ndarray, scales: Scales
     scales : that are judged
     typical : about which scales are expected to lie
     """
-    total = -0.5 * sum((np.log(scale / usual) / SCALES_DEVIATION) ** 2
-                       for scale, usual in zip(scales, typical, strict=True))
+    total = -0.5 * sum(
+        (np.log(scale / usual) / SCALES_DEVIATION) ** 2 for scale, usual in zip(scales, typical, strict=True)
+    )
     for axis in range(3):
         lower, column = cholesky(together.covariance(scales, axis), lower=True), log_ratio[:, axis]
         white = solve_triangular(lower, column, lower=True)

@@ -24,18 +24,22 @@ def read_others(capture: Capture, settings: Settings, report: Reporter) -> list[
     named = captures_in(settings.solve.together)
     roots = [root for root in named if root.resolve() != capture.root.resolve()]
     if named and not roots:
-        raise Problem(f"{settings.solve.together} is this capture itself.",
-                      "Name captures of the same person in other light.")
+        raise Problem(
+            f"{settings.solve.together} is this capture itself.", "Name captures of the same person in other light."
+        )
     others = []
     for k, root in enumerate(roots):
         report.progress(k, len(roots), f"reading {root.name}")
         other = Capture(root)
         if not other.texture.is_file() or not other.shadow_mask_auto.is_file():
-            raise Problem(f"{root.name} has no texture and shadow mask yet.",
-                          "Reconstruct it up to the shadow mask first, or leave it out.")
+            raise Problem(
+                f"{root.name} has no texture and shadow mask yet.",
+                "Reconstruct it up to the shadow mask first, or leave it out.",
+            )
         head = read_filmed_head(other)
         if not head.built_in:
-            raise Problem(f"{root.name} has a head in other UVs.",
-                          "Solve together only captures whose head is the built-in one.")
+            raise Problem(
+                f"{root.name} has a head in other UVs.", "Solve together only captures whose head is the built-in one."
+            )
         others.append(read_evidence(other, head, SIDE_TEXELS))
     return others

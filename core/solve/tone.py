@@ -31,8 +31,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     tell_skin_tone(estimate_skin_tone(capture, head, settings, evidence, report), settings, report)
 
 
-def resolve_skin_tone(capture: Capture, head: Head, settings: Settings, evidence: Evidence,
-                      report: Reporter) -> SkinTone:
+def resolve_skin_tone(
+    capture: Capture, head: Head, settings: Settings, evidence: Evidence, report: Reporter
+) -> SkinTone:
     """The tone of a solve: the artist's, or the estimate.
 
     Parameters
@@ -48,12 +49,12 @@ def resolve_skin_tone(capture: Capture, head: Head, settings: Settings, evidence
     Problem
         For a setting that is no colour, and where no facial skin was seen.
     """
-    return (read_given_tone(settings.solve.skin_tone)
-            or estimate_skin_tone(capture, head, settings, evidence, report))
+    return read_given_tone(settings.solve.skin_tone) or estimate_skin_tone(capture, head, settings, evidence, report)
 
 
-def estimate_skin_tone(capture: Capture, head: Head, settings: Settings, evidence: Evidence,
-                       report: Reporter) -> SkinTone:
+def estimate_skin_tone(
+    capture: Capture, head: Head, settings: Settings, evidence: Evidence, report: Reporter
+) -> SkinTone:
     """The tone that the frames tell under the measured white point, or without one; where frames or cameras are gone,
     the texture's. Parameters and errors are those of `resolve_skin_tone`."""
     look = read_look(capture, head, evidence.alpha.numpy(), report)

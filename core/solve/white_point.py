@@ -42,9 +42,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         if len(whites) == ENOUGH_CHARTS:
             break
     if not whites:
-        raise Problem("No ColorChecker was found in the frames.",
-                      "Film it flat, in focus, at least a fifth of the picture wide, or point at a grey card or white "
-                      "paper instead.")
+        raise Problem(
+            "No ColorChecker was found in the frames.",
+            "Film it flat, in focus, at least a fifth of the picture wide, or point at a grey card or white "
+            "paper instead.",
+        )
     report.figure("white_point", [round(float(v), 4) for v in np.median(list(whites.values()), 0)])
     report.figure("white_point_frame", next(iter(whites)))
 
@@ -87,16 +89,22 @@ def measure_card_white(srgb: np.ndarray, column: float, row: float, card: str) -
     """
     height, width = srgb.shape[:2]
     if not (0 <= column < width and 0 <= row < height):
-        raise Problem(f"The place {column:g}, {row:g} is outside of the frame, which is {width} x {height}.",
-                      "Give the pixel's column and row from the upper left.")
+        raise Problem(
+            f"The place {column:g}, {row:g} is outside of the frame, which is {width} x {height}.",
+            "Give the pixel's column and row from the upper left.",
+        )
     reach = max(2, round(PATCH_SHARE * max(width, height)))
     top, left = max(0, int(row) - reach), max(0, int(column) - reach)
-    patch = srgb[top:int(row) + reach + 1, left:int(column) + reach + 1].reshape(-1, 3)
+    patch = srgb[top : int(row) + reach + 1, left : int(column) + reach + 1].reshape(-1, 3)
     if np.median(patch, 0).max() >= 0.98 or np.median(patch, 0).min() < 0.03:
-        raise Problem("The card is burnt out or black there.",
-                      "Choose another frame or place, or a grey card instead of white paper.")
+        raise Problem(
+            "The card is burnt out or black there.",
+            "Choose another frame or place, or a grey card instead of white paper.",
+        )
     linear = images.srgb_to_linear(patch)
     if np.log(np.maximum(linear, 1e-3)).std(0).max() > MAX_STRAY_LOG:
-        raise Problem("That place is not of one colour.",
-                      "Point at the middle of the card, away from its border and from writing.")
+        raise Problem(
+            "That place is not of one colour.",
+            "Point at the middle of the card, away from its border and from writing.",
+        )
     return linear.mean(0) / CARDS[card]

@@ -47,8 +47,9 @@ class Window:
     moving: torch.Tensor
 
 
-def find_window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], multiple: int,
-                reference: int) -> Window | None:
+def find_window(
+    before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], multiple: int, reference: int
+) -> Window | None:
     """What an edit of the mask touches.
 
     Parameters
@@ -93,8 +94,15 @@ def find_window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int],
     return Window(tuple(inside), tuple(seen), tuple(cells_seen), moving[0][:, None] & moving[1][None])
 
 
-def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], earlier: Solution, window: Window,
-                 recipe: Recipe, seed: int, report: Reporter) -> tuple[torch.Tensor, Lights]:
+def solve_inside(
+    prior: ConditionedPrior,
+    observations: dict[int, Observation],
+    earlier: Solution,
+    window: Window,
+    recipe: Recipe,
+    seed: int,
+    report: Reporter,
+) -> tuple[torch.Tensor, Lights]:
     """The map and the lights of an earlier solve with a window of it sampled anew.
 
     Parameters
@@ -115,8 +123,9 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
     here = {factor: crop_observation(o, window, factor).to(device) for factor, o in observations.items()}
     known = denoised[(..., *window.context)].to(device)
     grid = lights.grid[(..., *window.cells)].to(device)
-    state = State(0, None, known.clone(),
-                  Lights(lights.glob.clone().to(device), grid.clone(), lights.chroma.clone().to(device)))
+    state = State(
+        0, None, known.clone(), Lights(lights.glob.clone().to(device), grid.clone(), lights.chroma.clone().to(device))
+    )
     moving, inside = window.moving.to(device), torch.zeros(known.shape[-2:], device=device)
     inside[
         tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(window.inside, window.context, strict=True))
@@ -133,8 +142,9 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
 
     last = max(end for _, _, end in recipe.phases)
     local = replace(recipe, steps=min(recipe.steps, MAX_STEPS), phases=(("cells", 0.0, last),), refit=0.0)
-    state = sample_within_memory(Sampler(prior, local, seed_noise(seed, device), with_known), here, state, keep_frozen,
-                                 report.log)
+    state = sample_within_memory(
+        Sampler(prior, local, seed_noise(seed, device), with_known), here, state, keep_frozen, report.log
+    )
     restored = restore_maps(prior, state.denoised, observations[1].coords.to(device), seed, window.context)
     solved, moved = denoised.clone(), lights.grid.clone()
     moved[(..., *window.cells)] = state.lights.grid.cpu()
@@ -145,8 +155,11 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
 def crop_observation(o: Observation, window: Window, factor: int) -> Observation:
     """What is known of the window and its surroundings, of a map coarser by `factor`; coordinates keep their place."""
     rows, columns = (slice(s.start // factor, s.stop // factor) for s in window.context)
-    tensors = {f.name: getattr(o, f.name)[..., rows, columns] for f in fields(o)
-               if isinstance(getattr(o, f.name), torch.Tensor)}
+    tensors = {
+        f.name: getattr(o, f.name)[..., rows, columns]
+        for f in fields(o)
+        if isinstance(getattr(o, f.name), torch.Tensor)
+    }
     return replace(o, **tensors, shader=o.shader.part(rows, columns, window.cells))
 
 

@@ -84,7 +84,7 @@ def _contrast(view: View, picture: np.ndarray, points: np.ndarray, covered: np.n
     if not np.isfinite(pixels).all() or (pixels < 0).any() or (pixels > [view.width, view.height]).any():
         return None
     patch = raster.sample(picture, pixels).reshape(covered[window].shape).astype(np.float32)
-    y, x = np.mgrid[-reach:reach + 1, -reach:reach + 1]
+    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
     distance = np.hypot(x, y)
     disc = (distance <= max(0.7 * mark.radius, 0.5)).astype(np.float32)
     ring = ((distance > 1.5 * mark.radius + 0.5) & (distance <= 2.5 * mark.radius + 1)).astype(np.float32)
@@ -92,4 +92,4 @@ def _contrast(view: View, picture: np.ndarray, points: np.ndarray, covered: np.n
     darker = cv2.filter2D(patch, -1, kernel, borderType=cv2.BORDER_REFLECT)
     middle = np.array(patch.shape) // 2
     near = max(1, round(mark.radius))
-    return float(darker[middle[0] - near:middle[0] + near + 1, middle[1] - near:middle[1] + near + 1].max())
+    return float(darker[middle[0] - near : middle[0] + near + 1, middle[1] - near : middle[1] + near + 1].max())

@@ -13,8 +13,9 @@ from .regions import lid_lines, regions
 from .spots import splat_spots, strew
 
 # albedo, linear sRGB
-LIPSTICKS = np.array([[0.30, 0.02, 0.03], [0.45, 0.10, 0.12], [0.20, 0.01, 0.04], [0.50, 0.16, 0.10],
-                      [0.12, 0.02, 0.03]])
+LIPSTICKS = np.array(
+    [[0.30, 0.02, 0.03], [0.45, 0.10, 0.12], [0.20, 0.01, 0.04], [0.50, 0.16, 0.10], [0.12, 0.02, 0.03]]
+)
 SHADOWS = np.array([[0.10, 0.06, 0.05], [0.05, 0.04, 0.06], [0.20, 0.11, 0.08], [0.06, 0.07, 0.12], [0.14, 0.08, 0.11]])
 
 
@@ -66,8 +67,9 @@ def lid_distance(on: Canvas) -> np.ndarray:
     return on.cache["lid line"]
 
 
-def put_on_make_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float,
-                   rng: np.random.Generator) -> np.ndarray:
+def put_on_make_up(
+    diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float, rng: np.random.Generator
+) -> np.ndarray:
     """Each of lipstick, eye shadow, liner and blusher is worn or not, at random.
 
     Parameters
@@ -98,6 +100,7 @@ def put_on_make_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.nd
 
 def _coat(below: np.ndarray, colour: np.ndarray, cover: np.ndarray) -> np.ndarray:
     """A thin coat of `colour` [3] over `below` [N, 3]: what lies below shines through, so pores and creases stay."""
-    relief = np.clip(below.mean(-1, keepdims=True) / max(float(np.average(below.mean(-1), weights=cover + 1e-6)), 1e-4),
-                     0.5, 1.5)
+    relief = np.clip(
+        below.mean(-1, keepdims=True) / max(float(np.average(below.mean(-1), weights=cover + 1e-6)), 1e-4), 0.5, 1.5
+    )
     return (below * (1 - cover[:, None]) + colour * relief * cover[:, None]).astype(np.float32)

@@ -130,15 +130,18 @@ def make_window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
     return _canvas(mesh, size, face[:, columns], bary[:, columns], template.landmark_points(mesh), mask)
 
 
-def _canvas(mesh: Mesh, size: int, face: np.ndarray, bary: np.ndarray, landmarks: np.ndarray,
-            mask: Callable[[str], np.ndarray]) -> Canvas:
+def _canvas(
+    mesh: Mesh, size: int, face: np.ndarray, bary: np.ndarray, landmarks: np.ndarray, mask: Callable[[str], np.ndarray]
+) -> Canvas:
     """The canvas of rastered texels [S, S]; `size`: of the map that they are of."""
     covered = face >= 0
     position = raster.interpolate(mesh.vertices * 1000, mesh.faces, face[covered], bary[covered]).astype(np.float32)
     normal = raster.interpolate(vertex_normals(mesh), mesh.faces, face[covered], bary[covered]).astype(np.float32)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
-    masks = {name: np.asarray(mask(name), np.float32)[covered]
-             for name in ("skin", "lips", "brows", "eyes", "ears", "neck", "scalp", "nose")}
+    masks = {
+        name: np.asarray(mask(name), np.float32)[covered]
+        for name in ("skin", "lips", "brows", "eyes", "ears", "neck", "scalp", "nose")
+    }
     return Canvas(len(face), covered, position, normal, _metric(mesh, size)[face[covered]], masks, landmarks * 1000)
 
 

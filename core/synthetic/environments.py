@@ -49,8 +49,9 @@ def panorama_environment(panorama: np.ndarray, rng: np.random.Generator) -> Envi
     if rng.random() < 0.5:
         turned = turned[:, ::-1]
     turned, lamp, colour = without_lamp(turned)
-    return _normalised(_gathered(turned), lamp, colour,
-                       cv2.resize(turned, (WIDTH, WIDTH // 2), interpolation=cv2.INTER_AREA))
+    return _normalised(
+        _gathered(turned), lamp, colour, cv2.resize(turned, (WIDTH, WIDTH // 2), interpolation=cv2.INTER_AREA)
+    )
 
 
 def without_lamp(panorama: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -62,8 +63,9 @@ def without_lamp(panorama: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
     hard = luminance > SUN_OVER_MEAN * mean
     if not hard.any():
         return panorama, np.array([0.0, -0.6, 0.8]), np.zeros(3)
-    excess = np.where(hard[..., None],
-                      panorama - SUN_OVER_MEAN * mean * panorama / np.maximum(luminance, 1e-6)[..., None], 0)
+    excess = np.where(
+        hard[..., None], panorama - SUN_OVER_MEAN * mean * panorama / np.maximum(luminance, 1e-6)[..., None], 0
+    )
     lamp = (directions * (excess.mean(-1) * solid)[..., None]).sum((0, 1))
     return panorama - excess, lamp / np.linalg.norm(lamp), (excess * solid[..., None]).sum((0, 1)) / np.pi
 
@@ -90,14 +92,23 @@ def background_radiance(environment: Environment, directions: np.ndarray) -> np.
     height, width = environment.panorama.shape[:2]
     column = (0.5 + np.arctan2(directions[..., 0], -directions[..., 1]) / (2 * np.pi)) * width
     row = np.arccos(np.clip(directions[..., 2], -1, 1)) / np.pi * height
-    return cv2.remap(environment.panorama.astype(np.float32), (column - 0.5).astype(np.float32),
-                     (row - 0.5).astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return cv2.remap(
+        environment.panorama.astype(np.float32),
+        (column - 0.5).astype(np.float32),
+        (row - 0.5).astype(np.float32),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
 
 
 def _normalised(radiance: np.ndarray, lamp: np.ndarray, colour: np.ndarray, panorama: np.ndarray) -> Environment:
     mean = max(float(radiance.mean()), 1e-6)
-    return Environment((radiance / mean).astype(np.float32), lamp, (colour / mean).astype(np.float32),
-                       (panorama / mean).astype(np.float32))
+    return Environment(
+        (radiance / mean).astype(np.float32),
+        lamp,
+        (colour / mean).astype(np.float32),
+        (panorama / mean).astype(np.float32),
+    )
 
 
 def _gathered(panorama: np.ndarray) -> np.ndarray:
@@ -108,16 +119,19 @@ def _gathered(panorama: np.ndarray) -> np.ndarray:
         panorama = cv2.resize(panorama, (width, height), interpolation=cv2.INTER_AREA)
     solid = solid_angles(height, width).ravel()
     weight = np.bincount(_NEAREST, solid, len(DIRECTIONS))
-    return np.stack([np.bincount(_NEAREST, solid * panorama[..., k].ravel(), len(DIRECTIONS)) for k in range(3)],
-                    -1) / weight[:, None]
+    return (
+        np.stack([np.bincount(_NEAREST, solid * panorama[..., k].ravel(), len(DIRECTIONS)) for k in range(3)], -1)
+        / weight[:, None]
+    )
 
 
 def panorama_directions(height: int, width: int) -> np.ndarray:
     """Unit directions [H, W, 3] of an equirectangular panorama's texels."""
     polar = (np.arange(height) + 0.5)[:, None] / height * np.pi
     azimuth = ((np.arange(width) + 0.5)[None] / width - 0.5) * 2 * np.pi
-    return np.stack([np.sin(polar) * np.sin(azimuth), -np.sin(polar) * np.cos(azimuth),
-                     np.cos(polar) * np.ones_like(azimuth)], -1)
+    return np.stack(
+        [np.sin(polar) * np.sin(azimuth), -np.sin(polar) * np.cos(azimuth), np.cos(polar) * np.ones_like(azimuth)], -1
+    )
 
 
 def solid_angles(height: int, width: int) -> np.ndarray:

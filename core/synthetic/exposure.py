@@ -23,8 +23,9 @@ def phone_exposure(rng: np.random.Generator, skin: np.ndarray, light: np.ndarray
     """What scene light is multiplied by in the picture that a phone takes of linear skin colours [N, 3], in light whose
     mean colour on a white surface is `light` [3]: exposure and the cast that is left, linear [3]."""
     cast = _cast(rng)
-    reflectance = np.clip(np.exp(rng.normal(np.log(0.2), 0.8, (SURFACES, 1)) + rng.normal(0, 0.25, (SURFACES, 3))),
-                          0.02, 0.9)
+    reflectance = np.clip(
+        np.exp(rng.normal(np.log(0.2), 0.8, (SURFACES, 1)) + rng.normal(0, 0.25, (SURFACES, 3))), 0.02, 0.9
+    )
     # it is rarely as light behind a person as on the face
     elsewhere = np.exp(rng.normal(0, 0.45)) * np.exp(rng.normal(0, 0.4, (SURFACES, 1)))
     behind = reflectance * elsewhere * light * np.exp(rng.normal(0, 0.06, 3))

@@ -34,8 +34,14 @@ class LampOnHead:
     reach: np.ndarray
 
 
-def fitted_light(transfer: np.ndarray, smooth: np.ndarray, lamps: list[LampOnHead], environment: Environment,
-                 tone: np.ndarray, rng: np.random.Generator) -> FittedLight:
+def fitted_light(
+    transfer: np.ndarray,
+    smooth: np.ndarray,
+    lamps: list[LampOnHead],
+    environment: Environment,
+    tone: np.ndarray,
+    rng: np.random.Generator,
+) -> FittedLight:
     """What core/light/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a
     little off.
 

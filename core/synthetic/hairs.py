@@ -37,8 +37,9 @@ def grow_brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, r
     return _strokes(on, roots, direction, rng.uniform(4.5, 8, len(roots)), 0.11, np.full(len(roots), -0.25), rng)
 
 
-def grow_stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float,
-                 rng: np.random.Generator) -> np.ndarray:
+def grow_stubble(
+    on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float, rng: np.random.Generator
+) -> np.ndarray:
     """How much of each texel beard hair covers.
 
     Parameters
@@ -93,8 +94,15 @@ def _along(normal: np.ndarray, way: list[float]) -> np.ndarray:
     return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-3)
 
 
-def _strokes(on: Canvas, roots: np.ndarray, direction: np.ndarray, length: np.ndarray, width: float, bend: np.ndarray,
-             rng: np.random.Generator) -> np.ndarray:
+def _strokes(
+    on: Canvas,
+    roots: np.ndarray,
+    direction: np.ndarray,
+    length: np.ndarray,
+    width: float,
+    bend: np.ndarray,
+    rng: np.random.Generator,
+) -> np.ndarray:
     """Cover [N] of hairs `width` mm thick and `length` [M] mm long from roots [M, 3] along direction [M, 3], sinking by
     `bend` (a share of the length)."""
     cover = np.zeros(len(on.position), np.float32)

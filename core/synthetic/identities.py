@@ -18,8 +18,9 @@ STRENGTH = 0.75  # of N(0, 1): the tails of MakeHuman's combinations are caricat
 
 def subject_mesh(seed: int) -> Mesh:
     """The head of a subject in the template's topology and pose: metres, +Z up, face towards -Y."""
-    return template.load().moved(template.load().vertices
-                                 + np.tensordot(identity_coefficients(seed), template.identity(), 1))
+    return template.load().moved(
+        template.load().vertices + np.tensordot(identity_coefficients(seed), template.identity(), 1)
+    )
 
 
 def identity_coefficients(seed: int) -> np.ndarray:

@@ -51,8 +51,9 @@ def random_light(rng: np.random.Generator) -> SkyAndSun:
     return SkyAndSun(sky, sun, colour, float(np.exp(rng.uniform(np.log(0.005), np.log(0.12)))))
 
 
-def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str,
-         rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def bake(
+    mesh: Mesh, size: int, light: SkyAndSun, shadows: str, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What a light makes of a mesh, in its UVs, bled beyond the charts.
 
     Parameters
@@ -88,8 +89,9 @@ def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str,
     return spread(shading), spread(shadow), spread(normals)
 
 
-def trace_transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster,
-                   rays: int = TRANSFER_RAYS) -> np.ndarray:
+def trace_transfer(
+    points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster, rays: int = TRANSFER_RAYS
+) -> np.ndarray:
     """Shading of points per coefficient of the sky's radiance, blocked where the mesh is in the way.
 
     Parameters
@@ -106,8 +108,14 @@ def trace_transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCa
     return radiance_transfer(caster, points, normals, rays)
 
 
-def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray, light: SkyAndSun, shadows: str,
-              rng: np.random.Generator) -> np.ndarray:
+def _sun_seen(
+    caster: raster.RayCaster,
+    points: np.ndarray,
+    normals: np.ndarray,
+    light: SkyAndSun,
+    shadows: str,
+    rng: np.random.Generator,
+) -> np.ndarray:
     """The share [N] of the sun's disc that each point sees past the head and past whatever else throws a shadow."""
     sun, radius = light.sun, light.radius
     right = np.cross(sun, [0.0, 0.0, 1.0])
@@ -122,8 +130,9 @@ def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray,
         return np.ones(len(points))
     facing = np.flatnonzero(normals @ sun > 0)
     for ray, direction in enumerate(directions):
-        seen[ray, facing] = ~caster.blocked(points[facing] + 1e-3 * normals[facing],
-                                            np.repeat(direction[None], len(facing), 0))
+        seen[ray, facing] = ~caster.blocked(
+            points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0)
+        )
     if shadows != "self":
         away = rng.uniform(0.25, 1.0)  # metres to what throws the shadow
         at = points[None, facing] + away * directions[:, None]

@@ -42,8 +42,9 @@ def light_stage(mesh: Mesh) -> LightStage:
     for i, direction in enumerate(DIRECTIONS):
         # a little beyond, or interpolation would darken the edge of the lit side
         facing = np.flatnonzero(normals @ direction > -0.05)
-        visible[facing, i] = ~caster.blocked(mesh.vertices[facing] + LIFT * normals[facing],
-                                             np.repeat(direction[None], len(facing), 0))
+        visible[facing, i] = ~caster.blocked(
+            mesh.vertices[facing] + LIFT * normals[facing], np.repeat(direction[None], len(facing), 0)
+        )
     return LightStage(mesh, normals.astype(np.float32), visible)
 
 
@@ -80,8 +81,15 @@ def mirror_environment(stage: LightStage, vertices: np.ndarray, environment: np.
     return (lobe * stage.visible[vertices]) @ environment.astype(np.float32) / np.maximum(weight, 1e-6)
 
 
-def trace_sun(caster: RayCaster, points: np.ndarray, normals: np.ndarray, sun: np.ndarray, radius: float,
-              rays: int, rng: np.random.Generator) -> np.ndarray:
+def trace_sun(
+    caster: RayCaster,
+    points: np.ndarray,
+    normals: np.ndarray,
+    sun: np.ndarray,
+    radius: float,
+    rays: int,
+    rng: np.random.Generator,
+) -> np.ndarray:
     """The share of a disc of light that points see past the head: a denser cone of rays, turned at random per point, so
     that few rays give an even penumbra.
 

@@ -54,8 +54,9 @@ def speaking(seed: int, jaw: float) -> tuple[raster.RayCaster, np.ndarray]:
     return raster.RayCaster(mesh), meshes.vertex_normals(mesh)
 
 
-def place_camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035),
-                 scale: float = 1.0) -> View:
+def place_camera(
+    azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035), scale: float = 1.0
+) -> View:
     """A camera that looks at the head, which it shows alike large from any distance.
 
     Parameters
@@ -72,21 +73,35 @@ def place_camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55
     x = np.cross(z, [0, 0, 1])
     x /= np.linalg.norm(x)
     rotation = np.stack([x, np.cross(z, x), z])
-    pinhole = pycolmap.Camera(camera_id=1, model="PINHOLE", width=round(WIDTH * scale), height=round(HEIGHT * scale),
-                              params=np.array([FOCAL * distance / 0.55, FOCAL * distance / 0.55, WIDTH / 2, HEIGHT / 2])
-                              * scale)
+    pinhole = pycolmap.Camera(
+        camera_id=1,
+        model="PINHOLE",
+        width=round(WIDTH * scale),
+        height=round(HEIGHT * scale),
+        params=np.array([FOCAL * distance / 0.55, FOCAL * distance / 0.55, WIDTH / 2, HEIGHT / 2]) * scale,
+    )
     return View("", Path(), pinhole, rotation, -rotation @ centre, True)
 
 
 def studio(scale: float = 1.0) -> list[View]:
     """Sixteen fixed cameras a metre away in two rows, over 100 degrees from side to side: the layout of multi-view
     studios as NeRSemble's."""
-    return [place_camera(azimuth, height, 1.0, scale=scale) for height in (-0.15, 0.25)
-            for azimuth in np.linspace(-50, 50, 8)]
+    return [
+        place_camera(azimuth, height, 1.0, scale=scale)
+        for height in (-0.15, 0.25)
+        for azimuth in np.linspace(-50, 50, 8)
+    ]
 
 
-def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: bool = False, seed: int = SEED,
-               texels: int = 256, jaw: float = 0.0) -> np.ndarray:
+def photograph(
+    view: View,
+    turned_deg: float = 0.0,
+    wall: bool = True,
+    even: bool = False,
+    seed: int = SEED,
+    texels: int = 256,
+    jaw: float = 0.0,
+) -> np.ndarray:
     """The person before a wall.
 
     Parameters
@@ -116,8 +131,9 @@ def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: boo
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     colour = raster.sample_uv(albedo, uv)
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary) @ rotation.T
-    shade = (np.full(len(face), 0.9) if even
-             else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1))
+    shade = (
+        np.full(len(face), 0.9) if even else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1)
+    )
     lit = np.zeros((*hit.shape, 3), np.float32)
     lit[hit] = colour * (shade * 1.6)[:, None]
     head = images.resize(lit, view.width, view.height)
@@ -140,5 +156,10 @@ def _wall(view: View) -> np.ndarray:
         reach = (WALL_AT - view.centre[1]) / rays[:, 1]
     hit = view.centre + rays * np.where(reach > 0, reach, 0)[:, None]
     at = ((hit[:, [0, 2]] / WALL_M + 0.5) % 1 * 1200).astype(np.float32)
-    return cv2.remap(_paper(), at[:, :1].reshape(y.shape), at[:, 1:].reshape(y.shape), cv2.INTER_LINEAR,
-                     borderMode=cv2.BORDER_REFLECT)
+    return cv2.remap(
+        _paper(),
+        at[:, :1].reshape(y.shape),
+        at[:, 1:].reshape(y.shape),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REFLECT,
+    )

@@ -64,19 +64,36 @@ def sample_parameters(seed: int) -> SkinParameters:
     freckled = rng.random() < 0.05 + 0.35 * lightness
     hair, grey = _hair_colour(lightness, rng), np.clip((age - 38) / 40, 0, 1) * rng.random()
     return SkinParameters(
-        melanin=melanin, blood=blood, oxygen=oxygen, scattering=scattering, slope=slope, chroma=chroma, age=age,
-        redness=float(rng.uniform(0.4, 1.5)), eye_circles=float(rng.uniform(0.1, 1.2)),
-        blotches=float(rng.uniform(0.6, 1.5)), mottling=float(np.exp(rng.uniform(np.log(0.15), np.log(0.9)))),
+        melanin=melanin,
+        blood=blood,
+        oxygen=oxygen,
+        scattering=scattering,
+        slope=slope,
+        chroma=chroma,
+        age=age,
+        redness=float(rng.uniform(0.4, 1.5)),
+        eye_circles=float(rng.uniform(0.1, 1.2)),
+        blotches=float(rng.uniform(0.6, 1.5)),
+        mottling=float(np.exp(rng.uniform(np.log(0.15), np.log(0.9)))),
         lip_melanin=float(1 - rng.uniform(0.05, 0.35) * (0.25 + 0.75 * lightness)),
         lip_blood=float(np.exp(rng.uniform(np.log(2.5), np.log(7.5)))),
-        pores=float(rng.uniform(0.4, 1.2) * (1.1 if male else 0.9)), wrinkles=float(rng.uniform(0.5, 1.3)),
+        pores=float(rng.uniform(0.4, 1.2) * (1.1 if male else 0.9)),
+        wrinkles=float(rng.uniform(0.5, 1.3)),
         oiliness=float(rng.uniform(0.3, 1.4)),
-        freckles=float(rng.uniform(0.05, 0.8)) if freckled else 0.0, freckle_contrast=float(rng.uniform(0.3, 0.9)),
-        moles=float(rng.gamma(1.5, 6.0)), beard=beard,
+        freckles=float(rng.uniform(0.05, 0.8)) if freckled else 0.0,
+        freckle_contrast=float(rng.uniform(0.3, 0.9)),
+        moles=float(rng.gamma(1.5, 6.0)),
+        beard=beard,
         beard_length=float(np.exp(rng.uniform(np.log(0.25), np.log(3.0)))),
-        brow_density=float(rng.uniform(0.5, 1.4) * (1.15 if male else 0.85)), scalp_hair=float(rng.uniform(0.25, 1.0)),
-        hair_colour=_greyed(hair, grey), brow_colour=_greyed(hair * 0.8, 0.4 * grey**2),
-        tone_seed=seed, mole_seed=seed, pore_seed=seed, hair_seed=seed)
+        brow_density=float(rng.uniform(0.5, 1.4) * (1.15 if male else 0.85)),
+        scalp_hair=float(rng.uniform(0.25, 1.0)),
+        hair_colour=_greyed(hair, grey),
+        brow_colour=_greyed(hair * 0.8, 0.4 * grey**2),
+        tone_seed=seed,
+        mole_seed=seed,
+        pore_seed=seed,
+        hair_seed=seed,
+    )
 
 
 def adorned(parameters: SkinParameters, seed: int) -> SkinParameters:
@@ -85,8 +102,13 @@ def adorned(parameters: SkinParameters, seed: int) -> SkinParameters:
     rng = np.random.default_rng([seed, 9])
     painted = rng.random() < (0.05 if parameters.beard > 0 else 0.6)
     make_up = float(rng.uniform(0.15, 1.0)) if painted else 0.0
-    return replace(parameters, scars=float(rng.gamma(1.0, 1.5)) if rng.random() < 0.5 else 0.0, make_up=make_up,
-                   mottling=parameters.mottling * (1 - 0.5 * make_up), adorn_seed=seed)
+    return replace(
+        parameters,
+        scars=float(rng.gamma(1.0, 1.5)) if rng.random() < 0.5 else 0.0,
+        make_up=make_up,
+        mottling=parameters.mottling * (1 - 0.5 * make_up),
+        adorn_seed=seed,
+    )
 
 
 def _melanin_of_angle(angle: float, blood: float, oxygen: float, scattering: float, slope: float) -> float:

@@ -28,26 +28,128 @@ BASELINE = 0.25  # on the absorption of skin without pigment
 BACKSCATTER = 0.012  # share of the light that returns from above the melanin
 
 WAVELENGTHS = np.arange(400, 701, 10, dtype=np.float64)  # nm
-D65 = np.array([82.75, 91.49, 93.43, 86.68, 104.86, 117.01, 117.81, 114.86, 115.92, 108.81, 109.35, 107.80, 104.79,
-                107.69, 104.41, 104.05,
-                100.00, 96.33, 95.79, 88.69, 90.01, 89.60, 87.70, 83.29, 83.70, 80.03, 80.21, 82.28, 78.28, 69.72,
-                71.61])
-OXYGENATED = np.array([266232, 466840, 480360, 246072, 102580, 62816, 44480, 33209, 26629, 23684, 20933, 20035, 24202,
-                       39957, 53236, 43016,
-                       # 1/(cm M)
-                       32613, 44496, 50104, 14401, 3200, 1506, 942, 610, 442, 368, 320, 294, 278, 276, 290], np.float64)
-DEOXYGENATED = np.array([223296, 303956, 407560, 528600, 413280, 103292, 23389, 16156, 14550, 16684, 20862, 25774,
-                         31590, 39036, 46592, 53412,
-                         53788, 45072, 37020, 28324, 14677, 9444, 6510, 5149, 4345, 3750, 3227, 2795, 2408, 2052, 1794],
-                        np.float64)
+D65 = np.array(
+    [
+        82.75,
+        91.49,
+        93.43,
+        86.68,
+        104.86,
+        117.01,
+        117.81,
+        114.86,
+        115.92,
+        108.81,
+        109.35,
+        107.80,
+        104.79,
+        107.69,
+        104.41,
+        104.05,
+        100.00,
+        96.33,
+        95.79,
+        88.69,
+        90.01,
+        89.60,
+        87.70,
+        83.29,
+        83.70,
+        80.03,
+        80.21,
+        82.28,
+        78.28,
+        69.72,
+        71.61,
+    ]
+)
+OXYGENATED = np.array(
+    [
+        266232,
+        466840,
+        480360,
+        246072,
+        102580,
+        62816,
+        44480,
+        33209,
+        26629,
+        23684,
+        20933,
+        20035,
+        24202,
+        39957,
+        53236,
+        43016,
+        # 1/(cm M)
+        32613,
+        44496,
+        50104,
+        14401,
+        3200,
+        1506,
+        942,
+        610,
+        442,
+        368,
+        320,
+        294,
+        278,
+        276,
+        290,
+    ],
+    np.float64,
+)
+DEOXYGENATED = np.array(
+    [
+        223296,
+        303956,
+        407560,
+        528600,
+        413280,
+        103292,
+        23389,
+        16156,
+        14550,
+        16684,
+        20862,
+        25774,
+        31590,
+        39036,
+        46592,
+        53412,
+        53788,
+        45072,
+        37020,
+        28324,
+        14677,
+        9444,
+        6510,
+        5149,
+        4345,
+        3750,
+        3227,
+        2795,
+        2408,
+        2052,
+        1794,
+    ],
+    np.float64,
+)
 # linear, D65 (IEC 61966-2-1)
 XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB (IEC 61966-2-1)
 TABLE = 512  # entries per axis; cv2.remap rounds to 1/32 of an entry
 
 
-def reflectance(melanin: np.ndarray, blood: np.ndarray, oxygen: float = 0.75, scattering: float = 1.0,
-                slope: float = 2.4, chroma: float = 1.0) -> np.ndarray:
+def reflectance(
+    melanin: np.ndarray,
+    blood: np.ndarray,
+    oxygen: float = 0.75,
+    scattering: float = 1.0,
+    slope: float = 2.4,
+    chroma: float = 1.0,
+) -> np.ndarray:
     """Diffuse albedo of melanin and blood, both clipped to the model's range.
 
     Parameters
@@ -68,11 +170,14 @@ def reflectance(melanin: np.ndarray, blood: np.ndarray, oxygen: float = 0.75, sc
     melanin, blood = np.asarray(melanin, np.float32), np.asarray(blood, np.float32)
     x = _position(blood, BLOOD_RANGE).reshape(1, -1)
     y = _position(melanin, MELANIN_RANGE).reshape(1, -1)
-    table = _table(round(float(oxygen), 3), round(float(scattering), 3), round(float(slope), 3),
-                   round(float(chroma), 3))
+    table = _table(
+        round(float(oxygen), 3), round(float(scattering), 3), round(float(slope), 3), round(float(chroma), 3)
+    )
     step = 32000  # cv2.remap takes fewer than 32767 columns
-    parts = [cv2.remap(table, x[:, i:i + step], y[:, i:i + step], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-             for i in range(0, x.size, step)]
+    parts = [
+        cv2.remap(table, x[:, i : i + step], y[:, i : i + step], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        for i in range(0, x.size, step)
+    ]
     return np.concatenate(parts, 1).reshape(*melanin.shape, 3)
 
 
@@ -122,6 +227,7 @@ def _spectrum(melanin: np.ndarray, blood: np.ndarray, oxygen: float, scattering:
 
 def _integrate(spectrum: np.ndarray) -> np.ndarray:
     """Reflectance per wavelength [..., 31] under D65 -> linear sRGB [..., 3]; a white surface gives 1."""
+
     def lobe(centre: float, below: float, above: float) -> np.ndarray:
         return np.exp(-0.5 * ((WAVELENGTHS - centre) * np.where(WAVELENGTHS < centre, below, above)) ** 2)
 

@@ -61,8 +61,13 @@ def sample_sight(stage: LightStage, skin: Skin, rng: np.random.Generator, size: 
     return trace_sight(stage, camera, skin.diffuse, F0 * skin.specular, skin.normal, rng, open_eyes=rng.random() < 0.7)
 
 
-def relight_sight(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: list[np.ndarray] = (),
-                  albedo: np.ndarray | None = None) -> Portrait:
+def relight_sight(
+    sight: Sight,
+    stage: LightStage,
+    rng: np.random.Generator,
+    panoramas: list[np.ndarray] = (),
+    albedo: np.ndarray | None = None,
+) -> Portrait:
     """One picture of a sight under a random light.
 
     Parameters
@@ -74,8 +79,11 @@ def relight_sight(sight: Sight, stage: LightStage, rng: np.random.Generator, pan
     albedo : [P, 3], linear, in place of the sight's
     """
     albedo = sight.albedo if albedo is None else albedo
-    environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
-                   and rng.random() < 0.6 else made_environment(rng))
+    environment = (
+        panorama_environment(panoramas[rng.integers(len(panoramas))], rng)
+        if len(panoramas) and rng.random() < 0.6
+        else made_environment(rng)
+    )
     carried = transport(stage, sight.vertices)
     ambient, shine = _under(environment, sight, stage, carried)
     lamps, colours, reaches = _lamps(environment, sight, rng)
@@ -99,20 +107,28 @@ def relight_sight(sight: Sight, stage: LightStage, rng: np.random.Generator, pan
     shading = images.srgb_to_linear(picture) / np.maximum(truth, 0.004)
     shadow, strong = _shadow(sight, lamps, colours, reaches, ambient)
     bare = 1 - hair
-    return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None],
-                    (images.srgb_to_linear(even) / np.where(head[..., None] > 0, sight.picture(plain), 1)
-                     ).astype(np.float32),
-                    sight.picture(shadow), strong, head * bare, face * bare,
-                    sight.picture(sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")]))
-                    * bare, _fitted(sight, carried, environment, lamps, colours, _tone(sight, albedo) * gains, rng))
+    return Portrait(
+        develop(picture, rng),
+        truth,
+        shading * (head * bare)[..., None],
+        (images.srgb_to_linear(even) / np.where(head[..., None] > 0, sight.picture(plain), 1)).astype(np.float32),
+        sight.picture(shadow),
+        strong,
+        head * bare,
+        face * bare,
+        sight.picture(sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")])) * bare,
+        _fitted(sight, carried, environment, lamps, colours, _tone(sight, albedo) * gains, rng),
+    )
 
 
-def _under(environment: Environment, sight: Sight, stage: LightStage,
-           carried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _under(
+    environment: Environment, sight: Sight, stage: LightStage, carried: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Shading by the environment and its mirror image, [P, 3] each; `carried` is the light transport of the vertices
     seen."""
-    lit = np.concatenate([carried @ environment.radiance,
-                          mirror_environment(stage, sight.vertices, environment.radiance, sight.eye)], 1)
+    lit = np.concatenate(
+        [carried @ environment.radiance, mirror_environment(stage, sight.vertices, environment.radiance, sight.eye)], 1
+    )
     ambient, shine = np.split(sight.at_pixels(lit), 2, 1)
     # the stage's vertices know no pores: these turn to its bright side
     relief = 1 + 0.5 * ((sight.normal - sight.smooth) @ _brightest(environment))[:, None]
@@ -129,7 +145,7 @@ def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> 
     """Up to two lamps beside the environment: unit directions, colours [3] as irradiance over pi, and the share [P] of
     each that arrives."""
     lamps, colours, reach = [], [], []
-    for k in rng.permutation(len(sight.lamps))[:rng.choice([0, 1, 1, 1, 1, 2])]:
+    for k in rng.permutation(len(sight.lamps))[: rng.choice([0, 1, 1, 1, 1, 2])]:
         strength = np.exp(rng.uniform(np.log(0.35), np.log(9.0)))
         warm = rng.normal(0.12, 0.22)
         colour = strength * np.exp([0.6 * warm, rng.normal(0, 0.04), -warm])
@@ -138,8 +154,9 @@ def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> 
         lamp = sight.lamps[k]
         lamps.append(lamp)
         colours.append(colour.astype(np.float32))
-        reach.append(sight.reach[k]
-                     * (1 - cast_gobo(sight.position, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng)))
+        reach.append(
+            sight.reach[k] * (1 - cast_gobo(sight.position, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng))
+        )
     return lamps, colours, reach
 
 
@@ -151,8 +168,9 @@ def with_lips(tone: np.ndarray, albedo: np.ndarray, lips: np.ndarray) -> np.ndar
     return (tone + lips[..., None] * (own - tone)).astype(np.float32)
 
 
-def cast_gobo(position: np.ndarray, lamp: np.ndarray, radius: float, kind: str,
-              rng: np.random.Generator) -> np.ndarray | float:
+def cast_gobo(
+    position: np.ndarray, lamp: np.ndarray, radius: float, kind: str, rng: np.random.Generator
+) -> np.ndarray | float:
     """What leaves, blinds or an edge before a lamp take away of its light.
 
     Parameters
@@ -172,8 +190,9 @@ def cast_gobo(position: np.ndarray, lamp: np.ndarray, radius: float, kind: str,
     right = np.cross(lamp, [0.0, 0.0, 1.0] if abs(lamp[2]) < 0.9 else [1.0, 0.0, 0.0])
     right /= np.linalg.norm(right)
     away = rng.uniform(0.1, 0.8)
-    return draw_sheet(position @ right, position @ np.cross(right, lamp), max(2 * away * min(radius, 0.03), 4e-4), kind,
-                      rng)
+    return draw_sheet(
+        position @ right, position @ np.cross(right, lamp), max(2 * away * min(radius, 0.03), 4e-4), kind, rng
+    )
 
 
 def _fresnel(sight: Sight) -> np.ndarray:
@@ -223,8 +242,9 @@ def _background(environment: Environment, sight: Sight, light: float, rng: np.ra
     for scale in (4, 9, 24):
         bright = rng.normal(0, 0.35, (scale, scale, 1))
         blobs = np.exp(bright + rng.normal(0, 0.12, (scale, scale, 3))).astype(np.float32)
-        blobs = cv2.resize(blobs, (sight.size,) * 2,
-                           interpolation=int(rng.choice([cv2.INTER_CUBIC, cv2.INTER_NEAREST])))
+        blobs = cv2.resize(
+            blobs, (sight.size,) * 2, interpolation=int(rng.choice([cv2.INTER_CUBIC, cv2.INTER_NEAREST]))
+        )
         ground = ground * np.clip(blobs, 0.1, 5)
     return ground * np.float32(light)
 
@@ -236,8 +256,9 @@ def _haired(picture: np.ndarray, sight: Sight, rng: np.random.Generator) -> tupl
     columns = sight.pixel % sight.size
     top, left, right = np.quantile(rows, 0.01), np.quantile(columns, 0.02), np.quantile(columns, 0.98)
     height = np.quantile(rows, 0.98) - top
-    colour = np.clip(np.array([0.13, 0.09, 0.07]) * np.exp(rng.normal(0.2, 0.9)) * np.exp(rng.normal(0, 0.15, 3)), 0,
-                     0.8)
+    colour = np.clip(
+        np.array([0.13, 0.09, 0.07]) * np.exp(rng.normal(0.2, 0.9)) * np.exp(rng.normal(0, 0.15, 3)), 0, 0.8
+    )
     drawn, cover, out = picture.copy(), np.zeros(picture.shape[:2], np.uint8), picture
     fringe, sides = rng.uniform(0.05, 0.35), rng.uniform(0.1, 0.9)
     for _ in range(int(rng.integers(150, 500))):
@@ -267,11 +288,20 @@ def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.n
     return (lost / strength.sum()).astype(np.float32), float(strength.sum() / (strength.sum() + ambient.mean()))
 
 
-def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: list, colours: list, tone: np.ndarray,
-            rng: np.random.Generator) -> FittedLight:
+def _fitted(
+    sight: Sight,
+    carried: np.ndarray,
+    environment: Environment,
+    lamps: list,
+    colours: list,
+    tone: np.ndarray,
+    rng: np.random.Generator,
+) -> FittedLight:
     transfer = sight.at_pixels(carried @ BASIS.astype(np.float32))
-    shining = [LampOnHead(lamp, colour, sight.reach[np.argmax(sight.lamps @ lamp)])
-               for lamp, colour in zip(lamps, colours, strict=True)]
+    shining = [
+        LampOnHead(lamp, colour, sight.reach[np.argmax(sight.lamps @ lamp)])
+        for lamp, colour in zip(lamps, colours, strict=True)
+    ]
     return fitted_light(transfer, sight.smooth, shining, environment, tone, rng)
 
 

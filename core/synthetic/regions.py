@@ -14,8 +14,30 @@ from .canvas import Canvas
 
 JAW = [132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361]
 MOUSTACHE = [92, 165, 167, 164, 393, 391, 322]
-LOWER_CHEEK = [214, 434, 192, 416, 213, 433, 147, 376, 135, 364, 169, 394, 210, 430, 211, 431, 138, 367, 215, 435, 177,
-               401]
+LOWER_CHEEK = [
+    214,
+    434,
+    192,
+    416,
+    213,
+    433,
+    147,
+    376,
+    135,
+    364,
+    169,
+    394,
+    210,
+    430,
+    211,
+    431,
+    138,
+    367,
+    215,
+    435,
+    177,
+    401,
+]
 GOATEE = [18, 200, 199, 201, 421, 204, 424, 202, 422, 212, 432, 57, 287, 43, 273, 83, 313]
 LIDS = [33, 7, 163, 144, 145, 153, 154, 155, 133], [362, 382, 381, 380, 374, 373, 390, 249, 263]
 SIDEBURNS = [127, 234, 93, 356, 454, 323]
@@ -40,12 +62,17 @@ def regions(on: Canvas) -> dict[str, np.ndarray]:
         for name, radius in (("lips", 0.7), ("brows", 1.5), ("ears", 4.0), ("neck", 12.0), ("scalp", 8.0)):
             on.cache[name] = _softened(on, name, radius)
         chin_down = np.array([0, 14.0, -22.0])
-        beard = on.soft(lambda points: 1 - (1 - 0.95 * _around(points, on.landmarks[JAW], 14))
-                        * (1 - _around(points, on.landmarks[MOUSTACHE], 5.5))
-                       * (1 - 0.95 * _around(points, on.landmarks[GOATEE], 7))
-                        * (1 - 0.8 * _around(points, on.landmarks[SIDEBURNS], 8))
-                       * (1 - 0.9 * _around(points, on.landmarks[LOWER_CHEEK], 8))
-                       * (1 - 0.85 * _around(points, on.landmarks[JAW[3:-3]] + chin_down, 16)))
+        beard = on.soft(
+            lambda points: (
+                1
+                - (1 - 0.95 * _around(points, on.landmarks[JAW], 14))
+                * (1 - _around(points, on.landmarks[MOUSTACHE], 5.5))
+                * (1 - 0.95 * _around(points, on.landmarks[GOATEE], 7))
+                * (1 - 0.8 * _around(points, on.landmarks[SIDEBURNS], 8))
+                * (1 - 0.9 * _around(points, on.landmarks[LOWER_CHEEK], 8))
+                * (1 - 0.85 * _around(points, on.landmarks[JAW[3:-3]] + chin_down, 16))
+            )
+        )
         on.cache["beard"] = beard * (1 - on.cache["lips"]) * (1 - on.cache["ears"]) * (1 - on.cache["scalp"])
         on.cache["oily"] = np.clip(on.cache["nose"] + 0.8 * on.cache["forehead"] + 0.5 * on.cache["chin"], 0, 1)
         on.cache["bald"] = (1 - np.clip(on.cache["scalp"] + on.cache["brows"], 0, 1)) * (1 - on.cache["lips"])
@@ -60,14 +87,27 @@ def creases(on: Canvas, rng: np.random.Generator) -> list[tuple[np.ndarray, floa
 
     def add(points: np.ndarray, width: float, depth: float, begins: float) -> None:
         wobble = rng.normal(0, 1.2, points.shape) * [1, 0, 1]
-        lines.append((_curve(points + wobble), width * rng.uniform(0.8, 1.3), depth * rng.uniform(0.6, 1.4),
-                      begins + rng.normal(0, 6)))
+        lines.append(
+            (
+                _curve(points + wobble),
+                width * rng.uniform(0.8, 1.3),
+                depth * rng.uniform(0.6, 1.4),
+                begins + rng.normal(0, 6),
+            )
+        )
 
     for share in (0.25, 0.45, 0.65, 0.85):  # across the forehead
-        add(np.stack([at[low] + share * (at[high] - at[low])
-                      for low, high in ((70, 54), (105, 103), (107, 109), (9, 10), (336, 338), (334, 332),
-                                        (300, 284))]),
-            1.6, 0.25, 34)
+        add(
+            np.stack(
+                [
+                    at[low] + share * (at[high] - at[low])
+                    for low, high in ((70, 54), (105, 103), (107, 109), (9, 10), (336, 338), (334, 332), (300, 284))
+                ]
+            ),
+            1.6,
+            0.25,
+            34,
+        )
     for side in ((129, 203, 206, 216, 212), (358, 423, 426, 436, 432)):  # beside the nose and mouth
         add(at[list(side)], 2.4, 0.35, 30)
     for side in ((61, 202, 204), (291, 422, 424)):  # below the corners of the mouth

@@ -62,8 +62,9 @@ def add_camera(scene: bpy.types.Scene, job: dict) -> bpy.types.Object:
     return camera
 
 
-def render_frames(scene: bpy.types.Scene, camera: bpy.types.Object, job: dict,
-                  place: Callable[[int], None] = lambda number: None) -> None:
+def render_frames(
+    scene: bpy.types.Scene, camera: bpy.types.Object, job: dict, place: Callable[[int], None] = lambda number: None
+) -> None:
     """Renders the job's frames that do not exist yet.
 
     Parameters

@@ -55,14 +55,26 @@ def main() -> None:
     options = parser.parse_args()
     wanted = [int(n) for n in options.only.split(",")] if options.only else list(range(options.frames))
     skin = make_skin(sample_parameters(options.seed), MAPS)
-    render_frames(options.work, options.seed, skin,
-                  scene.Shot(scene.camera_path(options.seed, options.frames), wanted, options.samples))
+    render_frames(
+        options.work,
+        options.seed,
+        skin,
+        scene.Shot(scene.camera_path(options.seed, options.frames), wanted, options.samples),
+    )
     if not options.only:
         write_sample(options.out, options.work, options.seed, skin, options.frames)
 
 
-def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: bool = True,
-                  light: scene.SceneLight | None = None, suffix: str = ".png", head: Mesh | None = None) -> None:
+def render_frames(
+    work: Path,
+    seed: int,
+    skin: Skin,
+    shot: scene.Shot,
+    leaves: bool = True,
+    light: scene.SceneLight | None = None,
+    suffix: str = ".png",
+    head: Mesh | None = None,
+) -> None:
     """Renders a bald subject to work/NNNNN.png by Cycles in a process of its own; files that exist are kept.
 
     Parameters
@@ -89,18 +101,33 @@ def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: b
     images.write_srgb(work / "diffuse.png", images.linear_to_srgb(skin.diffuse), bits=16)
     images.write_data(work / "specular.png", skin.specular, bits=16)
     images.write_data(work / "normal.png", skin.normal / 2 + 0.5, bits=16)
-    write_json(work / "job.json", {
-        "seed": seed, "room": shot.room, "head": str(work / "head.obj"),
-        "leaves": str(work / "leaves.obj") if light.blockers else None,
-        "suffix": suffix, "out": str(work), "frames": shot.frames, "samples": shot.samples,
-        "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")},
-        "cameras": shot.cameras.tolist(),
-        "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
-        "lamps": [asdict(lamp) for lamp in light.lamps], "flash": light.flash,
-        "width": round(scene.WIDTH * shot.scale), "height": round(scene.HEIGHT * shot.scale),
-        "focal_px": scene.FOCAL * shot.scale})
-    subprocess.run([sys.executable, "-m", "core.synthetic.render", str(work / "job.json")],
-                   cwd=Path(__file__).parents[2], check=True)
+    write_json(
+        work / "job.json",
+        {
+            "seed": seed,
+            "room": shot.room,
+            "head": str(work / "head.obj"),
+            "leaves": str(work / "leaves.obj") if light.blockers else None,
+            "suffix": suffix,
+            "out": str(work),
+            "frames": shot.frames,
+            "samples": shot.samples,
+            "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")},
+            "cameras": shot.cameras.tolist(),
+            "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None,
+            "sky": sky,
+            "lamps": [asdict(lamp) for lamp in light.lamps],
+            "flash": light.flash,
+            "width": round(scene.WIDTH * shot.scale),
+            "height": round(scene.HEIGHT * shot.scale),
+            "focal_px": scene.FOCAL * shot.scale,
+        },
+    )
+    subprocess.run(
+        [sys.executable, "-m", "core.synthetic.render", str(work / "job.json")],
+        cwd=Path(__file__).parents[2],
+        check=True,
+    )
 
 
 def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> None:
@@ -116,9 +143,17 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
     """
     out.mkdir(parents=True, exist_ok=True)
     cameras = scene.camera_path(seed, frames)
-    write_json(out / "cameras.json",
-               {"name": "sample", "light": "sun", "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
-                "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
+    write_json(
+        out / "cameras.json",
+        {
+            "name": "sample",
+            "light": "sun",
+            "focal_px": scene.FOCAL,
+            "width": scene.WIDTH,
+            "height": scene.HEIGHT,
+            "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)],
+        },
+    )
     write_video(out / "capture.mp4", (images.read_srgb(work / f"{k:05d}.png") for k in range(frames)))
     head, sun = subject_mesh(seed), scene.sun_of(seed)
     opaque = joined([head, scene.strew_leaves(seed, sun)])
@@ -128,8 +163,9 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
         name = f"{frame:04d}.png"
         for folder in ("albedo", "face", "shadow"):
             (out / folder).mkdir(exist_ok=True)
-        images.write_srgb(out / "albedo" / name, np.concatenate([images.linear_to_srgb(albedo), alpha[..., None]], -1),
-                          small=True)
+        images.write_srgb(
+            out / "albedo" / name, np.concatenate([images.linear_to_srgb(albedo), alpha[..., None]], -1), small=True
+        )
         images.write_data(out / "face" / name, face.astype(np.float32))
         images.write_data(out / "shadow" / name, shadow.astype(np.float32))
         total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
@@ -147,13 +183,15 @@ def view_of(matrix: np.ndarray, scale: float = 1.0) -> View:
     """A Blender camera-to-world matrix [4, 4] (looks along -z, y up) as a view; `scale`: of the picture's size."""
     rotation = np.diag([1, -1, -1]) @ matrix[:3, :3].T
     width, height, focal = round(scene.WIDTH * scale), round(scene.HEIGHT * scale), scene.FOCAL * scale
-    camera = pycolmap.Camera(camera_id=1, model="PINHOLE", width=width, height=height,
-                             params=[focal, focal, width / 2, height / 2])
+    camera = pycolmap.Camera(
+        camera_id=1, model="PINHOLE", width=width, height=height, params=[focal, focal, width / 2, height / 2]
+    )
     return View("", Path(), camera, rotation, -rotation @ matrix[:3, 3], True)
 
 
-def trace_frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None,
-                      over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def trace_frame_truth(
+    head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None, over: int = 2
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """What is true of a frame.
 
     Parameters

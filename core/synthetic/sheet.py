@@ -24,7 +24,7 @@ def main() -> None:
     out, seeds = Path(sys.argv[1]), [int(seed) for seed in sys.argv[2:]] or SEEDS
     with tempfile.TemporaryDirectory(prefix="wildcap_sheet_") as folder:
         tiles = [portrait(seed, Path(folder) / str(seed)) for seed in seeds]
-    rows = [np.concatenate(tiles[k:k + COLUMNS], 1) for k in range(0, len(tiles), COLUMNS)]
+    rows = [np.concatenate(tiles[k : k + COLUMNS], 1) for k in range(0, len(tiles), COLUMNS)]
     images.write_srgb(out, np.concatenate(rows))
 
 
@@ -42,10 +42,11 @@ def portrait(seed: int, work: Path, scale: float = 0.5) -> np.ndarray:
         back,
         scene.DISTANCE * 1.05 * back + [0, 0, -0.02],
     )
-    render_frames(work, seed, make_skin(sample_parameters(seed), 1024), scene.Shot(camera[None], [0], 24, scale),
-                  leaves=False)
+    render_frames(
+        work, seed, make_skin(sample_parameters(seed), 1024), scene.Shot(camera[None], [0], 24, scale), leaves=False
+    )
     picture = images.read_srgb(work / "00000.png")
-    return picture[picture.shape[0] // 12:-picture.shape[0] // 6]
+    return picture[picture.shape[0] // 12 : -picture.shape[0] // 6]
 
 
 if __name__ == "__main__":

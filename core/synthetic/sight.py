@@ -65,8 +65,9 @@ class Sight:
     def at_pixels(self, vertex_values: np.ndarray) -> np.ndarray:
         """Values of the seen vertices [N, C] at the pixels, float32 [P, C]."""
         count = len(self.pixel)
-        around = csr_matrix((self.bary.ravel(), self.corner.ravel(), np.arange(0, 3 * count + 1, 3)),
-                            (count, len(self.vertices)))
+        around = csr_matrix(
+            (self.bary.ravel(), self.corner.ravel(), np.arange(0, 3 * count + 1, 3)), (count, len(self.vertices))
+        )
         return (around @ np.asarray(vertex_values, np.float32)).astype(np.float32, copy=False)
 
     def picture(self, pixel_values: np.ndarray, empty: float = 0.0) -> np.ndarray:
@@ -94,8 +95,12 @@ def random_camera(landmarks: np.ndarray, size: int, rng: np.random.Generator) ->
     side = (high - low).max() * np.exp(rng.uniform(np.log(1.25), np.log(2.0)))
     centre = (low + high) / 2 + rng.uniform(-0.1, 0.1, 2) * side
     focal = size / side
-    camera = pycolmap.Camera(model="PINHOLE", width=size, height=size,
-                             params=[focal, focal, size / 2 - centre[0] * focal, size / 2 - centre[1] * focal])
+    camera = pycolmap.Camera(
+        model="PINHOLE",
+        width=size,
+        height=size,
+        params=[focal, focal, size / 2 - centre[0] * focal, size / 2 - centre[1] * focal],
+    )
     return View("", Path(), camera, rotation, np.array([0, 0, distance]) - rotation @ middle, True)
 
 
@@ -104,8 +109,15 @@ def landmarks_of(stage: LightStage) -> np.ndarray:
     return template.landmark_points(stage.mesh)
 
 
-def trace_sight(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, relief: np.ndarray,
-                rng: np.random.Generator, open_eyes: bool = True) -> Sight:
+def trace_sight(
+    stage: LightStage,
+    view: View,
+    diffuse: np.ndarray,
+    gloss: np.ndarray,
+    relief: np.ndarray,
+    rng: np.random.Generator,
+    open_eyes: bool = True,
+) -> Sight:
     """A head through a camera.
 
     Parameters
@@ -136,15 +148,27 @@ def trace_sight(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.nd
     if open_eyes:
         _open_eyes(stage, view, hit, albedo, shine, masks, rng)
     lamps, radius = _random_lamps(rng)
-    reach = np.stack([trace_sun(caster, position, smooth, lamp, r, RAYS, rng)
-                      for lamp, r in zip(lamps, radius, strict=True)])
-    y, x = np.mgrid[0:view.height, 0:view.width]
+    reach = np.stack(
+        [trace_sun(caster, position, smooth, lamp, r, RAYS, rng) for lamp, r in zip(lamps, radius, strict=True)]
+    )
+    y, x = np.mgrid[0 : view.height, 0 : view.width]
     rays = view.rays(np.stack([x.ravel(), y.ravel()], -1) + 0.5).reshape(view.height, view.width, 3)
     vertices, local = np.unique(corner, return_inverse=True)
     single = [np.asarray(pixels, np.float32) for pixels in (bary, albedo, shine, normal, smooth, position)]
-    return Sight(view.width, np.flatnonzero(hit).astype(np.int32), vertices.astype(np.int32),
-                 local.reshape(corner.shape).astype(np.int32), *single,
-                 view.centre, view.rotation, rays.astype(np.float32), masks.astype(np.float32), lamps, radius, reach)
+    return Sight(
+        view.width,
+        np.flatnonzero(hit).astype(np.int32),
+        vertices.astype(np.int32),
+        local.reshape(corner.shape).astype(np.int32),
+        *single,
+        view.centre,
+        view.rotation,
+        rays.astype(np.float32),
+        masks.astype(np.float32),
+        lamps,
+        radius,
+        reach,
+    )
 
 
 def save(path: Path, sight: Sight) -> None:
@@ -167,8 +191,9 @@ def load(path: Path) -> Sight:
 def full(sight: Sight) -> Sight:
     """A loaded sight in single precision."""
     arrays = {f.name: getattr(sight, f.name) for f in fields(Sight)}
-    arrays |= {name: value.astype(np.float32) for name, value in arrays.items()
-               if getattr(value, "dtype", None) == np.float16}
+    arrays |= {
+        name: value.astype(np.float32) for name, value in arrays.items() if getattr(value, "dtype", None) == np.float16
+    }
     arrays["reach"] = sight.reach.astype(np.float32) / 255 if sight.reach.dtype == np.uint8 else sight.reach
     return Sight(**arrays)
 
@@ -195,8 +220,15 @@ def _tangents(stage: LightStage) -> np.ndarray:
     return _unit((first * v[:, 1:] - second * u[:, 1:]) / np.where(np.abs(area) < 1e-12, 1, area)[:, None])
 
 
-def _open_eyes(stage: LightStage, view: View, hit: np.ndarray, albedo: np.ndarray, gloss: np.ndarray, masks: np.ndarray,
-               rng: np.random.Generator) -> None:
+def _open_eyes(
+    stage: LightStage,
+    view: View,
+    hit: np.ndarray,
+    albedo: np.ndarray,
+    gloss: np.ndarray,
+    masks: np.ndarray,
+    rng: np.random.Generator,
+) -> None:
     """Draws sclera, iris, pupil and lash line between the corners of each eye that faces the camera, into arrays of the
     pixels hit."""
     points, _ = view.project(landmarks_of(stage))
@@ -218,8 +250,12 @@ def _open_eyes(stage: LightStage, view: View, hit: np.ndarray, albedo: np.ndarra
         cv2.polylines(lash, [np.round(upper * 8).astype(np.int32)], False, 1, max(1, round(0.05 * width)), shift=3)
         ring = _disc(hit.shape, at, 0.20 * width) & lid
         pupil = _disc(hit.shape, at, rng.uniform(0.07, 0.1) * width) & lid
-        for where, colour in ((lid, [0.36, 0.29, 0.26]), (ring, iris), (pupil, [0.01, 0.01, 0.01]),
-                              (lash > 0, [0.03, 0.022, 0.018])):
+        for where, colour in (
+            (lid, [0.36, 0.29, 0.26]),
+            (ring, iris),
+            (pupil, [0.01, 0.01, 0.01]),
+            (lash > 0, [0.03, 0.022, 0.018]),
+        ):
             albedo[where[hit]] = colour
         gloss[lid[hit]] = 0.035
         drawn = (lid | (lash > 0))[hit]
@@ -233,7 +269,7 @@ def _filled(shape: tuple[int, int], outline: np.ndarray) -> np.ndarray:
 
 
 def _disc(shape: tuple[int, int], centre: np.ndarray, radius: float) -> np.ndarray:
-    y, x = np.mgrid[0:shape[0], 0:shape[1]]
+    y, x = np.mgrid[0 : shape[0], 0 : shape[1]]
     return (x - centre[0]) ** 2 + (y - centre[1]) ** 2 < radius**2
 
 

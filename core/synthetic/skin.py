@@ -45,8 +45,13 @@ def make_skin(parameters: SkinParameters | int, size: int = 1024) -> Skin:
     return paint_skin(parameters, canvas(size), canvas(GROUND))
 
 
-def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas,
-               traits: tuple[np.ndarray, np.ndarray] | None = None, hair: bool = True) -> Skin:
+def paint_skin(
+    parameters: SkinParameters,
+    on: Canvas,
+    ground: Canvas,
+    traits: tuple[np.ndarray, np.ndarray] | None = None,
+    hair: bool = True,
+) -> Skin:
     """`make_skin` on any canvas.
 
     Parameters
@@ -73,35 +78,59 @@ def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas,
 
     diffuse = pigment.reflectance(melanin, blood, p.oxygen, p.scattering, p.slope, p.chroma)
     diffuse = diffuse * (1 - 0.07 * np.clip(hollow, 0, 1))[:, None]
-    diffuse = adornment.put_on_make_up(diffuse, area, adornment.lid_distance(on), p.make_up,
-                                       np.random.default_rng([p.adorn_seed, 11]))
+    diffuse = adornment.put_on_make_up(
+        diffuse, area, adornment.lid_distance(on), p.make_up, np.random.default_rng([p.adorn_seed, 11])
+    )
     specular = _specular(parameters, on, area, hollow, dry)
     if hair:
         cover, diffuse = _hair(parameters, on, ground, area, diffuse)
         specular, height = specular * (1 - 0.55 * cover), height + 0.05 * cover
-    return Skin(on.spread(np.clip(diffuse, 0, 1)), on.spread(specular), on.spread(height.astype(np.float32)),
-                on.spread(normals(height, on)), on.covered)
+    return Skin(
+        on.spread(np.clip(diffuse, 0, 1)),
+        on.spread(specular),
+        on.spread(height.astype(np.float32)),
+        on.spread(normals(height, on)),
+        on.covered,
+    )
 
 
 def _pigments(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Melanin and blood fractions [N] from tone, regions and variation at all scales, without marks."""
     rng = np.random.default_rng([p.tone_seed, 1])
     flush = p.redness
-    blood = (flush
-             * (0.55 * area["cheeks"] + 0.70 * area["nose"] + 0.55 * area["ears"] + 0.35 * area["chin"] + 0.30
-                * area["eyelids"])
-             - 0.25 * area["forehead"] - 0.20 * area["mouth_surround"] + 0.15 * area["under_eyes"] - 0.10
-             * area["neck"])
-    melanin = (0.12 * area["forehead"] + p.eye_circles * min(1.0, _contrast(p))
-               * (0.40 * area["under_eyes"] + 0.25 * area["sockets"] + 0.25 * area["eyelids"])
-               - 0.15 * area["neck"] - 0.12 * area["cheeks"] + 0.10 * area["mouth_surround"])
-    slow = [on.soft(lambda points, wavelengths=w: octaves(points, wavelengths, rng, smooth=True))
-            for w in ([60.0, 30.0], [55.0, 22.0], [9.0], [12.0, 7.0])]
+    blood = (
+        flush
+        * (
+            0.55 * area["cheeks"]
+            + 0.70 * area["nose"]
+            + 0.55 * area["ears"]
+            + 0.35 * area["chin"]
+            + 0.30 * area["eyelids"]
+        )
+        - 0.25 * area["forehead"]
+        - 0.20 * area["mouth_surround"]
+        + 0.15 * area["under_eyes"]
+        - 0.10 * area["neck"]
+    )
+    melanin = (
+        0.12 * area["forehead"]
+        + p.eye_circles
+        * min(1.0, _contrast(p))
+        * (0.40 * area["under_eyes"] + 0.25 * area["sockets"] + 0.25 * area["eyelids"])
+        - 0.15 * area["neck"]
+        - 0.12 * area["cheeks"]
+        + 0.10 * area["mouth_surround"]
+    )
+    slow = [
+        on.soft(lambda points, wavelengths=w: octaves(points, wavelengths, rng, smooth=True))
+        for w in ([60.0, 30.0], [55.0, 22.0], [9.0], [12.0, 7.0])
+    ]
     fine = [octaves(on.position, wavelengths, rng) for wavelengths in ([3.2, 1.7], [4.5, 2.2], [0.8])]
     grain = noise(on.position, 0.5, rng)
     contrast = p.blotches * _contrast(p)
-    melanin = melanin + contrast * (0.11 * slow[0] + 0.06 * slow[2] + p.mottling
-                                    * (0.055 * fine[0] + 0.05 * fine[2] + 0.03 * grain))
+    melanin = melanin + contrast * (
+        0.11 * slow[0] + 0.06 * slow[2] + p.mottling * (0.055 * fine[0] + 0.05 * fine[2] + 0.03 * grain)
+    )
     blood = blood + p.blotches * (0.14 * slow[1] + 0.10 * slow[3] + p.mottling * (0.10 * fine[1] + 0.06 * fine[2]))
     lips = np.clip(area["lips"] * (1 + 0.15 * slow[2]), 0, 1)
     melanin = melanin + lips * np.log(p.lip_melanin)
@@ -115,14 +144,19 @@ def _contrast(p: SkinParameters) -> float:
     return (0.05 / (p.melanin + 0.02)) ** 0.4
 
 
-def _relief(p: SkinParameters, on: Canvas, ground: Canvas,
-            area: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _relief(
+    p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Height [N] in mm, how deep in a pore or crease each texel lies [N] in [0, 1.5], and how rough it is [N] of
     deviation 1."""
     rng = np.random.default_rng([p.pore_seed, 2])
     here, age = regions(ground), np.clip((p.age - 20) / 50, 0, 1)
-    density = 0.55 * (0.35 + here["nose"] + 0.8 * here["cheeks"] + 0.5 * here["forehead"] + 0.5
-                      * here["chin"]) * here["bald"] * (1 - 0.7 * here["neck"])
+    density = (
+        0.55
+        * (0.35 + here["nose"] + 0.8 * here["cheeks"] + 0.5 * here["forehead"] + 0.5 * here["chin"])
+        * here["bald"]
+        * (1 - 0.7 * here["neck"])
+    )
     points, texel = strew(ground, density, rng)
     size = p.pores * rng.lognormal(0, 0.3, len(points)) * (0.7 + 0.5 * here["nose"] + 0.35 * here["cheeks"])[texel]
     pores = splat_spots(on, points, 0.16 * size, np.clip(0.9 * size, 0, 1.4))
@@ -161,8 +195,12 @@ def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, n
     room = here["bald"] * (1 - here["ears"])
     sunny = np.clip(here["cheeks"] + here["nose"] + 0.35 * here["forehead"] + 0.05, 0, 1)
     points, _ = strew(ground, 0.22 * p.freckles * sunny * room, rng)
-    freckles = splat_spots(on, points, rng.lognormal(np.log(0.40), 0.35, len(points)),
-                           p.freckle_contrast * _contrast(p) * rng.uniform(0.3, 1.0, len(points)))
+    freckles = splat_spots(
+        on,
+        points,
+        rng.lognormal(np.log(0.40), 0.35, len(points)),
+        p.freckle_contrast * _contrast(p) * rng.uniform(0.3, 1.0, len(points)),
+    )
     points, _ = strew(ground, p.moles * room / float((ground.area * room).sum()), rng)
     radius = np.clip(rng.lognormal(np.log(0.75), 0.45, len(points)), 0.4, 2.5)
     # a dark stain needs more melanin on light skin; raised ones are often paler
@@ -173,8 +211,9 @@ def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, n
     return np.maximum(freckles, stain), dome
 
 
-def _hair(p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndarray],
-          diffuse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _hair(
+    p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndarray], diffuse: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Cover of all hair [N], and the diffuse albedo with it."""
     rng, here = np.random.default_rng([p.hair_seed, 4]), regions(ground)
     colour, brow_colour = np.asarray(p.hair_colour, np.float32), np.asarray(p.brow_colour, np.float32)
@@ -195,8 +234,9 @@ def _hair(p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndar
     return 1 - (1 - eyebrow) * (1 - other[:, 0]), diffuse
 
 
-def _specular(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray], hollow: np.ndarray,
-              dry: np.ndarray) -> np.ndarray:
+def _specular(
+    p: SkinParameters, on: Canvas, area: dict[str, np.ndarray], hollow: np.ndarray, dry: np.ndarray
+) -> np.ndarray:
     rng = np.random.default_rng([p.pore_seed, 5])
     slow = on.soft(lambda at: octaves(at, [35.0, 12.0], rng, smooth=True))
     level = (

@@ -30,8 +30,9 @@ def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tupl
     return here + (steps * share).sum(1), texel
 
 
-def splat_spots(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray,
-                blend=np.maximum) -> np.ndarray:
+def splat_spots(
+    on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, blend=np.maximum
+) -> np.ndarray:
     """Bell-shaped spots. A radius below the texel's size becomes the texel's size, with the strength lowered by the
     same share of area.
 
@@ -57,8 +58,14 @@ def splat_spots(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np
     return out
 
 
-def splat_patches(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, rng: np.random.Generator,
-                  ragged: float = 0.25) -> tuple[np.ndarray, np.ndarray]:
+def splat_patches(
+    on: Canvas,
+    points: np.ndarray,
+    radius: np.ndarray,
+    strength: np.ndarray,
+    rng: np.random.Generator,
+    ragged: float = 0.25,
+) -> tuple[np.ndarray, np.ndarray]:
     """Flat spots with a ragged edge (a mole's stain), and their dome.
 
     Parameters
@@ -80,8 +87,12 @@ def splat_patches(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: 
         edge = noise(on.position[texel], 1.3, rng, smooth=True) if len(texel) else np.zeros(0)
         inward = 1 - distance / radius[point] + ragged * 0.5 * edge
         softness = 0.25 + 0.25 / np.maximum(radius[point], 0.3)
-        np.maximum.at(stain, texel,
-                      (strength[point] * np.clip(inward / softness + 0.3, 0, 1) * (1 + 0.12 * edge)).astype(np.float32))
-        np.maximum.at(dome, texel,
-                      (strength[point] * np.clip(1 - (distance / radius[point]) ** 2, 0, 1)).astype(np.float32))
+        np.maximum.at(
+            stain,
+            texel,
+            (strength[point] * np.clip(inward / softness + 0.3, 0, 1) * (1 + 0.12 * edge)).astype(np.float32),
+        )
+        np.maximum.at(
+            dome, texel, (strength[point] * np.clip(1 - (distance / radius[point]) ** 2, 0, 1)).astype(np.float32)
+        )
     return stain, dome

@@ -57,8 +57,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     covered = surface.covered_at(size)
     built = build(observations, surface, settings, report, size)
     if built.confidence[covered].max(initial=0) <= 0:
-        raise Problem("No delit frame sees the head.",
-                      "Check the cameras' and the head's pictures in the report, and run those stages again.")
+        raise Problem(
+            "No delit frame sees the head.",
+            "Check the cameras' and the head's pictures in the report, and run those stages again.",
+        )
     texture = fill(np.exp(built.log_texture), built.confidence, covered)
 
     images.write_linear(capture.texture, texture)
@@ -66,15 +68,17 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     images.write_data(capture.texture_confidence, built.confidence)
     remove_file(capture.texture_parts)
     if shown.judged.any():
-        images.write_data(capture.texture_parts, shown.shares[..., :len(GROWTHS)])
+        images.write_data(capture.texture_parts, shown.shares[..., : len(GROWTHS)])
     _leave_figures(capture, report, observations, built, texture, covered)
     detail = fine_detail(observations, surface, size, report)
     remove_file(capture.texture_detail)
     if detail is not None:
         images.write_data(capture.texture_detail, detail)
         report.figure("fine_detail_size_px", len(detail))
-        report.figure("fine_detail_agreed_percent",
-                      round(100 * float(detail[..., 1][detail[..., 1] > 0].mean()), 1) if detail[..., 1].any() else 0.0)
+        report.figure(
+            "fine_detail_agreed_percent",
+            round(100 * float(detail[..., 1][detail[..., 1] > 0].mean()), 1) if detail[..., 1].any() else 0.0,
+        )
     lit = filmed(observations, surface.covered, size, report)
     remove_file(capture.texture_filmed)
     if lit is not None:
@@ -93,8 +97,9 @@ class Built:
     losses: dict
 
 
-def observe_all(capture: Capture, head: Head, size: int,
-                report: Reporter) -> tuple[list[UnwrappedView], Unfolded, PartsShown]:
+def observe_all(
+    capture: Capture, head: Head, size: int, report: Reporter
+) -> tuple[list[UnwrappedView], Unfolded, PartsShown]:
     """What each delit view sees of the head, the frame's own sharpness counted, and which parts of the person they
     show.
 
@@ -113,14 +118,17 @@ def observe_all(capture: Capture, head: Head, size: int,
     frames = read_frames(capture).by_name
     views = delit_views(capture)
     if not views:
-        raise Problem("There is no delit frame of a registered view.",
-                      "Run the stage Delight, or put pictures named like the frames into the delighter's folder.")
+        raise Problem(
+            "There is no delit frame of a registered view.",
+            "Run the stage Delight, or put pictures named like the frames into the delighter's folder.",
+        )
     report.progress(0, len(views) + 6, "unfolding the head")
     surface = head.unfold(size)
     best = max(frames[view.name].sharpness for view, _ in views) or 1.0
     middle = surface.points.mean(0)
-    pixel_m = float(np.median([np.linalg.norm(view.centre - middle) / view.camera.mean_focal_length()
-                               for view, _ in views]))
+    pixel_m = float(
+        np.median([np.linalg.norm(view.centre - middle) / view.camera.mean_focal_length() for view, _ in views])
+    )
     observations = []
     for i, (view, path) in enumerate(views):
         report.progress(i, len(views) + 6, f"projecting {view.name}")
@@ -139,8 +147,14 @@ def _delit(path: Path, view: View) -> HeldPicture:
     return picture
 
 
-def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settings, report: Reporter,
-          size: int | None = None, aligned: bool = True) -> Built:
+def build(
+    observations: list[UnwrappedView],
+    surface: Unfolded,
+    settings: Settings,
+    report: Reporter,
+    size: int | None = None,
+    aligned: bool = True,
+) -> Built:
     """One map from what the views see.
 
     Parameters
@@ -175,8 +189,9 @@ def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settin
 
         features = load_features(settings.texture.perceptual_network, settings.compute_device)
         wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5 if built_in else True)
-        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual,
-                                     report)
+        log_texture, losses = refine(
+            log_texture, observations, surface, wanted, features, settings.texture.perceptual, report
+        )
         report.figure("perceptual_network", features.name)
     return Built(log_texture, confidence, gains, shift, losses)
 
@@ -184,8 +199,10 @@ def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settin
 def _leave_figures(capture, report, observations, built, texture, covered):
     log_texture, confidence = built.log_texture, built.confidence
     height = min(512, len(texture))
-    sheet = [images.resize(images.linear_to_srgb(texture), height, height),
-             np.repeat(images.resize(confidence, height, height)[..., None], 3, 2)]
+    sheet = [
+        images.resize(images.linear_to_srgb(texture), height, height),
+        np.repeat(images.resize(confidence, height, height)[..., None], 3, 2),
+    ]
     images.write_srgb(capture.picture("texture", "map_and_confidence"), np.hstack(sheet))
     small = images.resize(log_texture, *observations[0].weight.shape)
     residuals = [np.abs(o.log_colour - small)[o.weight > 0.25 * o.weight.max()].ravel()[::16] for o in observations]
@@ -195,9 +212,10 @@ def _leave_figures(capture, report, observations, built, texture, covered):
     report.figure("disagreement_percent", round(100 * float(np.median(np.concatenate(residuals))), 2))
     report.figure("alignment_shift_texels", round(built.shift, 2))
     report.figure("gain_spread_percent", round(100 * float(np.std(built.gains)), 2))
-    report.figure("fine_contrast_percent",
-                  round(100 * float(np.std(fine[cv2.erode((confidence > 0.3).astype(np.uint8), np.ones((9, 9))) > 0])),
-                        2))
+    report.figure(
+        "fine_contrast_percent",
+        round(100 * float(np.std(fine[cv2.erode((confidence > 0.3).astype(np.uint8), np.ones((9, 9))) > 0])), 2),
+    )
     if built.losses:
         report.figure("perceptual_loss_before", round(built.losses["before"], 5))
         report.figure("perceptual_loss_after", round(built.losses["after"], 5))

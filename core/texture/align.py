@@ -38,10 +38,11 @@ def align(observations: list[UnwrappedView], surface: Unfolded, report: Reporter
     total = len(observations) + 6
     for step in range(ROUNDS):
         details = [_detail(o) for o in observations]
-        consensus = weighted_mean(details, (o.weight ** 3 for o in observations))
+        consensus = weighted_mean(details, (o.weight**3 for o in observations))
         for i, observation in enumerate(observations):
-            report.progress(total - 6 + (step * len(observations) + i) / len(observations), total,
-                            f"aligning {observation.name}")
+            report.progress(
+                total - 6 + (step * len(observations) + i) / len(observations), total, f"aligning {observation.name}"
+            )
             warps[i] += _flow(consensus, details[i], observation.weight)
         del details
         drift = weighted_mean(warps, (o.weight for o in observations))
@@ -67,8 +68,9 @@ def _flow(consensus: np.ndarray, detail: np.ndarray, weight: np.ndarray) -> np.n
     is something to see."""
     trust = np.clip(weight / max(np.percentile(weight[weight > 0], 80) if (weight > 0).any() else 1, 1e-9), 0, 1)
     spread = max(float(consensus[trust > 0.2].std()) if (trust > 0.2).any() else 0.0, 1e-4)
-    first, second = ((128 + 127 * np.tanh(trust * image / (3 * spread))).astype(np.uint8)
-                     for image in (consensus, detail))
+    first, second = (
+        (128 + 127 * np.tanh(trust * image / (3 * spread))).astype(np.uint8) for image in (consensus, detail)
+    )
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     dis.setFinestScale(1)
     raw = dis.calc(first, second, None)
@@ -85,5 +87,5 @@ def _limit(warp: np.ndarray, longest: float) -> None:
 
 def _moved(pixels: np.ndarray, warp: np.ndarray) -> np.ndarray:
     """pixels(x + warp(x)): where the picture shows what belongs at texel x."""
-    y, x = np.mgrid[0:len(warp), 0:len(warp)].astype(np.float32)
+    y, x = np.mgrid[0 : len(warp), 0 : len(warp)].astype(np.float32)
     return cv2.remap(pixels, x + warp[..., 0], y + warp[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -68,8 +68,14 @@ def robust_weights(observations: list[UnwrappedView], tolerance: float = 0.10) -
         o.weight = o.weight * cv2.resize(factor, o.weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
-def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter, kind: str = "delit",
-          done: int = 2) -> np.ndarray:
+def blend(
+    observations: list[UnwrappedView],
+    covered: np.ndarray,
+    size: int,
+    report: Reporter,
+    kind: str = "delit",
+    done: int = 2,
+) -> np.ndarray:
     """One texture of observations, each enlarged when its turn comes.
 
     Parameters
@@ -92,12 +98,13 @@ def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, rep
     sums, norms = ([np.zeros((*largest.shape, channels), np.float32) for _ in BANDS] for channels in (3, 1))
     scale = len(largest) / 1024
     for i, o in enumerate(observations):
-        report.progress(len(observations) + done + 2 * i / len(observations), len(observations) + 6,
-                        f"blending {o.name}, {kind}")
+        report.progress(
+            len(observations) + done + 2 * i / len(observations), len(observations) + 6, f"blending {o.name}, {kind}"
+        )
         o = o.enlarged(size, covered)
         seen, share = o.weight > 0, o.weight / largest
         for band, (log_colour, (reach, exponent)) in enumerate(zip(bands_of(o.log_colour, seen), BANDS, strict=True)):
-            weight = share ** exponent
+            weight = share**exponent
             # feathered where the best view changes, but nothing taken from where the view is blind
             if np.isfinite(reach):
                 weight = _feathered(weight, reach, scale) * np.minimum(1, 4 * share)

@@ -20,8 +20,9 @@ REACH_RADII = 1.7
 MARKS_PER_EDGE = 9  # points of a lid's edge, from corner to corner
 
 
-def leave_out_blinks(capture: Capture, observations: list[UnwrappedView], surface: Unfolded,
-                     report: Reporter) -> list[str]:
+def leave_out_blinks(
+    capture: Capture, observations: list[UnwrappedView], surface: Unfolded, report: Reporter
+) -> list[str]:
     """Takes quality and weight from the texels around an eye in the views whose frame shows it more or less open than
     the head would look there, next to what the other frames show.
 
@@ -46,12 +47,18 @@ def leave_out_blinks(capture: Capture, observations: list[UnwrappedView], surfac
     if not surface.head.eyes_open:
         return []
     eyes = read_eyes(capture)
-    seen = {observation.name: _eyes_in(observation.view) for observation in observations
-            if observation.view.path.is_file()}
+    seen = {
+        observation.name: _eyes_in(observation.view) for observation in observations if observation.view.path.is_file()
+    }
     left_out = set()
     for side, ball in enumerate(eyes):
-        unlike = differing({o.name: _opening(seen[o.name], o.view, surface.mesh.vertices, side) for o in observations
-                            if o.name in seen})
+        unlike = differing(
+            {
+                o.name: _opening(seen[o.name], o.view, surface.mesh.vertices, side)
+                for o in observations
+                if o.name in seen
+            }
+        )
         zone = surface.spread(_around(surface, ball)) > 0
         if not any((o.weight[zone] > 0).any() for o in observations if o.name not in unlike):
             continue
@@ -76,8 +83,10 @@ def _opening(eye_sight: tuple | None, view: View, vertices: np.ndarray, side: in
     too much from the side."""
     if eye_sight is None or not faces.shows_eye(eye_sight[0], side):
         return None
-    upper, lower = (view.project(edge[np.linspace(0, len(edge) - 1, MARKS_PER_EDGE).round().astype(int)])[0]
-                    for edge in lids.edges(vertices, side))
+    upper, lower = (
+        view.project(edge[np.linspace(0, len(edge) - 1, MARKS_PER_EDGE).round().astype(int)])[0]
+        for edge in lids.edges(vertices, side)
+    )
     return eye_sight[1 + side].opening / max(faces.Eye(upper, lower, upper[0], 0.0).opening, 1e-3)
 
 

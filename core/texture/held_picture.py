@@ -38,8 +38,9 @@ class HeldPicture:
         points = pixels.reshape(-1, 2)
         left, top = np.clip(np.floor(points.min(0)) - MARGIN_PX, 0, [width - 1, height - 1]).astype(int)
         right, bottom = np.clip(np.ceil(points.max(0)) + MARGIN_PX, [left + 1, top + 1], [width, height]).astype(int)
-        return replace(self, stored=self._part(slice(top, bottom), slice(left, right)).copy(),
-                       corner=(int(left), int(top)))
+        return replace(
+            self, stored=self._part(slice(top, bottom), slice(left, right)).copy(), corner=(int(left), int(top))
+        )
 
     def brightened(self, log_gain: np.ndarray) -> HeldPicture:
         """The same under another exposure [3]."""
@@ -58,7 +59,7 @@ class HeldPicture:
 
     def _part(self, rows: slice, columns: slice) -> np.ndarray:
         left, top = self.corner
-        return self.stored[rows.start - top:rows.stop - top, columns.start - left:columns.stop - left]
+        return self.stored[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
 
     def _decoded(self, stored: np.ndarray) -> np.ndarray:
         gain = 1.0 if self.log_gain is None else np.exp(self.log_gain)

@@ -62,8 +62,10 @@ def _look(observation: UnwrappedView, surface: Unfolded) -> tuple[np.ndarray, np
     parts = parser.parse(srgb, landmarks)
     height, width = observation.picture.shape[:2]
     at = [observation.pixels[..., k] - 0.5 for k in range(2)]
-    *shares, known = (cv2.remap(images.resize(mask, width, height), *at, cv2.INTER_LINEAR)
-                      for mask in (*(parts.of(name) for name in ASKED), parts.known()))
+    *shares, known = (
+        cv2.remap(images.resize(mask, width, height), *at, cv2.INTER_LINEAR)
+        for mask in (*(parts.of(name) for name in ASKED), parts.known())
+    )
     return np.stack(shares, -1), known
 
 

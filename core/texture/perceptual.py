@@ -50,8 +50,15 @@ class Target:
     trust: np.ndarray  # float32 [h, w] in [0, 1]: how far a pixel may pull; zero off the head
 
 
-def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: Unfolded, face_mask: np.ndarray,
-           features: Features, steps: int, report: Reporter) -> tuple[np.ndarray, dict]:
+def refine(
+    log_texture: np.ndarray,
+    observations: list[UnwrappedView],
+    surface: Unfolded,
+    face_mask: np.ndarray,
+    features: Features,
+    steps: int,
+    report: Reporter,
+) -> tuple[np.ndarray, dict]:
     """The blend with its detail optimised; same machine, same map.
 
     Parameters
@@ -82,7 +89,7 @@ def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: 
     change = torch.zeros_like(start, requires_grad=True)
     optimiser = torch.optim.Adam([change], lr=LEARNING_RATE, betas=(0.8, 0.99))
     schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / steps))
-    checks = [_tile(target, np.random.default_rng(1), device) for target in targets[::max(1, len(targets) // 4)]]
+    checks = [_tile(target, np.random.default_rng(1), device) for target in targets[:: max(1, len(targets) // 4)]]
     before = _losses(start, checks, features, report)
     order = np.concatenate([rng.permutation(len(targets)) for _ in range(-(-steps // len(targets)))])[:steps]
     for step, index in enumerate(order):
@@ -111,7 +118,7 @@ def _target(observation: UnwrappedView, surface: Unfolded, face_mask: np.ndarray
     low = np.maximum(np.floor(pixels.min(0)).astype(int) - 4, 0)
     high = np.minimum(np.ceil(pixels.max(0)).astype(int) + 4, [width, height])
     (w, h), view, size = high - low, observation.view, len(face_mask)
-    y, x = np.mgrid[0:RAYS_PER_SIDE * h, 0:RAYS_PER_SIDE * w]
+    y, x = np.mgrid[0 : RAYS_PER_SIDE * h, 0 : RAYS_PER_SIDE * w]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) / RAYS_PER_SIDE + low
     mesh, caster = surface.mesh, surface.caster
     directions = view.rays(at * [view.width / width, view.height / height])
@@ -140,8 +147,9 @@ def _tile(target: Target, rng: np.random.Generator, device: str) -> tuple[Tensor
     """A random part of a view: picture [1, 3, t, t'], grid [1, RAYS_PER_SIDE t, RAYS_PER_SIDE t', 2], trust [1, 1, t,
     t']; sides at most TILE_PX, around a trusted pixel."""
     height, width = target.trust.shape
-    y, x = np.unravel_index(rng.choice(np.flatnonzero(target.trust.ravel() > 0.2 * target.trust.max())),
-                            target.trust.shape)
+    y, x = np.unravel_index(
+        rng.choice(np.flatnonzero(target.trust.ravel() > 0.2 * target.trust.max())), target.trust.shape
+    )
     rows, columns = _span(y, height), _span(x, width)
     fine = tuple(slice(RAYS_PER_SIDE * span.start, RAYS_PER_SIDE * span.stop) for span in (rows, columns))
     grid = torch.from_numpy(target.grid[fine].copy())[None].to(device)
@@ -159,8 +167,9 @@ def _loss(log_texture: Tensor, tile: tuple[Tensor, Tensor, Tensor], features: Fe
     """Perceptual distance plus the gradients' L1; off the head and where a view sees badly, the rendering is the
     picture itself."""
     picture, grid, trust = tile
-    linear = functional.grid_sample(log_texture.exp(), grid, mode="bilinear", padding_mode="border",
-                                    align_corners=False)
+    linear = functional.grid_sample(
+        log_texture.exp(), grid, mode="bilinear", padding_mode="border", align_corners=False
+    )
     linear = functional.avg_pool2d(linear, RAYS_PER_SIDE)
     rendered = _srgb(linear) * trust + picture * (1 - trust)
     with torch.no_grad():

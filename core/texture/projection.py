@@ -57,12 +57,19 @@ class UnwrappedView:
 
         pixels = larger(raster.bleed(self.pixels, covered))
         warp = None if self.warp is None else larger(self.warp) * np.float32(size / len(self.weight))
-        return replace(self, pixels=pixels, log_colour=self.picture.log_colours(pixels), quality=larger(self.quality),
-                       weight=larger(self.weight), warp=warp)
+        return replace(
+            self,
+            pixels=pixels,
+            log_colour=self.picture.log_colours(pixels),
+            quality=larger(self.quality),
+            weight=larger(self.weight),
+            warp=warp,
+        )
 
 
-def observe(view: View, picture: HeldPicture, surface: Unfolded, sharpness: float,
-            reference_m: float | None = None) -> UnwrappedView:
+def observe(
+    view: View, picture: HeldPicture, surface: Unfolded, sharpness: float, reference_m: float | None = None
+) -> UnwrappedView:
     """Projects every texel into a picture of a view.
 
     Parameters
@@ -85,13 +92,15 @@ def observe(view: View, picture: HeldPicture, surface: Unfolded, sharpness: floa
     pixel_m = distance / view.camera.mean_focal_length()
     if reference_m is None:
         reference_m = float(np.median(pixel_m[seen])) if seen.any() else 1.0
-    weight = quality ** 2 * sharpness * (reference_m / pixel_m) ** 2
-    return UnwrappedView(view, picture, pixels, picture.log_colours(pixels), surface.spread(quality),
-                         surface.spread(weight))
+    weight = quality**2 * sharpness * (reference_m / pixel_m) ** 2
+    return UnwrappedView(
+        view, picture, pixels, picture.log_colours(pixels), surface.spread(quality), surface.spread(weight)
+    )
 
 
-def _look(view: View, surface: Unfolded, rows: slice,
-          silhouette: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _look(
+    view: View, surface: Unfolded, rows: slice, silhouette: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Of a part of the surface's points: pixels [N, 2] (nan behind the camera), quality [N], distance [N], and whether
     they are seen [N]."""
     points, normals = surface.points[rows], surface.normals[rows]

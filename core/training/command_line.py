@@ -24,13 +24,18 @@ def make_parser(training: str, description: str, configs: dict, out: Path) -> ar
     configs : by name, of which --config chooses
     out : where its weights go by default
     """
-    options = argparse.ArgumentParser(f"python -m core train {training}", description=description,
-                                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(
+        f"python -m core train {training}",
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     options.add_argument("--config", default="cpu", choices=tuple(configs))
-    options.add_argument("--minutes", type=float,
-                         help="in all, those of earlier runs included; the configuration's by default")
-    options.add_argument("--export", action="store_true",
-                         help="write the weights of the work folder's last checkpoint and stop")
+    options.add_argument(
+        "--minutes", type=float, help="in all, those of earlier runs included; the configuration's by default"
+    )
+    options.add_argument(
+        "--export", action="store_true", help="write the weights of the work folder's last checkpoint and stop"
+    )
     options.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / f"wildcap_{training}")
     options.add_argument("--out", type=Path, default=out)
     return options
@@ -39,21 +44,31 @@ def make_parser(training: str, description: str, configs: dict, out: Path) -> ar
 def add_skins(options: argparse.ArgumentParser) -> None:
     """The options of a training that can learn from skins of other heads."""
     options.add_argument("--skins", type=Path, metavar="FOLDER", help="skins that `train carry` brought into our UVs")
-    options.add_argument("--held-out", nargs="+", default=[], metavar="NAME",
-                         help="skins of FOLDER that are kept from training, each with its cluster")
+    options.add_argument(
+        "--held-out",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="skins of FOLDER that are kept from training, each with its cluster",
+    )
 
 
 def add_sights(options: argparse.ArgumentParser, sight_kind: str) -> None:
     """The options of a training on sights that are made first: `sight_kind` names them, in the plural."""
-    options.add_argument("--hdri", type=Path, metavar="FOLDER",
-                         help="panoramas whose licence lets weights trained with them be shipped")
+    options.add_argument(
+        "--hdri", type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped"
+    )
     options.add_argument("--growing", action="store_true", help=f"train on the {sight_kind} that are there already")
     options.add_argument("--prepare", action="store_true", help=f"make the {sight_kind} and stop")
 
 
-def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, train: Callable[..., dict],
-              export: Callable[[Path, Path], dict],
-              prepare: Callable[[str, Path, Reporter], None] | None = None) -> int:
+def carry_out(
+    options: argparse.ArgumentParser,
+    arguments: list[str] | None,
+    train: Callable[..., dict],
+    export: Callable[[Path, Path], dict],
+    prepare: Callable[[str, Path, Reporter], None] | None = None,
+) -> int:
     """Trains, or exports an earlier training.
 
     Parameters
@@ -69,8 +84,9 @@ def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, tra
     The exit code.
     """
     flags = vars(options.parse_args(arguments))
-    report = Reporter("train",
-                      emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None)
+    report = Reporter(
+        "train", emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None
+    )
     exports, prepares = flags.pop("export"), flags.pop("prepare", False)
     if exports:
         export(flags["work"], flags["out"])

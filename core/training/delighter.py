@@ -37,14 +37,36 @@ from .shading_errors import disagreement, mean_deviation, mean_size, slope_error
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
 _MODEL = {"widths": [64, 128, 192, 224], "depths": [2, 2, 2, 2]}
 CONFIGS = {
-    "cpu": {"model": _MODEL,
-            "training": {"pairs": 2, "echo": 2, "rate": 4e-4, "minutes": 180, "skins": 48, "people": 120, "views": 8,
-                         "held_out": 6, "seed": 0,
-                          "workers": 1}},
-    "gpu": {"model": _MODEL,
-            "training": {"pairs": 16, "echo": 1, "rate": 1.0e-3, "minutes": 24, "skins": 160, "people": 360, "views": 8,
-                         "held_out": 6, "seed": 0,
-                          "workers": 14}},
+    "cpu": {
+        "model": _MODEL,
+        "training": {
+            "pairs": 2,
+            "echo": 2,
+            "rate": 4e-4,
+            "minutes": 180,
+            "skins": 48,
+            "people": 120,
+            "views": 8,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 1,
+        },
+    },
+    "gpu": {
+        "model": _MODEL,
+        "training": {
+            "pairs": 16,
+            "echo": 1,
+            "rate": 1.0e-3,
+            "minutes": 24,
+            "skins": 160,
+            "people": 360,
+            "views": 8,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 14,
+        },
+    },
 }
 """`people`, and `skins` bald subjects, are seen from `views` sides each; a step shows `pairs` of them under two lights
 each. Every `echo` steps show the same, mirrored and painted over in turn: where making them costs as much as learning
@@ -57,8 +79,14 @@ TONE, SLOPE, AGREEMENT, SHADOW = 0.25, 1.0, 0.25, 0.3
 the shadows."""
 
 
-def train_delighter(config: str, out: Path, report: Reporter, run: descent.TrainingRun, skins: Path | None = None,
-                    held_out: list[str] = ()) -> dict:
+def train_delighter(
+    config: str,
+    out: Path,
+    report: Reporter,
+    run: descent.TrainingRun,
+    skins: Path | None = None,
+    held_out: list[str] = (),
+) -> dict:
     """Trains the delighter; preparation does not count into its minutes.
 
     Parameters
@@ -81,34 +109,53 @@ def train_delighter(config: str, out: Path, report: Reporter, run: descent.Train
     hdri, start = run.hdri, run.start
     work, t, device = descent.work_folder(run, "delighter"), CONFIGS[config]["training"], descent.device_of(config)
     data = named_data(t, skins, held_out) | {
-        "panoramas": panorama_names(hdri), "people": training_seeds(t["people"]),
-        "started": "the weights before" if start else SCRATCH}
+        "panoramas": panorama_names(hdri),
+        "people": training_seeds(t["people"]),
+        "started": "the weights before" if start else SCRATCH,
+    }
     if not run.growing:
         prepare_delighter(config, work, report)
-    if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind])
-               for kind in ("people", "held_out_seeds")):
-        raise Problem(f"There are no people in {work} yet.",
-                      "Wait for `train delighter --prepare`, or train without --growing.")
+    if not all(
+        any(is_prepared(seed, t["views"], work) for seed in data[kind]) for kind in ("people", "held_out_seeds")
+    ):
+        raise Problem(
+            f"There are no people in {work} yet.", "Wait for `train delighter --prepare`, or train without --growing."
+        )
     prepare(data["seeds"], t["views"], work, report, skins, data["skins"], max(2, t["workers"]))
     prepare(data["held_out_seeds"], t["views"], work, report)
-    unseen = {"": Portraits(data["held_out_seeds"], t["views"], work,
-                            hdri).draw(4 * t["held_out"], np.random.default_rng(1), augment=False),
-              "people_": People(data["held_out_seeds"], t["views"], work,
-                                hdri).draw(4 * t["held_out"], np.random.default_rng(1))}
+    unseen = {
+        "": Portraits(data["held_out_seeds"], t["views"], work, hdri).draw(
+            4 * t["held_out"], np.random.default_rng(1), augment=False
+        ),
+        "people_": People(data["held_out_seeds"], t["views"], work, hdri).draw(
+            4 * t["held_out"], np.random.default_rng(1)
+        ),
+    }
     torch.manual_seed(t["seed"])
     network = DelightNet(**CONFIGS[config]["model"])
     if start:
         network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 200, 0.01),
-                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"],
-                                    save_every=600)
+    recipe = descent.TrainingRecipe(
+        run.minutes or t["minutes"],
+        descent.cosine(t["rate"], 200, 0.01),
+        betas=(0.9, 0.98),
+        weight_decay=1e-2,
+        averaging=0.998,
+        workers=t["workers"],
+        save_every=600,
+    )
     objective = descent.Objective(
-        _DelighterSteps(Portraits(data["seeds"], t["views"], work, hdri),
-                        People(data["people"], t["views"], work, hdri), t),
+        _DelighterSteps(
+            Portraits(data["seeds"], t["views"], work, hdri), People(data["people"], t["views"], work, hdri), t
+        ),
         lambda batch, step, share: sum(losses(network, batch, device).values()),
-        lambda average: {kind + name: value for kind, batch in unseen.items()
-                         for name, value in measure_figures(average, config, batch, device).items()})
+        lambda average: {
+            kind + name: value
+            for kind, batch in unseen.items()
+            for name, value in measure_figures(average, config, batch, device).items()
+        },
+    )
     descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
@@ -117,8 +164,9 @@ def prepare_delighter(config: str, work: Path, report: Reporter) -> None:
     """The sights of all people, those of the held-out ones first."""
     t = CONFIGS[config]["training"]
     work.mkdir(parents=True, exist_ok=True)
-    prepare_people(held_out_seeds(t["held_out"]) + training_seeds(t["people"]), t["views"], work, report,
-                   max(2, t["workers"]))
+    prepare_people(
+        held_out_seeds(t["held_out"]) + training_seeds(t["people"]), t["views"], work, report, max(2, t["workers"])
+    )
 
 
 def losses(network: DelightNet, batch: PortraitBatch, device: str) -> dict[str, torch.Tensor]:
@@ -127,8 +175,12 @@ def losses(network: DelightNet, batch: PortraitBatch, device: str) -> dict[str, 
         shading, shadow = network(batch.layers.to(device, memory_format=torch.channels_last))
     weight = batch.weight.to(device)
     tone, error = split_tone(shading - batch.shading.to(device), weight)
-    terms = {"shading": mean_size(error, weight), "tone": TONE * tone.abs().mean(),
-             "slope": SLOPE * slope_error(error, weight), "agreement": AGREEMENT * disagreement(error, weight)}
+    terms = {
+        "shading": mean_size(error, weight),
+        "tone": TONE * tone.abs().mean(),
+        "slope": SLOPE * slope_error(error, weight),
+        "agreement": AGREEMENT * disagreement(error, weight),
+    }
     lost = functional.binary_cross_entropy_with_logits(shadow, batch.shadow.to(device), reduction="none")
     sure = batch.shadow_weight.to(device)
     terms["shadow"] = SHADOW * (lost * sure).sum() / sure.sum().clamp_min(1)
@@ -179,9 +231,11 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = descent.read_state(work)
     data = state["data"]
-    told = ("Synthetic people with hair, beards and open eyes (core/synthetic/people) and portraits of bald subjects "
-            "(core/synthetic) on the built-in head, "
-            "which derives from the MakeHuman base mesh (CC0)")
+    told = (
+        "Synthetic people with hair, beards and open eyes (core/synthetic/people) and portraits of bald subjects "
+        "(core/synthetic) on the built-in head, "
+        "which derives from the MakeHuman base mesh (CC0)"
+    )
     if data["skins"]:
         told += f"; some wear one of {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs"
     if data["panoramas"]:
@@ -197,9 +251,11 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     # the others were not there yet
     ready = sum(is_prepared(seed, CONFIGS[state["config"]]["training"]["views"], work) for seed in data["people"])
     more = {"panoramas": data["panoramas"], "people": data["people"][:ready], "started": data["started"]}
-    return release(out, state,
-                   TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what},
-                                more))
+    return release(
+        out,
+        state,
+        TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, more),
+    )
 
 
 class _DelighterSteps(Dataset):
@@ -215,8 +271,10 @@ class _DelighterSteps(Dataset):
         index = step // self.options["echo"]
         rng = np.random.default_rng((self.options["seed"], index))
         if self.drawn[0] != index:
-            self.drawn = index, (self.people if rng.random() < PEOPLE
-                                 else self.portraits).draw(self.options["pairs"], rng)
+            self.drawn = (
+                index,
+                (self.people if rng.random() < PEOPLE else self.portraits).draw(self.options["pairs"], rng),
+            )
         turned = step % 2 if self.options["echo"] > 1 else rng.random() < 0.5
         if not turned:
             return self.drawn[1]

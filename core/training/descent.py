@@ -80,6 +80,7 @@ def device_of(config: str) -> str:
 def cosine(rate: float, warming: int, least: float) -> Callable[[int, float], float]:
     """A learning rate that grows over the first `warming` steps, then falls along half a cosine to `least` of `rate`
     (Loshchilov and Hutter 2017)."""
+
     def at(step: int, share: float) -> float:
         return rate * min(1.0, (step + 1) / warming) * max(least, 0.5 + 0.5 * math.cos(math.pi * share))
 
@@ -89,8 +90,17 @@ def cosine(rate: float, warming: int, least: float) -> Callable[[int, float], fl
 def beginning(config: str, data: dict, network: torch.nn.Module, **more) -> dict:
     """The state before the first step."""
     weights = network.state_dict()
-    return {"config": config, "data": data, "step": 0, "seconds": 0.0, "history": [], "network": weights,
-            "optimiser": {}, "average": {name: value.clone() for name, value in weights.items()}, **more}
+    return {
+        "config": config,
+        "data": data,
+        "step": 0,
+        "seconds": 0.0,
+        "history": [],
+        "network": weights,
+        "optimiser": {},
+        "average": {name: value.clone() for name, value in weights.items()},
+        **more,
+    }
 
 
 def resumed(work: Path, begun: dict) -> dict:
@@ -100,8 +110,10 @@ def resumed(work: Path, begun: dict) -> dict:
         return begun
     state = begun | read_state(work)  # a training begun by an older version lacks the newer entries
     if state["data"] != begun["data"] or state["config"] != begun["config"]:
-        raise Problem(f"The training in {work} is on other data or of another configuration.",
-                      "Name another --work folder, or delete this one.")
+        raise Problem(
+            f"The training in {work} is on other data or of another configuration.",
+            "Name another --work folder, or delete this one.",
+        )
     return state
 
 
@@ -113,8 +125,15 @@ def read_state(work: Path) -> dict:
     return torch.load(path, weights_only=True, map_location="cpu")
 
 
-def descend(network: torch.nn.Module, state: dict, objective: Objective, recipe: TrainingRecipe, work: Path,
-            device: str, report: Reporter) -> None:
+def descend(
+    network: torch.nn.Module,
+    state: dict,
+    objective: Objective,
+    recipe: TrainingRecipe,
+    work: Path,
+    device: str,
+    report: Reporter,
+) -> None:
     """Trains until the recipe's minutes are over.
 
     Parameters
@@ -129,14 +148,20 @@ def descend(network: torch.nn.Module, state: dict, objective: Objective, recipe:
     minutes = recipe.minutes
     network.load_state_dict(state["network"])
     network.to(device, memory_format=torch.channels_last)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=recipe.rate(0, 0.0), betas=recipe.betas,
-                                  weight_decay=recipe.weight_decay)
+    optimiser = torch.optim.AdamW(
+        network.parameters(), lr=recipe.rate(0, 0.0), betas=recipe.betas, weight_decay=recipe.weight_decay
+    )
     if state["optimiser"]:
         optimiser.load_state_dict(state["optimiser"])
     average = {name: value.to(device) for name, value in state["average"].items()}
     began, before, saved_at = time.monotonic(), state["seconds"], state["seconds"]
-    loader = DataLoader(objective.batches, batch_size=None, sampler=range(state["step"], 10**9),
-                        num_workers=recipe.workers, prefetch_factor=3 if recipe.workers else None)
+    loader = DataLoader(
+        objective.batches,
+        batch_size=None,
+        sampler=range(state["step"], 10**9),
+        num_workers=recipe.workers,
+        prefetch_factor=3 if recipe.workers else None,
+    )
     for step, batch in zip(range(state["step"], 10**9), loader, strict=False):
         share = min(1.0, state["seconds"] / (60 * minutes))
         for group in optimiser.param_groups:
@@ -154,8 +179,10 @@ def descend(network: torch.nn.Module, state: dict, objective: Objective, recipe:
         report.progress(min(state["seconds"], 60 * minutes), 60 * minutes, f"step {step + 1}")
         if state["seconds"] - saved_at > recipe.save_every or ended:
             state["history"].append([state["step"], round(state["seconds"]), objective.figures(average)])
-            report.log(f"step {step + 1}, {state['seconds'] / 60:.1f} min, loss {value.item():.4f}, held out "
-                       f"{state['history'][-1][2]}")
+            report.log(
+                f"step {step + 1}, {state['seconds'] / 60:.1f} min, loss {value.item():.4f}, held out "
+                f"{state['history'][-1][2]}"
+            )
             state |= {"network": network.state_dict(), "optimiser": optimiser.state_dict(), "average": average}
             with replacing(Path(work) / STATE) as temporary:
                 torch.save(state, temporary)

@@ -35,12 +35,34 @@ from .snapshots import Echoed, Jitter, export_parsing, jitter_crop, recipe_of, r
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "eyes.safetensors"
 _MODEL = {"widths": [32, 48, 64, 96], "depths": [1, 1, 1, 2]}
 CONFIGS = {
-    "cpu": {"model": _MODEL,
-            "training": {"batch": 16, "echo": 3, "rate": 1.5e-3, "minutes": 40, "figures": 160, "poses": 3,
-                         "held_out": 6, "seed": 0, "workers": 1}},
-    "gpu": {"model": _MODEL,
-            "training": {"batch": 64, "echo": 1, "rate": 3e-3, "minutes": 20, "figures": 640, "poses": 3,
-                         "held_out": 6, "seed": 0, "workers": 14}},
+    "cpu": {
+        "model": _MODEL,
+        "training": {
+            "batch": 16,
+            "echo": 3,
+            "rate": 1.5e-3,
+            "minutes": 40,
+            "figures": 160,
+            "poses": 3,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 1,
+        },
+    },
+    "gpu": {
+        "model": _MODEL,
+        "training": {
+            "batch": 64,
+            "echo": 1,
+            "rate": 3e-3,
+            "minutes": 20,
+            "figures": 640,
+            "poses": 3,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 14,
+        },
+    },
 }
 VIEWS = 4
 """Sights of each pose of a figure's lids, half of them of the left eye."""
@@ -76,13 +98,16 @@ def train_eyes(config: str, out: Path, report: Reporter, run: descent.TrainingRu
         prepare_figures(config, work, report)
     require_figures("eyes", data, lambda seed: is_prepared(seed, t["poses"], work), work)
     unseen = Eyes(data["held_out_seeds"], t["poses"], work, run.hdri).draw(
-        32 * t["held_out"], 1, np.random.default_rng(1), augment=False)[0]
+        32 * t["held_out"], 1, np.random.default_rng(1), augment=False
+    )[0]
     torch.manual_seed(t["seed"])
     network = ParseNet(**CONFIGS[config]["model"], parts=len(CLASSES))
     state = descent.resumed(work, descent.beginning(config, data, network))
-    objective = descent.Objective(Echoed(Eyes(data["seeds"], t["poses"], work, run.hdri), t),
-                                  lambda batch, step, share: loss(network, batch, device),
-                                  lambda average: measure_figures(average, config, unseen, device))
+    objective = descent.Objective(
+        Echoed(Eyes(data["seeds"], t["poses"], work, run.hdri), t),
+        lambda batch, step, share: loss(network, batch, device),
+        lambda average: measure_figures(average, config, unseen, device),
+    )
     descent.descend(network, state, objective, recipe_of(t, run.minutes), work, device, report)
     return export(work, out)
 
@@ -141,8 +166,9 @@ class Eyes:
         return [tuple(torch.from_numpy(np.stack(arrays)) for arrays in zip(*batch, strict=True)) for batch in batches]
 
 
-def make_example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, rng: np.random.Generator,
-                 augment: bool = True) -> tuple[np.ndarray, np.ndarray]:
+def make_example(
+    picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSight, rng: np.random.Generator, augment: bool = True
+) -> tuple[np.ndarray, np.ndarray]:
     """A photograph as the network sees it.
 
     Parameters
@@ -165,8 +191,10 @@ def make_example(picture: np.ndarray, ball: np.ndarray, sight: eye_sights.EyeSig
         seen = spoilt(seen, rng)
     shares = np.clip(cut(ball, move, SIDE_PX), 0, 1)
     shares = np.concatenate([1 - shares.sum(-1, keepdims=True), shares], -1)
-    return (network_input(seen, inside(picture.shape, move, SIDE_PX)),
-            np.ascontiguousarray(np.clip(shares, 0, 1).transpose(2, 0, 1), np.float32))
+    return (
+        network_input(seen, inside(picture.shape, move, SIDE_PX)),
+        np.ascontiguousarray(np.clip(shares, 0, 1).transpose(2, 0, 1), np.float32),
+    )
 
 
 def loss(network: ParseNet, batch: tuple, device: str) -> torch.Tensor:
@@ -211,11 +239,14 @@ def measure_figures(average: dict, config: str, batch: tuple, device: str) -> di
 def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder, with their card."""
     config = CONFIGS[descent.read_state(work)["config"]]
-    words = ("synthetic people's eyes",
-             "photographs of held-out figures' eyes: intersection over union of the ball and of the iris, "
-             "where a class is what most of a pixel is")
-    return export_parsing("eyes", work, out, config, words,
-                          lambda seed: is_prepared(seed, config["training"]["poses"], work))
+    words = (
+        "synthetic people's eyes",
+        "photographs of held-out figures' eyes: intersection over union of the ball and of the iris, "
+        "where a class is what most of a pixel is",
+    )
+    return export_parsing(
+        "eyes", work, out, config, words, lambda seed: is_prepared(seed, config["training"]["poses"], work)
+    )
 
 
 def _path(work: Path, seed: int, number: int) -> Path:

@@ -80,20 +80,27 @@ class FineWindows:
         window = np.load(self.paths[rng.integers(len(self.paths))], mmap_mode="r")
         around = patch + 8  # room for the blur
         row, column = FACTOR * rng.integers(0, window.shape[1] // FACTOR - around + 1, 2)
-        large = window[:, row:row + FACTOR * around, column:column + FACTOR * around].astype(np.float32)
+        large = window[:, row : row + FACTOR * around, column : column + FACTOR * around].astype(np.float32)
         large = _turned(large, rng)
         small = degraded(large, random_degradation(rng), rng)
         edge = 4
-        return (torch.from_numpy(np.ascontiguousarray(small[:, edge:-edge, edge:-edge])),
-                torch.from_numpy(np.ascontiguousarray(large[:, FACTOR * edge:-FACTOR * edge,
-                                                            FACTOR * edge:-FACTOR * edge])))
+        return (
+            torch.from_numpy(np.ascontiguousarray(small[:, edge:-edge, edge:-edge])),
+            torch.from_numpy(
+                np.ascontiguousarray(large[:, FACTOR * edge : -FACTOR * edge, FACTOR * edge : -FACTOR * edge])
+            ),
+        )
 
 
 def random_degradation(rng: np.random.Generator) -> Degradation:
     """From a plain reduction to the soft, faintly noisy maps that sampling a prior gives."""
     blur = rng.uniform(0.0, 0.8) if rng.random() < 0.7 else 0.0
-    return Degradation(blur, min(1.2, blur + rng.uniform(0.0, 0.5)) if rng.random() < 0.7 else blur,
-                       rng.uniform(0.0, 0.006), rng.uniform(0.8, 1.0))
+    return Degradation(
+        blur,
+        min(1.2, blur + rng.uniform(0.0, 0.5)) if rng.random() < 0.7 else blur,
+        rng.uniform(0.0, 0.006),
+        rng.uniform(0.8, 1.0),
+    )
 
 
 def degraded(large: np.ndarray, degradation: Degradation, rng: np.random.Generator) -> np.ndarray:
@@ -144,8 +151,9 @@ def _paint(work: Path, window: tuple[int, int]) -> None:
     parameters = replace(adorned(sample_parameters(seed), seed), scars=0.0)
     skin = paint_skin(parameters, make_window_canvas(SIZE, row, column, SIDE), canvas(GROUND))
     inner = slice(MARGIN, SIDE - MARGIN)
-    maps = np.concatenate([images.linear_to_srgb(skin.diffuse), skin.normal, skin.specular[..., None]],
-                          -1)[inner, inner]
+    maps = np.concatenate([images.linear_to_srgb(skin.diffuse), skin.normal, skin.specular[..., None]], -1)[
+        inner, inner
+    ]
     with replacing(_path(work, seed, index)) as temporary, open(temporary, "wb") as file:
         np.save(file, maps.transpose(2, 0, 1).astype(np.float16))
 
@@ -158,4 +166,3 @@ def _face() -> np.ndarray:
 @cache
 def _head() -> np.ndarray:
     return np.argwhere(raster.rasterize_uv(template.load(), SIZE // FACTOR)[0] >= 0)
-

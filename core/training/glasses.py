@@ -88,16 +88,25 @@ def train(figures: int, pictures: int, work: Path, out: Path, hdri: Path | None,
     told = np.array([describe(strip) for strip in judged.pictures]) @ plane + offset
     with replacing(out) as temporary, open(temporary, "wb") as file:
         np.savez_compressed(file, plane=plane.astype(np.float32), offset=np.float32(offset))
-    card = {"data": "Photographs of synthetic people (core/synthetic/people) on the built-in head, which derives from "
-                    "the MakeHuman base mesh (CC0), with and "
-                    "without drawn glasses; light from procedural environments and lamps"
-            + (f" and {len(panoramas)} panoramas (CC0)" if panoramas else ""), "licence": "GPL-3.0-or-later",
-            "command": f"python -m core train glasses --figures {figures} --pictures {pictures}" + " --hdri hdri"
-            * bool(panoramas), "seeds": learnt, "held_out_seeds": held_out, "pictures": len(seen.worn), "ridge": RIDGE,
-            "held_out": {"what": "single photographs of held-out figures, share that is told to wear glasses",
-                         "pictures": len(judged.worn),
-                         "with_percent": round(100 * float((told[judged.worn] > 0).mean()), 1),
-                         "without_percent": round(100 * float((told[~judged.worn] > 0).mean()), 1)}}
+    card = {
+        "data": "Photographs of synthetic people (core/synthetic/people) on the built-in head, which derives from "
+        "the MakeHuman base mesh (CC0), with and "
+        "without drawn glasses; light from procedural environments and lamps"
+        + (f" and {len(panoramas)} panoramas (CC0)" if panoramas else ""),
+        "licence": "GPL-3.0-or-later",
+        "command": f"python -m core train glasses --figures {figures} --pictures {pictures}"
+        + " --hdri hdri" * bool(panoramas),
+        "seeds": learnt,
+        "held_out_seeds": held_out,
+        "pictures": len(seen.worn),
+        "ridge": RIDGE,
+        "held_out": {
+            "what": "single photographs of held-out figures, share that is told to wear glasses",
+            "pictures": len(judged.worn),
+            "with_percent": round(100 * float((told[judged.worn] > 0).mean()), 1),
+            "without_percent": round(100 * float((told[~judged.worn] > 0).mean()), 1),
+        },
+    }
     write_json(out.with_suffix(".json"), card)
     return card
 
@@ -121,8 +130,13 @@ def prepare(of: list[int], work: Path, report: Reporter) -> None:
             depth = raster.render_view(scene.whole, view)[2]
             unlit.save(_path(work, seed, number).with_suffix(".unlit.npz"), unlit.trace_unlit(scene, view, rng, 1))
             with replacing(_path(work, seed, number)) as temporary, open(temporary, "wb") as file:
-                np.savez_compressed(file, depth=depth.astype(np.float32), landmarks=unlit.landmarks_of(figure),
-                                    translation=view.translation, params=view.camera.params)
+                np.savez_compressed(
+                    file,
+                    depth=depth.astype(np.float32),
+                    landmarks=unlit.landmarks_of(figure),
+                    translation=view.translation,
+                    params=view.camera.params,
+                )
 
 
 def read(work: Path, seed: int, number: int) -> BareSight:
@@ -135,8 +149,9 @@ def read(work: Path, seed: int, number: int) -> BareSight:
         return BareSight(sight, depth, stored["landmarks"], view)
 
 
-def photograph_sight(sight: BareSight, pair: glasses.Glasses | None, rng: np.random.Generator,
-                     panoramas: list[np.ndarray] = ()) -> np.ndarray:
+def photograph_sight(
+    sight: BareSight, pair: glasses.Glasses | None, rng: np.random.Generator, panoramas: list[np.ndarray] = ()
+) -> np.ndarray:
     """A photograph of a sight, with a pair of glasses or without.
 
     Parameters
@@ -150,6 +165,7 @@ def photograph_sight(sight: BareSight, pair: glasses.Glasses | None, rng: np.ran
     -------
     sRGB [S, S, 3].
     """
+
     def worn(radiance: np.ndarray, light: float) -> np.ndarray:
         return glasses.put_on(radiance, sight.view, sight.depth, pair, light, rng) if pair else radiance
 
@@ -182,9 +198,11 @@ def draw(of: list[int], pictures: int, work: Path, panoramas: list[np.ndarray], 
 
 def fit(described: np.ndarray, worn: np.ndarray, ridge: float = RIDGE) -> tuple[np.ndarray, float]:
     """The plane [D] and its offset: what they give of described [N, D] is the logarithm of the odds."""
-    sign, middle, spread = np.where(worn, 1.0,
-                                    -1.0), described.mean(0), (described.std(0)
-                                                               + LEAST_SPREAD) * np.sqrt(described.shape[1])
+    sign, middle, spread = (
+        np.where(worn, 1.0, -1.0),
+        described.mean(0),
+        (described.std(0) + LEAST_SPREAD) * np.sqrt(described.shape[1]),
+    )
     described = (described - middle) / spread
 
     def cost(state: np.ndarray) -> tuple[float, np.ndarray]:
@@ -209,8 +227,9 @@ def _before(figure, rng: np.random.Generator) -> View:
 def _spoilt(srgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Noise, less resolution and the mirror image, now and then."""
     if rng.random() < 0.3:
-        srgb = np.clip(srgb + rng.normal(0, np.exp(rng.uniform(*np.log([0.004, 0.03]))), srgb.shape), 0,
-                       1).astype(np.float32)
+        srgb = np.clip(srgb + rng.normal(0, np.exp(rng.uniform(*np.log([0.004, 0.03]))), srgb.shape), 0, 1).astype(
+            np.float32
+        )
     if rng.random() < 0.3:
         small, side = round(len(srgb) / np.exp(rng.uniform(0.2, 1.0))), len(srgb)
         srgb = cv2.resize(cv2.resize(srgb, (small, small), interpolation=cv2.INTER_AREA), (side, side))
@@ -222,12 +241,14 @@ def _path(work: Path, seed: int, number: int) -> Path:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m core train glasses", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="python -m core train glasses", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--figures", type=int, default=8)
     parser.add_argument("--pictures", type=int, default=60)
-    parser.add_argument("--hdri", type=Path, metavar="FOLDER",
-                        help="panoramas whose licence lets weights trained with them be shipped")
+    parser.add_argument(
+        "--hdri", type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped"
+    )
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_glasses")
     parser.add_argument("--out", type=Path, default=WEIGHTS)
     print(json.dumps(train(**vars(parser.parse_args(arguments)), report=Reporter("train"))["held_out"], indent=1))

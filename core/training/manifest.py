@@ -14,8 +14,12 @@ FOLDERS = ("assets", "weights")
 
 def make_manifest() -> dict[str, dict[str, str]]:
     """What the manifest says of the files as they are now."""
-    files = (path for folder in FOLDERS for path in sorted((CORE / folder).rglob("*")) if path.is_file()
-             and path.suffix not in (".py", ".pyc"))
+    files = (
+        path
+        for folder in FOLDERS
+        for path in sorted((CORE / folder).rglob("*"))
+        if path.is_file() and path.suffix not in (".py", ".pyc")
+    )
     return {"core": {path.relative_to(CORE).as_posix(): hash_shipped(path) for path in files}}
 
 

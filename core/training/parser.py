@@ -39,14 +39,34 @@ from .snapshots import (
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "parser.safetensors"
 _MODEL = {"widths": [40, 64, 112, 144], "depths": [1, 1, 1, 2]}
 CONFIGS = {
-    "cpu": {"model": _MODEL,
-            "training": {"batch": 8, "echo": 3, "rate": 8e-4, "minutes": 60, "figures": 360, "views": 10, "held_out": 6,
-                         "seed": 0,
-                         "workers": 1}},
-    "gpu": {"model": _MODEL,
-            "training": {"batch": 32, "echo": 1, "rate": 2e-3, "minutes": 30, "figures": 720, "views": 10,
-                         "held_out": 6, "seed": 0,
-                         "workers": 14}},
+    "cpu": {
+        "model": _MODEL,
+        "training": {
+            "batch": 8,
+            "echo": 3,
+            "rate": 8e-4,
+            "minutes": 60,
+            "figures": 360,
+            "views": 10,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 1,
+        },
+    },
+    "gpu": {
+        "model": _MODEL,
+        "training": {
+            "batch": 32,
+            "echo": 1,
+            "rate": 2e-3,
+            "minutes": 30,
+            "figures": 720,
+            "views": 10,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 14,
+        },
+    },
 }
 """A step shows `batch` crops; every `echo` steps show the same photographs, cropped and spoilt in other ways: making
 them costs as much as learning."""
@@ -80,14 +100,17 @@ def train_parser(config: str, out: Path, report: Reporter, run: descent.Training
     if not run.growing:
         prepare_figures(config, work, report)
     require_figures("parser", data, lambda seed: is_prepared(seed, t["views"], work), work)
-    unseen = Snapshots(data["held_out_seeds"], t["views"], work,
-                       hdri).draw(8 * t["held_out"], 1, np.random.default_rng(1), augment=False)[0]
+    unseen = Snapshots(data["held_out_seeds"], t["views"], work, hdri).draw(
+        8 * t["held_out"], 1, np.random.default_rng(1), augment=False
+    )[0]
     torch.manual_seed(t["seed"])
     network = ParseNet(**CONFIGS[config]["model"])
     state = descent.resumed(work, descent.beginning(config, data, network))
-    objective = descent.Objective(Echoed(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step,
-                                  share: loss(network, batch, device),
-                                  lambda average: measure_figures(average, config, unseen, device))
+    objective = descent.Objective(
+        Echoed(Snapshots(data["seeds"], t["views"], work, hdri), t),
+        lambda batch, step, share: loss(network, batch, device),
+        lambda average: measure_figures(average, config, unseen, device),
+    )
     descent.descend(network, state, objective, recipe_of(t, run.minutes), work, device, report)
     return export(work, out)
 
@@ -141,11 +164,14 @@ def measure_figures(average: dict, config: str, batch: SnapshotBatch, device: st
 def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder, with their card."""
     config = CONFIGS[descent.read_state(work)["config"]]
-    words = ("synthetic people",
-             "photographs of held-out figures: intersection over union of each part, "
-             "where a part is what most of a pixel is")
-    return export_parsing("parser", work, out, config, words,
-                          lambda seed: is_prepared(seed, config["training"]["views"], work))
+    words = (
+        "synthetic people",
+        "photographs of held-out figures: intersection over union of each part, "
+        "where a part is what most of a pixel is",
+    )
+    return export_parsing(
+        "parser", work, out, config, words, lambda seed: is_prepared(seed, config["training"]["views"], work)
+    )
 
 
 def main(arguments: list[str] | None = None) -> int:

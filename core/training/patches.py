@@ -43,16 +43,15 @@ class Windows:
         share = np.where(whole, (1 - real) / max(whole.sum(), 1), real / max((~whole).sum(), 1))
         self.chance = share / share.sum()
         self.face = np.argwhere(template.mask("face", SIZE) > 0.5)
-        bare = template.mask("skin",
-                             SIZE
-                             // SCALES[-1]) * template.mask("face",
-                                                            SIZE
-                                                            // SCALES[-1]) * (1
-                                                                              - template.mask("eyes",
-                                                                                              SIZE // SCALES[-1]))
+        bare = (
+            template.mask("skin", SIZE // SCALES[-1])
+            * template.mask("face", SIZE // SCALES[-1])
+            * (1 - template.mask("eyes", SIZE // SCALES[-1]))
+        )
         some = np.flatnonzero(bare > 0.9)[::29]  # enough texels of facial skin for its mean
-        self.sparse = [m[:, some // bare.shape[1], some % bare.shape[1]].float().numpy()[:, None]
-                       for m in skins.maps[SCALES[-1]]]
+        self.sparse = [
+            m[:, some // bare.shape[1], some % bare.shape[1]].float().numpy()[:, None] for m in skins.maps[SCALES[-1]]
+        ]
 
     def draw(self, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> PatchBatch:
         """Random windows: a third of each scale, three quarters of them on the face.
@@ -97,11 +96,14 @@ class Windows:
         sparse = self.sparse[index]
         own = float(np.median(sparse[7]))
         lightest = -DARK_REACH if own > np.log(0.3) else -REACH
-        more = rng.uniform(max(LN_MELANIN[0] - own, lightest),
-                           np.clip(LN_MELANIN[1] - own, 0, REACH)), rng.normal(0, 0.15)
+        more = (
+            rng.uniform(max(LN_MELANIN[0] - own, lightest), np.clip(LN_MELANIN[1] - own, 0, REACH)),
+            rng.normal(0, 0.15),
+        )
         gain = np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3))[:, None, None]
-        albedo, everywhere = (np.clip((m[:3] + 1) / 2 * gain * _change(m[7], m[8], *more), 0, 1)
-                              for m in (maps, sparse))
+        albedo, everywhere = (
+            np.clip((m[:3] + 1) / 2 * gain * _change(m[7], m[8], *more), 0, 1) for m in (maps, sparse)
+        )
         clean = torch.from_numpy(np.concatenate([2 * albedo - 1, maps[3:7]]).astype(np.float32))
         tone = everywhere.mean((1, 2)) * np.exp(rng.normal(0, 0.06) + rng.normal(0, 0.02, 3))
         return clean, torch.from_numpy(tone.astype(np.float32))

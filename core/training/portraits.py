@@ -60,8 +60,15 @@ class PortraitBatch:
     shadow_weight: torch.Tensor
 
 
-def prepare(seeds: list[int], views: int, work: Path, report: Reporter, skins: Path | None = None,
-            names: list[str] = (), processes: int = 2) -> None:
+def prepare(
+    seeds: list[int],
+    views: int,
+    work: Path,
+    report: Reporter,
+    skins: Path | None = None,
+    names: list[str] = (),
+    processes: int = 2,
+) -> None:
     """Makes the sights of these subjects that the work folder lacks.
 
     Parameters
@@ -96,8 +103,9 @@ class Portraits:
 
     def draw(self, pairs: int, rng: np.random.Generator, augment: bool = True) -> PortraitBatch:
         """`pairs` sights under two lights each."""
-        return stacked([make_example(portrait, geometry, rng)
-                        for portrait, geometry in self.portraits(pairs, rng, augment)])
+        return stacked(
+            [make_example(portrait, geometry, rng) for portrait, geometry in self.portraits(pairs, rng, augment)]
+        )
 
     def portraits(self, pairs: int, rng: np.random.Generator, augment: bool):
         for _ in range(pairs):
@@ -105,8 +113,9 @@ class Portraits:
             seen = sight.full(sight.load(self.work / f"subject_{seed}" / f"{view}.npz"))
             albedo = seen.albedo
             if augment:  # other tones than the subjects' own
-                albedo = np.clip(albedo * np.exp(rng.normal(0, 0.12) + rng.normal(0, 0.04, 3)), 0.003,
-                                 0.9).astype(np.float32)
+                albedo = np.clip(albedo * np.exp(rng.normal(0, 0.12) + rng.normal(0, 0.04, 3)), 0.003, 0.9).astype(
+                    np.float32
+                )
             for _ in range(2):
                 lit = relight_sight(seen, self._stage(seed), rng, self.panoramas, albedo)
                 parts = (
@@ -121,8 +130,9 @@ class Portraits:
         if seed not in self.heads:
             bits = np.load(self.work / f"subject_{seed}" / "visible.npy")
             mesh = subject_mesh(seed)
-            self.heads[seed] = LightStage(mesh, vertex_normals(mesh).astype(np.float32),
-                                          np.unpackbits(bits, axis=1).astype(bool))
+            self.heads[seed] = LightStage(
+                mesh, vertex_normals(mesh).astype(np.float32), np.unpackbits(bits, axis=1).astype(bool)
+            )
         return self.heads[seed]
 
 
@@ -140,16 +150,23 @@ def make_example(
     if rng.random() < WITH_GEOMETRY:
         off = SLIP_PX[int(rng.random() < FROM_LANDMARKS)]
         slip = np.float32([[1, 0, rng.normal(0, off)], [0, 1, rng.normal(0, off)]])
-        geometry = [cv2.warpAffine(np.ascontiguousarray(array, np.float32), slip, (len(array), len(array)))
-                    for array in geometry_maps]
+        geometry = [
+            cv2.warpAffine(np.ascontiguousarray(array, np.float32), slip, (len(array), len(array)))
+            for array in geometry_maps
+        ]
     layers, middle = network_input(portrait.srgb, *geometry)
     sure = (_half(portrait.head) > 0.99) & (_half(portrait.albedo).min(-1) > 0.002)
     shading = np.log(np.maximum(_half(portrait.even), LEAST)) - middle
     weight = sure * (LEAST_WEIGHT + (1 - LEAST_WEIGHT) * _half(portrait.skin))
     strong = portrait.strong
     trust = 1.0 if strong > 0.4 or strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
-    parts = (layers, shading.transpose(2, 0, 1), weight[None], _half(portrait.shadow)[None] * (strong > 0.2),
-             (sure * trust)[None])
+    parts = (
+        layers,
+        shading.transpose(2, 0, 1),
+        weight[None],
+        _half(portrait.shadow)[None] * (strong > 0.2),
+        (sure * trust)[None],
+    )
     parts = [np.ascontiguousarray(array, np.float32) for array in parts]
     return tuple(parts)
 
@@ -158,8 +175,11 @@ def mirrored(batch: PortraitBatch) -> PortraitBatch:
     """Left and right exchanged; a normal's x changes its sign."""
     layers = batch.layers.flip(-1)  # a copy
     layers[:, 12] *= -1
-    return replace(batch, layers=layers,
-                   **{name: getattr(batch, name).flip(-1) for name in ("shading", "weight", "shadow", "shadow_weight")})
+    return replace(
+        batch,
+        layers=layers,
+        **{name: getattr(batch, name).flip(-1) for name in ("shading", "weight", "shadow", "shadow_weight")},
+    )
 
 
 def repainted(batch: PortraitBatch, rng: np.random.Generator) -> PortraitBatch:
@@ -173,13 +193,14 @@ def repainted(batch: PortraitBatch, rng: np.random.Generator) -> PortraitBatch:
         for k in (first, first + 1):
             srgb = (layers[k, :3].numpy().transpose(1, 2, 0) + 1) / 2
             painted = np.clip(images.srgb_to_linear(srgb) * np.exp(skin[k] * paint), 0, 1)
-            (before, middle), (after, moved) = (network_input(picture)
-                                                for picture in (srgb, images.linear_to_srgb(painted)))
+            (before, middle), (after, moved) = (
+                network_input(picture) for picture in (srgb, images.linear_to_srgb(painted))
+            )
             change = torch.from_numpy(after[3:6] + moved - before[3:6] - middle)
             layers[k, :6] = torch.from_numpy(after[:6])
             for light in (6, 9):  # what is left of the logarithm under the fitted light
-                rest = (layers[k, light:light + 3] + change).clamp(-FARTHEST_LOG, FARTHEST_LOG)
-                layers[k, light:light + 3] = rest * layers[k, 15]
+                rest = (layers[k, light : light + 3] + change).clamp(-FARTHEST_LOG, FARTHEST_LOG)
+                layers[k, light : light + 3] = rest * layers[k, 15]
             shading[k] += middle - moved
     return replace(batch, layers=layers, shading=shading)
 
@@ -219,15 +240,20 @@ def _prepare_one(job: tuple) -> None:
 def _skin(skins: Skins, index: int) -> Skin:
     """A map of `skins` as the generator's own type; height is not needed."""
     maps = skins.maps[1][index].float().numpy().transpose(1, 2, 0)
-    return Skin(np.ascontiguousarray((maps[..., :3] + 1) / 2), np.ascontiguousarray((maps[..., 6] + 1) / 2),
-                np.zeros(maps.shape[:2], np.float32),
-                np.ascontiguousarray(maps[..., 3:6]), np.ones(maps.shape[:2], bool))
+    return Skin(
+        np.ascontiguousarray((maps[..., :3] + 1) / 2),
+        np.ascontiguousarray((maps[..., 6] + 1) / 2),
+        np.zeros(maps.shape[:2], np.float32),
+        np.ascontiguousarray(maps[..., 3:6]),
+        np.ones(maps.shape[:2], bool),
+    )
 
 
 def _wearing(skin: Skin, own: Skins, carried: Skins) -> Skin:
     """The subject with another's colours where these are known, and its own, moved to that tone, elsewhere."""
     known = cv2.GaussianBlur(carried.known[1][0].float().numpy(), (0, 0), 6)[..., None]
     tone = (carried.tones[0] / own.tones[0]).numpy()
-    return replace(skin,
-                   diffuse=np.clip(known * _skin(carried, 0).diffuse + (1 - known) * skin.diffuse * tone, 0,
-                                   1).astype(np.float32))
+    return replace(
+        skin,
+        diffuse=np.clip(known * _skin(carried, 0).diffuse + (1 - known) * skin.diffuse * tone, 0, 1).astype(np.float32),
+    )

@@ -31,17 +31,51 @@ from .seeds import named_subjects
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
 OCTAVES = 6
-_MODEL = {"type": "image_v1", "input_channels": 7, "patch_size": 2, "mapping_out": 128,
-          "self_attn_depths": [False, False, False], "augment_wrapper": False,
-          "mapping_cond_dim": 5, "norm": "pixel", "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}
+_MODEL = {
+    "type": "image_v1",
+    "input_channels": 7,
+    "patch_size": 2,
+    "mapping_out": 128,
+    "self_attn_depths": [False, False, False],
+    "augment_wrapper": False,
+    "mapping_cond_dim": 5,
+    "norm": "pixel",
+    "sigma_data": 0.5,
+    "sigma_min": 0.01,
+    "sigma_max": 80,
+}
 _COND = {"type": "posenc", "pos_enc_freq": OCTAVES}
 CONFIGS = {
-    "cpu": {"model": {**_MODEL, "depths": [1, 2, 2], "channels": [48, 96, 160]}, "cond": _COND,
-            "training": {"patch": 64, "batch": 16, "wide_every": 4, "rate": 6e-4, "minutes": 60, "skins": 96,
-                         "held_out": 6, "seed": 0, "workers": 0}},
-    "gpu": {"model": {**_MODEL, "depths": [2, 2, 2], "channels": [64, 128, 256]}, "cond": _COND,
-            "training": {"patch": 64, "batch": 64, "wide_every": 4, "rate": 4e-4, "minutes": 20, "skins": 160,
-                         "held_out": 6, "seed": 0, "workers": 12}},
+    "cpu": {
+        "model": {**_MODEL, "depths": [1, 2, 2], "channels": [48, 96, 160]},
+        "cond": _COND,
+        "training": {
+            "patch": 64,
+            "batch": 16,
+            "wide_every": 4,
+            "rate": 6e-4,
+            "minutes": 60,
+            "skins": 96,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 0,
+        },
+    },
+    "gpu": {
+        "model": {**_MODEL, "depths": [2, 2, 2], "channels": [64, 128, 256]},
+        "cond": _COND,
+        "training": {
+            "patch": 64,
+            "batch": 64,
+            "wide_every": 4,
+            "rate": 4e-4,
+            "minutes": 20,
+            "skins": 160,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 12,
+        },
+    },
 }
 """`wide_every`: every so many steps the windows are twice as wide and a quarter as many."""
 SIGMA = {1: (-2.4, 1.2), 2: (-1.8, 1.3), 4: (-1.0, 1.5)}
@@ -52,8 +86,14 @@ they must follow from the diffuse, of which more is then to be seen (ln sigma lo
 CLEARER = 1.5
 
 
-def train_prior(config: str, out: Path, report: Reporter, run: descent.TrainingRun, skins: Path | None = None,
-                held_out: list[str] = ()) -> dict:
+def train_prior(
+    config: str,
+    out: Path,
+    report: Reporter,
+    run: descent.TrainingRun,
+    skins: Path | None = None,
+    held_out: list[str] = (),
+) -> dict:
     """Trains the solver's prior.
 
     Parameters
@@ -76,8 +116,11 @@ def train_prior(config: str, out: Path, report: Reporter, run: descent.TrainingR
     work, t, device = descent.work_folder(run, "prior"), CONFIGS[config]["training"], descent.device_of(config)
     data = named_data(t, skins, held_out)
     windows, seen, unseen = _windows(data, skins, work, report)
-    held_out_windows = {kind: Windows(s, real=0.5).draw(96, t["patch"], np.random.default_rng(1))
-                        for kind, s in unseen.items() if s.names}
+    held_out_windows = {
+        kind: Windows(s, real=0.5).draw(96, t["patch"], np.random.default_rng(1))
+        for kind, s in unseen.items()
+        if s.names
+    }
     state = descent.resumed(work, _begin(config, data, seen, windows))
     network = build_network(CONFIGS[config])
     statistics = {name: value.to(device) for name, value in state["statistics"].items()}
@@ -92,11 +135,18 @@ def train_prior(config: str, out: Path, report: Reporter, run: descent.TrainingR
         """Constant, then linear to zero over the second half."""
         return t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share)))
 
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], rate, betas=(0.9, 0.99), weight_decay=1e-3,
-                                    averaging=0.9995, workers=t["workers"],
-                                    save_every=120)
-    descent.descend(network, state, descent.Objective(_PriorSteps(windows, t), loss, figures), recipe, work, device,
-                    report)
+    recipe = descent.TrainingRecipe(
+        run.minutes or t["minutes"],
+        rate,
+        betas=(0.9, 0.99),
+        weight_decay=1e-3,
+        averaging=0.9995,
+        workers=t["workers"],
+        save_every=120,
+    )
+    descent.descend(
+        network, state, descent.Objective(_PriorSteps(windows, t), loss, figures), recipe, work, device, report
+    )
     return export(work, out)
 
 
@@ -110,13 +160,21 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     told = "Procedural skins of core/synthetic on the built-in head, which derives from the MakeHuman base mesh (CC0)"
     if data["skins"]:
         told += f"; {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs, diffuse only"
-    losses = {kind: dict(zip((f"scale_{scale}" for scale in SCALES), of, strict=True))
-              for kind, of in state["history"][-1][2].items()}
-    what = ("mean squared error of the network's output on fixed patches and noise of held-out skins; 1 is that of the "
-            "mean face")
-    card = TrainingCard({**CONFIGS[state["config"]], "scales": list(SCALES)}, told, again("prior", state),
-                        {"loss": losses, "what": what},
-                        {"tones": [[round(v, 4) for v in tone] for tone in state["tones"]]})
+    losses = {
+        kind: dict(zip((f"scale_{scale}" for scale in SCALES), of, strict=True))
+        for kind, of in state["history"][-1][2].items()
+    }
+    what = (
+        "mean squared error of the network's output on fixed patches and noise of held-out skins; 1 is that of the "
+        "mean face"
+    )
+    card = TrainingCard(
+        {**CONFIGS[state["config"]], "scales": list(SCALES)},
+        told,
+        again("prior", state),
+        {"loss": losses, "what": what},
+        {"tones": [[round(v, 4) for v in tone] for tone in state["tones"]]},
+    )
     return release(out, state, card, {**statistics, "references": levels, "references_range": limits})
 
 
@@ -131,14 +189,20 @@ def named_data(t: dict, skins: Path | None, held_out: list[str]) -> dict:
         raise Problem(f"{skins} holds no skin named {', '.join(unknown)}.", f"Choose from {', '.join(names)}.")
     kept = {name for group in clusters(skins, names) if set(group) & set(held_out) for name in group}
     carried = json.loads((Path(skins) / "carried.json").read_text(encoding="utf-8"))
-    return data | {"from": carried["from"], "notices": carried["notices"], "skins": [n for n in names if n not in kept],
-                   "held_out_skins": sorted(kept)}
+    return data | {
+        "from": carried["from"],
+        "notices": carried["notices"],
+        "skins": [n for n in names if n not in kept],
+        "held_out_skins": sorted(kept),
+    }
 
 
 def _windows(data: dict, folder: Path | None, work: Path, report: Reporter) -> tuple[Windows, Skins, dict[str, Skins]]:
     """What windows are drawn from, the same as skins, and the held-out skins by kind."""
-    seen, unseen = synthetic_skins(data["seeds"], work,
-                                   report), {"synthetic": synthetic_skins(data["held_out_seeds"], work, report)}
+    seen, unseen = (
+        synthetic_skins(data["seeds"], work, report),
+        {"synthetic": synthetic_skins(data["held_out_seeds"], work, report)},
+    )
     if data["skins"]:
         mean = mean_map(seen)
         seen = seen + carried_skins(folder, data["skins"], mean, work, report)
@@ -151,9 +215,14 @@ def _begin(config: str, data: dict, skins: Skins, windows: Windows) -> dict:
     t = CONFIGS[config]["training"]
     torch.manual_seed(t["seed"])
     mean = mean_map(skins)
-    return descent.beginning(config, data, build_network(CONFIGS[config]), tones=skins.tones.tolist(),
-                             references=reference_skins(skins),
-                             statistics={"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])})
+    return descent.beginning(
+        config,
+        data,
+        build_network(CONFIGS[config]),
+        tones=skins.tones.tolist(),
+        references=reference_skins(skins),
+        statistics={"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])},
+    )
 
 
 class _PriorSteps(Dataset):
@@ -169,8 +238,9 @@ class _PriorSteps(Dataset):
         return self.windows.draw(t["batch"] // wide**2, t["patch"] * wide, np.random.default_rng((t["seed"], step, 0)))
 
 
-def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: PatchBatch, rng: np.random.Generator,
-          device: str) -> torch.Tensor:
+def _loss(
+    network: UNet, statistics: dict[str, torch.Tensor], batch: PatchBatch, rng: np.random.Generator, device: str
+) -> torch.Tensor:
     """EDM's weighted denoising error per sample [N] (Karras et al. 2022, table 1): the squared error of F itself, where
     the truth is known. What is not known goes in as pure noise."""
     mean, deviation = (torch.tensor([SIGMA[int(scale)][i] for scale in batch.scale]) for i in (0, 1))
@@ -178,8 +248,13 @@ def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: PatchBatch,
     blind = torch.from_numpy(rng.random(len(mean)) < BLINDFOLDED).float().to(device)
     mean = mean.to(device) - CLEARER * blind
     blind = torch.maximum(blind, 1 - known[:, 3:].amax((1, 2, 3)))
-    sigma = (torch.from_numpy(rng.standard_normal(len(mean))).float()
-             * deviation).to(device).add(mean).exp().clamp(0.005, BLIND_SIGMA)
+    sigma = (
+        (torch.from_numpy(rng.standard_normal(len(mean))).float() * deviation)
+        .to(device)
+        .add(mean)
+        .exp()
+        .clamp(0.005, BLIND_SIGMA)
+    )
     noise = torch.from_numpy(rng.standard_normal(batch.clean.shape, dtype=np.float32)).to(device)
     told = make_condition(batch.coords.to(device), OCTAVES, **statistics, tone=batch.tone.to(device), blind=blind)
     s, spread = sigma[:, None, None, None].expand(-1, 7, -1, -1).clone(), told.spread
@@ -197,8 +272,9 @@ def _held_out_loss(average: dict, statistics: dict, config: str, batch: PatchBat
     """The averaged network's loss per scale, always on the same patches and noise."""
     network = build_network(CONFIGS[config])
     network.load_state_dict(average)
-    losses = _loss(network.to(device, memory_format=torch.channels_last), statistics, batch, np.random.default_rng(2),
-                   device).cpu()
+    losses = _loss(
+        network.to(device, memory_format=torch.channels_last), statistics, batch, np.random.default_rng(2), device
+    ).cpu()
     return [round(losses[batch.scale == scale].mean().item(), 4) for scale in SCALES]
 
 

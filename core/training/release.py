@@ -45,12 +45,22 @@ def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch
     with replacing(out) as temporary:
         half = {name: value.half().contiguous() for name, value in state["average"].items()}
         save_file({**half, **(tensors or {})}, temporary)
-    told = {**card.config, "data": card.data, "licence": "GPL-3.0-or-later", "notices": named["notices"],
-            "command": card.command, "steps": state["step"],
-            "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()),
-            "seeds": named["seeds"],
-            "held_out_seeds": named["held_out_seeds"], "skins": named["skins"],
-            "held_out_skins": named["held_out_skins"], "held_out": card.held_out, **card.more}
+    told = {
+        **card.config,
+        "data": card.data,
+        "licence": "GPL-3.0-or-later",
+        "notices": named["notices"],
+        "command": card.command,
+        "steps": state["step"],
+        "minutes": round(state["seconds"] / 60, 1),
+        "parameters": sum(v.numel() for v in state["average"].values()),
+        "seeds": named["seeds"],
+        "held_out_seeds": named["held_out_seeds"],
+        "skins": named["skins"],
+        "held_out_skins": named["held_out_skins"],
+        "held_out": card.held_out,
+        **card.more,
+    }
     with replacing(out.with_suffix(".json")) as temporary:
         temporary.write_text(json.dumps(told, indent=1), encoding="utf-8")
     return told

@@ -26,11 +26,20 @@ def held_out_seeds(count: int) -> list[int]:
 
 def named_subjects(count: int, held_out: int) -> dict:
     """Who is learnt from and who is kept from it, of synthetic subjects alone, as a training's state has it."""
-    return {"seeds": training_seeds(count), "held_out_seeds": held_out_seeds(held_out), "from": "", "skins": [],
-            "held_out_skins": [], "notices": []}
+    return {
+        "seeds": training_seeds(count),
+        "held_out_seeds": held_out_seeds(held_out),
+        "from": "",
+        "skins": [],
+        "held_out_skins": [],
+        "notices": [],
+    }
 
 
 def panorama_names(folder: Path | None) -> list[str]:
     """The panoramas of a folder, none without one."""
-    return sorted(path.name for path in Path(folder).iterdir() if path.suffix.lower() in (".hdr", ".exr")) \
-        if folder else []
+    return (
+        sorted(path.name for path in Path(folder).iterdir() if path.suffix.lower() in (".hdr", ".exr"))
+        if folder
+        else []
+    )

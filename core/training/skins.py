@@ -53,9 +53,12 @@ class Skins:
     names: list[str]
 
     def __add__(self, other: Skins) -> Skins:
-        return Skins({s: self.maps[s] + other.maps[s] for s in SCALES},
-                     {s: self.known[s] + other.known[s] for s in SCALES},
-                     torch.cat([self.tones, other.tones]), self.names + other.names)
+        return Skins(
+            {s: self.maps[s] + other.maps[s] for s in SCALES},
+            {s: self.known[s] + other.known[s] for s in SCALES},
+            torch.cat([self.tones, other.tones]),
+            self.names + other.names,
+        )
 
 
 def synthetic_skins(seeds: list[int], cache: Path, report: Reporter) -> Skins:
@@ -125,15 +128,17 @@ def unshaded(diffuse: np.ndarray, mean: torch.Tensor) -> np.ndarray:
     small = images.resize(diffuse, FITTED, FITTED).mean(-1)
     face = np.asarray(mean[:3].mean(0), np.float32)
     face = cv2.resize(face, (FITTED, FITTED), interpolation=cv2.INTER_AREA)
-    basis, weight = _sky_basis(), _bare(FITTED) * (1
-                                                   - template.mask("lips", FITTED)) * (1
-                                                                                       - template.mask("brows", FITTED))
+    basis, weight = (
+        _sky_basis(),
+        _bare(FITTED) * (1 - template.mask("lips", FITTED)) * (1 - template.mask("brows", FITTED)),
+    )
     columns = (basis * face).reshape(9, -1).astype(np.float64)
     w = weight.reshape(-1)
     for _ in range(3):  # robust: what is far off is paint or hair, not light
         matrix = (columns * w) @ columns.T
-        coefficients = np.linalg.solve(matrix + 0.02 * np.trace(matrix) / 9 * np.diag([0.0] + [1.0] * 8),
-                                       (columns * w) @ small.reshape(-1))
+        coefficients = np.linalg.solve(
+            matrix + 0.02 * np.trace(matrix) / 9 * np.diag([0.0] + [1.0] * 8), (columns * w) @ small.reshape(-1)
+        )
         ratio = np.log(np.maximum(small.reshape(-1), 1e-3) / np.maximum(coefficients @ columns, 1e-3))
         w = weight.reshape(-1) / (1 + (ratio / 0.15) ** 2)
     shading = np.maximum(np.tensordot(coefficients, basis, 1), 1e-3)
@@ -145,8 +150,9 @@ def pigments(albedo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Logarithms of the melanin and blood fractions whose reflectance is about nearest to an albedo [..., 3] (linear),
     float32 [...] each."""
     level = (1 - np.log(np.clip(albedo, DARKEST, 1)) / np.log(DARKEST)) * (LEVELS - 1)
-    return tuple(map_coordinates(table, level.reshape(-1, 3).T, order=1).reshape(albedo.shape[:-1])
-                 for table in _pigment_table())
+    return tuple(
+        map_coordinates(table, level.reshape(-1, 3).T, order=1).reshape(albedo.shape[:-1]) for table in _pigment_table()
+    )
 
 
 def shrink(full: np.ndarray, scale: int) -> np.ndarray:
@@ -154,8 +160,9 @@ def shrink(full: np.ndarray, scale: int) -> np.ndarray:
     if scale == 1:
         return full
     side = full.shape[-1] // scale
-    small = np.stack([cv2.resize(channel.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA)
-                      for channel in full])
+    small = np.stack(
+        [cv2.resize(channel.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA) for channel in full]
+    )
     small[3:6] /= np.maximum(np.linalg.norm(small[3:6], axis=0), 1e-6)
     return small.astype(full.dtype)
 
@@ -175,10 +182,14 @@ def _read(paths: list[Path], names: list[str], learnable: np.ndarray | None) -> 
         for scale in SCALES:
             maps[scale].append(torch.from_numpy(shrink(full, scale)))
         tones.append(((full[:3].astype(np.float32) + 1) / 2 * skin).sum((1, 2)) / skin.sum())
-    areas = {scale: None if learnable is None
-             else torch.from_numpy(cv2.resize(learnable.astype(np.float32), (SIZE // scale,) * 2,
-                                              interpolation=cv2.INTER_AREA) > 0.99)
-             for scale in SCALES}
+    areas = {
+        scale: None
+        if learnable is None
+        else torch.from_numpy(
+            cv2.resize(learnable.astype(np.float32), (SIZE // scale,) * 2, interpolation=cv2.INTER_AREA) > 0.99
+        )
+        for scale in SCALES
+    }
     tones = torch.from_numpy(np.stack(tones)).float() if tones else torch.zeros(0, 3)
     return Skins(maps, {scale: [areas[scale]] * len(paths) for scale in SCALES}, tones, names)
 
@@ -196,21 +207,28 @@ def _sky_basis() -> np.ndarray:
     occlusion."""
     head = template.load()
     face, bary = raster.rasterize_uv(head, FITTED)
-    return raster.bleed(raster.interpolate(light.sky_transfer(), head.faces, face, bary),
-                        face >= 0).transpose(2, 0, 1).astype(np.float32)
+    return (
+        raster.bleed(raster.interpolate(light.sky_transfer(), head.faces, face, bary), face >= 0)
+        .transpose(2, 0, 1)
+        .astype(np.float32)
+    )
 
 
 @cache
 def _pigment_table() -> tuple[np.ndarray, np.ndarray]:
     """`pigments` of LEVELS colours per channel: float32 [LEVELS, LEVELS, LEVELS] each."""
-    tried = np.stack(np.meshgrid(*(np.geomspace(*limits, NODES)
-                                   for limits in (pigment.MELANIN_RANGE, pigment.BLOOD_RANGE)), indexing="ij"),
-                     -1).reshape(-1, 2)
+    tried = np.stack(
+        np.meshgrid(
+            *(np.geomspace(*limits, NODES) for limits in (pigment.MELANIN_RANGE, pigment.BLOOD_RANGE)), indexing="ij"
+        ),
+        -1,
+    ).reshape(-1, 2)
     logs = (1 - np.linspace(0, 1, LEVELS)) * np.log(DARKEST)
     colours = np.stack(np.meshgrid(logs, logs, logs, indexing="ij"), -1)
     known = np.log(pigment.reflectance(tried[:, 0], tried[:, 1]))
     # in dark skin blood hardly shows: of two that fit as well the usual one is taken
     unusual = USUAL_BLOOD * np.log(tried[:, 1:] / 0.02)
-    _, nearest = cKDTree(np.hstack([known, unusual])).query(np.concatenate([colours, np.zeros((*colours.shape[:3], 1))],
-                                                                           -1), eps=0.3)
+    _, nearest = cKDTree(np.hstack([known, unusual])).query(
+        np.concatenate([colours, np.zeros((*colours.shape[:3], 1))], -1), eps=0.3
+    )
     return tuple(np.log(tried).astype(np.float32)[nearest].transpose(3, 0, 1, 2))

@@ -96,8 +96,10 @@ class Snapshots:
             srgb, shares = photograph(sight, rng, self.panoramas)
             for batch in batches:
                 batch.append(make_example(srgb, shares, sight.landmarks, rng, augment))
-        return [SnapshotBatch(*(torch.from_numpy(np.stack(arrays)) for arrays in zip(*batch, strict=True)))
-                for batch in batches]
+        return [
+            SnapshotBatch(*(torch.from_numpy(np.stack(arrays)) for arrays in zip(*batch, strict=True)))
+            for batch in batches
+        ]
 
 
 class Echoed(Dataset):
@@ -113,13 +115,18 @@ class Echoed(Dataset):
         torch.set_num_threads(1)
         index, turn = divmod(step, self.options["echo"])
         if self.drawn[0] != index:
-            self.drawn = index, self.source.draw(self.options["batch"], self.options["echo"],
-                                                 np.random.default_rng((self.options["seed"], index)))
+            self.drawn = (
+                index,
+                self.source.draw(
+                    self.options["batch"], self.options["echo"], np.random.default_rng((self.options["seed"], index))
+                ),
+            )
         return self.drawn[1][turn]
 
 
-def make_example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator,
-                 augment: bool = True) -> tuple[np.ndarray, ...]:
+def make_example(
+    srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator, augment: bool = True
+) -> tuple[np.ndarray, ...]:
     """A photograph as the network sees it.
 
     Parameters
@@ -181,7 +188,7 @@ def _ended(rng: np.random.Generator) -> np.ndarray:
     for turn in range(4):
         if rng.random() < 0.4:
             known = np.rot90(known, turn).copy()
-            known[:int(rng.uniform(0, 0.25) * SIDE_PX)] = 0
+            known[: int(rng.uniform(0, 0.25) * SIDE_PX)] = 0
             known = np.rot90(known, -turn).copy()
     return known
 
@@ -190,17 +197,20 @@ def spoilt(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """A square crop [S, S, 3] with another white balance and gamma, less resolution, no colour, now and then."""
     side = len(picture)
     if rng.random() < 0.6:
-        picture = np.clip(picture, 0,
-                          1) ** np.float32(np.exp(rng.normal(0, 0.2))) * np.exp(rng.normal(0, 0.1, 3)
-                                                                                + rng.normal(0,
-                                                                                             0.15)).astype(np.float32)
+        picture = np.clip(picture, 0, 1) ** np.float32(np.exp(rng.normal(0, 0.2))) * np.exp(
+            rng.normal(0, 0.1, 3) + rng.normal(0, 0.15)
+        ).astype(np.float32)
     if rng.random() < 0.35:
         small = int(side / np.exp(rng.uniform(np.log(1.2), np.log(4.0))))
-        picture = cv2.resize(cv2.resize(picture, (small, small), interpolation=cv2.INTER_AREA), (side, side),
-                             interpolation=cv2.INTER_LINEAR)
+        picture = cv2.resize(
+            cv2.resize(picture, (small, small), interpolation=cv2.INTER_AREA),
+            (side, side),
+            interpolation=cv2.INTER_LINEAR,
+        )
     if rng.random() < 0.3:
-        picture = picture + rng.normal(0, np.exp(rng.uniform(np.log(0.004), np.log(0.05))),
-                                       picture.shape).astype(np.float32)
+        picture = picture + rng.normal(0, np.exp(rng.uniform(np.log(0.004), np.log(0.05))), picture.shape).astype(
+            np.float32
+        )
     if rng.random() < 0.06:
         picture = np.repeat(picture.mean(-1, keepdims=True), 3, 2)
     return np.clip(picture, 0, 1).astype(np.float32)
@@ -236,19 +246,28 @@ def require_figures(training: str, data: dict, prepared: Callable[[int], bool], 
         Where none of those learnt from, or none of those kept from it, is prepared.
     """
     if not all(any(map(prepared, data[kind])) for kind in ("seeds", "held_out_seeds")):
-        raise Problem(f"There are no figures in {work} yet.",
-                      f"Wait for `train {training} --prepare`, or train without --growing.")
+        raise Problem(
+            f"There are no figures in {work} yet.",
+            f"Wait for `train {training} --prepare`, or train without --growing.",
+        )
 
 
 def recipe_of(options: dict, minutes: float | None) -> descent.TrainingRecipe:
     """How a network that parses pictures is trained."""
-    return descent.TrainingRecipe(minutes or options["minutes"], descent.cosine(options["rate"], 100, 0.02),
-                                  betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=options["workers"],
-                                  save_every=150)
+    return descent.TrainingRecipe(
+        minutes or options["minutes"],
+        descent.cosine(options["rate"], 100, 0.02),
+        betas=(0.9, 0.98),
+        weight_decay=1e-2,
+        averaging=0.995,
+        workers=options["workers"],
+        save_every=150,
+    )
 
 
-def export_parsing(training: str, work: Path, out: Path, config: dict, words: tuple[str, str],
-                   prepared: Callable[[int], bool]) -> dict:
+def export_parsing(
+    training: str, work: Path, out: Path, config: dict, words: tuple[str, str], prepared: Callable[[int], bool]
+) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from.
 
     Parameters
@@ -272,8 +291,10 @@ def export_parsing(training: str, work: Path, out: Path, config: dict, words: tu
     state = descent.read_state(work)
     whom, what = words
     named, panoramas = state["data"], state["data"]["panoramas"]
-    told = (f"Photographs of {whom} (core/synthetic/people) on the built-in head, which derives from the MakeHuman "
-            "base mesh (CC0)")
+    told = (
+        f"Photographs of {whom} (core/synthetic/people) on the built-in head, which derives from the MakeHuman "
+        "base mesh (CC0)"
+    )
     if panoramas:
         told += f"; light from procedural environments, lamps and {len(panoramas)} panoramas (CC0)"
     command = again(training, state) + (" --hdri hdri" if panoramas else "")

@@ -74,22 +74,29 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=MODEL_FILE)
     options = parser.parse_args(arguments)
     if not 50 <= options.subjects <= HELD_OUT_SEED - FIRST_SEED:
-        raise Problem(f"{options.subjects} subjects are too few or too many.",
-                      f"Take 50 to {HELD_OUT_SEED - FIRST_SEED}.")
+        raise Problem(
+            f"{options.subjects} subjects are too few or too many.", f"Take 50 to {HELD_OUT_SEED - FIRST_SEED}."
+        )
     people = fit_people(*read_people(options.spectra))
     report = Reporter("tones", print)
     scenes = []
     for seed in range(FIRST_SEED, FIRST_SEED + options.subjects):
         report.progress(seed - FIRST_SEED, options.subjects, f"subject {seed}")
         scenes += scenes_of(seed)
-    write_json(options.out,
-               {**people, **fit_camera(scenes), "licence": "GPL-3.0-or-later",
-                "command": f"python -m core train tones SPECTRA --subjects {options.subjects}",
-                "data": "People: figures fitted to the International Skin Spectra Archive (Lu et al., Scientific Data "
-                        "2025), the mean of each person's facial sites less "
-                        f"{100 * SURFACE_REFLECTANCE:.1f} % of surface reflection, origins weighed alike. Camera: "
-                        f"simulated skins and lights of core/synthetic, seeds {FIRST_SEED} to "
-                        f"{FIRST_SEED + options.subjects - 1}"})
+    write_json(
+        options.out,
+        {
+            **people,
+            **fit_camera(scenes),
+            "licence": "GPL-3.0-or-later",
+            "command": f"python -m core train tones SPECTRA --subjects {options.subjects}",
+            "data": "People: figures fitted to the International Skin Spectra Archive (Lu et al., Scientific Data "
+            "2025), the mean of each person's facial sites less "
+            f"{100 * SURFACE_REFLECTANCE:.1f} % of surface reflection, origins weighed alike. Camera: "
+            f"simulated skins and lights of core/synthetic, seeds {FIRST_SEED} to "
+            f"{FIRST_SEED + options.subjects - 1}",
+        },
+    )
     return 0
 
 
@@ -130,8 +137,13 @@ def fit_people(linear: np.ndarray, origin: np.ndarray) -> dict:
     of_lightness = _fit_polynomial(lightness[:, None], ratios, weight, DEGREE)
     error = ratios - of_lightness(lightness[:, None])
     open_l = np.sqrt(np.mean([_colour_error(lightness, ratios, weight, origin == name) for name in np.unique(origin)]))
-    result = {"lightness": LIGHTNESS, "share": counts / counts.sum(), "ratios": of_lightness(LIGHTNESS[:, None]),
-              "ratio_covariance": np.cov(error.T, aweights=weight), "colour_sigma_l": open_l}
+    result = {
+        "lightness": LIGHTNESS,
+        "share": counts / counts.sum(),
+        "ratios": of_lightness(LIGHTNESS[:, None]),
+        "ratio_covariance": np.cov(error.T, aweights=weight),
+        "colour_sigma_l": open_l,
+    }
     return {name: np.round(array, 5).tolist() for name, array in result.items()}
 
 
@@ -142,8 +154,9 @@ def _colour_error(lightness: np.ndarray, ratios: np.ndarray, weight: np.ndarray,
     return float(np.mean(np.square(lightness[left_out] - of_colour(ratios[left_out])[:, 0])))
 
 
-def _fit_polynomial(inputs: np.ndarray, outputs: np.ndarray, weight: np.ndarray,
-                    degree: int) -> Callable[[np.ndarray], np.ndarray]:
+def _fit_polynomial(
+    inputs: np.ndarray, outputs: np.ndarray, weight: np.ndarray, degree: int
+) -> Callable[[np.ndarray], np.ndarray]:
     """The polynomial [N, I] -> [N, O] of least weighted squares, without products of two inputs."""
     centre, spread = inputs.mean(0), inputs.std(0)
 
@@ -182,8 +195,9 @@ def scenes_of(seed: int) -> list[LitSkin]:
         turned /= np.linalg.norm(turned)
         card = np.maximum((sh_basis(turned) * per_function(LAMBERT)) @ sky, 0.005) + max(turned @ sun, 0) * colour
         used = (weight > 0.05) & ~shadowed
-        skins.append(LitSkin(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright,
-                             card))
+        skins.append(
+            LitSkin(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright, card)
+        )
     return skins
 
 
@@ -197,8 +211,13 @@ def _head():
     face, bary = face[where], bary[where]
     normals = raster.interpolate(meshes.vertex_normals(mesh), mesh.faces, face, bary)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    return (where, raster.interpolate(mesh.vertices, mesh.faces, face, bary), normals,
-            raster.interpolate(light.sky_transfer(), mesh.faces, face, bary), raster.RayCaster(mesh))
+    return (
+        where,
+        raster.interpolate(mesh.vertices, mesh.faces, face, bary),
+        normals,
+        raster.interpolate(light.sky_transfer(), mesh.faces, face, bary),
+        raster.RayCaster(mesh),
+    )
 
 
 def photographed(lit_skin: LitSkin, rng: np.random.Generator) -> tuple[Look, np.ndarray]:
@@ -217,11 +236,15 @@ def fit_camera(scenes: list[LitSkin]) -> dict:
         for phone in range(PHONES):
             taken, card = photographed(each, np.random.default_rng([len(true), phone, 32]))
             best, front, white, tone = to_coordinates(
-                np.stack([taken.best, taken.front, card, each.tone + SHEEN_REFLECTANCE]))
+                np.stack([taken.best, taken.front, card, each.tone + SHEEN_REFLECTANCE])
+            )
             true.append(tone)
             shown.append(np.concatenate([best, front - white]))
     system = np.concatenate([true, np.ones((len(true), 1))], 1)
     solution = np.linalg.lstsq(system, np.array(shown), rcond=None)[0]
-    result = {"slope": solution[:3].T, "offset": solution[3],
-              "covariance": np.cov((np.array(shown) - system @ solution).T)}
+    result = {
+        "slope": solution[:3].T,
+        "offset": solution[3],
+        "covariance": np.cov((np.array(shown) - system @ solution).T),
+    }
     return {name: np.round(array, 5).tolist() for name, array in result.items()}

@@ -56,11 +56,18 @@ def main(arguments: list[str] | None = None) -> int:
     places, covered = place_cells(CELLS)
     deviation[covered] = deviations_at(places, found)
     carried = json.loads((options.skins / "carried.json").read_text(encoding="utf-8"))
-    write_json(options.out, {"deviation": np.round(deviation, 2).tolist(), "skins": len(found.ratio),
-                             "licence": "GPL-3.0-or-later", "command": "python -m core train traits SKINS",
-                             "data": f"Deviations of {len(found.ratio)} skins of {carried['from']}, one of each "
-                                     "cluster, carried into the built-in UVs",
-                             "notices": carried["notices"]})
+    write_json(
+        options.out,
+        {
+            "deviation": np.round(deviation, 2).tolist(),
+            "skins": len(found.ratio),
+            "licence": "GPL-3.0-or-later",
+            "command": "python -m core train traits SKINS",
+            "data": f"Deviations of {len(found.ratio)} skins of {carried['from']}, one of each "
+            "cluster, carried into the built-in UVs",
+            "notices": carried["notices"],
+        },
+    )
     return 0
 
 
@@ -69,8 +76,13 @@ def read_shapes(folder: Path, change: Callable[[np.ndarray], np.ndarray] = lambd
     [SIZE, SIZE, 3], linear. Raises Problem where it is no such folder."""
     mesh = template.load()
     face, bary = raster.rasterize_uv(mesh, COUNT)
-    bare = np.prod([1 - images.resize(template.mask(name, SIZE), COUNT, COUNT)
-                    for name in ("brows", "lips", "eyes", "nostrils", "scalp", "ears")], 0)
+    bare = np.prod(
+        [
+            1 - images.resize(template.mask(name, SIZE), COUNT, COUNT)
+            for name in ("brows", "lips", "eyes", "nostrils", "scalp", "ears")
+        ],
+        0,
+    )
     where = (face >= 0) & (images.resize(template.mask("face", SIZE), COUNT, COUNT) * bare > 0.7)
     logs = []
     for cluster in clusters(folder, carried_names(folder)):

@@ -28,17 +28,48 @@ from .seeds import named_subjects
 
 _MODEL = {"groups": 5, "blocks": 10, "width": 64}
 CONFIGS = {
-    "cpu": {"model": _MODEL,
-            "training": {"patch": 48, "batch": 8, "rate": 8e-4, "minutes": 70, "skins": 32, "views": 3, "held_out": 6,
-                         "seed": 0,
-                         "workers": 0}},
-    "gpu": {"model": _MODEL,
-            "training": {"patch": 48, "batch": 32, "rate": 5e-4, "minutes": 20, "skins": 96, "views": 4, "held_out": 6,
-                         "seed": 0,
-                         "workers": 12}},
-    "paper": {"model": {"groups": 10, "blocks": 20, "width": 64},
-              "training": {"patch": 48, "batch": 16, "rate": 2e-4, "minutes": 600, "skins": 160, "views": 6,
-                           "held_out": 6, "seed": 0, "workers": 12}},
+    "cpu": {
+        "model": _MODEL,
+        "training": {
+            "patch": 48,
+            "batch": 8,
+            "rate": 8e-4,
+            "minutes": 70,
+            "skins": 32,
+            "views": 3,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 0,
+        },
+    },
+    "gpu": {
+        "model": _MODEL,
+        "training": {
+            "patch": 48,
+            "batch": 32,
+            "rate": 5e-4,
+            "minutes": 20,
+            "skins": 96,
+            "views": 4,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 12,
+        },
+    },
+    "paper": {
+        "model": {"groups": 10, "blocks": 20, "width": 64},
+        "training": {
+            "patch": 48,
+            "batch": 16,
+            "rate": 2e-4,
+            "minutes": 600,
+            "skins": 160,
+            "views": 6,
+            "held_out": 6,
+            "seed": 0,
+            "workers": 12,
+        },
+    },
 }
 """`views` windows of each of `skins` subjects. `paper` has the size of the paper's network; nothing of ours was trained
 with it."""
@@ -73,8 +104,9 @@ def train_upscaler(config: str, out: Path, report: Reporter, run: descent.Traini
     data = named_subjects(t["skins"], t["held_out"])
     for seeds in (data["seeds"], data["held_out_seeds"]):
         prepare(seeds, t["views"], work, report, max(2, t["workers"]))
-    held_out = FineWindows(data["held_out_seeds"], t["views"],
-                           work).draw(4 * t["held_out"], t["patch"], np.random.default_rng(1))
+    held_out = FineWindows(data["held_out_seeds"], t["views"], work).draw(
+        4 * t["held_out"], t["patch"], np.random.default_rng(1)
+    )
     torch.manual_seed(t["seed"])
     network = Rcan(**CONFIGS[config]["model"])
     state = descent.resumed(work, descent.beginning(config, data, network))
@@ -82,11 +114,20 @@ def train_upscaler(config: str, out: Path, report: Reporter, run: descent.Traini
     def loss(batch, step, share):
         return _error(network, batch, device, max(growth for growth in GROWTH if growth[0] <= share)[1]).mean()
 
-    recipe = descent.TrainingRecipe(run.minutes or t["minutes"], descent.cosine(t["rate"], 100, 0.01),
-                                    betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"],
-                                    save_every=180)
-    objective = descent.Objective(_UpscalerSteps(FineWindows(data["seeds"], t["views"], work), t), loss,
-                                  lambda average: measure_figures(average, config, held_out, device))
+    recipe = descent.TrainingRecipe(
+        run.minutes or t["minutes"],
+        descent.cosine(t["rate"], 100, 0.01),
+        betas=(0.9, 0.99),
+        weight_decay=1e-4,
+        averaging=0.995,
+        workers=t["workers"],
+        save_every=180,
+    )
+    objective = descent.Objective(
+        _UpscalerSteps(FineWindows(data["seeds"], t["views"], work), t),
+        loss,
+        lambda average: measure_figures(average, config, held_out, device),
+    )
     descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
@@ -101,8 +142,9 @@ def _error(network: Rcan, pairs: tuple[torch.Tensor, torch.Tensor], device: str,
 
 
 @torch.no_grad()
-def measure_figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor],
-                    device: str) -> dict[str, float]:
+def measure_figures(
+    average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor], device: str
+) -> dict[str, float]:
     """The averaged network on held-out patches.
 
     Parameters
@@ -118,11 +160,13 @@ def measure_figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch
     """
     network = Rcan(**CONFIGS[config]["model"]).to(device, memory_format=torch.channels_last)
     network.load_state_dict(average)
-    parts = [tuple(x[i:i + 4] for x in pairs) for i in range(0, len(pairs[0]), 4)]
+    parts = [tuple(x[i : i + 4] for x in pairs) for i in range(0, len(pairs[0]), 4)]
     error = sum(_error(network, chunk, device, None).cpu() for chunk in parts) / len(parts)
     missed = (pairs[1] - bicubic(pairs[0])).abs().mean((0, 2, 3)) / torch.tensor(BICUBIC_ERRORS)
-    return {name: round(float(error[channels].sum() / missed[channels].sum()), 4)
-            for name, channels in (("diffuse", slice(0, 3)), ("normal", slice(3, 6)), ("specular", slice(6, 7)))}
+    return {
+        name: round(float(error[channels].sum() / missed[channels].sum()), 4)
+        for name, channels in (("diffuse", slice(0, 3)), ("normal", slice(3, 6)), ("specular", slice(6, 7)))
+    }
 
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:
@@ -133,19 +177,30 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
         state | {"average": shallow(state["average"], KEPT)},
         config | {"model": config["model"] | {"blocks": min(KEPT, config["model"]["blocks"])}},
     )
-    told = ("Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the "
-            "MakeHuman base mesh (CC0)")
-    what = ("mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's, with all "
-            "blocks that were trained")
-    return release(out, state,
-                   TrainingCard(config, told, again("upscaler", state), {**state["history"][-1][2], "what": what},
-                                {"growth": GROWTH}))
+    told = (
+        "Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the "
+        "MakeHuman base mesh (CC0)"
+    )
+    what = (
+        "mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's, with all "
+        "blocks that were trained"
+    )
+    return release(
+        out,
+        state,
+        TrainingCard(
+            config, told, again("upscaler", state), {**state["history"][-1][2], "what": what}, {"growth": GROWTH}
+        ),
+    )
 
 
 def shallow(weights: dict[str, torch.Tensor], blocks: int) -> dict[str, torch.Tensor]:
     """A network's weights without the blocks of each group beyond the first `blocks`."""
-    return {name: value for name, value in weights.items()
-            if not (name.startswith("groups.") and int(name.split(".")[2]) >= blocks)}
+    return {
+        name: value
+        for name, value in weights.items()
+        if not (name.startswith("groups.") and int(name.split(".")[2]) >= blocks)
+    }
 
 
 class _UpscalerSteps(Dataset):
@@ -155,8 +210,9 @@ class _UpscalerSteps(Dataset):
         self.windows, self.options = windows, options
 
     def __getitem__(self, step: int) -> tuple[torch.Tensor, torch.Tensor]:
-        return self.windows.draw(self.options["batch"], self.options["patch"],
-                                 np.random.default_rng((self.options["seed"], step)))
+        return self.windows.draw(
+            self.options["batch"], self.options["patch"], np.random.default_rng((self.options["seed"], step))
+        )
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -26,8 +26,9 @@ def draw_own_map(capture: Capture, number: int, srgb: np.ndarray, side: int = 51
     images.write_srgb(capture.picture("transfer", f"own_{number}"), images.resize(srgb, side, side))
 
 
-def draw_scan_sheet(capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: np.ndarray, views: list[View],
-                    height: int = 420) -> None:
+def draw_scan_sheet(
+    capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: np.ndarray, views: list[View], height: int = 420
+) -> None:
     """A frame, and the textured scan through the same camera: lit, then albedo.
 
     Parameters

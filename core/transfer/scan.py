@@ -56,11 +56,16 @@ def reduced(scan: Mesh, cell: float) -> Mesh:
 def _two_sided(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """The triangles without those that make an edge of more than two: fins first, where sheets of the scan were pressed
     into one, then the smallest."""
-    area = np.linalg.norm(np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]],
-                                   vertices[faces[:, 2]] - vertices[faces[:, 0]]), axis=1)
+    area = np.linalg.norm(
+        np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]), axis=1
+    )
     while True:
-        _, edge, uses = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0,
-                                  return_inverse=True, return_counts=True)
+        _, edge, uses = np.unique(
+            np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1),
+            axis=0,
+            return_inverse=True,
+            return_counts=True,
+        )
         of = uses[edge.ravel()].reshape(-1, 3)
         crowded = (of > 2).any(1)
         if not crowded.any():

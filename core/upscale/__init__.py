@@ -50,34 +50,54 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
     maps, hair_maps, hairs = _whole(capture, maps, settings, report)
     share = SHARES[method]
-    large = enlarged(maps, size, method, settings.compute_device,
-                     lambda done: report.progress(share * done, 1, "enlarging"))
+    large = enlarged(
+        maps, size, method, settings.compute_device, lambda done: report.progress(share * done, 1, "enlarging")
+    )
     with replacing_folder(capture.maps_4k) as folder:
         srgb = large[..., :3]
         if guided:
             texture = len(images.read_mask(capture.texture_confidence))
-            detail.guide(srgb, images.read_data(capture.texture_detail), texture,
-                         lambda done: report.progress(share, 1, "fine detail"))
+            detail.guide(
+                srgb,
+                images.read_data(capture.texture_detail),
+                texture,
+                lambda done: report.progress(share, 1, "fine detail"),
+            )
         _picture(capture, srgb)
-        _write_together([
-            lambda: images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16, check=report.check),
-            lambda: images.write_data(folder / "normal.png",
-                                      _mapped(large[..., 3:6], lambda vectors: vectors * 0.5 + 0.5), bits=16,
-                                      check=report.check),
-            *([] if hair_maps is None
-              else [lambda: hair.write(folder, srgb, *hair_maps, report.check),
-                    lambda: grooming.write(folder / STRANDS, hairs)]),
-            lambda: images.write_linear(folder / "diffuse_albedo.exr", _mapped(srgb, images.srgb_to_linear),
-                                        check=report.check),
-            lambda: images.write_data(folder / "specular_albedo.png", large[..., 6], bits=16, check=report.check),
-            lambda: images.write_data(folder / "confidence.png", _resampled(maps.confidence, size), check=report.check),
-            lambda: images.write_linear(folder / "shading.exr", _resampled(maps.shading, size), check=report.check),
-        ], lambda done: report.progress(share + done * (1 - share), 1, "writing the maps"))
+        _write_together(
+            [
+                lambda: images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16, check=report.check),
+                lambda: images.write_data(
+                    folder / "normal.png",
+                    _mapped(large[..., 3:6], lambda vectors: vectors * 0.5 + 0.5),
+                    bits=16,
+                    check=report.check,
+                ),
+                *(
+                    []
+                    if hair_maps is None
+                    else [
+                        lambda: hair.write(folder, srgb, *hair_maps, report.check),
+                        lambda: grooming.write(folder / STRANDS, hairs),
+                    ]
+                ),
+                lambda: images.write_linear(
+                    folder / "diffuse_albedo.exr", _mapped(srgb, images.srgb_to_linear), check=report.check
+                ),
+                lambda: images.write_data(folder / "specular_albedo.png", large[..., 6], bits=16, check=report.check),
+                lambda: images.write_data(
+                    folder / "confidence.png", _resampled(maps.confidence, size), check=report.check
+                ),
+                lambda: images.write_linear(folder / "shading.exr", _resampled(maps.shading, size), check=report.check),
+            ],
+            lambda done: report.progress(share + done * (1 - share), 1, "writing the maps"),
+        )
     report.progress(1, 1)
 
 
-def _whole(capture: Capture, maps: HeadMaps, settings: Settings,
-           report: Reporter) -> tuple[HeadMaps, tuple | None, dict[str, Strands]]:
+def _whole(
+    capture: Capture, maps: HeadMaps, settings: Settings, report: Reporter
+) -> tuple[HeadMaps, tuple | None, dict[str, Strands]]:
     """The maps of the whole head; the hair's masks, the albedo without it and where that differs, or None where they
     are not asked for; single hairs."""
     options = settings.upscale
@@ -88,8 +108,9 @@ def _whole(capture: Capture, maps: HeadMaps, settings: Settings,
     if options.whole_head:
         report.progress(0, 1, "completing neck, ears and scalp")
         seen, maps = maps, complete(maps, surface, report, settings.seed)
-        images.write_srgb(capture.picture("upscale", "before_and_after_completion"),
-                          drawing.turned(surface, [seen, maps]))
+        images.write_srgb(
+            capture.picture("upscale", "before_and_after_completion"), drawing.turned(surface, [seen, maps])
+        )
     if not options.hair:
         return maps, None, {}
     report.progress(0, 1, "finding brows, lashes and beard")
@@ -103,8 +124,9 @@ def _whole(capture: Capture, maps: HeadMaps, settings: Settings,
     behind = round(100 * float((masks.hidden * masks.brows).sum() / max(masks.brows.sum(), 1e-6)))
     if behind:
         report.figure("brows_hidden_percent", behind)
-        report.log(f"Hair covers {behind} % of the brows: there they are grown like the other side, or as brows "
-                   "usually are.")
+        report.log(
+            f"Hair covers {behind} % of the brows: there they are grown like the other side, or as brows usually are."
+        )
     images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, masks, cleaned))
     report.progress(0, 1, "growing hair")
     hairs = grooming.groom(maps, masks, cleaned, surface, settings.seed, check=report.check)
@@ -146,8 +168,9 @@ def _joined(diffuse: np.ndarray, normal: np.ndarray, specular: np.ndarray, size:
     joined[..., 3:6] = _resampled(normal, size)
     progress(1.0)
     _by_strips(joined[..., :3], images.linear_to_srgb)
-    _by_strips(joined[..., 3:6],
-               lambda vectors: vectors / np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6))
+    _by_strips(
+        joined[..., 3:6], lambda vectors: vectors / np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6)
+    )
     return joined
 
 
@@ -185,11 +208,11 @@ def _mapped(image: np.ndarray, operation: Callable) -> np.ndarray:
 def _by_strips(image: np.ndarray, operation) -> None:
     """Applies a texel-wise operation in place."""
     for row in range(0, len(image), STRIP_ROWS):
-        image[row:row + STRIP_ROWS] = operation(image[row:row + STRIP_ROWS])
+        image[row : row + STRIP_ROWS] = operation(image[row : row + STRIP_ROWS])
 
 
 def _picture(capture: Capture, srgb: np.ndarray) -> None:
     """A crop from the middle of the map, texel by texel."""
     side = int(CROP_SIDE_SHARE * len(srgb))
     start = (len(srgb) - side) // 2
-    images.write_srgb(capture.picture("upscale", "crop"), srgb[start:start + side, start:start + side])
+    images.write_srgb(capture.picture("upscale", "crop"), srgb[start : start + side, start : start + side])

@@ -73,8 +73,12 @@ def masks(diffuse: np.ndarray, hair: Hair, cleaned: np.ndarray, side: int = 400)
         tinted = tinted * (1 - cover) + np.float32(tint) * cover
     first, last = (round(share * len(diffuse)) for share in FACE_EXTENT)
     inner = np.s_[first:last, first:last]
-    return np.hstack([images.resize(picture[inner], side, side)
-                      for picture in (images.linear_to_srgb(diffuse), tinted, images.linear_to_srgb(cleaned))])
+    return np.hstack(
+        [
+            images.resize(picture[inner], side, side)
+            for picture in (images.linear_to_srgb(diffuse), tinted, images.linear_to_srgb(cleaned))
+        ]
+    )
 
 
 def _axes(direction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -89,7 +93,7 @@ def _lit(maps: HeadMaps, texel: np.ndarray, axes, eye) -> np.ndarray:
     """Linear colours [N, 3] at texels [N, 2] (x, y) with tangent frames `axes`: Lambert, and Blinn's highlights (a
     picture, not a measurement)."""
     albedo, tilted, level = (raster.sample(picture, texel) for picture in (maps.diffuse, maps.normal, maps.specular))
-    normal = sum(tilted[:, i:i + 1] * axis for i, axis in enumerate(axes))
+    normal = sum(tilted[:, i : i + 1] * axis for i, axis in enumerate(axes))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     colour = AMBIENT * albedo
     for place, strength in LAMPS:

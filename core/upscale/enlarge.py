@@ -25,8 +25,9 @@ STRIP_ROWS = 64
 
 
 @torch.no_grad()
-def enlarge(maps: HeadMaps, progress: Callable[[float], None], device: str = "cpu",
-            network: Rcan | None = None) -> np.ndarray:
+def enlarge(
+    maps: HeadMaps, progress: Callable[[float], None], device: str = "cpu", network: Rcan | None = None
+) -> np.ndarray:
     """The maps four times as large, by the network.
 
     Parameters
@@ -49,16 +50,18 @@ def enlarge(maps: HeadMaps, progress: Callable[[float], None], device: str = "cp
         features = network.features(small, tick=lambda share: progress(0.75 * share))
         for row in range(0, height, STRIP_ROWS):
             rows = slice(row, min(row + STRIP_ROWS, height))
-            large[FACTOR * rows.start:FACTOR
-                  * rows.stop] = _strip(network, small, features, rows).permute(1, 2, 0).cpu().numpy()
+            large[FACTOR * rows.start : FACTOR * rows.stop] = (
+                _strip(network, small, features, rows).permute(1, 2, 0).cpu().numpy()
+            )
             progress(0.75 + 0.25 * rows.stop / height)
     return large
 
 
 def channels_of(maps: HeadMaps) -> torch.Tensor:
     """What the network reads: [1, 7, S, S]."""
-    stacked = np.concatenate([images.linear_to_srgb(np.clip(maps.diffuse, 0, 1)), maps.normal,
-                              maps.specular[..., None]], -1)
+    stacked = np.concatenate(
+        [images.linear_to_srgb(np.clip(maps.diffuse, 0, 1)), maps.normal, maps.specular[..., None]], -1
+    )
     return torch.from_numpy(np.ascontiguousarray(stacked.transpose(2, 0, 1), np.float32))[None]
 
 
@@ -66,8 +69,10 @@ def channels_of(maps: HeadMaps) -> torch.Tensor:
 def load_network(path: Path = WEIGHTS) -> Rcan:
     """The shipped network. Raises Problem where its files are missing."""
     if not has_files(path):
-        raise Problem(f"The upscaler's weights are missing ({path.name}).",
-                      "Install the extension again, or choose Lanczos as the way to enlarge.")
+        raise Problem(
+            f"The upscaler's weights are missing ({path.name}).",
+            "Install the extension again, or choose Lanczos as the way to enlarge.",
+        )
     return read_network(Rcan, path)
 
 

@@ -20,6 +20,6 @@ def on_cheeks_and_forehead(specular: np.ndarray, confidence: np.ndarray) -> floa
     for name in WITHOUT:
         where &= template.mask(name, size) < 0.5
     lips = template.mask("lips", size).sum(1)
-    where[int(np.average(np.arange(size), weights=lips)):] = False  # a chin is neither
+    where[int(np.average(np.arange(size), weights=lips)) :] = False  # a chin is neither
     seen = where * confidence
     return float(np.average(specular, weights=seen if seen.sum() > 0 else where))

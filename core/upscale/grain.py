@@ -55,8 +55,13 @@ def measure(channels: np.ndarray, slopes: np.ndarray, weight: np.ndarray, surfac
     where = weight > 0.99
     texel = float(np.median(surface.texel[where])) if where.any() else 1.0
     parts = [bands(picture, weight, texel) for picture in (channels, slopes)]
-    moments = [[np.cov(_clipped(band[where]), rowvar=False) if where.sum() > 100 else np.zeros((band.shape[-1],) * 2)
-                for band in picture_bands] for picture_bands in parts]
+    moments = [
+        [
+            np.cov(_clipped(band[where]), rowvar=False) if where.sum() > 100 else np.zeros((band.shape[-1],) * 2)
+            for band in picture_bands
+        ]
+        for picture_bands in parts
+    ]
     answer, answer_slope = _answers(surface, where, texel, np.random.default_rng([seed, 1]))
     mix, tie = np.zeros((len(WAVELENGTHS_MM), 4, 4)), np.ones(len(WAVELENGTHS_MM))
     strength = np.stack([nnls(answer, [cov[i, i] for cov in moments[0]])[0] for i in range(4)], 1)  # [K, 4] variances
@@ -120,15 +125,17 @@ def blurred(picture: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray
     return top / np.maximum(cv2.GaussianBlur(weight, (0, 0), max(sigma, 0.3)), 1e-4)[..., None]
 
 
-def _answers(surface: HeadSurface, mask: np.ndarray, texel: float,
-             rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _answers(
+    surface: HeadSurface, mask: np.ndarray, texel: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """Variances [band, wavelength] that a noise of deviation 1, and the slopes of such a height, have in each band of
     the map."""
     rows, columns = np.nonzero(mask)
     side = int(min(np.sqrt(SAMPLE_TEXELS), surface.size))
-    top, left = (int(np.clip(np.median(at) - side / 2, 0, surface.size - side)) if len(at) else 0
-                 for at in (rows, columns))
-    window = np.s_[top:top + side, left:left + side]
+    top, left = (
+        int(np.clip(np.median(at) - side / 2, 0, surface.size - side)) if len(at) else 0 for at in (rows, columns)
+    )
+    window = np.s_[top : top + side, left : left + side]
     points, inner = surface.position[window].reshape(-1, 3), np.ones((side, side), np.float32)
     there = np.zeros(surface.covered.shape, bool)
     there[window] = True

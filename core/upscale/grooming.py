@@ -81,8 +81,15 @@ OFF_SEAM_M = 0.0003
 """Metres from where the lids meet, so that each lash is nearest to its own lid."""
 
 
-def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface, seed: int = 0,
-          trust: float = TRUSTED_COHERENCE, check: Callable[[], None] = lambda: None) -> dict[str, Strands]:
+def groom(
+    maps: HeadMaps,
+    hair: Hair,
+    cleaned: np.ndarray,
+    surface: HeadSurface,
+    seed: int = 0,
+    trust: float = TRUSTED_COHERENCE,
+    check: Callable[[], None] = lambda: None,
+) -> dict[str, Strands]:
     """The hairs of each growth that a face has, by its name.
 
     Parameters
@@ -118,11 +125,13 @@ def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface,
             kind = _as_long_as_seen(kind, length)
             if kind.length[0] < STUBBLE_MM and "brows" in hairs:  # its shade is the skin's
                 colours = np.broadcast_to(hairs["brows"].colour.mean(0), colours.shape)
-        hairs[kind.name] = _grown(kind, cover[where], colours, texels, way, surface,
-                                  np.random.default_rng([seed, number]))
+        hairs[kind.name] = _grown(
+            kind, cover[where], colours, texels, way, surface, np.random.default_rng([seed, number])
+        )
     if "brows" in hairs:
-        hairs["lashes"] = _lashes(hairs["brows"].colour.mean(0), surface.mesh.vertices / 1000,
-                                  np.random.default_rng([seed, len(KINDS)]))
+        hairs["lashes"] = _lashes(
+            hairs["brows"].colour.mean(0), surface.mesh.vertices / 1000, np.random.default_rng([seed, len(KINDS)])
+        )
     return hairs
 
 
@@ -156,8 +165,15 @@ def _light(albedo: np.ndarray) -> np.ndarray:
     return np.log(np.maximum(albedo, DARKEST_LINEAR)).mean(-1).astype(np.float32)
 
 
-def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairTexels, way: np.ndarray,
-           surface: HeadSurface, rng: np.random.Generator) -> Strands:
+def _grown(
+    kind: HairKind,
+    cover: np.ndarray,
+    colours: np.ndarray,
+    texels: HairTexels,
+    way: np.ndarray,
+    surface: HeadSurface,
+    rng: np.random.Generator,
+) -> Strands:
     """The hairs over texels of which hair covers `cover` [N], in `colours` [N, 3], along `way` [N, 3]."""
     texel = surface.texel[texels.mask]
     density = np.minimum(-np.log1p(-np.minimum(cover, 0.95)) / (kind.length[0] * TAPER * kind.diameter), kind.most)
@@ -167,18 +183,27 @@ def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairT
     beyond = float(np.median(texel))
     _, free = _walked(middle, -1, before, texels, way, tree, beyond)
     # no seam of roots
-    root, back = _walked(middle, -1, np.where(free < before, free * rng.uniform(0, 1, len(middle)), before), texels,
-                         way, tree, beyond)
+    root, back = _walked(
+        middle, -1, np.where(free < before, free * rng.uniform(0, 1, len(middle)), before), texels, way, tree, beyond
+    )
     tip, on = _walked(middle, 1, length - before, texels, way, tree, beyond)
     length = np.maximum(back + on, 0.3 * length) / 1000
-    place = (texels.position[root]
-             + texels.raise_up(rng.uniform(-0.5, 0.5, (len(root), 2)) * texel[root, None], root)) / 1000
+    place = (
+        texels.position[root] + texels.raise_up(rng.uniform(-0.5, 0.5, (len(root), 2)) * texel[root, None], root)
+    ) / 1000
     normal = texels.normal[root]
     roots = Roots(place, normal, _turned(way[root], normal, rng.normal(0, UNLIKE_RAD, len(root))), place)
     skin = strands.SkinSurface(surface.mesh.moved(surface.mesh.vertices / 1000))
     lift = rng.normal(kind.lift, 0.3 * kind.lift, len(root)).clip(0.05)
-    points = strands.grow(roots, length, lift, skin, way[tip] - way[root] - kind.bend * normal,
-                          np.full(len(root), CLEARANCE_M), POINTS_PER_HAIR)
+    points = strands.grow(
+        roots,
+        length,
+        lift,
+        skin,
+        way[tip] - way[root] - kind.bend * normal,
+        np.full(len(root), CLEARANCE_M),
+        POINTS_PER_HAIR,
+    )
     colour = np.clip(colours[middle] * np.exp(rng.normal(0, 0.15, (len(root), 1))), DARKEST_LINEAR, 0.8)
     return Strands(points, np.full(len(root), kind.diameter / 2000, np.float32), colour.astype(np.float32), kind.name)
 
@@ -188,12 +213,15 @@ def _strewn(expected: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     shares of the sum."""
     total = np.cumsum(expected)
     count = round(total[-1])
-    return np.minimum(np.searchsorted(total, (np.arange(count) + rng.uniform(size=count)) / max(count, 1) * total[-1]),
-                      len(expected) - 1)
+    return np.minimum(
+        np.searchsorted(total, (np.arange(count) + rng.uniform(size=count)) / max(count, 1) * total[-1]),
+        len(expected) - 1,
+    )
 
 
-def _walked(start: np.ndarray, sign: int, far: np.ndarray, texels: HairTexels, way: np.ndarray, tree: cKDTree,
-            beyond: float) -> tuple[np.ndarray, np.ndarray]:
+def _walked(
+    start: np.ndarray, sign: int, far: np.ndarray, texels: HairTexels, way: np.ndarray, tree: cKDTree, beyond: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Texels [M] `far` mm [M] along the ways (against them for sign -1), and how far those are: a hair ends where no
     texel with hair is within `beyond` mm."""
     at, gone = start.copy(), np.zeros(len(start))
@@ -227,8 +255,11 @@ def _unmix(albedo: np.ndarray, skin: np.ndarray, cover: np.ndarray, reach: float
 def _lashes(brows: np.ndarray, vertices: np.ndarray, rng: np.random.Generator) -> Strands:
     """Along the edges of the lids, as they lie when these are closed: no texture shows lashes one by one. brows: their
     colour [3]; vertices [V, 3] of the head, metres."""
-    rows = [_lash_row(lids.closed_edge(vertices, side, number, OFF_SEAM_M)[::-1], lid, rng) for side in (0, 1)
-            for number, lid in enumerate(LASH)]
+    rows = [
+        _lash_row(lids.closed_edge(vertices, side, number, OFF_SEAM_M)[::-1], lid, rng)
+        for side in (0, 1)
+        for number, lid in enumerate(LASH)
+    ]
     lashes = np.concatenate(rows).astype(np.float32)
     colour = np.exp(rng.normal(0, 0.1, (len(lashes), 1))) * np.minimum(LASH_ALBEDO_RATIO * brows, LASH_LIGHTEST_LINEAR)
     return Strands(

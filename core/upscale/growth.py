@@ -44,8 +44,13 @@ class Growth:
     by_parser: bool
 
 
-def find(light: np.ndarray, seen: np.ndarray, zones: dict[str, np.ndarray], surface: HeadSurface,
-         part_shares: np.ndarray | None) -> Growth:
+def find(
+    light: np.ndarray,
+    seen: np.ndarray,
+    zones: dict[str, np.ndarray],
+    surface: HeadSurface,
+    part_shares: np.ndarray | None,
+) -> Growth:
     """Where hair grows.
 
     Parameters
@@ -57,8 +62,12 @@ def find(light: np.ndarray, seen: np.ndarray, zones: dict[str, np.ndarray], surf
     part_shares : [S, S, len(GROWTHS)] in [0, 1], what the parser saw; None where it was not asked
     """
     size, texel = surface.size, float(np.median(surface.texel))
-    bare = ((template.mask("skin", size) > 0.99) & (zones["beard"] < 0.05) & (zones["brows"] < 0.01)
-            & (seen_well(seen, surface) >= 1))
+    bare = (
+        (template.mask("skin", size) > 0.99)
+        & (zones["beard"] < 0.05)
+        & (zones["brows"] < 0.01)
+        & (seen_well(seen, surface) >= 1)
+    )
     head = (
         np.zeros((size, size), np.float32) if part_shares is None else _faded(part_shares[..., GROWTHS.index("hair")])
     )
@@ -66,15 +75,20 @@ def find(light: np.ndarray, seen: np.ndarray, zones: dict[str, np.ndarray], surf
     fine = beard.fine(light, texel)
     grain = beard.deviation(fine[bare])
     if part_shares is None:
-        return Growth(zones["brows"], beard.presence(fine, grain, bare, zones["beard"], surface.texel), head, grain,
-                      False)
+        return Growth(
+            zones["brows"], beard.presence(fine, grain, bare, zones["beard"], surface.texel), head, grain, False
+        )
     loud = np.minimum(np.abs(fine) / max(grain, 1e-6), LOUDEST_DEVIATIONS)
-    power = {name: (cv2.GaussianBlur(loud, (0, 0), reach / texel) / USUAL_LOUDNESS) ** 2
-             for name, reach in ALIKE_MM.items()}
+    power = {
+        name: (cv2.GaussianBlur(loud, (0, 0), reach / texel) / USUAL_LOUDNESS) ** 2 for name, reach in ALIKE_MM.items()
+    }
     bearded = _present(_likely("beard", part_shares, power) * _bearable(zones["beard"]), power["beard"], seen > 0)
     return Growth(
-        _faded(_likely("brows", part_shares, power)) * _near_brows(surface), _faded(_over_usual(bearded)), head, grain,
-        True
+        _faded(_likely("brows", part_shares, power)) * _near_brows(surface),
+        _faded(_over_usual(bearded)),
+        head,
+        grain,
+        True,
     )
 
 

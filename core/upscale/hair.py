@@ -48,8 +48,12 @@ class Hair:
     hidden: np.ndarray
 
 
-def find(maps: HeadMaps, surface: HeadSurface, part_shares: np.ndarray | None = None,
-         check: Callable[[], None] = lambda: None) -> Hair:
+def find(
+    maps: HeadMaps,
+    surface: HeadSurface,
+    part_shares: np.ndarray | None = None,
+    check: Callable[[], None] = lambda: None,
+) -> Hair:
     """The hair of a face.
 
     Parameters
@@ -68,15 +72,17 @@ def find(maps: HeadMaps, surface: HeadSurface, part_shares: np.ndarray | None = 
     darker = _skin(light[..., None], zones, grown.beard, grown.head, surface)[..., 0] - light
     lashes = _cover(_closed(light, texel) - light, zones["lashes"], grown.grain)
     if not grown.by_parser:
-        return Hair(_cover(darker, grown.brows, grown.grain), lashes, _cover(darker, grown.beard, grown.grain),
-                    grown.head)
+        return Hair(
+            _cover(darker, grown.brows, grown.grain), lashes, _cover(darker, grown.beard, grown.grain), grown.head
+        )
     brows, clearest = _told_cover(darker, grown.brows * (1 - grown.head), grown.grain, USUAL_COVER["brows"])
     bearded, _ = _told_cover(darker, grown.beard, grown.grain, USUAL_COVER["beard"], clearest)
     return Hair(_behind(brows, grown, surface), lashes, bearded, grown.head)
 
 
-def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0,
-          check: Callable[[], None] = lambda: None) -> tuple[np.ndarray, np.ndarray]:
+def clean(
+    maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0, check: Callable[[], None] = lambda: None
+) -> tuple[np.ndarray, np.ndarray]:
     """The skin below the hair.
 
     Parameters
@@ -102,8 +108,13 @@ def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0,
     where = (share > 0) & surface.covered
     if not where.any():
         return maps.diffuse, share
-    skin = _skin(channels, zones, cv2.dilate((hair.beard > 0.02).astype(np.float32), beard.disc(2.0 / texel)),
-                 hair.hidden, surface)
+    skin = _skin(
+        channels,
+        zones,
+        cv2.dilate((hair.beard > 0.02).astype(np.float32), beard.disc(2.0 / texel)),
+        hair.hidden,
+        surface,
+    )
     check()
     lids = zones["lashes"][..., None]
     skin = skin * (1 - lids) + _closed(channels, texel) * lids  # a field from beyond the sockets knows no lid
@@ -118,8 +129,14 @@ def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0,
     return cleaned, share * surface.covered
 
 
-def write(folder: Path, albedo: np.ndarray, hair: Hair, cleaned: np.ndarray, share: np.ndarray,
-          check: Callable[[], None] = lambda: None) -> None:
+def write(
+    folder: Path,
+    albedo: np.ndarray,
+    hair: Hair,
+    cleaned: np.ndarray,
+    share: np.ndarray,
+    check: Callable[[], None] = lambda: None,
+) -> None:
     """The masks at the albedo's size, and the albedo without hair.
 
     Parameters
@@ -168,8 +185,9 @@ def _off(position: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.linalg.norm(position - a - share[:, None] * along, axis=1)
 
 
-def _skin(channels: np.ndarray, zones: dict[str, np.ndarray], bearded: np.ndarray, hidden: np.ndarray,
-          surface: HeadSurface) -> np.ndarray:
+def _skin(
+    channels: np.ndarray, zones: dict[str, np.ndarray], bearded: np.ndarray, hidden: np.ndarray, surface: HeadSurface
+) -> np.ndarray:
     """Channels [S, S, C] of the skin as they would be without hair, without detail."""
     size = surface.size
     other = np.maximum.reduce([*(template.mask(name, size) for name in (*FEATURES, "scalp")), zones["brows"]])
@@ -188,8 +206,9 @@ def _cover(darker: np.ndarray, zone: np.ndarray, usual: float) -> np.ndarray:
     return (np.clip((1 - np.exp(-darker) - least) / (most - least), 0, 1) * zone).astype(np.float32)
 
 
-def _told_cover(darker: np.ndarray, hair_share: np.ndarray, grain: float, usual: float,
-                clearest: float = 0.0) -> tuple[np.ndarray, float]:
+def _told_cover(
+    darker: np.ndarray, hair_share: np.ndarray, grain: float, usual: float, clearest: float = 0.0
+) -> tuple[np.ndarray, float]:
     """Share of hair [S, S] where the parser says that there is some, and how far below the skin's albedo the clearest
     hairs lie, as a share of it.
 

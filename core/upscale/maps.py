@@ -34,19 +34,29 @@ def read_maps(folder: Path, texture_confidence: Path) -> HeadMaps:
     is none, and as that says where the file of the texture's is gone. Raises Problem where a map is damaged or of
     another size than the others.
     """
-    paths = {"diffuse": folder / "diffuse_albedo.exr", "normal": folder / "normal.png",
-             "specular": folder / "specular_albedo.png",
-             "confidence": folder / "confidence.png", "shading": folder / "shading.exr"}
+    paths = {
+        "diffuse": folder / "diffuse_albedo.exr",
+        "normal": folder / "normal.png",
+        "specular": folder / "specular_albedo.png",
+        "confidence": folder / "confidence.png",
+        "shading": folder / "shading.exr",
+    }
     normal = images.read_normals(paths["normal"])
     confidence = images.read_mask(paths["confidence"])
-    maps = HeadMaps(images.read_linear(paths["diffuse"]),
-                    normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
-                    images.read_mask(paths["specular"]), confidence, images.read_linear(paths["shading"]),
-                    images.read_data(texture_confidence)[..., 0] if texture_confidence.is_file() else confidence)
+    maps = HeadMaps(
+        images.read_linear(paths["diffuse"]),
+        normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
+        images.read_mask(paths["specular"]),
+        confidence,
+        images.read_linear(paths["shading"]),
+        images.read_data(texture_confidence)[..., 0] if texture_confidence.is_file() else confidence,
+    )
     side = len(maps.diffuse)
     for name, pixels in vars(maps).items():
         if name in paths and pixels.shape[:2] != (side, side):
-            raise Problem(f"{paths[name]} is {pixels.shape[1]} x {pixels.shape[0]} pixels, but {paths['diffuse'].name} "
-                          f"is {maps.diffuse.shape[1]} x {side}.",
-                          advise_again("solve"))
+            raise Problem(
+                f"{paths[name]} is {pixels.shape[1]} x {pixels.shape[0]} pixels, but {paths['diffuse'].name} "
+                f"is {maps.diffuse.shape[1]} x {side}.",
+                advise_again("solve"),
+            )
     return replace(maps, seen=images.resize(maps.seen, side, side).clip(0, 1) * (maps.confidence > 0))

@@ -62,8 +62,9 @@ class Rcan(nn.Module):
     def __init__(self, groups: int, blocks: int, width: int, squeeze: int = 16):
         super().__init__()
         self.head = nn.Conv2d(CHANNELS, width, 3, padding=1)
-        self.groups = nn.ModuleList(nn.ModuleList(ChannelAttentionBlock(width, squeeze) for _ in range(blocks))
-                                    for _ in range(groups))
+        self.groups = nn.ModuleList(
+            nn.ModuleList(ChannelAttentionBlock(width, squeeze) for _ in range(blocks)) for _ in range(groups)
+        )
         self.joins = nn.ModuleList(nn.Conv2d(width, width, 3, padding=1) for _ in range(groups))
         self.join = nn.Conv2d(width, width, 3, padding=1)
         self.widen = nn.ModuleList(nn.Conv2d(width, 4 * width, 3, padding=1) for _ in range(2))
@@ -77,8 +78,9 @@ class Rcan(nn.Module):
         blocks used of each group."""
         return self.details(self.features(maps, depth))
 
-    def features(self, maps: torch.Tensor, depth: int | None = None,
-                 tick: Callable[[float], None] = lambda share: None) -> torch.Tensor:
+    def features(
+        self, maps: torch.Tensor, depth: int | None = None, tick: Callable[[float], None] = lambda share: None
+    ) -> torch.Tensor:
         """The body: [N, 7, H, W] -> [N, width, H, W]. Its attention looks at the whole map, so it cannot be had in
         pieces. `tick` hears the share done."""
         begun = self.head((maps - _channels(CHANNEL_MEANS, maps)) / _channels(CHANNEL_DEVIATIONS, maps))

@@ -64,7 +64,7 @@ def _covariances(fine: np.ndarray, mask: np.ndarray, way: np.ndarray, texel: flo
     found = []
     for lag in LAGS_MM:
         x, y = (_rows(at) for at in (u + lag * way[:, 0] / texel, v - lag * way[:, 1] / texel))
-        other, kept = (cv2.remap(picture, x, y, cv2.INTER_LINEAR).ravel()[:len(u)] for picture in (fine, inside))
+        other, kept = (cv2.remap(picture, x, y, cv2.INTER_LINEAR).ravel()[: len(u)] for picture in (fine, inside))
         kept = kept > 0.99
         found.append(float((own[kept] * other[kept]).mean()) if kept.any() else 0.0)
     return np.array(found)
@@ -80,7 +80,7 @@ def _half(across: np.ndarray) -> float:
     if not len(below):
         return float(LAGS_MM[-1])
     last = below[0]
-    return float(np.interp(-across[0] / 2, -across[last - 1:last + 1], LAGS_MM[last - 1:last + 1]))
+    return float(np.interp(-across[0] / 2, -across[last - 1 : last + 1], LAGS_MM[last - 1 : last + 1]))
 
 
 def _excess_of(length: float, sharp: float) -> np.ndarray:

@@ -49,10 +49,12 @@ class HairTexels:
 def lay_texels(surface: HeadSurface, mask: np.ndarray) -> HairTexels:
     """The texels of `mask` bool [S, S], all of them on the head."""
     tangent, bitangent = surface.frames(mask)
-    normal = raster.interpolate(vertex_normals(surface.mesh), surface.mesh.faces, surface.face[mask],
-                                surface.bary[mask])
-    return HairTexels(mask, surface.position[mask].astype(np.float64), normal / lengths(normal)[:, None], tangent,
-                      bitangent)
+    normal = raster.interpolate(
+        vertex_normals(surface.mesh), surface.mesh.faces, surface.face[mask], surface.bary[mask]
+    )
+    return HairTexels(
+        mask, surface.position[mask].astype(np.float64), normal / lengths(normal)[:, None], tangent, bitangent
+    )
 
 
 def measure_tensors(albedo: np.ndarray, texels: HairTexels, texel: float) -> np.ndarray:

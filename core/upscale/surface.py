@@ -64,11 +64,11 @@ class HeadSurface:
 
     def spread(self, vertex_values: np.ndarray) -> np.ndarray:
         """Values of the vertices [V, C] as a map, float32 [S, S, C]."""
-        return raster.bleed(raster.interpolate(vertex_values, self.mesh.faces, self.face, self.bary).astype(np.float32),
-                            self.covered)
+        return raster.bleed(
+            raster.interpolate(vertex_values, self.mesh.faces, self.face, self.bary).astype(np.float32), self.covered
+        )
 
-    def smooth(self, field: np.ndarray, weight: np.ndarray, reach: float,
-               tolerance: float | None = None) -> np.ndarray:
+    def smooth(self, field: np.ndarray, weight: np.ndarray, reach: float, tolerance: float | None = None) -> np.ndarray:
         """The map that follows a field where its weight is, and is as even as can be elsewhere.
 
         Minimises the integral of weight (x - field)^2 + reach^2 |grad x|^2 over the surface, with a weak pull to the
@@ -129,8 +129,9 @@ class HeadSurface:
             rows.append(self.mesh.faces[:, (i + 1) % 3])
             columns.append(self.mesh.faces[:, (i + 2) % 3])
             weights.append(np.clip(cotangent, 1e-3, 20) / 2)
-        half = sparse.coo_matrix((np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))),
-                                 (count, count)).tocsr()
+        half = sparse.coo_matrix(
+            (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))), (count, count)
+        ).tocsr()
         both = half + half.T
         return sparse.diags(np.asarray(both.sum(1)).ravel()) - both
 

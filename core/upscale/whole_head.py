@@ -104,8 +104,9 @@ def seen_well(seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
     inside = cv2.distanceTransform(
         np.pad((closed >= UNSEEN_CONFIDENCE) | ~surface.covered, 1, mode="edge").astype(np.uint8), cv2.DIST_L2, 5
     )[1:-1, 1:-1]
-    return (enough * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT_MM) / FEATHER_MM)
-            * surface.covered).astype(np.float32)
+    return (
+        enough * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT_MM) / FEATHER_MM) * surface.covered
+    ).astype(np.float32)
 
 
 def _scalp_share(confidence: np.ndarray, seen: np.ndarray, surface: HeadSurface) -> np.ndarray:

@@ -62,7 +62,7 @@ def _take_stdout():
         try:
             with lock:
                 while line:
-                    line = line[os.write(channel, line):]
+                    line = line[os.write(channel, line) :]
         except OSError:
             os._exit(3)  # nobody reads any more
 

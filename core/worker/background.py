@@ -78,18 +78,30 @@ class BackgroundTask:
         self.check()
         self._messages.put(Progress(self.name, done, of, text))
 
-    def run(self, command: list, hear: Callable[[str], None] = lambda line: None,
-            limit_s: float = threading.TIMEOUT_MAX) -> tuple[int, str]:
+    def run(
+        self, command: list, hear: Callable[[str], None] = lambda line: None, limit_s: float = threading.TIMEOUT_MAX
+    ) -> tuple[int, str]:
         """Runs a command, for `limit_s` at most, each line it writes through `hear`; its exit code and the last line
         with an error in it. Raises OSError when it cannot be started, and CancelledError where the task is cancelled
         before or meanwhile."""
         self.check()
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
-        environment = {name: value for name, value in switchlight_api.environment_without_key().items()
-                       if not name.startswith("PYTHON") and name not in PLACES}
+        environment = {
+            name: value
+            for name, value in switchlight_api.environment_without_key().items()
+            if not name.startswith("PYTHON") and name not in PLACES
+        }
         self._process = subprocess.Popen(
-            [str(word) for word in command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **apart)
+            [str(word) for word in command],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            **apart,
+        )
         if self._cancelled_at is not None:
             self._kill()
         last_error, limit = "", threading.Timer(limit_s, self._kill)

@@ -26,8 +26,15 @@ Run = Callable[[list], tuple[int, str]]
 """Runs a command; its exit code and the last line with an error in it."""
 
 
-def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | None = None, wheel_only: bool = False,
-         keep: str = "") -> Path:
+def make(
+    folder: Path,
+    base: Path,
+    requirements: Path,
+    run: Run,
+    wheels: Path | None = None,
+    wheel_only: bool = False,
+    keep: str = "",
+) -> Path:
     """Makes an environment anew.
 
     Parameters
@@ -57,8 +64,9 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
         _by_hand(folder, base)
     python = python_of(folder)
     if answer(python, "import sys; print(sys.prefix != sys.base_prefix)") != "True":
-        raise Problem(f"No environment can be made from {base} ({error or 'it does not start'}).",
-                      "Click Use an Existing Python.")
+        raise Problem(
+            f"No environment can be made from {base} ({error or 'it does not start'}).", "Click Use an Existing Python."
+        )
     has_pip = not wheel_only and answer(python, "import ensurepip; print(ensurepip.version())")
     if not has_pip or run([python, "-I", "-m", "ensurepip", "--default-pip"])[0]:
         unpack_pip(folder, pip_source.fetch(requirements, wheels))
@@ -72,8 +80,9 @@ def unpack_pip(folder: Path, wheel: bytes) -> None:
     needs."""
     said = answer(python_of(folder), "import sysconfig; print(sysconfig.get_paths()['purelib'])")
     if not said:
-        raise Problem(f"The environment {folder} does not answer.",
-                      "Click Use an Existing Python, or choose another folder.")
+        raise Problem(
+            f"The environment {folder} does not answer.", "Click Use an Existing Python, or choose another folder."
+        )
     try:
         with zipfile.ZipFile(io.BytesIO(wheel)) as file:
             file.extractall(said)
@@ -83,8 +92,9 @@ def unpack_pip(folder: Path, wheel: bytes) -> None:
 
 def _by_hand(folder: Path, base: Path) -> None:
     """What the module venv makes, without it: pyvenv.cfg, the interpreter and the folder of packages (PEP 405)."""
-    said = answer(base,
-                  "import sys; print(sys._base_executable); print('%d.%d.%d' % sys.version_info[:3])").splitlines()
+    said = answer(
+        base, "import sys; print(sys._base_executable); print('%d.%d.%d' % sys.version_info[:3])"
+    ).splitlines()
     if len(said) != 2:
         raise Problem(f"{base} is not a working Python.", "Click Use an Existing Python, or install Blender again.")
     real, version = Path(said[0]), said[1]
@@ -101,8 +111,7 @@ def _by_hand(folder: Path, base: Path) -> None:
             (folder / "lib" / f"python{short}" / "site-packages").mkdir(parents=True, exist_ok=True)
             for name in ("python", "python3", f"python{short}"):
                 (python.parent / name).symlink_to(real)
-        text = (f"home = {real.parent}\ninclude-system-site-packages = false\nversion = {version}\n"
-                f"executable = {real}\n")
+        text = f"home = {real.parent}\ninclude-system-site-packages = false\nversion = {version}\nexecutable = {real}\n"
         (folder / "pyvenv.cfg").write_text(text, encoding="utf-8")
     except OSError as error:
         raise storage_problem(error, folder) from error

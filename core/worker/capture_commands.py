@@ -21,18 +21,27 @@ ROOT = Path(__file__).resolve().parents[2]
 def add_commands(commands) -> None:
     """Adds them to the subparsers of `python -m core`."""
     add_command(commands, "status", _status, "say which stages of a capture are done", "CAPTURE")
-    gone = add_command(commands, "delete", _delete,
-                       "delete a face: all that WildCap wrote of it; without --yes, list what would go and what would "
-                       "stay", "CAPTURE")
+    gone = add_command(
+        commands,
+        "delete",
+        _delete,
+        "delete a face: all that WildCap wrote of it; without --yes, list what would go and what would stay",
+        "CAPTURE",
+    )
     gone.add_argument("--yes", action="store_true", help="delete it, for good")
-    about = add_command(commands, "report-problem", _report_problem,
-                        "write a zip to send: logs, versions, settings; no pictures, names or paths")
+    about = add_command(
+        commands,
+        "report-problem",
+        _report_problem,
+        "write a zip to send: logs, versions, settings; no pictures, names or paths",
+    )
     about.add_argument("capture", metavar="CAPTURE", type=Path, nargs="?")
     about.add_argument("--to", metavar="ZIP", type=Path, required=True)
     mask = commands.add_parser("mask", help="bring a painted shadow mask in")
     mask = mask.add_subparsers(required=True, metavar="import")
-    bring = add_command(mask, "import", _mask_import, "make a picture the capture's shadow mask: white is shadow",
-                        "CAPTURE")
+    bring = add_command(
+        mask, "import", _mask_import, "make a picture the capture's shadow mask: white is shadow", "CAPTURE"
+    )
     bring.add_argument("picture", metavar="PNG", type=Path)
     marks = commands.add_parser("landmarks", help="put landmarks by hand; they win over what was found")
     marks = marks.add_subparsers(required=True, metavar="set|free|import")
@@ -42,8 +51,9 @@ def add_commands(commands) -> None:
         put.add_argument(axis.lower(), metavar=axis, type=float, help="metres")
     free = add_command(marks, "free", _landmarks, "let the frames say again where a landmark is", "CAPTURE")
     free.add_argument("index", metavar="INDEX")
-    many = add_command(marks, "import", _landmarks,
-                       'take the points of a JSON file: {"points": {"152": [x, y, z]}}, metres', "CAPTURE")
+    many = add_command(
+        marks, "import", _landmarks, 'take the points of a JSON file: {"points": {"152": [x, y, z]}}, metres', "CAPTURE"
+    )
     many.add_argument("file", metavar="JSON", type=Path)
 
 
@@ -51,17 +61,20 @@ def _status(options: argparse.Namespace) -> int:
     """States under the settings of the last job."""
     capture = Capture(options.capture)
     if not capture.root.is_dir():
-        raise Problem(f"There is no capture at {capture.root}.",
-                      "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
+        raise Problem(
+            f"There is no capture at {capture.root}.", "Check the name; `python -m core run SOURCE CAPTURE` makes one."
+        )
     record = capture.read()
     chosen = last_settings(capture)
     print(f"source        {capture.source or 'none yet'}")
     for stage in stages.STAGES:
         finished, verdict = record["stages"].get(stage.name), capture.verdict(stage, chosen)
-        print(f"{stage.name:13} {verdict.state:6}"
-              + (f" {finished['seconds']:8.1f} s  {finished.get('finished', '')}" if finished else "")
-              + (f"  {verdict.reason()}" if verdict.reason() else "")
-              + ("  slimmed away" if (finished or {}).get("slimmed") else ""))
+        print(
+            f"{stage.name:13} {verdict.state:6}"
+            + (f" {finished['seconds']:8.1f} s  {finished.get('finished', '')}" if finished else "")
+            + (f"  {verdict.reason()}" if verdict.reason() else "")
+            + ("  slimmed away" if (finished or {}).get("slimmed") else "")
+        )
     if capture.shadow_mask.is_file():
         print("shadow mask   painted")
     for finding in report.findings(record):
@@ -83,11 +96,15 @@ def _report_problem(options: argparse.Namespace) -> int:
 
     capture = Capture(options.capture) if options.capture else None
     if capture is not None and not capture.json.is_file():
-        raise Problem(f"There is no capture at {capture.root}.",
-                      "Check the name, or leave it out for a report about the installation alone.")
+        raise Problem(
+            f"There is no capture at {capture.root}.",
+            "Check the name, or leave it out for a report about the installation alone.",
+        )
     print(problem_report.write(options.to, ROOT, Path(sys.executable), capture))
-    print(f"It holds {', '.join(problem_report.TOLD)}; no pictures, and no names or paths of yours. Nothing was sent: "
-          "look into it first.")
+    print(
+        f"It holds {', '.join(problem_report.TOLD)}; no pictures, and no names or paths of yours. Nothing was sent: "
+        "look into it first."
+    )
     return 0
 
 

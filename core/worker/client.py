@@ -22,8 +22,13 @@ from ..contract.messages import FINAL, Cancelled, Failed, Log, Message, Problem,
 GRACE_S = 0.7
 """How long a cancelled worker may take to reach its next report before it is stopped."""
 
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS",
-                    "VECLIB_MAXIMUM_THREADS")
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
 SPINS = {"GOMP_SPINCOUNT": "2000"}
 """How long a thread of GCC's OpenMP (PyTorch's on Linux) spins before it sleeps while it waits for the others: its own
 300,000 keep a core from the very thread that is waited for when Blender, or anything else, is busy on another core, and
@@ -63,15 +68,33 @@ class Worker:
             log = open(self.log, "wb")
         except OSError as error:
             raise storage_problem(error, self.log) from error
-        command = [str(self.python), "-E", "-s", "-B", "-X", "utf8", "-m", f"{_package()}.worker",
-                   str(self.job.absolute())]
+        command = [
+            str(self.python),
+            "-E",
+            "-s",
+            "-B",
+            "-X",
+            "utf8",
+            "-m",
+            f"{_package()}.worker",
+            str(self.job.absolute()),
+        ]
         with log:
             try:
-                self._process = subprocess.Popen(command, cwd=self.root, env=_environment(self._own),
-                                                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, **_apart())
+                self._process = subprocess.Popen(
+                    command,
+                    cwd=self.root,
+                    env=_environment(self._own),
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=log,
+                    **_apart(),
+                )
             except OSError as error:
-                raise Problem(f"The solver's Python {self.python} could not be started ({error.strerror or error}).",
-                              "Install the solver again, or choose another Python.") from error
+                raise Problem(
+                    f"The solver's Python {self.python} could not be started ({error.strerror or error}).",
+                    "Install the solver again, or choose another Python.",
+                ) from error
         threading.Thread(target=self._read, name="wildcap-worker-reader", daemon=True).start()
 
     def poll(self) -> list[Message]:
@@ -139,12 +162,17 @@ class Worker:
         log = stage_log if self._stage and stage_log.is_file() else self.log
         during = f" during the stage {self._stage}" if self._stage else " before its first stage"
         if code in (-9, 137):
-            return Failed(self._stage,
-                          f"The worker was killed from outside{during}, most likely because memory ran out.",
-                          f"Close other programs or choose a lower quality, then run again: finished stages are kept. "
-                          f"The log is {log}.")
-        return Failed(self._stage, f"The worker ended unexpectedly{during} (exit code {code}).",
-                      f"Run again: finished stages are kept. If it happens again, read {log}.")
+            return Failed(
+                self._stage,
+                f"The worker was killed from outside{during}, most likely because memory ran out.",
+                f"Close other programs or choose a lower quality, then run again: finished stages are kept. "
+                f"The log is {log}.",
+            )
+        return Failed(
+            self._stage,
+            f"The worker ended unexpectedly{during} (exit code {code}).",
+            f"Run again: finished stages are kept. If it happens again, read {log}.",
+        )
 
 
 def _package() -> str:
@@ -167,6 +195,9 @@ def _apart() -> dict:
     On POSIX the worker lowers its own priority, because a function run between fork and exec is unsafe with threads.
     """
     if os.name == "nt":
-        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS
-                | subprocess.CREATE_NEW_PROCESS_GROUP}
+        return {
+            "creationflags": subprocess.CREATE_NO_WINDOW
+            | subprocess.BELOW_NORMAL_PRIORITY_CLASS
+            | subprocess.CREATE_NEW_PROCESS_GROUP
+        }
     return {"start_new_session": True}

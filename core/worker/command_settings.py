@@ -39,13 +39,27 @@ def add_options(parser: argparse.ArgumentParser, command: str) -> None:
 
 def add_assignments(parser: argparse.ArgumentParser, command: str) -> None:
     """Gives the parser --settings and --set alone."""
-    example = ('{"solve": {"steps": 30}, "seed": 1}; its values replace those of the quality' if command == "run"
-               else '{"deliver": {"preset": "unreal"}}')
-    parser.add_argument("--settings", dest="settings_file", metavar="FILE", type=Path,
-                        help=f"a JSON file like {example}; relative paths in it begin at its folder")
-    parser.add_argument("--set", dest="assignments", metavar="STAGE.NAME=VALUE", action="append", default=[],
-                        help="any setting that `settings` lists; may be given again for another; replaces the file's "
-                             "value, as flags do")
+    example = (
+        '{"solve": {"steps": 30}, "seed": 1}; its values replace those of the quality'
+        if command == "run"
+        else '{"deliver": {"preset": "unreal"}}'
+    )
+    parser.add_argument(
+        "--settings",
+        dest="settings_file",
+        metavar="FILE",
+        type=Path,
+        help=f"a JSON file like {example}; relative paths in it begin at its folder",
+    )
+    parser.add_argument(
+        "--set",
+        dest="assignments",
+        metavar="STAGE.NAME=VALUE",
+        action="append",
+        default=[],
+        help="any setting that `settings` lists; may be given again for another; replaces the file's "
+        "value, as flags do",
+    )
 
 
 def read_options(options: argparse.Namespace, command: str) -> dict:
@@ -75,12 +89,20 @@ def read_file(path: Path) -> dict:
     try:
         settings = read_json(path)
     except (OSError, ValueError) as error:
-        raise Problem(f"The settings file {path} cannot be read ({error}).",
-                      'It is a JSON file like {"solve": {"steps": 30}, "seed": 1}.') from error
+        raise Problem(
+            f"The settings file {path} cannot be read ({error}).",
+            'It is a JSON file like {"solve": {"steps": 30}, "seed": 1}.',
+        ) from error
     from_json(settings)
-    return {stage: {name: absolute_path(value, path.parent) if "path" in find_setting(f"{stage}.{name}").metadata
-                    else value for name, value in own.items()}
-            if stage in STAGE_KINDS else own for stage, own in settings.items()}
+    return {
+        stage: {
+            name: absolute_path(value, path.parent) if "path" in find_setting(f"{stage}.{name}").metadata else value
+            for name, value in own.items()
+        }
+        if stage in STAGE_KINDS
+        else own
+        for stage, own in settings.items()
+    }
 
 
 def refuse_lone_flags(options: argparse.Namespace, by_stage: dict) -> None:
@@ -91,14 +113,18 @@ def refuse_lone_flags(options: argparse.Namespace, by_stage: dict) -> None:
     for name, wanted in (("delight.folder", "folder"), ("delight.checkpoint", "opendelight")):
         if given.get(name) and delighter != wanted:
             flag = find_setting(name).metadata["flag"]
-            raise Problem(f"{flag} goes with --delighter {wanted} only.",
-                          f"Add --delighter {wanted}, or leave {flag} out.")
+            raise Problem(
+                f"{flag} goes with --delighter {wanted} only.", f"Add --delighter {wanted}, or leave {flag} out."
+            )
     if (given.get("delight.switchlight_preview") or options.send_frames) and delighter != "switchlight":
-        raise Problem("--preview and --send-frames go with --delighter switchlight only.",
-                      "Add --delighter switchlight, or leave them out.")
+        raise Problem(
+            "--preview and --send-frames go with --delighter switchlight only.",
+            "Add --delighter switchlight, or leave them out.",
+        )
     if given.get("registration.new_atlas") and not by_stage.get("registration", {}).get("template"):
-        raise Problem("--new-atlas goes with --template only.",
-                      "Name your head mesh with --template, or leave --new-atlas out.")
+        raise Problem(
+            "--new-atlas goes with --template only.", "Name your head mesh with --template, or leave --new-atlas out."
+        )
 
 
 def list_settings() -> str:
@@ -115,11 +141,17 @@ def _argument(name: str, field: Field) -> dict:
     """What argparse is told of a setting's flag, but for its name."""
     tooltip = _tooltip(name).replace("%", "%%")
     if isinstance(field.default, bool):
-        return {"action": "store_const", "const": not field.default,
-                "help": f"switches off: {tooltip}" if field.default else tooltip}
+        return {
+            "action": "store_const",
+            "const": not field.default,
+            "help": f"switches off: {tooltip}" if field.default else tooltip,
+        }
     choices = field.metadata.get("choices")
-    return {"type": type(field.default), "help": tooltip,
-            **({"choices": choices} if choices else {"metavar": _metavar(field)})}
+    return {
+        "type": type(field.default),
+        "help": tooltip,
+        **({"choices": choices} if choices else {"metavar": _metavar(field)}),
+    }
 
 
 def _metavar(field: Field) -> str:
@@ -132,8 +164,11 @@ def _metavar(field: Field) -> str:
 def _flag_words(field: Field) -> str:
     """The flag as it is written, with what stands for its value."""
     flag = field.metadata["flag"]
-    return (flag if isinstance(field.default, bool)
-            else f"{flag} {'VALUE' if 'choices' in field.metadata else _metavar(field)}")
+    return (
+        flag
+        if isinstance(field.default, bool)
+        else f"{flag} {'VALUE' if 'choices' in field.metadata else _metavar(field)}"
+    )
 
 
 def _tooltip(name: str) -> str:
@@ -144,8 +179,11 @@ def _tooltip(name: str) -> str:
 def _flags(options: argparse.Namespace) -> list[tuple[str, str, object]]:
     """The settings that flags give: (flag, name, value)."""
     given = {name: value for name, value in vars(options).items() if name in known_settings() and value != ""}
-    return [(field.metadata["flag"], name, absolute_path(given[name]) if "path" in field.metadata else given[name])
-            for name, field in known_settings().items() if name in given]
+    return [
+        (field.metadata["flag"], name, absolute_path(given[name]) if "path" in field.metadata else given[name])
+        for name, field in known_settings().items()
+        if name in given
+    ]
 
 
 def _assignment(text: str, command: str) -> tuple[str, str, object]:
@@ -154,8 +192,9 @@ def _assignment(text: str, command: str) -> tuple[str, str, object]:
     name = name.strip()
     field = find_setting(name)
     if not equals:
-        raise Problem(f"--set {text} gives no value.",
-                      f"Write --set {name}=VALUE, as {name}={value_to_text(field.default)}.")
+        raise Problem(
+            f"--set {text} gives no value.", f"Write --set {name}=VALUE, as {name}={value_to_text(field.default)}."
+        )
     if COMMANDS[name] != command:
         raise Problem(f"`core {command}` has no use for {name}.", f"It is a setting of `core {COMMANDS[name]}`.")
     return f"--set {text}", name, value_from_text(name, field, value)

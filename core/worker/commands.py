@@ -9,8 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 
-def add_command(commands, name: str, carry_out: Callable[[argparse.Namespace], int], help: str,
-                *paths: str) -> argparse.ArgumentParser:
+def add_command(
+    commands, name: str, carry_out: Callable[[argparse.Namespace], int], help: str, *paths: str
+) -> argparse.ArgumentParser:
     """Adds `name PATH ...` to subparsers.
 
     Parameters

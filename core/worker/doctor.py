@@ -24,8 +24,13 @@ class Findings:
 
     @property
     def text(self) -> str:
-        wrong = ["", "What is wrong:", *(f"  {problem}" for problem in self.problems), "What to do:",
-                 *(f"  {remedy}" for remedy in self.remedies)]
+        wrong = [
+            "",
+            "What is wrong:",
+            *(f"  {problem}" for problem in self.problems),
+            "What to do:",
+            *(f"  {remedy}" for remedy in self.remedies),
+        ]
         return "\n".join((*self.lines, *(wrong if self.problems else ["Nothing is missing."])))
 
 
@@ -34,18 +39,24 @@ def examine(root: Path, python: Path, importing: bool = True) -> Findings:
     Without `importing` a broken package may go unseen, and it takes a second in place of ten."""
     requirements = root / "requirements"
     probe = environment.survey(python, requirements, importing)
-    lines = [f"WildCap       {__version__} at {root}",
-             f"Python        {probe['python'][0]}.{probe['python'][1]} at {python}",
-             f"device        {probe['device'] or 'not tried'}" + (f"  ({probe['reason']})" if probe["reason"] else "")]
+    lines = [
+        f"WildCap       {__version__} at {root}",
+        f"Python        {probe['python'][0]}.{probe['python'][1]} at {python}",
+        f"device        {probe['device'] or 'not tried'}" + (f"  ({probe['reason']})" if probe["reason"] else ""),
+    ]
     for name, version in environment.required(requirements).items():
         has = probe["versions"][name]
-        lines.append(f"  {name:32} {has or 'missing':14}"
-                     + ("" if has and has.partition("+")[0] == version else f" {version} is needed"))
+        lines.append(
+            f"  {name:32} {has or 'missing':14}"
+            + ("" if has and has.partition("+")[0] == version else f" {version} is needed")
+        )
     of_files = shipped_files.find_faults(root / "core")
     count = len(shipped_files.read_manifest()["core"])
     lines.append(f"own files     {count - len(of_files)} of {count} whole")
-    lines += [f"weights       {path.name}: {_described(path)}"
-              for path in sorted((root / "core" / "weights").glob("*.safetensors"))]
+    lines += [
+        f"weights       {path.name}: {_described(path)}"
+        for path in sorted((root / "core" / "weights").glob("*.safetensors"))
+    ]
     of_packages = environment.judge(probe, requirements)
     remedies = []
     if of_packages:

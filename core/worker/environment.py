@@ -23,8 +23,12 @@ from .background import BackgroundTask
 PYTHONS = ((3, 11), (3, 12), (3, 13))
 """Versions of Python for which every direct requirement has a wheel; locks.py has those that an environment is made
 for."""
-MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage",
-           "pillow-heif": "pillow_heif"}
+MODULES = {
+    "opencv-contrib-python-headless": "cv2",
+    "openimageio": "OpenImageIO",
+    "scikit-image": "skimage",
+    "pillow-heif": "pillow_heif",
+}
 """Modules of the packages that are called otherwise."""
 COMPUTE_FILE = "wildcap_compute.txt"
 """Says in an environment for what, from where and by which lock it was made: another choice makes it anew, and so does
@@ -47,8 +51,10 @@ def default_folder() -> Path:
 
 def required(requirements: Path) -> dict[str, str]:
     """Package -> pinned version, of worker.txt in the folder `requirements`."""
-    lines = [line.partition("#")[0].strip()
-             for line in (requirements / "worker.txt").read_text(encoding="utf-8").splitlines()]
+    lines = [
+        line.partition("#")[0].strip()
+        for line in (requirements / "worker.txt").read_text(encoding="utf-8").splitlines()
+    ]
     return dict(line.split("==") for line in lines if line)
 
 
@@ -73,16 +79,20 @@ def survey(python: Path, requirements: Path, importing: bool = False, task: Back
     try:
         return json.loads(printed.splitlines()[-1])
     except (ValueError, IndexError):
-        raise Problem(f"{python} is not a working Python.",
-                      "Choose another Python, or install the solver again.") from None
+        raise Problem(
+            f"{python} is not a working Python.", "Choose another Python, or install the solver again."
+        ) from None
 
 
 def judge(survey: dict, requirements: Path) -> list[str]:
     """What is wrong with a survey's findings, one sentence each."""
     problems = []
     if tuple(survey["python"]) not in PYTHONS:
-        problems.append(f"It is Python {survey['python'][0]}.{survey['python'][1]}; "
-                        + " or ".join(f"{a}.{b}" for a, b in PYTHONS) + " is needed.")
+        problems.append(
+            f"It is Python {survey['python'][0]}.{survey['python'][1]}; "
+            + " or ".join(f"{a}.{b}" for a, b in PYTHONS)
+            + " is needed."
+        )
     for name, version in required(requirements).items():
         has = survey["versions"][name]
         if has is None:
@@ -90,8 +100,10 @@ def judge(survey: dict, requirements: Path) -> list[str]:
         elif has.partition("+")[0] != version:
             problems.append(f"{name} is {has}, not {version}.")
     if len(survey["opencv"]) > 1:
-        problems.append(f"More than one OpenCV is installed ({', '.join(survey['opencv'])}); remove all but "
-                        "opencv-contrib-python-headless.")
+        problems.append(
+            f"More than one OpenCV is installed ({', '.join(survey['opencv'])}); remove all but "
+            "opencv-contrib-python-headless."
+        )
     return problems + [f"{module} does not load: {text}." for module, text in survey["errors"].items()]
 
 
@@ -126,12 +138,15 @@ def empty(folder: Path, keep: str, check: Callable[[], None] = lambda: None) -> 
 def check_removable(folder: Path) -> None:
     """Raises Problem for a folder that is no environment of ours."""
     if Path(folder).exists() and not (Path(folder) / COMPUTE_FILE).is_file():
-        raise Problem(f"{folder} is no environment that WildCap made, so it is not deleted.",
-                      "Choose the folder that the solver was installed to.")
+        raise Problem(
+            f"{folder} is no environment that WildCap made, so it is not deleted.",
+            "Choose the folder that the solver was installed to.",
+        )
 
 
 def removal(folder: Path) -> BackgroundTask:
     """`remove` in the background: an environment has tens of thousands of files."""
+
     def work(task: BackgroundTask) -> None:
         task.say(0, 1, "deleting the solver")
         with alone_in(folder, task):
@@ -195,9 +210,15 @@ def answer(python: str | Path, code: str, timeout_s: float = 20) -> str:
     started in is nobody's module."""
     flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
     try:
-        result = subprocess.run([str(python), "-I", "-c", code], capture_output=True, text=True,
-                                timeout=timeout_s, stdin=subprocess.DEVNULL,
-                                env=switchlight_api.environment_without_key(), **flags)
+        result = subprocess.run(
+            [str(python), "-I", "-c", code],
+            capture_output=True,
+            text=True,
+            timeout=timeout_s,
+            stdin=subprocess.DEVNULL,
+            env=switchlight_api.environment_without_key(),
+            **flags,
+        )
         return result.stdout.strip()
     except (OSError, subprocess.TimeoutExpired):
         return ""

@@ -38,10 +38,15 @@ class InstallationPlan:
         return self.download + self.disk
 
 
-def plan_installation(requirements: Path, base: Path, compute: str, source: str,
-                      run: Callable[[list[str]], tuple[int, str]],
-                      say: Callable[[float, float, str], None] = lambda *_: None,
-                      wheels: Path | None = None) -> InstallationPlan:
+def plan_installation(
+    requirements: Path,
+    base: Path,
+    compute: str,
+    source: str,
+    run: Callable[[list[str]], tuple[int, str]],
+    say: Callable[[float, float, str], None] = lambda *_: None,
+    wheels: Path | None = None,
+) -> InstallationPlan:
     """What an installation would bring (see installation.py).
 
     Parameters
@@ -74,31 +79,42 @@ def plan_installation(requirements: Path, base: Path, compute: str, source: str,
         def ask(words: tuple[str, ...]) -> tuple[int, str]:
             code, error = run([*pip, "--dry-run", "--quiet", "--ignore-installed", "--report", report, *words])
             for entry in json.loads(report.read_text(encoding="utf-8"))["install"] if not code else ():
-                packages[locks.normal(entry["metadata"]["name"])] = (entry["metadata"]["version"],
-                                                                     entry["download_info"]["url"])
+                packages[locks.normal(entry["metadata"]["name"])] = (
+                    entry["metadata"]["version"],
+                    entry["download_info"]["url"],
+                )
             return code, error
 
         todo = pip_steps.plan_steps(requirements, lock, compute, source, Path(folder), wheels)
-        code, error = pip_steps.carry_out(todo, ask,
-                                          lambda done: say(2 + done / len(todo), 3, "asking the package index"))
+        code, error = pip_steps.carry_out(
+            todo, ask, lambda done: say(2 + done / len(todo), 3, "asking the package index")
+        )
         if code:
-            raise Problem(f"The package index did not answer as expected "
-                          f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
-                          "Check the network connection, and try again.")
+            raise Problem(
+                f"The package index did not answer as expected "
+                f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
+                "Check the network connection, and try again.",
+            )
     known = locks.known_sizes(requirements, lock.name)
     sizes = [known[f"{name}=={version}"] for name, (version, _) in packages.items()]
     hosts = sorted({urllib.parse.urlsplit(url).hostname or "this disk" for _, url in packages.values()})
-    return InstallationPlan({name: version for name, (version, _) in packages.items()}, tuple(hosts),
-                            sum(size for size, _ in sizes), sum(disk for _, disk in sizes))
+    return InstallationPlan(
+        {name: version for name, (version, _) in packages.items()},
+        tuple(hosts),
+        sum(size for size, _ in sizes),
+        sum(disk for _, disk in sizes),
+    )
 
 
 def check_space(plan: InstallationPlan, folder: Path) -> int:
     """Bytes free on the disk of a folder that need not be there yet. Raises Problem when the plan does not fit."""
     free = free_space(folder)
     if free < plan.needed:
-        raise Problem(f"The disk that holds {folder} has {gigabytes(free)} free; {gigabytes(plan.needed)} are needed "
-                      "while the solver is installed.",
-                      "Free some space, or choose a solver folder on another disk.")
+        raise Problem(
+            f"The disk that holds {folder} has {gigabytes(free)} free; {gigabytes(plan.needed)} are needed "
+            "while the solver is installed.",
+            "Free some space, or choose a solver folder on another disk.",
+        )
     return free
 
 

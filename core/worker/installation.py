@@ -34,8 +34,9 @@ class PackageSource:
     wheels: Path | None = None
 
 
-def installation(folder: Path, requirements: Path, log: Path, base: Path | None, chosen: PackageSource,
-                 packages: int = 0) -> BackgroundTask:
+def installation(
+    folder: Path, requirements: Path, log: Path, base: Path | None, chosen: PackageSource, packages: int = 0
+) -> BackgroundTask:
     """Makes an environment in the background. One in the same folder as a broken or cancelled one continues that; where
     that does not work, it is made anew. What a cancel leaves stays, and what was downloaded is in pip's cache.
 
@@ -67,8 +68,9 @@ def installation(folder: Path, requirements: Path, log: Path, base: Path | None,
             for place in (log.parent, folder.parent):
                 place.mkdir(parents=True, exist_ok=True)
             with alone_in(folder, task), open(log, "w", encoding="utf-8") as file:
-                _Installing(task, folder, requirements, base or base_python(), chosen, _listener(task, file, expected),
-                            log).run()
+                _Installing(
+                    task, folder, requirements, base or base_python(), chosen, _listener(task, file, expected), log
+                ).run()
         except OSError as error:
             raise storage_problem(error, folder) from error
 
@@ -80,10 +82,15 @@ def find_python() -> Path | None:
     is none."""
     own = "{}.{}".format(*sys.version_info)
     names = [f"python{major}.{minor}" for major, minor in locks.PYTHONS] + ["python3", "python"]
-    candidates = [sys.executable, f"{sys.base_prefix}/bin/python{own}", f"{sys.base_prefix}/bin/python.exe",
-                  *(shutil.which(name) for name in names)]
-    candidates += [f"{folder}/{name}" for folder in ("/usr/bin", "/usr/local/bin", "/opt/homebrew/bin")
-                   for name in names]
+    candidates = [
+        sys.executable,
+        f"{sys.base_prefix}/bin/python{own}",
+        f"{sys.base_prefix}/bin/python.exe",
+        *(shutil.which(name) for name in names),
+    ]
+    candidates += [
+        f"{folder}/{name}" for folder in ("/usr/bin", "/usr/local/bin", "/opt/homebrew/bin") for name in names
+    ]
     if os.name == "nt":
         programs = Path(os.environ.get("LOCALAPPDATA", "")) / "Programs" / "Python"
         candidates += [programs / f"Python{major}{minor}" / "python.exe" for major, minor in locks.PYTHONS]
@@ -133,8 +140,14 @@ class _Installing:
             task.say(0, 100, "making the solver's folder")
             folder.mkdir(parents=True, exist_ok=True)
             (folder / COMPUTE_FILE).write_text("", encoding="utf-8")
-            bare_environment.make(folder, self.base, requirements, lambda command: task.run(command, self.hear),
-                                  chosen.wheels, keep=COMPUTE_FILE)
+            bare_environment.make(
+                folder,
+                self.base,
+                requirements,
+                lambda command: task.run(command, self.hear),
+                chosen.wheels,
+                keep=COMPUTE_FILE,
+            )
             (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
         pip = [python_of(folder), *INSTALL, "--progress-bar", "off"]
         todo = plan_steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
@@ -173,13 +186,18 @@ def _listener(task: BackgroundTask, log, expected: int):
 def _failure(last_error: str, folder: Path, log: Path) -> Problem:
     text = last_error.lower()
     if "do not match the hashes" in text:
-        return Problem("A package is not the file that WildCap was made with: its hash is another.",
-                       f"Install again, or ask who runs your package index; the log is {log}.")
+        return Problem(
+            "A package is not the file that WildCap was made with: its hash is another.",
+            f"Install again, or ask who runs your package index; the log is {log}.",
+        )
     if "no space left" in text or "disk" in text:
-        return Problem(f"The disk that holds {folder} is full.",
-                       "Free some space, or choose another folder, and install again.")
+        return Problem(
+            f"The disk that holds {folder} is full.", "Free some space, or choose another folder, and install again."
+        )
     if any(words in text for words in ("no matching distribution", "connection", "timed out", "resolve", "retries")):
-        return Problem("A package could not be downloaded.",
-                       f"Check the network connection and install again; it continues. The log is {log}.")
+        return Problem(
+            "A package could not be downloaded.",
+            f"Check the network connection and install again; it continues. The log is {log}.",
+        )
     said = last_error.removeprefix("ERROR: ").rstrip(".") or "no message"
     return Problem(f"The installation stopped ({said}).", f"Install again; the log is {log}.")

@@ -34,8 +34,16 @@ class JobRequest:
     tool: stages.Stage | None = None  # what runs in the chain's place
 
 
-def write_job(capture: Capture, *, source: str | Path = "", first: str | None = None, last: str | None = None,
-              settings: dict | None = None, quality: str = "standard", tool: str = "") -> Path:
+def write_job(
+    capture: Capture,
+    *,
+    source: str | Path = "",
+    first: str | None = None,
+    last: str | None = None,
+    settings: dict | None = None,
+    quality: str = "standard",
+    tool: str = "",
+) -> Path:
     """Writes the capture's job.json.
 
     Parameters
@@ -60,8 +68,15 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
         another worker is at the capture: job.json is the record of what that one was asked.
     """
     chosen = convert_settings(settings or {}, lambda path: write_portable(path, capture.root))
-    job = {"capture": ".", "source": write_portable(source, capture.root) if str(source) else "", "from": first,
-           "until": last, "settings": chosen, "quality": quality, **({"tool": tool} if tool else {})}
+    job = {
+        "capture": ".",
+        "source": write_portable(source, capture.root) if str(source) else "",
+        "from": first,
+        "until": last,
+        "settings": chosen,
+        "quality": quality,
+        **({"tool": tool} if tool else {}),
+    }
     _check_names(capture.root, source)
     _job(job, capture.root)
     if str(source):
@@ -72,8 +87,9 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
     return capture.job
 
 
-def wait_until_free(capture: Capture, tell: Callable[[str], None],
-                    cancelled: Callable[[], bool] = lambda: False) -> None:
+def wait_until_free(
+    capture: Capture, tell: Callable[[str], None], cancelled: Callable[[], bool] = lambda: False
+) -> None:
     """Sees to it that nobody holds the capture before a job is written there: a lease that a machine which has gone
     left behind is taken over when its term is out. Raises Problem where somebody works there, and CancelledError;
     `tell` hears of the wait."""
@@ -89,8 +105,10 @@ def read_job(path: Path) -> JobRequest:
     except Problem as problem:
         raise Problem(f"The job file {path} cannot be used: {problem.problem}", problem.remedy) from problem
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise Problem(f"The job file {path} cannot be read ({error}).",
-                      "Start the job again from Blender or with `python -m core run`.") from error
+        raise Problem(
+            f"The job file {path} cannot be read ({error}).",
+            "Start the job again from Blender or with `python -m core run`.",
+        ) from error
 
 
 def last_settings(capture: Capture) -> Settings:
@@ -105,29 +123,45 @@ def _check_names(root: Path, source: str | Path) -> None:
     try:
         inside = os.listdir(source) if str(source) and os.path.isdir(source) else []
     except OSError as error:
-        raise Problem(f"{source} cannot be read ({error.strerror}).",
-                      "Change its permissions, or copy it to a folder that may be read.") from error
+        raise Problem(
+            f"{source} cannot be read ({error.strerror}).",
+            "Change its permissions, or copy it to a folder that may be read.",
+        ) from error
     for name in (os.path.abspath(root), str(source), *inside):
         try:
             name.encode()
         except UnicodeEncodeError:
-            raise Problem(f"The name {name.encode(errors='backslashreplace').decode()!r} is not in UTF-8.",
-                          "Rename the file or folder: it may come from an old disk or archive.") from None
+            raise Problem(
+                f"The name {name.encode(errors='backslashreplace').decode()!r} is not in UTF-8.",
+                "Rename the file or folder: it may come from an old disk or archive.",
+            ) from None
 
 
 def _job(request: dict, folder: Path) -> JobRequest:
     """`folder` is where the job file lies; its paths are relative to that where they can be."""
-    first, last = (stages.NAMES.index(stages.by_name(name).name) if name else default
-                   for name, default in ((request.get("from"), 0), (request.get("until"), len(stages.NAMES) - 1)))
+    first, last = (
+        stages.NAMES.index(stages.by_name(name).name) if name else default
+        for name, default in ((request.get("from"), 0), (request.get("until"), len(stages.NAMES) - 1))
+    )
     if first > last:
-        raise Problem(f"The stage {stages.NAMES[first]} comes after {stages.NAMES[last]}.",
-                      "Name the first stage to run before the last one.")
+        raise Problem(
+            f"The stage {stages.NAMES[first]} comes after {stages.NAMES[last]}.",
+            "Name the first stage to run before the last one.",
+        )
     chosen = convert_settings(request.get("settings") or {}, lambda path: str(read_portable(path, folder)))
     settings = from_json(chosen, preset(request.get("quality") or "standard"))
     tool = next((each for each in stages.TOOLS if each.name == request.get("tool")), None)
     if request.get("tool") and tool is None:
-        raise Problem(f"There is no tool named {request['tool']!r}.",
-                      f"The tools are {', '.join(each.name for each in stages.TOOLS)}.")
+        raise Problem(
+            f"There is no tool named {request['tool']!r}.",
+            f"The tools are {', '.join(each.name for each in stages.TOOLS)}.",
+        )
     source = str(read_portable(request["source"], folder)) if request.get("source") else ""
-    return JobRequest(Capture(read_portable(request["capture"], folder)), source, stages.STAGES[first:last + 1],
-                      bool(request.get("from")), settings, tool)
+    return JobRequest(
+        Capture(read_portable(request["capture"], folder)),
+        source,
+        stages.STAGES[first : last + 1],
+        bool(request.get("from")),
+        settings,
+        tool,
+    )

@@ -29,8 +29,10 @@ MACOS, GLIBC = (14, 0), (2, 28)
 """The oldest that the wheels are made for."""
 LONGEST_PATH = 250
 """Characters that no path of an installation exceeds; Windows without long paths switched on stops at 259."""
-ELSEWHERE = ("Click Use an Existing Python and choose one with the packages of requirements/worker.txt; masks, "
-             "materials and renders work without the solver.")
+ELSEWHERE = (
+    "Click Use an Existing Python and choose one with the packages of requirements/worker.txt; masks, "
+    "materials and renders work without the solver."
+)
 
 DESCRIBE = """
 import json, platform, struct, sys, sysconfig
@@ -77,29 +79,40 @@ def lock_name(description: str) -> str:
         about = json.loads(description)
         python, system, machine = tuple(about["python"]), about["system"], about["machine"]
     except (ValueError, KeyError, TypeError):
-        raise Problem("The Python that the solver was to be made from does not answer.",
-                      "Click Use an Existing Python, or install Blender again.") from None
+        raise Problem(
+            "The Python that the solver was to be made from does not answer.",
+            "Click Use an Existing Python, or install Blender again.",
+        ) from None
     version = ".".join(map(str, python))
     if python not in PYTHONS or about["free_threaded"]:
         kind = f"{version} without its global lock" if about["free_threaded"] else version
-        raise Problem(f"This Python is {kind}; the solver's packages are made for "
-                      f"{' and '.join(f'{a}.{b}' for a, b in PYTHONS)}.",
-                      "Click Use an Existing Python and choose one of these versions, or take the Blender from "
-                      "blender.org, which brings its own.")
+        raise Problem(
+            f"This Python is {kind}; the solver's packages are made for "
+            f"{' and '.join(f'{a}.{b}' for a, b in PYTHONS)}.",
+            "Click Use an Existing Python and choose one of these versions, or take the Blender from "
+            "blender.org, which brings its own.",
+        )
     if system == "darwin" and machine != "arm64":
-        raise Problem("There is no solver for Macs with an Intel processor: PyTorch and pycolmap are no longer made "
-                      "for them.", ELSEWHERE)
+        raise Problem(
+            "There is no solver for Macs with an Intel processor: PyTorch and pycolmap are no longer made for them.",
+            ELSEWHERE,
+        )
     if system == "darwin" and _numbers(about["macos"]) < MACOS:
-        raise Problem(f"The solver needs macOS {MACOS[0]} or newer; this is {about['macos']}.",
-                      f"Update macOS. Or {ELSEWHERE[0].lower()}{ELSEWHERE[1:]}")
+        raise Problem(
+            f"The solver needs macOS {MACOS[0]} or newer; this is {about['macos']}.",
+            f"Update macOS. Or {ELSEWHERE[0].lower()}{ELSEWHERE[1:]}",
+        )
     known = machine in ("arm64", "x86_64", "amd64") and about["bits"] == 64
     if not known or (machine == "arm64" and system != "darwin"):
-        raise Problem(f"There is no solver for this processor ({machine}, {about['bits']} bits): pycolmap is not made "
-                      "for it.", ELSEWHERE)
+        raise Problem(
+            f"There is no solver for this processor ({machine}, {about['bits']} bits): pycolmap is not made for it.",
+            ELSEWHERE,
+        )
     if system.startswith("linux") and (about["libc"][0] != "glibc" or _numbers(about["libc"][1]) < GLIBC):
         has = " ".join(filter(None, about["libc"])) or "another library"
-        raise Problem(f"The solver needs a Linux with glibc {'.'.join(map(str, GLIBC))} or newer; this has {has}.",
-                      ELSEWHERE)
+        raise Problem(
+            f"The solver needs a Linux with glibc {'.'.join(map(str, GLIBC))} or newer; this has {has}.", ELSEWHERE
+        )
     platform = {"darwin": "macosx_arm64", "win32": "win_amd64"}.get(system, "manylinux_x86_64")
     return f"{platform}-{version}"
 
@@ -113,8 +126,10 @@ def read(requirements: Path, name: str) -> Lock:
     joined = [line.partition("#")[0].strip() for line in text.replace("\\\n", " ").splitlines()]
     lines = {normal(re.split(r"[=<>!\s\[]", line, maxsplit=1)[0]): re.sub(r"\s+", " ", line) for line in joined if line}
     longest = re.search(r"# longest path: (\d+)", text)
-    sizes = {pinned: (int(download), int(disk))
-             for pinned, download, disk in re.findall(r"# (\S+==\S+): (\d+) bytes, (\d+) on disk", text)}
+    sizes = {
+        pinned: (int(download), int(disk))
+        for pinned, download, disk in re.findall(r"# (\S+==\S+): (\d+) bytes, (\d+) on disk", text)
+    }
     return Lock(name, lines, int(longest[1]) if longest else 0, sizes)
 
 
@@ -139,9 +154,11 @@ def check_path(lock: Lock, folder: Path, limited: bool) -> None:
     this system cuts them."""
     room = LONGEST_PATH - lock.longest - 1
     if limited and len(str(Path(folder).absolute())) > room:
-        raise Problem(f"The solver's folder {folder} has too long a path: with what comes into it, Windows cannot open "
-                      "some files.",
-                      f"Choose a folder whose path has at most {room} characters.")
+        raise Problem(
+            f"The solver's folder {folder} has too long a path: with what comes into it, Windows cannot open "
+            "some files.",
+            f"Choose a folder whose path has at most {room} characters.",
+        )
 
 
 def normal(name: str) -> str:

@@ -36,14 +36,17 @@ def fetch(requirements: Path, wheels: Path | None = None) -> bytes:
     if wheels is not None:
         path = Path(wheels) / name
         if not path.is_file():
-            raise Problem(f"{name} is not in {wheels}.",
-                          "Make the folder of wheels again: `python -m core wheels` puts it there.")
+            raise Problem(
+                f"{name} is not in {wheels}.", "Make the folder of wheels again: `python -m core wheels` puts it there."
+            )
         content = path.read_bytes()
     else:
         content = _download(name)
     if hashlib.sha256(content).hexdigest() != digest:
-        raise Problem(f"{name} is not the file that WildCap was made with: its hash is another.",
-                      "Try again; if that does not help, click Use an Existing Python.")
+        raise Problem(
+            f"{name} is not the file that WildCap was made with: its hash is another.",
+            "Try again; if that does not help, click Use an Existing Python.",
+        )
     return content
 
 
@@ -55,13 +58,19 @@ def setting(name: str) -> str:
     if files == [os.devnull]:
         pass
     elif os.name == "nt":
-        files += [f"{os.environ.get('APPDATA', '')}/pip/pip.ini", f"{Path.home()}/pip/pip.ini",
-                  f"{os.environ.get('PROGRAMDATA', '')}/pip/pip.ini"]
+        files += [
+            f"{os.environ.get('APPDATA', '')}/pip/pip.ini",
+            f"{Path.home()}/pip/pip.ini",
+            f"{os.environ.get('PROGRAMDATA', '')}/pip/pip.ini",
+        ]
     else:
         home = Path.home()
         own = os.environ.get("XDG_CONFIG_HOME") or f"{home}/.config"
-        apple = ([f"{home}/Library/Application Support/pip/pip.conf", "/Library/Application Support/pip/pip.conf"]
-                 if sys.platform == "darwin" else [])
+        apple = (
+            [f"{home}/Library/Application Support/pip/pip.conf", "/Library/Application Support/pip/pip.conf"]
+            if sys.platform == "darwin"
+            else []
+        )
         files += [f"{own}/pip/pip.conf", f"{home}/.pip/pip.conf", *apple, "/etc/pip.conf"]
     for file in files if not said else ():
         parser = configparser.RawConfigParser(strict=False)
@@ -69,8 +78,9 @@ def setting(name: str) -> str:
             parser.read(file, encoding="utf-8")
         except (configparser.Error, UnicodeDecodeError):  # pip refuses such a file by name when it runs
             continue
-        said = next((parser.get(section, name) for section in ("install", "global")
-                     if parser.has_option(section, name)), "")
+        said = next(
+            (parser.get(section, name) for section in ("install", "global") if parser.has_option(section, name)), ""
+        )
         if said:
             break
     return said.strip()
@@ -83,14 +93,19 @@ def _download(name: str) -> bytes:
         if links:
             return _get(urllib.parse.urljoin(page, links[0].replace("&amp;", "&").partition("#")[0]))
     except (OSError, ValueError) as error:
-        raise Problem(f"pip could not be downloaded ({error}).",
-                      "Check the network connection and install again, or click Use an Existing Python.") from error
-    raise Problem(f"The package index has no {name}.",
-                  "Put it on your mirror, install from a folder of wheels, or click Use an Existing Python.")
+        raise Problem(
+            f"pip could not be downloaded ({error}).",
+            "Check the network connection and install again, or click Use an Existing Python.",
+        ) from error
+    raise Problem(
+        f"The package index has no {name}.",
+        "Put it on your mirror, install from a folder of wheels, or click Use an Existing Python.",
+    )
 
 
 def _get(url: str) -> bytes:
     cert = setting("cert")
-    with urllib.request.urlopen(url, timeout=TIMEOUT_S,
-                                context=ssl.create_default_context(cafile=cert) if cert else None) as answer:
+    with urllib.request.urlopen(
+        url, timeout=TIMEOUT_S, context=ssl.create_default_context(cafile=cert) if cert else None
+    ) as answer:
         return answer.read()

@@ -21,8 +21,14 @@ from .environment import answer
 TORCH = "https://download.pytorch.org/whl/"
 """Where PyTorch keeps the builds that are not on PyPI, whose build for Linux brings CUDA and whose build for Windows is
 for the CPU."""
-BUILDS = {("linux", "cpu"): "cpu", ("linux", "cuda"): "", ("win32", "cpu"): "", ("win32", "cuda"): "cu130",
-          ("darwin", "cpu"): "", ("darwin", "apple"): ""}
+BUILDS = {
+    ("linux", "cpu"): "cpu",
+    ("linux", "cuda"): "",
+    ("win32", "cpu"): "",
+    ("win32", "cuda"): "cu130",
+    ("darwin", "cpu"): "",
+    ("darwin", "apple"): "",
+}
 """Which of them a system and its choice need; '' for PyPI's. On a Mac there is one build, for both."""
 SOURCES = ("pytorch", "pip", "folder")
 """Where packages come from: PyTorch from its own index for the builds above and the others from where this machine's
@@ -59,8 +65,9 @@ class PipStep:
     otherwise: tuple[tuple[str, ...], ...] = ()
 
 
-def plan_steps(requirements: Path, lock: locks.Lock, compute: str, source: str, scratch: Path,
-               wheels: Path | None = None) -> list[PipStep]:
+def plan_steps(
+    requirements: Path, lock: locks.Lock, compute: str, source: str, scratch: Path, wheels: Path | None = None
+) -> list[PipStep]:
     """What pip is to do in turn.
 
     Parameters
@@ -81,8 +88,9 @@ def plan_steps(requirements: Path, lock: locks.Lock, compute: str, source: str, 
     libraries = ((*checked, "-r", str(cuda)),) if system == "linux" and cuda is not None else ()
     if own is None or not build:
         return [PipStep((*checked, "-r", whole)), *map(PipStep, libraries)]
-    rest = str(_write(Path(scratch) / "wildcap_packages.txt",
-                      (line for name, line in lock.lines.items() if name != "torch")))
+    rest = str(
+        _write(Path(scratch) / "wildcap_packages.txt", (line for name, line in lock.lines.items() if name != "torch"))
+    )
     torch = str(_write(Path(scratch) / "wildcap_torch.txt", [lock.lines["torch"]]))
     hashes = ("--require-hashes",) if locks.read(requirements, f"{lock.name}-{compute}").verified else ()
     links = ("--find-links", f"{TORCH}{build}/torch/") if source == "pytorch" else where
@@ -91,8 +99,11 @@ def plan_steps(requirements: Path, lock: locks.Lock, compute: str, source: str, 
     return [PipStep((*checked, "-r", rest)), PipStep((*PINNED, *hashes, *links, "-r", str(own)), instead)]
 
 
-def carry_out(todo: list[PipStep], run: Callable[[tuple[str, ...]], tuple[int, str]],
-              say: Callable[[int], None] = lambda done: None) -> tuple[int, str]:
+def carry_out(
+    todo: list[PipStep],
+    run: Callable[[tuple[str, ...]], tuple[int, str]],
+    say: Callable[[int], None] = lambda done: None,
+) -> tuple[int, str]:
     """Runs steps in turn until one fails; the exit code and the last error of the last. `say` takes how many are
     done."""
     code, error = 0, ""

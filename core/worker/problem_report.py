@@ -44,8 +44,23 @@ TOLD = ("logs", "versions", "settings", "which stages ended and with what figure
 REMOVED = "<removed>"
 ABSOLUTE = re.compile(r"""(?<![\w<>:/\\.])(?:file:/{1,3}|[A-Za-z]:[\\/]|\\\\|~[\w.-]*[\\/]|/(?=[^\s/]))""")
 """Where an absolute path begins: POSIX, a drive, a server's share, somebody's home, a file's URL."""
-COMMON = {"root", "user", "admin", "frames", "video", "capture", "photographs", "home", "users", "tmp", "var",
-          "wildcap", "head", "mesh", "template"}
+COMMON = {
+    "root",
+    "user",
+    "admin",
+    "frames",
+    "video",
+    "capture",
+    "photographs",
+    "home",
+    "users",
+    "tmp",
+    "var",
+    "wildcap",
+    "head",
+    "mesh",
+    "template",
+}
 """Words that tell nobody's name, and stand in every log."""
 
 
@@ -73,14 +88,23 @@ def write(target: Path, root: Path, python: Path | None, capture: Capture | None
     if target.suffix.lower() != ".zip":
         target = target.with_name(f"{target.name}.zip")
     if target.exists():
-        raise Problem(f"{target} already exists.",
-                      "Choose another name for the report: WildCap overwrites nothing of yours.")
+        raise Problem(
+            f"{target} already exists.", "Choose another name for the report: WildCap overwrites nothing of yours."
+        )
     scrub = Scrubber(root, python, capture)
     texts = {"doctor.txt": _examined(root, python), "unforeseen.txt": "\n".join(unforeseen.recent), **_logs(capture)}
-    told = {"versions": {"WildCap": __version__, "Python": platform.python_version(), "system": platform.system(),
-                         "release": platform.release(),
-                         "machine": platform.machine(), "processors": os.cpu_count(), **versions},
-            "capture": _described(capture)}
+    told = {
+        "versions": {
+            "WildCap": __version__,
+            "Python": platform.python_version(),
+            "system": platform.system(),
+            "release": platform.release(),
+            "machine": platform.machine(),
+            "processors": os.cpu_count(),
+            **versions,
+        },
+        "capture": _described(capture),
+    }
     texts["report.json"] = json.dumps(told, indent=1, ensure_ascii=False)
     with replacing(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
@@ -92,19 +116,29 @@ class Scrubber:
     """Takes out of a text what tells who the user is and where their files lie. What lies in the extension, in the
     capture or in Python's folders keeps its path from there on, for that is what a report is about."""
 
-    def __init__(self, root: Path, python: Path | None = None, capture: Capture | None = None,
-                 more: Iterable[str] = ()):
+    def __init__(
+        self, root: Path, python: Path | None = None, capture: Capture | None = None, more: Iterable[str] = ()
+    ):
         known = {root: "<WildCap>", sys.prefix: "<Python>", sys.base_prefix: "<Python>"}
         if python is not None:
             known[Path(python).parent.parent] = "<solver>"
         if capture is not None:
             known[capture.root] = "<capture>"
-        self._places = sorted(((form, word) for place, word in known.items()
-                               for path in {str(place), os.path.realpath(place)} for form in _forms(path)),
-                              key=lambda pair: -len(pair[0]))
+        self._places = sorted(
+            (
+                (form, word)
+                for place, word in known.items()
+                for path in {str(place), os.path.realpath(place)}
+                for form in _forms(path)
+            ),
+            key=lambda pair: -len(pair[0]),
+        )
         names = {*_own_names(), *(_names_of(capture) if capture is not None else ()), *more}
-        self._names = sorted({form for name in names for form in _forms(name) if len(name) > 1
-                              and name.lower() not in COMMON}, key=len, reverse=True)
+        self._names = sorted(
+            {form for name in names for form in _forms(name) if len(name) > 1 and name.lower() not in COMMON},
+            key=len,
+            reverse=True,
+        )
         key = os.environ.get(switchlight_api.KEY_VARIABLE, "").strip()
         self._secrets = [key] if key else []
 
@@ -125,8 +159,11 @@ def _own_file(inside: str) -> str:
     """A file's path in the capture where it is one that WildCap gives; others have names of the user's."""
     inside = re.sub(r"[\\/]+", "/", inside)
     stem = inside.rstrip(".")
-    return (inside if stem in LOGS | BOOKS or any(fnmatch.fnmatchcase(stem, pattern) for pattern in FIRST_FORMAT)
-            else "<file>")
+    return (
+        inside
+        if stem in LOGS | BOOKS or any(fnmatch.fnmatchcase(stem, pattern) for pattern in FIRST_FORMAT)
+        else "<file>"
+    )
 
 
 def _without_paths(line: str) -> str:
@@ -136,7 +173,7 @@ def _without_paths(line: str) -> str:
     while path_match := ABSOLUTE.search(line):
         quote = line[path_match.start() - 1] if path_match.start() and line[path_match.start() - 1] in "'\"`" else ""
         end = line.find(quote, path_match.end()) if quote else -1
-        done += line[:path_match.start()] + "<path>"
+        done += line[: path_match.start()] + "<path>"
         line = line[end:] if end >= 0 else ""
     return done + line
 
@@ -216,9 +253,14 @@ def _described(capture: Capture | None) -> dict:
         record, chosen = capture.read(), last_settings(capture)
     except Problem as problem:
         return {"problem": str(problem)}
-    done = {name: {"state": capture.state(stages.by_name(name), chosen),
-                   **{key: stage.get(key) for key in ("seconds", "version", "device", "figures")}}
-            for name, stage in record["stages"].items() if name in stages.NAMES}
+    done = {
+        name: {
+            "state": capture.state(stages.by_name(name), chosen),
+            **{key: stage.get(key) for key in ("seconds", "version", "device", "figures")},
+        }
+        for name, stage in record["stages"].items()
+        if name in stages.NAMES
+    }
     return {"stages": done, "stopped": record.get("stopped"), "settings": _without_path_settings(chosen)}
 
 

@@ -26,8 +26,10 @@ def stand_in(capture: Capture, folder: str) -> Iterator[Capture]:
         yield capture
         return
     if not folder:
-        raise Problem(f"{capture.root} is read-only.",
-                      "Deliver to another folder: --to FOLDER, or Deliver To in the panel Deliver.")
+        raise Problem(
+            f"{capture.root} is read-only.",
+            "Deliver to another folder: --to FOLDER, or Deliver To in the panel Deliver.",
+        )
     place = Path(folder).expanduser() / f".wildcap.{os.getpid()}.tmp"
     try:
         try:

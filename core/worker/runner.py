@@ -40,8 +40,9 @@ from .job import JobRequest, read_job
 from .stage_log import at_work
 
 
-def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None,
-            cancelled: Callable[[], bool] = lambda: False) -> Message:
+def run_job(
+    path: Path, emit: Callable[[Message], None] = lambda message: None, cancelled: Callable[[], bool] = lambda: False
+) -> Message:
     """Runs the job file `path`, sends what happens through `emit` and returns the final message, which is not sent.
 
     The capture's lock is given back before the return, so whoever reads the final message may start the next job.
@@ -70,8 +71,12 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None,
                     raise CancelledError(stage)
                 kept += [step.label] if run_stage(step, job, emit, cancelled) == OLDER else []
             if kept:
-                emit(Log(f"Made by older code and kept: {', '.join(kept)}. Run a stage again to have it made by "
-                         f"WildCap {__version__}."))
+                emit(
+                    Log(
+                        f"Made by older code and kept: {', '.join(kept)}. Run a stage again to have it made by "
+                        f"WildCap {__version__}."
+                    )
+                )
     except CancelledError:
         return Cancelled(stage)
     except Exception as error:
@@ -131,8 +136,7 @@ def _run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], can
     emit(StageDone(tool.name, round(time.monotonic() - started, 2), False, reporter.figures))
 
 
-def _bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None],
-                cancelled: Callable[[], bool]) -> None:
+def _bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
     """Has made again what a stage or tool reads and was slimmed away, with the settings that it was made with. Where
     the same comes out, it is as if it had never gone; where not, for the code is another or what it is made from has
     changed, it counts as new. Raises whatever the stages raise."""
@@ -149,8 +153,12 @@ def _bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None],
             emit(StageDone(stage.name, round(seconds, 2), False, reporter.figures))
             if not slimmed.is_back(capture.root, entry):
                 capture.finish(stage, conditions, seconds, settings, reporter.figures, __version__, reporter.findings)
-                emit(Log(f"{stage.label}: not what they were before, for other code made them, or from other inputs. "
-                         "What was made from them is out of date."))
+                emit(
+                    Log(
+                        f"{stage.label}: not what they were before, for other code made them, or from other inputs. "
+                        "What was made from them is out of date."
+                    )
+                )
                 continue
         capture.drop_hashes(stage)
 
@@ -158,11 +166,14 @@ def _bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None],
 def _as_before(stage: Stage, entry: dict, job: JobRequest) -> Settings:
     """The settings that a stage was last run with, by its entry in capture.json, on the same device where this machine
     has it."""
-    then = convert_settings({stage.name: entry["settings"]},
-                            lambda path: str(read_portable(path, job.capture.root)))[stage.name]
+    then = convert_settings({stage.name: entry["settings"]}, lambda path: str(read_portable(path, job.capture.root)))[
+        stage.name
+    ]
     known = asdict(getattr(job.settings, stage.name))
-    settings = from_json({stage.name: {name: value for name, value in then.items() if name in known},
-                          "seed": entry["seed"]}, job.settings)
+    settings = from_json(
+        {stage.name: {name: value for name, value in then.items() if name in known}, "seed": entry["seed"]},
+        job.settings,
+    )
     with contextlib.suppress(Problem):
         there = from_json({"device": entry["device"]}, settings)
         _check_device(there.device)
@@ -185,8 +196,14 @@ def _check_slimmed(job: JobRequest) -> None:
     record = capture.read()
     if slimmed.hashes_of(record):
         chain = (job.tool,) if job.tool else job.chain
-        first = next((i for i, step in enumerate(chain) if job.tool or job.force
-                      or capture.state(step, job.settings) not in FINISHED), len(chain))
+        first = next(
+            (
+                i
+                for i, step in enumerate(chain)
+                if job.tool or job.force or capture.state(step, job.settings) not in FINISHED
+            ),
+            len(chain),
+        )
         if not all(stage.reads for stage in slimmed.makers(record, chain[first:])):
             try:
                 capture.require_source()
@@ -203,11 +220,15 @@ def explained(error: Exception, stage: str, log: Path) -> Problem:
         return error
     during = f"the stage {stage}" if stage else "the job"
     if out_of_memory(error):
-        return Problem(f"There was not enough memory for {during}.",
-                       "Close other programs or choose a lower quality, then run again: finished stages are kept.")
+        return Problem(
+            f"There was not enough memory for {during}.",
+            "Close other programs or choose a lower quality, then run again: finished stages are kept.",
+        )
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith(__package__.split(".")[0]):
-        return Problem(f"The solver's Python has no module named {error.name}, which {during} needs.",
-                       "Click Install Solver under Setup, or see what `python -m core doctor` says.")
+        return Problem(
+            f"The solver's Python has no module named {error.name}, which {during} needs.",
+            "Click Install Solver under Setup, or see what `python -m core doctor` says.",
+        )
     if isinstance(error, OSError) and error.filename and not isinstance(error, FileNotFoundError):
         return storage_problem(error, Path(os.fsdecode(error.filename)))
     return unforeseen.explain(error, during, log)
@@ -225,8 +246,10 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
         raise Problem("This capture has no video yet.", "Choose a video or a folder of photographs.")
     if not source.exists():
         if job.force or not capture.has(first.writes[0]) or first.name not in capture.read()["stages"]:
-            raise Problem(f"There is no video or folder at {source}.",
-                          "Check its name and whether the disk it is on is connected.")
+            raise Problem(
+                f"There is no video or folder at {source}.",
+                "Check its name and whether the disk it is on is connected.",
+            )
         emit(Log(f"{source} is not there any more; what was taken from it is used."))
         return
     try:
@@ -234,13 +257,16 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
             capture.set_source(source)
             return
     except PermissionError as error:
-        raise Problem(f"{error.filename or source} cannot be read.",
-                      "Change its permissions (on a Mac: System Settings, Privacy & Security, Files and Folders), or "
-                      "copy it to a folder that Blender may read.") from error
-    raise Problem(f"This capture was made from {known.name if known else 'another source'}, not from this "
-                  f"{source.name}.",
-                  f"Choose another capture folder for another video, or run the stage {first.label} again (in a "
-                  f"terminal: --from {first.name}) to replace everything but the painted masks.")
+        raise Problem(
+            f"{error.filename or source} cannot be read.",
+            "Change its permissions (on a Mac: System Settings, Privacy & Security, Files and Folders), or "
+            "copy it to a folder that Blender may read.",
+        ) from error
+    raise Problem(
+        f"This capture was made from {known.name if known else 'another source'}, not from this {source.name}.",
+        f"Choose another capture folder for another video, or run the stage {first.label} again (in a "
+        f"terminal: --from {first.name}) to replace everything but the painted masks.",
+    )
 
 
 def _check_paths(job: JobRequest) -> None:
@@ -260,8 +286,10 @@ def _check_device(device: str) -> None:
         import torch
 
         if not (torch.cuda.is_available() if device == "cuda" else torch.backends.mps.is_available()):
-            raise Problem(f"This machine has no device {device} that torch can use.",
-                          "Choose auto, or see what `python -m core doctor` says.")
+            raise Problem(
+                f"This machine has no device {device} that torch can use.",
+                "Choose auto, or see what `python -m core doctor` says.",
+            )
 
 
 def _with_device(step: Stage, settings: Settings, reporter: Reporter) -> Settings:

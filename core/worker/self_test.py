@@ -19,6 +19,10 @@ def prepare(folder: Path, seed: int = 0, device: str = "auto") -> Capture:
     """A copy of the sample head in `folder`, new and for this alone, with the job for it: the draft, which takes
     seconds. Raises Problem where it cannot be written."""
     capture = copy_to(folder)
-    write_job(capture, tool="self_test", quality="draft",
-              settings={"solve": {"skin_tone": SKIN_TONE}, "seed": seed, "device": device})
+    write_job(
+        capture,
+        tool="self_test",
+        quality="draft",
+        settings={"solve": {"skin_tone": SKIN_TONE}, "seed": seed, "device": device},
+    )
     return capture

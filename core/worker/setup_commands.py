@@ -22,32 +22,51 @@ POLL_S = 0.1  # between two looks at the installation
 
 def add_commands(commands) -> None:
     """Adds them to the subparsers of `python -m core`."""
-    install = add_command(commands, "install", _install,
-                          "make the solver's environment from this Python, as Install Solver does")
-    install.add_argument("folder", metavar="FOLDER", type=Path,
-                         help="new, empty, or one that an earlier installation began")
-    install.add_argument("--wheels", metavar="FOLDER", type=Path,
-                         help="a folder of wheels to install from, without a network")
+    install = add_command(
+        commands, "install", _install, "make the solver's environment from this Python, as Install Solver does"
+    )
+    install.add_argument(
+        "folder", metavar="FOLDER", type=Path, help="new, empty, or one that an earlier installation began"
+    )
+    install.add_argument(
+        "--wheels", metavar="FOLDER", type=Path, help="a folder of wheels to install from, without a network"
+    )
     _add_build(install)
-    bring = add_command(commands, "wheels", _wheels,
-                        "download all wheels of a platform into a folder, to install from without a network", "FOLDER")
-    bring.add_argument("--for", dest="name", choices=locks.names(), metavar="PLATFORM-PYTHON",
-                       help=f"{', '.join(locks.names())}; this machine and Python without it")
+    bring = add_command(
+        commands,
+        "wheels",
+        _wheels,
+        "download all wheels of a platform into a folder, to install from without a network",
+        "FOLDER",
+    )
+    bring.add_argument(
+        "--for",
+        dest="name",
+        choices=locks.names(),
+        metavar="PLATFORM-PYTHON",
+        help=f"{', '.join(locks.names())}; this machine and Python without it",
+    )
     _add_build(bring)
 
 
 def _add_build(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--compute", choices=("auto", "cpu", "cuda", "apple"), default="auto",
-                        help="what PyTorch computes on")
-    parser.add_argument("--packages", choices=("pytorch", "pip"), default="pytorch",
-                        help="where PyTorch comes from: its own index where PyPI lacks the build, or with all others "
-                             "from where pip is set up to look")
+    parser.add_argument(
+        "--compute", choices=("auto", "cpu", "cuda", "apple"), default="auto", help="what PyTorch computes on"
+    )
+    parser.add_argument(
+        "--packages",
+        choices=("pytorch", "pip"),
+        default="pytorch",
+        help="where PyTorch comes from: its own index where PyPI lacks the build, or with all others "
+        "from where pip is set up to look",
+    )
 
 
 def _install(options: argparse.Namespace) -> int:
     folder = options.folder.absolute()
-    source = installation.PackageSource(options.compute, "folder" if options.wheels else options.packages,
-                                        options.wheels)
+    source = installation.PackageSource(
+        options.compute, "folder" if options.wheels else options.packages, options.wheels
+    )
     log = folder.with_name(f"{folder.name}.wildcap-install.log")
     task = installation.installation(folder, REQUIREMENTS, log, Path(sys.executable), source)
     _follow(task)
@@ -62,14 +81,22 @@ def _wheels(options: argparse.Namespace) -> int:
         raise Problem(f"There is no solver for {compute} on {name}.", "Leave --compute out, or choose another.")
 
     def work(task: BackgroundTask):
-        return wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder,
-                               lambda command: task.run(command, lambda line: _hear(task, line)))
+        return wheels.download(
+            REQUIREMENTS,
+            name,
+            compute,
+            options.packages,
+            options.folder,
+            lambda command: task.run(command, lambda line: _hear(task, line)),
+        )
 
     task = BackgroundTask("wheels", work)
     _follow(task)
-    print(f"{len(task.result)} wheels for {name} in {options.folder}, "
-          f"{index.gigabytes(sum(path.stat().st_size for path in task.result))}; "
-          f"`python -m core install FOLDER --wheels {options.folder}` installs from them, and so does Install Solver")
+    print(
+        f"{len(task.result)} wheels for {name} in {options.folder}, "
+        f"{index.gigabytes(sum(path.stat().st_size for path in task.result))}; "
+        f"`python -m core install FOLDER --wheels {options.folder}` installs from them, and so does Install Solver"
+    )
     return 0
 
 

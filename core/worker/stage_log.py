@@ -36,8 +36,10 @@ def at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], canc
     """
     missing = [name for name in step.reads if not capture.has(name)]
     if missing:
-        raise Problem(f"{step.label} needs {missing[0]}, which this capture does not have.",
-                      "Run the stages before it first: click Reconstruct.")
+        raise Problem(
+            f"{step.label} needs {missing[0]}, which this capture does not have.",
+            "Run the stages before it first: click Reconstruct.",
+        )
     emit(Progress(step.name, 0, 1, "Starting"))
     kept_before = ownership.kept_files(capture.root)
     with _log_of(capture, step) as log:
@@ -81,6 +83,7 @@ def _log_of(capture: Capture, stage: Stage):
 
 def _logging(emit: Callable[[Message], None], log) -> Callable[[Message], None]:
     """`emit` that also keeps the stage's log lines in its log."""
+
     def both(message: Message) -> None:
         if isinstance(message, Log):
             with contextlib.suppress(OSError):

@@ -56,13 +56,17 @@ def print_message(message: Message, capture: Capture, line: ProgressLine) -> int
         case Progress():
             share = message.done / message.of if message.of else 0
             left = f", {_duration(message.eta_s)} left" if message.eta_s and message.eta_s >= 1 else ""
-            line.show(f"{stages.LABELS[message.stage]:12} {share:4.0%}  {message.text}{left}",
-                      step=(message.stage, int(share * 4)))
+            line.show(
+                f"{stages.LABELS[message.stage]:12} {share:4.0%}  {message.text}{left}",
+                step=(message.stage, int(share * 4)),
+            )
         case Log():
             line.keep(message.text)
         case StageDone():
-            line.keep(f"{stages.LABELS[message.stage]:12} "
-                      + ("unchanged" if message.skipped else f"done in {_duration(message.seconds)}"))
+            line.keep(
+                f"{stages.LABELS[message.stage]:12} "
+                + ("unchanged" if message.skipped else f"done in {_duration(message.seconds)}")
+            )
         case Done():
             told = f" {capture.report} has the pictures and figures." if capture.report.is_file() else ""
             line.keep(f"Finished in {_duration(message.seconds)}.{told}")
@@ -87,7 +91,7 @@ class ProgressLine:
 
     def show(self, text: str, step: object = None) -> None:
         if self._live:
-            text = text[:shutil.get_terminal_size().columns - 1]
+            text = text[: shutil.get_terminal_size().columns - 1]
             print("\r" + text.ljust(len(self._shown)), end="", flush=True)
             self._shown = text
         elif step is None or step != self._step:

@@ -18,8 +18,9 @@ from ..contract.messages import Problem
 from . import locks, pip_steps
 
 
-def download(requirements: Path, name: str, compute: str, source: str, folder: Path,
-             run: Callable[[list], tuple[int, str]]) -> list[Path]:
+def download(
+    requirements: Path, name: str, compute: str, source: str, folder: Path, run: Callable[[list], tuple[int, str]]
+) -> list[Path]:
     """Brings the wheels of a lock into a folder. Those that are there already stay.
 
     Parameters
@@ -45,23 +46,44 @@ def download(requirements: Path, name: str, compute: str, source: str, folder: P
     if folder.exists() and not folder.is_dir():
         raise Problem(f"{folder} is not a folder.", "Choose a folder for the wheels.")
     # -P and not -I: this Python's pip may be the user's own, but is not what lies in the working directory
-    pip = [sys.executable, "-P", "-m", "pip", "download", "--disable-pip-version-check", "--no-input", "--progress-bar",
-           "off", "--dest", folder, *tags(name)]
+    pip = [
+        sys.executable,
+        "-P",
+        "-m",
+        "pip",
+        "download",
+        "--disable-pip-version-check",
+        "--no-input",
+        "--progress-bar",
+        "off",
+        "--dest",
+        folder,
+        *tags(name),
+    ]
     with tempfile.TemporaryDirectory(prefix="wildcap_wheels_") as scratch:
-        own_pip = pip_steps.PipStep(("--no-deps", "--require-hashes", "-r",
-                                     str(Path(requirements) / "locks" / "pip.txt")))
+        own_pip = pip_steps.PipStep(
+            ("--no-deps", "--require-hashes", "-r", str(Path(requirements) / "locks" / "pip.txt"))
+        )
         steps = [*pip_steps.plan_steps(requirements, lock, compute, source, Path(scratch)), own_pip]
         code, error = pip_steps.carry_out(steps, lambda words: run([*pip, *words]))
     if code:
-        raise Problem(f"Not all wheels for {name} could be downloaded "
-                      f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
-                      "Check the network connection and run the command again: it continues.")
+        raise Problem(
+            f"Not all wheels for {name} could be downloaded "
+            f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
+            "Check the network connection and run the command again: it continues.",
+        )
     return sorted(folder.glob("*.whl"))
 
 
 def tags(name: str) -> list[str]:
     """pip's options for the wheels of a lock's platform and Python."""
     platform, _, python = name.rpartition("-")
-    return ["--only-binary", ":all:", "--implementation", "cp", "--python-version", python,
-            *(word for tag in locks.PLATFORMS[platform] for word in ("--platform", tag))]
-
+    return [
+        "--only-binary",
+        ":all:",
+        "--implementation",
+        "cp",
+        "--python-version",
+        python,
+        *(word for tag in locks.PLATFORMS[platform] for word in ("--platform", tag)),
+    ]

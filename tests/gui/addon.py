@@ -80,11 +80,15 @@ def worker_process(root: Path):
 
 def continued(root: Path):
     """The large button is Continue Solving; a click on it, and the solver says from which step it goes on."""
-    yield from d.until(lambda: next_step().label == "Continue Solving",
-                       f"the offer to continue instead of {next_step()}", 10)
+    yield from d.until(
+        lambda: next_step().label == "Continue Solving", f"the offer to continue instead of {next_step()}", 10
+    )
     yield from d.lead("wildcap.solve")
-    yield from d.until(lambda: job(root) is None or any("Going on after" in line for line in job(root).log),
-                       "going on from the checkpoint", START_LIMIT_S)
+    yield from d.until(
+        lambda: job(root) is None or any("Going on after" in line for line in job(root).log),
+        "going on from the checkpoint",
+        START_LIMIT_S,
+    )
     assert job(root) is not None, problem(root)
     d.say(next(line for line in job(root).log if "Going on after" in line))
 

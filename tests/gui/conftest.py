@@ -30,8 +30,13 @@ def play_flow(*arguments: str) -> None:
             if said:
                 break
             pytest.skip("no time is left for it in this run")
-        done = subprocess.run([Path(__file__).with_name("run.sh"), *arguments], stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, text=True, errors="replace")
+        done = subprocess.run(
+            [Path(__file__).with_name("run.sh"), *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+        )
         print(done.stdout, flush=True)
         if not done.returncode:
             return

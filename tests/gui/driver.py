@@ -56,6 +56,7 @@ def survive_lost_contexts() -> None:
     """
     import _cycles
     import cycles
+
     _cycles.init(os.path.dirname(cycles.__file__), bpy.utils.resource_path('USER'), True)
     passing = ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p)
     xlib = ctypes.CDLL("libX11.so.6")
@@ -250,8 +251,9 @@ def browse(path: Path):
     if path != folder:  # a browser for folders has no name to fill in
         area.spaces.active.params.filename = path.name
     yield 0.5
-    with bpy.context.temp_override(window=window(), area=area,
-                                   region=next(r for r in area.regions if r.type == 'WINDOW')):
+    with bpy.context.temp_override(
+        window=window(), area=area, region=next(r for r in area.regions if r.type == 'WINDOW')
+    ):
         bpy.ops.file.execute()
     yield from until(lambda: any(area.type == 'VIEW_3D' for area in window().screen.areas), "the 3D view", 10)
     yield 1.0

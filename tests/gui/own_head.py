@@ -100,8 +100,13 @@ def lit_face(root: Path):
 
 def count(way: str, started: float) -> None:
     """Says how many clicks and minutes lie between a moment and now, and leaves them in clicks_WAY.json."""
-    found = {"blender": bpy.app.version_string, "clicks": d.actions(),
-             "minutes": round((time.monotonic() - started) / 60, 1)}
+    found = {
+        "blender": bpy.app.version_string,
+        "clicks": d.actions(),
+        "minutes": round((time.monotonic() - started) / 60, 1),
+    }
     (d.OUT / f"clicks_{way}.json").write_text(json.dumps(found) + "\n", encoding="utf-8")
-    d.say(f"{found['clicks']} clicks and {found['minutes']} min from dragging the zip to a relit own head, in Blender "
-          f"{found['blender']}")
+    d.say(
+        f"{found['clicks']} clicks and {found['minutes']} min from dragging the zip to a relit own head, in Blender "
+        f"{found['blender']}"
+    )

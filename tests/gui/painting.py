@@ -62,8 +62,9 @@ def pixels(image) -> np.ndarray:
 
 def kept(path, wanted: np.ndarray, limit_s: float = 5):
     """Waits until the file holds that mask."""
-    yield from d.until(lambda: path.is_file() and np.abs(on_disk(path) - wanted).max() < 0.01,
-                       f"the mask in {path.name}", limit_s)
+    yield from d.until(
+        lambda: path.is_file() and np.abs(on_disk(path) - wanted).max() < 0.01, f"the mask in {path.name}", limit_s
+    )
 
 
 def facing(obj, towards: Vector) -> tuple[float, float]:

@@ -34,20 +34,25 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     light = scene.SceneLight((0.42, 0.42, 0.42), lamps=(WINDOW,))
     with tempfile.TemporaryDirectory() as work:
-        filmed.render(Path(work), make_figure(somebody()), light,
-                      scene.Shot(cameras(), range(len(AZIMUTHS)), SAMPLES, SCALE))
+        filmed.render(
+            Path(work), make_figure(somebody()), light, scene.Shot(cameras(), range(len(AZIMUTHS)), SAMPLES, SCALE)
+        )
         linear = [images.read_linear(Path(work) / f"{k:05d}.exr")[..., :3] for k in range(len(AZIMUTHS))]
     gain = 0.75 / np.percentile(linear[len(linear) // 2], 95)
     for k, picture in enumerate(linear):
-        images.write_srgb(folder / f"{k + 1:04d}.jpg",
-                          images.linear_to_srgb(np.clip(gain * picture, 0, 1).astype(np.float32)), quality=90)
+        images.write_srgb(
+            folder / f"{k + 1:04d}.jpg",
+            images.linear_to_srgb(np.clip(gain * picture, 0, 1).astype(np.float32)),
+            quality=90,
+        )
 
 
 def somebody() -> Person:
     """The first person from FIRST_SEED on with open eyes, short hair, no fringe and no beard."""
     people = (sample_person(seed) for seed in range(FIRST_SEED, FIRST_SEED + 1000))
-    return next(one for one in people if one.openness > 0.5 and one.hair == "short" and not one.fringe
-                and one.beard == "none")
+    return next(
+        one for one in people if one.openness > 0.5 and one.hair == "short" and not one.fringe and one.beard == "none"
+    )
 
 
 def cameras() -> np.ndarray:

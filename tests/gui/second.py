@@ -25,15 +25,31 @@ def start(part: str, folder: Path) -> subprocess.Popen:
     """The second Blender, in a smaller window that leaves the first one's tab to be seen. What it prints goes into the
     flow's log."""
     folder.mkdir(parents=True, exist_ok=True)
-    return subprocess.Popen(["blender", "--enable-event-simulate", "--no-window-focus", "-p", "0", "0", "900", "700",
-                             "-P", str(Path(__file__).resolve()), "--", part, str(folder)])
+    return subprocess.Popen(
+        [
+            "blender",
+            "--enable-event-simulate",
+            "--no-window-focus",
+            "-p",
+            "0",
+            "0",
+            "900",
+            "700",
+            "-P",
+            str(Path(__file__).resolve()),
+            "--",
+            part,
+            str(folder),
+        ]
+    )
 
 
 def heard(process: subprocess.Popen, folder: Path, name: str, limit_s: float):
     """Waits for a word of the second Blender; it must not have failed meanwhile. Returns what it told."""
     path = folder / f"{name}.json"
-    yield from d.until(lambda: path.is_file() or process.poll() is not None, f"the second Blender's word {name}",
-                       limit_s)
+    yield from d.until(
+        lambda: path.is_file() or process.poll() is not None, f"the second Blender's word {name}", limit_s
+    )
     assert path.is_file(), f"the second Blender ended with {process.poll()}"
     return json.loads(path.read_text())
 
@@ -58,8 +74,9 @@ def solve_and_quit():
 def solve():
     """The solver runs; it then waits to be killed."""
     root = yield from solving()
-    yield from d.until(lambda: (root / "checkpoints" / "solve.safetensors").is_file(), "the first checkpoint",
-                       addon.START_LIMIT_S)
+    yield from d.until(
+        lambda: (root / "checkpoints" / "solve.safetensors").is_file(), "the first checkpoint", addon.START_LIMIT_S
+    )
     tell("checkpoint", worker=addon.worker_process(root).pid)
     yield 600.0
 
@@ -100,16 +117,16 @@ def walk_and_quit():
     yield from stroke(0, "stroke")
     d.screenshot("batch_1_walk")
     yield from d.press("wildcap.accept_mask")
-    yield from d.until(lambda: addon.module("paint.session").root() == str(folder / "bert.wildcap"), "the second mask",
-                       20)
+    yield from d.until(
+        lambda: addon.module("paint.session").root() == str(folder / "bert.wildcap"), "the second mask", 20
+    )
     yield from painting.in_hand()
     yield from d.press("wildcap.accept_mask")
     yield from d.until(lambda: bpy.context.mode == 'OBJECT' and batches.ready() == 2, "all masks being looked at", 20)
     yield 1.0
     d.screenshot("batch_2_looked_at")
     yield from d.press("wildcap.solve_all")
-    yield from d.until(lambda: batches.line(batches.view()) != "", "the batch's first word",
-                       addon.START_LIMIT_S)
+    yield from d.until(lambda: batches.line(batches.view()) != "", "the batch's first word", addon.START_LIMIT_S)
     tell("solving", batch=json.loads((folder / "lock").read_text())["pid"])
     bpy.ops.wm.quit_blender()
     yield 600.0

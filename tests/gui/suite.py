@@ -37,8 +37,11 @@ def main() -> int:
 def start_screen() -> str:
     """Starts a virtual X server that ends with this process; returns its display."""
     reader, writer = os.pipe()
-    subprocess.Popen(["Xvfb", "-displayfd", str(writer), "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x24", "-nolisten", "tcp"],
-                     pass_fds=[writer], stderr=subprocess.DEVNULL)
+    subprocess.Popen(
+        ["Xvfb", "-displayfd", str(writer), "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x24", "-nolisten", "tcp"],
+        pass_fds=[writer],
+        stderr=subprocess.DEVNULL,
+    )
     os.close(writer)
     number = os.read(reader, 16).decode().strip()
     if not number:
@@ -53,22 +56,46 @@ def run(flow: Path, archive: Path, out: Path, display: str) -> tuple[bool, float
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder) / "home"
         (home / "Documents").mkdir(parents=True)
-        environment = {**os.environ, "DISPLAY": display, "HOME": str(home),
-                       "BLENDER_USER_RESOURCES": str(Path(folder) / "profile"),
-                       "WILDCAP_GUI_OUT": str(out), "WILDCAP_GUI_ZIP": str(archive), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = {
+            **os.environ,
+            "DISPLAY": display,
+            "HOME": str(home),
+            "BLENDER_USER_RESOURCES": str(Path(folder) / "profile"),
+            "WILDCAP_GUI_OUT": str(out),
+            "WILDCAP_GUI_ZIP": str(archive),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }
         if flow.stem not in WITHOUT:
-            install = subprocess.run(["blender", "--command", "extension", "install-file", "-r", "user_default", "-e",
-                                      str(archive)],
-                                     env=environment, capture_output=True, text=True)
+            install = subprocess.run(
+                ["blender", "--command", "extension", "install-file", "-r", "user_default", "-e", str(archive)],
+                env=environment,
+                capture_output=True,
+                text=True,
+            )
             if install.returncode:
                 print(install.stdout, install.stderr, sep="\n")
                 return False, time.monotonic() - started
         log = out / f"{flow.stem}.log"
         with open(log, "w", encoding="utf-8") as file:
             try:
-                code = subprocess.call(["blender", "--enable-event-simulate", "--no-window-focus", "-p", "0", "0",
-                                        str(SIZE[0]), str(SIZE[1]), "-P", str(flow)],
-                                       env=environment, stdout=file, stderr=subprocess.STDOUT, timeout=LIMIT_S)
+                code = subprocess.call(
+                    [
+                        "blender",
+                        "--enable-event-simulate",
+                        "--no-window-focus",
+                        "-p",
+                        "0",
+                        "0",
+                        str(SIZE[0]),
+                        str(SIZE[1]),
+                        "-P",
+                        str(flow),
+                    ],
+                    env=environment,
+                    stdout=file,
+                    stderr=subprocess.STDOUT,
+                    timeout=LIMIT_S,
+                )
             except subprocess.TimeoutExpired:
                 code = -1
         text = log.read_text(encoding="utf-8", errors="replace")

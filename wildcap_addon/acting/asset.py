@@ -59,11 +59,23 @@ def load() -> FaceUnits:
         units = {}
         for name in stored["names"].tolist():
             units[name] = _unit(stored, name, mirror, step)
-        return FaceUnits(template, triangles, stored["copies"].astype(int), stored["seam"], stored["corners"],
-                         stored["faces"].astype(int), stored["slots"], stored["uvs"], stored["kind"],
-                         stored["anchors"].astype(int),
-                         weights / np.maximum(weights.sum(1, keepdims=True), 1e-9), stored["parts"] * step,
-                         stored["balls"].astype(np.float64), mirror, units)
+        return FaceUnits(
+            template,
+            triangles,
+            stored["copies"].astype(int),
+            stored["seam"],
+            stored["corners"],
+            stored["faces"].astype(int),
+            stored["slots"],
+            stored["uvs"],
+            stored["kind"],
+            stored["anchors"].astype(int),
+            weights / np.maximum(weights.sum(1, keepdims=True), 1e-9),
+            stored["parts"] * step,
+            stored["balls"].astype(np.float64),
+            mirror,
+            units,
+        )
 
 
 def sockets(asset: FaceUnits) -> np.ndarray:

@@ -24,8 +24,9 @@ HELD_M = 0.01
 a rim's neighbourhood fitted, and a throat hung ten times as far behind it would swing by centimetres."""
 
 
-def carried(asset: FaceUnits, head: np.ndarray,
-            filmed: FilmedEyes | None = None) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
+def carried(
+    asset: FaceUnits, head: np.ndarray, filmed: FilmedEyes | None = None
+) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """All vertices [V + C + P, 3] of the head cut open, at rest, and each unit's rows and displacements, for a
     registered head [V, 3]; and by HALF and a side what keeps the lids off the ball half way, where a straight line
     from shut to open would lead through it.
@@ -70,8 +71,7 @@ def carried(asset: FaceUnits, head: np.ndarray,
         rows, moves = units[f"eyesOpen{side}"]
         own = ~np.isin(rows, len(head) + len(asset.copies) + mouth)  # the highest of the palate is no lid
         rows, moves = rows[own], moves[own]
-        moves = (moves + _outwards(rest[rows] + moves, ball) if filmed is None
-                 else _as_filmed(rest, rows, moves, filmed))
+        moves = moves + _outwards(rest[rows] + moves, ball) if filmed is None else _as_filmed(rest, rows, moves, filmed)
         units[f"eyesOpen{side}"], units[f"eyeBlink{side}"] = (rows, moves), (rows, -moves)
         units[f"{HALF}{side}"] = rows, _outwards(rest[rows] + moves / 2, ball)
     return rest, units
@@ -106,14 +106,16 @@ def frames(triangles: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.n
     """Rotation times scale [V, 3, 3] of each vertex's neighbourhood between two shapes [V, 3] of one mesh: least
     squares over moments that spread along the edges."""
     count = len(before)
-    edges = np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1),
-                      axis=0)
+    edges = np.unique(
+        np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1), axis=0
+    )
     edges = np.concatenate([edges, edges[:, ::-1], np.arange(count)[:, None].repeat(2, 1)])
     edges = edges[np.argsort(edges[:, 0], kind="stable")]
     starts = np.searchsorted(edges[:, 0], np.arange(count))
     degree = np.diff(np.append(starts, len(edges)))[:, None]
-    normal = np.cross(before[triangles[:, 1]] - before[triangles[:, 0]],
-                      before[triangles[:, 2]] - before[triangles[:, 0]])
+    normal = np.cross(
+        before[triangles[:, 1]] - before[triangles[:, 0]], before[triangles[:, 2]] - before[triangles[:, 0]]
+    )
     area = np.bincount(triangles.ravel(), np.linalg.norm(normal, axis=1).repeat(3), count)[:, None]
     outer = (after[:, :, None] * before[:, None]).reshape(-1, 9)
     # [V, 17]
@@ -137,8 +139,9 @@ def _rotation_and_scale(covariance: np.ndarray, variance: np.ndarray) -> np.ndar
     return (u * sign[..., None, :]) @ vt * scale[..., None, None]
 
 
-def _similarity(asset: FaceUnits, head: np.ndarray, around: np.ndarray, reach: float,
-                point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _similarity(
+    asset: FaceUnits, head: np.ndarray, around: np.ndarray, reach: float, point: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Rotation times scale [3, 3] of the head around a point of the template, and where the similarity takes
     `point`."""
     weight = np.clip(1 - np.linalg.norm(asset.template - around, axis=1) / reach, 0, None)[:, None]
@@ -156,8 +159,9 @@ def _surface(direction: np.ndarray, matrix: np.ndarray, radius: float) -> np.nda
     return radius * (1 + CORNEA[0] * np.clip(1 - (angle / CORNEA[1]) ** 2, 0, None))
 
 
-def _behind_lids(asset: FaceUnits, head: np.ndarray, ball: np.ndarray, matrix: np.ndarray, centre: np.ndarray,
-                 radius: float) -> np.ndarray:
+def _behind_lids(
+    asset: FaceUnits, head: np.ndarray, ball: np.ndarray, matrix: np.ndarray, centre: np.ndarray, radius: float
+) -> np.ndarray:
     """The eyeball's centre, moved along its gaze until the closed lids clear it."""
     gaze = matrix @ [0, -1, 0] / np.linalg.norm(matrix @ [0, -1, 0])
     arm = asset.template - ball[:3]

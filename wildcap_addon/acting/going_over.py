@@ -7,9 +7,16 @@ import numpy as np
 
 from ..data_blocks import read_field
 
-LAYOUT = {'FLOAT': ("value", 1, np.float32), 'INT': ("value", 1, np.int32), 'INT8': ("value", 1, np.int32),
-          'BOOLEAN': ("value", 1, bool), 'FLOAT2': ("vector", 2, np.float32), 'FLOAT_VECTOR': ("vector", 3, np.float32),
-          'FLOAT_COLOR': ("color", 4, np.float32), 'BYTE_COLOR': ("color", 4, np.float32)}
+LAYOUT = {
+    'FLOAT': ("value", 1, np.float32),
+    'INT': ("value", 1, np.int32),
+    'INT8': ("value", 1, np.int32),
+    'BOOLEAN': ("value", 1, bool),
+    'FLOAT2': ("vector", 2, np.float32),
+    'FLOAT_VECTOR': ("vector", 3, np.float32),
+    'FLOAT_COLOR': ("color", 4, np.float32),
+    'BYTE_COLOR': ("color", 4, np.float32),
+}
 """Kinds of attributes that are carried over: field, how many numbers it has, and of which kind."""
 SEAM = ".uv_seam"
 """Seams in Blender 4.2, which counts the attribute as its own."""

@@ -12,8 +12,13 @@ from ..data_blocks import find
 SIZE_PX = 512
 IRIS_ANGLE_RAD = 0.42  # radians from the pupil's middle to the iris' rim, seen from the eye's centre
 PUPIL_ANGLE_RAD = 0.15
-IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0.14, 0.20, 0.10),
-          "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
+IRISES = {
+    "brown": (0.13, 0.055, 0.02),
+    "hazel": (0.25, 0.16, 0.06),
+    "green": (0.14, 0.20, 0.10),
+    "blue": (0.12, 0.22, 0.36),
+    "grey": (0.24, 0.27, 0.29),
+}
 """Linear colours of sRGB's primaries, as all numbers of colours here."""
 DEFAULT = "brown"
 SLOTS = ("Eyes", "Mouth", "Teeth")
@@ -28,8 +33,11 @@ def inside(name: str, iris: str | tuple) -> list[bpy.types.Material]:
     changes. iris: one of IRISES, or a colour."""
     eyes = _material(f"{name} Eyes", "eyes", (0.8, 0.8, 0.8), 0.35, 1.0)
     _paint(eyes, name, iris)
-    return [eyes, _material(f"{name} Mouth", "mouth", (0.22, 0.05, 0.045), 0.35, 0.3),
-            _material(f"{name} Teeth", "teeth", (0.66, 0.58, 0.45), 0.25, 0.4)]
+    return [
+        eyes,
+        _material(f"{name} Mouth", "mouth", (0.22, 0.05, 0.045), 0.35, 0.3),
+        _material(f"{name} Teeth", "teeth", (0.66, 0.58, 0.45), 0.25, 0.4),
+    ]
 
 
 def recolour(obj, iris: str | tuple) -> None:
@@ -37,8 +45,9 @@ def recolour(obj, iris: str | tuple) -> None:
     for material in obj.data.materials:
         if material is not None and material.get(KEY) == "eyes":
             _paint(material, obj.name, iris)
-    for material in {slot.material for child in obj.children for slot in child.material_slots
-                     if slot.material is not None}:
+    for material in {
+        slot.material for child in obj.children for slot in child.material_slots if slot.material is not None
+    }:
         if material.get(KEY) == IRIS:
             tint(material, IRISES.get(iris, iris))
 
@@ -59,8 +68,11 @@ def rgba(colour: tuple[float, float, float]) -> tuple[float, ...]:
 def colour_of(obj) -> tuple[float, float, float]:
     """The linear colour that the head's irises have."""
     for material in obj.data.materials:
-        node = (material.node_tree.nodes.get("WildCap Eye") if material is not None and material.get(KEY) == "eyes"
-                else None)
+        node = (
+            material.node_tree.nodes.get("WildCap Eye")
+            if material is not None and material.get(KEY) == "eyes"
+            else None
+        )
         told = node.image.get("wildcap_iris", "") if node is not None and node.image is not None else ""
         if told:
             return IRISES[told] if told in IRISES else tuple(float(value) for value in told.split())
@@ -124,8 +136,10 @@ def picture(iris: tuple[float, float, float]) -> np.ndarray:
     y, x = (np.mgrid[:SIZE_PX, :SIZE_PX] + 0.5) / SIZE_PX - 0.5
     angle = np.pi * (2 * np.hypot(x, y)) ** (1 / 0.6)
     turn = np.arctan2(y, x)
-    fibres = sum(np.sin(k * turn + p + 3 * np.sin(9 * angle + p)) / (1 + i)
-                 for i, (k, p) in enumerate(((23, 0.3), (41, 1.7), (67, 4.1), (97, 2.2))))
+    fibres = sum(
+        np.sin(k * turn + p + 3 * np.sin(9 * angle + p)) / (1 + i)
+        for i, (k, p) in enumerate(((23, 0.3), (41, 1.7), (67, 4.1), (97, 2.2)))
+    )
     rim, pupil = _step(angle, IRIS_ANGLE_RAD, 0.03), _step(angle, PUPIL_ANGLE_RAD, 0.012)
     across = np.clip((angle - PUPIL_ANGLE_RAD) / (IRIS_ANGLE_RAD - PUPIL_ANGLE_RAD), 0, 1)
     # a dark ring at the limbus

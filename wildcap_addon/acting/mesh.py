@@ -101,8 +101,11 @@ def filmed_iris(obj) -> tuple[float, float, float]:
 
 def filmed_eyes(obj, asset: FaceUnits) -> filmed.FilmedEyes | None:
     """What the head's capture knows of its eyes."""
-    return (filmed.read(Capture(Path(bpy.path.abspath(obj[captures.HEAD_KEY]))), asset) if obj.get(captures.HEAD_KEY)
-            else None)
+    return (
+        filmed.read(Capture(Path(bpy.path.abspath(obj[captures.HEAD_KEY]))), asset)
+        if obj.get(captures.HEAD_KEY)
+        else None
+    )
 
 
 def follow(obj, head: np.ndarray, normals: np.ndarray) -> None:
@@ -150,19 +153,24 @@ def renewed(obj, mesh) -> bool:
     if not has(obj) or len(mesh.vertices) != len(load().template):
         return False
     if not is_whole(obj):
-        raise Problem("This head's mesh was changed since it got its face units, and cannot follow a new shape.",
-                      "Keep it as it is, or delete it and click Bring In Head.")
+        raise Problem(
+            "This head's mesh was changed since it got its face units, and cannot follow a new shape.",
+            "Keep it as it is, or delete it and click Bring In Head.",
+        )
     follow(obj, _vertices(mesh), _corner_normals(mesh))
     return True
 
 
 def _check(obj, asset: FaceUnits) -> None:
     if obj.data.shape_keys is not None:
-        raise Problem("This head has shape keys of its own.",
-                      "Remove them, or bring the head in anew, then click Add Face Units.")
+        raise Problem(
+            "This head has shape keys of its own.", "Remove them, or bring the head in anew, then click Add Face Units."
+        )
     if not is_built_in(obj, asset):
-        raise Problem("Face units are made for the built-in head, and this is another mesh.",
-                      "Reconstruct with the built-in head, or bring the head in anew.")
+        raise Problem(
+            "Face units are made for the built-in head, and this is another mesh.",
+            "Reconstruct with the built-in head, or bring the head in anew.",
+        )
 
 
 def is_built_in(obj, asset: FaceUnits) -> bool:
@@ -205,10 +213,16 @@ def _attributes(source, target, asset: FaceUnits) -> None:
     origin = _origin(asset)
     known, ends = (read_field(mesh.edges, "vertices", 2, np.int32) for mesh in (source, target))
     edges = {tuple(sorted(pair)): at for at, pair in enumerate(known.tolist())}
-    going_over.copy_attributes(source, target, {
-        'POINT': origin, 'EDGE': np.array([edges.get(tuple(sorted(pair)), -1) for pair in origin[ends].tolist()]),
-        'FACE': _first(len(source.polygons), len(target.polygons)),
-        'CORNER': _first(len(source.loops), len(target.loops))})
+    going_over.copy_attributes(
+        source,
+        target,
+        {
+            'POINT': origin,
+            'EDGE': np.array([edges.get(tuple(sorted(pair)), -1) for pair in origin[ends].tolist()]),
+            'FACE': _first(len(source.polygons), len(target.polygons)),
+            'CORNER': _first(len(source.loops), len(target.loops)),
+        },
+    )
 
 
 def _origin(asset: FaceUnits) -> np.ndarray:
@@ -233,7 +247,7 @@ def _corner_normals(mesh) -> np.ndarray:
 def _set_normals(mesh, normals: np.ndarray) -> None:
     """The closed head's normals on its faces; zero lets Blender find the others."""
     every = np.zeros((len(mesh.loops), 3), np.float32)
-    every[:len(normals)] = normals
+    every[: len(normals)] = normals
     mesh.normals_split_custom_set(every)
 
 
@@ -241,10 +255,14 @@ def _drive(keys, filmed_open: bool) -> None:
     """Lids open by the slider, or as far as a unit of the eye is used, and half way they keep off the ball: drivers of
     kind Maximum and simple expressions, which need no script."""
     keys[OPEN] = 1.0 if filmed_open else 0.0
-    told = ("How far the lids are open; 1 is as they were filmed" if filmed_open
-            else "How far the lids are open; they were filmed closed")
-    keys.id_properties_ui(OPEN).update(min=0.0, max=1.0, soft_min=0.0, soft_max=1.0, default=keys[OPEN],
-                                       description=told)
+    told = (
+        "How far the lids are open; 1 is as they were filmed"
+        if filmed_open
+        else "How far the lids are open; they were filmed closed"
+    )
+    keys.id_properties_ui(OPEN).update(
+        min=0.0, max=1.0, soft_min=0.0, soft_max=1.0, default=keys[OPEN], description=told
+    )
     for side in SIDES:
         driver = keys.key_blocks[f"{OPEN}{side}"].driver_add("value").driver
         driver.type = 'MAX'

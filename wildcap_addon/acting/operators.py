@@ -23,15 +23,20 @@ class WILDCAP_OT_add_face_units(HeadOperator, bpy.types.Operator):
     bl_label = "Add Face Units"
     bl_options = {'REGISTER', 'UNDO'}
 
-    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes",
-                                 items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)])
+    iris: bpy.props.EnumProperty(
+        name="Iris",
+        description="Colour of the eyes",
+        items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)],
+    )
 
     def work(self, context):
         item = captures.require(context)
         obj = captures.require_head(context, item)
         if mesh.has(obj):
-            raise Problem("This head has its face units already.",
-                          "Move their sliders, here or under Shape Keys in the mesh's properties.")
+            raise Problem(
+                "This head has its face units already.",
+                "Move their sliders, here or under Shape Keys in the mesh's properties.",
+            )
         mesh.add(obj, "" if self.iris == FILMED[0] else self.iris)
         head.complete(obj, captures.folder(item))
         self.warn(filmed_open(captures.folder(item)))
@@ -44,8 +49,11 @@ class WILDCAP_OT_iris(HeadOperator, bpy.types.Operator):
     bl_label = "Iris"
     bl_options = {'REGISTER', 'UNDO'}
 
-    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes",
-                                 items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)])
+    iris: bpy.props.EnumProperty(
+        name="Iris",
+        description="Colour of the eyes",
+        items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)],
+    )
 
     def work(self, context):
         obj = _acting(context)
@@ -75,8 +83,10 @@ class _Toggle(HeadOperator):
         elif mesh.is_complete(obj):
             self.switched.add(context, obj)
         else:
-            raise Problem("This head lost vertices or face units since it got them.",
-                          "Undo that, or delete the head, click Bring In Head and Add Face Units, then this.")
+            raise Problem(
+                "This head lost vertices or face units since it got them.",
+                "Undo that, or delete the head, click Bring In Head and Add Face Units, then this.",
+            )
 
 
 class WILDCAP_OT_gaze(_Toggle, bpy.types.Operator):
@@ -101,9 +111,12 @@ def filmed_open(capture) -> str:
     for others."""
     seen = capture.read()["stages"].get("registration", {}).get("figures", {}).get("eye_opening")
     on_lids = seen is not None and seen > OPEN_RATIO and not capture.eyes.is_file()
-    return ("The eyes were open while filming: the lids carry a picture of them, which shows when they move. "
-            "Reconstruct again to have them open"
-            if on_lids else "")
+    return (
+        "The eyes were open while filming: the lids carry a picture of them, which shows when they move. "
+        "Reconstruct again to have them open"
+        if on_lids
+        else ""
+    )
 
 
 def _acting(context):

@@ -23,9 +23,11 @@ class AllFaces(BaseOperator):
     @classmethod
     def poll(cls, context):
         many = batches.current() is not None or len(context.scene.wildcap.captures) > 1
-        return (cls.allowed(many, "The list has fewer than two captures: use that capture's own buttons")
-                and cls.allowed(not running.running(), "A batch is running: wait for it, or cancel it")
-                and cls.allowed(not jobs.elsewhere(""), "A job is running: wait for it, or click Cancel"))
+        return (
+            cls.allowed(many, "The list has fewer than two captures: use that capture's own buttons")
+            and cls.allowed(not running.running(), "A batch is running: wait for it, or cancel it")
+            and cls.allowed(not jobs.elsewhere(""), "A job is running: wait for it, or click Cancel")
+        )
 
     def prepare(self, context) -> Batch:
         """What is meant by all; a mask that is being painted is saved. Raises Problem where there is no solver, before
@@ -120,8 +122,9 @@ class WILDCAP_OT_close_batch(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return (cls.allowed(batches.current() is not None, "No batch is open: click Open Batch first")
-                and cls.allowed(not running.running(), "A batch is running: wait for it, or cancel it"))
+        return cls.allowed(batches.current() is not None, "No batch is open: click Open Batch first") and cls.allowed(
+            not running.running(), "A batch is running: wait for it, or cancel it"
+        )
 
     def work(self, context):
         batches.close()
@@ -134,9 +137,9 @@ class MaskWalk(BaseOperator):
 
     @classmethod
     def poll(cls, context):
-        return (cls.allowed(batches.current() is not None, "No batch is open: click Open Batch first")
-                and cls.allowed(context.mode == 'OBJECT' or walking.painting(),
-                                "This works in Object Mode only, or while you paint a mask"))
+        return cls.allowed(batches.current() is not None, "No batch is open: click Open Batch first") and cls.allowed(
+            context.mode == 'OBJECT' or walking.painting(), "This works in Object Mode only, or while you paint a mask"
+        )
 
 
 class WILDCAP_OT_next_mask(MaskWalk, bpy.types.Operator):
@@ -149,7 +152,8 @@ class WILDCAP_OT_next_mask(MaskWalk, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         return super().poll(context) and cls.allowed(
-            cls.face(context) is not None, "No other mask waits to be looked at")
+            cls.face(context) is not None, "No other mask waits to be looked at"
+        )
 
     @staticmethod
     def face(context):
@@ -170,7 +174,8 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
     def poll(cls, context):
         face_state = batches.state_of(captures.root(captures.active(context)))
         return super().poll(context) and cls.allowed(
-            face_state is not None and face_state.state == WAITING, "This face's mask does not wait: click Next Mask")
+            face_state is not None and face_state.state == WAITING, "This face's mask does not wait: click Next Mask"
+        )
 
     def work(self, context):
         root = captures.root(captures.require(context))
@@ -183,5 +188,12 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
             self.report({'INFO'}, rpt_("All masks have been looked at: click Solve All"))
 
 
-CLASSES = (WILDCAP_OT_reconstruct_all, WILDCAP_OT_solve_all, WILDCAP_OT_cancel_batch, WILDCAP_OT_open_batch,
-           WILDCAP_OT_close_batch, WILDCAP_OT_next_mask, WILDCAP_OT_accept_mask)
+CLASSES = (
+    WILDCAP_OT_reconstruct_all,
+    WILDCAP_OT_solve_all,
+    WILDCAP_OT_cancel_batch,
+    WILDCAP_OT_open_batch,
+    WILDCAP_OT_close_batch,
+    WILDCAP_OT_next_mask,
+    WILDCAP_OT_accept_mask,
+)

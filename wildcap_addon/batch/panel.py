@@ -30,8 +30,11 @@ class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
         problems.draw(layout, known.problem, width)
         if running.running():
             row = layout.row(align=True)
-            words = (iface_("{} of {} faces").format(known.progress["ended"], known.progress["of"]) if known.progress
-                     else iface_("Starting"))
+            words = (
+                iface_("{} of {} faces").format(known.progress["ended"], known.progress["of"])
+                if known.progress
+                else iface_("Starting")
+            )
             row.progress(text=words, translate=False, factor=batches.share(known))
             row.operator("wildcap.cancel_batch", text="", icon='CANCEL')
             if batches.line(known):
@@ -57,10 +60,14 @@ def count_words(view: batches.BatchView) -> str:
     of, seen = len(view.batch.faces), len(view.states)
     waiting = len(batches.waiting())
     accepted = view.count(WAITING) - waiting  # and not looked at since
-    counts = [(waiting, iface_("masks waiting: {}")), (view.count(DONE), iface_("done: {}")),
-              (view.count(WORKING), iface_("in work: {}")),
-              (view.count(STOPPED), iface_("stopped: {}")), (view.count(TO_DO) + accepted, iface_("to do: {}")),
-              (of - seen, iface_("not looked at yet: {}"))]
+    counts = [
+        (waiting, iface_("masks waiting: {}")),
+        (view.count(DONE), iface_("done: {}")),
+        (view.count(WORKING), iface_("in work: {}")),
+        (view.count(STOPPED), iface_("stopped: {}")),
+        (view.count(TO_DO) + accepted, iface_("to do: {}")),
+        (of - seen, iface_("not looked at yet: {}")),
+    ]
     text = ", ".join(words.format(count) for count, words in counts if count)
     return text[:1].upper() + text[1:]
 

@@ -29,11 +29,14 @@ def prepare(context) -> tuple[Batch, list[str]]:
         return opened, []
     faces, left_out = _list_faces(context)
     if not faces:
-        raise Problem("No capture of the list has a video or photographs that it could be made from.",
-                      "Choose videos: each becomes a capture of the list.")
+        raise Problem(
+            "No capture of the list has a video or photographs that it could be made from.",
+            "Choose videos: each becomes a capture of the list.",
+        )
     same = opened is not None and {face.root for face in opened.faces} == {face.root for face in faces}
-    batch = Batch(opened.root if same else _make_folder(preferences.captures_folder() / FOLDER), tuple(faces),
-                  gate=GATES[1])
+    batch = Batch(
+        opened.root if same else _make_folder(preferences.captures_folder() / FOLDER), tuple(faces), gate=GATES[1]
+    )
     write_batch(batch)
     batches.choose(batch.root)
     return batch, left_out
@@ -55,8 +58,11 @@ def _list_faces(context) -> tuple[list[BatchFace], list[str]]:
         if source is None:
             left_out.append(item.name)
         else:
-            faces.append(BatchFace(_name(capture.root.stem, taken), source, capture.root, item.quality,
-                                   properties.job_settings(item)))
+            faces.append(
+                BatchFace(
+                    _name(capture.root.stem, taken), source, capture.root, item.quality, properties.job_settings(item)
+                )
+            )
     return faces, left_out
 
 
@@ -64,8 +70,11 @@ def _name(base: str, taken: set[str]) -> str:
     """A name of its own for a face; two captures in two folders may have the same."""
     # on a command line a hyphen would begin an option
     base = base.lstrip("-") if plain_name(base.lstrip("-")) else "face"
-    name = next(name for number in itertools.count(1)
-                if (name := base if number == 1 else f"{base}_{number}").casefold() not in taken)
+    name = next(
+        name
+        for number in itertools.count(1)
+        if (name := base if number == 1 else f"{base}_{number}").casefold() not in taken
+    )
     taken.add(name.casefold())
     return name
 

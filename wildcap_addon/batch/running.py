@@ -51,11 +51,20 @@ def start(batch: Batch, *words: str) -> None:
         raise storage_problem(error, log) from error
     with told:
         try:
-            _process = subprocess.Popen(command, cwd=jobs.ROOT, env=_environment(batch), stdin=subprocess.DEVNULL,
-                                        stdout=told, stderr=told, **_apart())
+            _process = subprocess.Popen(
+                command,
+                cwd=jobs.ROOT,
+                env=_environment(batch),
+                stdin=subprocess.DEVNULL,
+                stdout=told,
+                stderr=told,
+                **_apart(),
+            )
         except OSError as error:
-            raise Problem(f"The solver's Python {python} could not be started ({error.strerror or error}).",
-                          "Install the solver again, or choose another Python.") from error
+            raise Problem(
+                f"The solver's Python {python} could not be started ({error.strerror or error}).",
+                "Install the solver again, or choose another Python.",
+            ) from error
     if os.name == "posix":
         with contextlib.suppress(OSError):  # it has ended already
             os.setpriority(os.PRIO_PROCESS, _process.pid, NICE_VALUE)
@@ -106,22 +115,29 @@ def _problem_of(code: int) -> Problem | None:
         return None
     if code in (1, 2) and problem:  # as the command line tells a Problem
         return Problem(problem, remedy)
-    return Problem(f"The batch ended unexpectedly (exit code {code}).",
-                   f"Start it again: what was finished is kept. If it happens again, read {log}.")
+    return Problem(
+        f"The batch ended unexpectedly (exit code {code}).",
+        f"Start it again: what was finished is kept. If it happens again, read {log}.",
+    )
 
 
 def _environment(batch: Batch) -> dict[str, str]:
     """Blender's own, with the key of a paid service for those alone who need it."""
     paid = next((face for face in batch.faces if face.chosen().delight.delighter == "switchlight"), None)
-    return {**switchlight_api.environment_without_key(),
-            **preferences.worker_environment("switchlight" if paid else "")}
+    return {
+        **switchlight_api.environment_without_key(),
+        **preferences.worker_environment("switchlight" if paid else ""),
+    }
 
 
 def _apart() -> dict:
     """Popen arguments: a process that does not end with Blender, its terminal or its session."""
     if os.name == "nt":
-        return {"creationflags": subprocess.DETACHED_PROCESS | subprocess.BELOW_NORMAL_PRIORITY_CLASS
-                | subprocess.CREATE_NEW_PROCESS_GROUP}
+        return {
+            "creationflags": subprocess.DETACHED_PROCESS
+            | subprocess.BELOW_NORMAL_PRIORITY_CLASS
+            | subprocess.CREATE_NEW_PROCESS_GROUP
+        }
     return {"start_new_session": True}
 
 

@@ -7,7 +7,8 @@ import bpy
 from . import deleting, operators, panel, sample_head, source, strip
 
 _register, _unregister = bpy.utils.register_classes_factory(
-    (*source.CLASSES, *operators.CLASSES, *deleting.CLASSES, *sample_head.CLASSES, *panel.CLASSES))
+    (*source.CLASSES, *operators.CLASSES, *deleting.CLASSES, *sample_head.CLASSES, *panel.CLASSES)
+)
 
 
 def register():

@@ -42,14 +42,24 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
         removal = asking.answer(key)
         asking.forget(key)  # whoever closes the dialog and comes back is told what is there then
         if removal is None:
-            asking.find_answer(key, lambda task: look_at(task, capture), "delete_face",
-                               lambda: captures.root(captures.active(bpy.context)) == str(capture.root))
+            asking.find_answer(
+                key,
+                lambda task: look_at(task, capture),
+                "delete_face",
+                lambda: captures.root(captures.active(bpy.context)) == str(capture.root),
+            )
             return None
-        return (capture.root.name, *deletion.lines(removal, iface_),
-                "A head in the scene stays as a mesh and loses its maps: deliver it first to keep them.")
+        return (
+            capture.root.name,
+            *deletion.lines(removal, iface_),
+            "A head in the scene stays as a mesh and loses its maps: deliver it first to keep them.",
+        )
 
-    root: bpy.props.StringProperty(name="Capture", options={'HIDDEN', 'SKIP_SAVE'},
-                                   description="Folder of the face that was asked for; empty: the active one")
+    root: bpy.props.StringProperty(
+        name="Capture",
+        options={'HIDDEN', 'SKIP_SAVE'},
+        description="Folder of the face that was asked for; empty: the active one",
+    )
 
     def invoke(self, context, event):
         self.root = captures.root(captures.active(context))
@@ -58,10 +68,13 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
     def work(self, context):
         capture = captures.folder(captures.require(context))
         if self.root not in ("", str(capture.root)):
-            raise Problem("Another face is selected now, not the one that you wanted to delete.",
-                          "Select that one, and click Delete Face again.")
-        jobs.start_worker("", "ask", BackgroundTask("setup", lambda task: delete(task, capture)),
-                          lambda: forget(str(capture.root)))
+            raise Problem(
+                "Another face is selected now, not the one that you wanted to delete.",
+                "Select that one, and click Delete Face again.",
+            )
+        jobs.start_worker(
+            "", "ask", BackgroundTask("setup", lambda task: delete(task, capture)), lambda: forget(str(capture.root))
+        )
 
 
 def look_at(task: BackgroundTask, capture: Capture) -> deletion.Deletion:

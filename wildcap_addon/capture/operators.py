@@ -50,16 +50,21 @@ class WILDCAP_OT_locate_capture(FileOperator, CaptureOperator, bpy.types.Operato
         item = captures.require(context)
         name = links.name(item)
         if not self.directory and captures.folder(item).root.is_dir():
-            raise Problem(f"{name} is where it was.",
-                          "To work on another copy of it, click Locate Capture and choose its folder.")
+            raise Problem(
+                f"{name} is where it was.", "To work on another copy of it, click Locate Capture and choose its folder."
+            )
         chosen = Path(bpy.path.abspath(self.directory)).absolute() if self.directory else links.find(item)
         if chosen is None:
-            raise Problem(f"{name} is neither beside this .blend nor among your captures.",
-                          "Click Locate Capture and choose the folder it is in now.")
+            raise Problem(
+                f"{name} is neither beside this .blend nor among your captures.",
+                "Click Locate Capture and choose the folder it is in now.",
+            )
         place = next((path for path in (chosen, chosen / name) if links.is_capture(path)), None)
         if place is None:
-            raise Problem(f"{chosen} is not a capture, and holds no {name}.",
-                          "Choose the folder that ends in .wildcap, or the one it lies in.")
+            raise Problem(
+                f"{chosen} is not a capture, and holds no {name}.",
+                "Choose the folder that ends in .wildcap, or the one it lies in.",
+            )
         Capture(place).read()  # refuses a damaged or newer one
         links.move(item, place)
         for other in links.missing():

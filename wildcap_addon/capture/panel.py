@@ -19,8 +19,9 @@ class WILDCAP_UL_captures(bpy.types.UIList):
         ----------
         context, layout, data, item, icon, active_data, active_property : as Blender gives them; `item` is the capture's
         """
-        layout.prop(item, "name", text="", emboss=False,
-                    icon='CHECKMARK' if item == captures.active(context) else 'USER')
+        layout.prop(
+            item, "name", text="", emboss=False, icon='CHECKMARK' if item == captures.active(context) else 'USER'
+        )
         face_state = batches.state_of(captures.root(item))
         if face_state is not None:
             layout.label(text="", icon=batches.ICONS[face_state.state])

@@ -17,8 +17,10 @@ def write_cameras(scene: bpy.types.Scene, path: str) -> int:
     """Each camera under its object's name, which is to be its photograph's; or, where there is one camera alone and it
     moves, one entry per frame of the scene, numbered as the video's from 0. Pictures have the scene's resolution and
     square pixels. Gives how many were written."""
-    width, height = (round(side * scene.render.resolution_percentage / 100)
-                     for side in (scene.render.resolution_x, scene.render.resolution_y))
+    width, height = (
+        round(side * scene.render.resolution_percentage / 100)
+        for side in (scene.render.resolution_x, scene.render.resolution_y)
+    )
     objects = [thing for thing in scene.objects if thing.type == 'CAMERA' and thing.data.type == 'PERSP']
     before, entries = scene.frame_current, []
     if len(objects) == 1 and objects[0].animation_data is not None and objects[0].animation_data.action is not None:
@@ -40,5 +42,8 @@ def _entry(camera: bpy.types.Object, width: int, height: int) -> dict:
     across = lens.sensor_fit == 'HORIZONTAL' or (lens.sensor_fit == 'AUTO' and width >= height)
     side = width if across else height
     focal = lens.lens / (lens.sensor_height if lens.sensor_fit == 'VERTICAL' else lens.sensor_width) * side
-    return {"matrix_world": [list(row) for row in camera.matrix_world.normalized()], "focal_px": focal,
-            "centre_px": [width / 2 - lens.shift_x * side, height / 2 + lens.shift_y * side]}
+    return {
+        "matrix_world": [list(row) for row in camera.matrix_world.normalized()],
+        "focal_px": focal,
+        "centre_px": [width / 2 - lens.shift_x * side, height / 2 + lens.shift_y * side],
+    }

@@ -34,8 +34,9 @@ class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
     filepath: bpy.props.StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
     directory: bpy.props.StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE', 'HIDDEN'})
     files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={'SKIP_SAVE', 'HIDDEN'})
-    filter_glob: bpy.props.StringProperty(default=";".join(f"*{s};*{s.upper()}" for s in VIDEOS + PHOTOGRAPHS),
-                                          options={'HIDDEN'})
+    filter_glob: bpy.props.StringProperty(
+        default=";".join(f"*{s};*{s.upper()}" for s in VIDEOS + PHOTOGRAPHS), options={'HIDDEN'}
+    )
 
     def invoke(self, context, event):
         if self.filepath or self.files:  # dropped
@@ -47,8 +48,10 @@ class WILDCAP_OT_choose_video(FileOperator, bpy.types.Operator):
         folder = preferences.captures_folder()
         problems.draw_text(self.layout, iface_("The capture goes to {}.").format(folder), WIDTH_PX)
         if not bpy.data.filepath and folder == preferences.captures_default():
-            told = ("No cloud copies that folder. Another one is chosen in the preferences, and a saved .blend has its "
-                    "captures beside it.")
+            told = (
+                "No cloud copies that folder. Another one is chosen in the preferences, and a saved .blend has its "
+                "captures beside it."
+            )
             problems.draw_text(self.layout, told, WIDTH_PX)
 
     def work(self, context):
@@ -74,8 +77,9 @@ class WILDCAP_FH_source(bpy.types.FileHandler):
         area = context.area
         if area is None or area.type != 'VIEW_3D' or not area.spaces.active.show_region_ui:
             return False
-        return any(region.type == 'UI' and region.active_panel_category == WildcapPanel.bl_category
-                   for region in area.regions)
+        return any(
+            region.type == 'UI' and region.active_panel_category == WildcapPanel.bl_category for region in area.regions
+        )
 
 
 def sources(chosen: list[Path]) -> list[Path]:
@@ -88,8 +92,10 @@ def sources(chosen: list[Path]) -> list[Path]:
         if path.is_file() and path.suffix.lower() in PHOTOGRAPHS:
             path = path.parent
         elif path.is_file() and path.suffix.lower() not in VIDEOS:
-            raise Problem(f"{path.name} is neither a video nor a photograph.",
-                          f"Choose one of {', '.join(s[1:] for s in VIDEOS)}, or a folder of photographs.")
+            raise Problem(
+                f"{path.name} is neither a video nor a photograph.",
+                f"Choose one of {', '.join(s[1:] for s in VIDEOS)}, or a folder of photographs.",
+            )
         if path.is_dir() and not any(file.suffix.lower() in PHOTOGRAPHS for file in path.iterdir()):
             raise Problem(f"There are no photographs in {path}.", "Choose a video, or a folder of photographs.")
         paths.append(path.absolute())
@@ -104,8 +110,9 @@ def new_folder(parent: Path, source: Path) -> Path:
         folder = parent / (f"{name}.wildcap" if number == 1 else f"{name}_{number}.wildcap")
         if not folder.exists() or (Capture(folder).json.is_file() and Capture(folder).source == source):
             return folder
-    raise Problem(f"{parent} holds a thousand captures named {name}.",
-                  "Choose another captures folder in the preferences.")
+    raise Problem(
+        f"{parent} holds a thousand captures named {name}.", "Choose another captures folder in the preferences."
+    )
 
 
 CLASSES = (WILDCAP_OT_choose_video, WILDCAP_FH_source)

@@ -73,9 +73,20 @@ def _read(capture: Capture) -> Strip | None:
     choice = used or list(range(len(frames)))
     shown = [choice[i * len(choice) // min(MOST_FRAMES, len(choice))] for i in range(min(MOST_FRAMES, len(choice)))]
     sharpest = max(sharpness) or 1.0
-    return Strip(tuple(Frame(frames[i].name.rpartition(".")[0], sharpness[i] / sharpest, sharpness[i] < limit,
-                             frame_icons.load(capture.frames / frames[i].name))
-                       for i in shown), len(frames), len(used), sum(value < limit for value in sharpness))
+    return Strip(
+        tuple(
+            Frame(
+                frames[i].name.rpartition(".")[0],
+                sharpness[i] / sharpest,
+                sharpness[i] < limit,
+                frame_icons.load(capture.frames / frames[i].name),
+            )
+            for i in shown
+        ),
+        len(frames),
+        len(used),
+        sum(value < limit for value in sharpness),
+    )
 
 
 def _tick() -> float:

@@ -22,11 +22,14 @@ def check(suffix: str) -> None:
     """Raises Problem where this Blender has no exporter for that file."""
     name = ADDONS.get(suffix)
     if name and name not in dir(bpy.ops.export_scene):
-        raise Problem(f"Blender's add-on for {name} files is switched off.",
-                      "Switch it on in the preferences under Add-ons, or choose another format.")
+        raise Problem(
+            f"Blender's add-on for {name} files is switched off.",
+            "Switch it on in the preferences under Add-ons, or choose another format.",
+        )
     if suffix == ".usdc" and not has_usd():
-        raise Problem("This Blender was built without USD.",
-                      "Choose another format, or use the Blender from blender.org.")
+        raise Problem(
+            "This Blender was built without USD.", "Choose another format, or use the Blender from blender.org."
+        )
 
 
 def has_usd() -> bool:
@@ -44,20 +47,44 @@ def export(plan: DeliveryPlan) -> Path:
 
 def _gltf(path: Path) -> None:
     separate = path.suffix == ".gltf"
-    _call(bpy.ops.export_scene.gltf, path, export_format='GLTF_SEPARATE' if separate else 'GLB',
-          export_keep_originals=separate, use_active_scene=True,
-          export_yup=True, export_apply=False, export_morph=True, export_morph_normal=True, export_animations=False,
-          export_materials='EXPORT',
-          export_image_format='AUTO', export_cameras=False, export_lights=False, export_extras=False)
+    _call(
+        bpy.ops.export_scene.gltf,
+        path,
+        export_format='GLTF_SEPARATE' if separate else 'GLB',
+        export_keep_originals=separate,
+        use_active_scene=True,
+        export_yup=True,
+        export_apply=False,
+        export_morph=True,
+        export_morph_normal=True,
+        export_animations=False,
+        export_materials='EXPORT',
+        export_image_format='AUTO',
+        export_cameras=False,
+        export_lights=False,
+        export_extras=False,
+    )
 
 
 def _usd(path: Path) -> None:
-    _call(bpy.ops.wm.usd_export, path, selected_objects_only=True, export_animation=False, export_materials=True,
-          export_textures=False,
-          export_textures_mode='KEEP', relative_paths=True, export_shapekeys=True, export_subdivision='IGNORE',
-          export_lights=False, export_cameras=False,
-          convert_world_material=False, generate_preview_surface=True, export_custom_properties=False,
-          author_blender_name=False)
+    _call(
+        bpy.ops.wm.usd_export,
+        path,
+        selected_objects_only=True,
+        export_animation=False,
+        export_materials=True,
+        export_textures=False,
+        export_textures_mode='KEEP',
+        relative_paths=True,
+        export_shapekeys=True,
+        export_subdivision='IGNORE',
+        export_lights=False,
+        export_cameras=False,
+        convert_world_material=False,
+        generate_preview_surface=True,
+        export_custom_properties=False,
+        author_blender_name=False,
+    )
 
 
 def _fbx(path: Path) -> None:
@@ -85,24 +112,52 @@ def _relative_alone():
 
 
 def _fbx_as_it_is(path: Path) -> None:
-    _call(bpy.ops.export_scene.fbx, path, use_selection=True, object_types={'MESH'}, axis_forward='-Z', axis_up='Y',
-          bake_space_transform=True,
-          apply_unit_scale=True, apply_scale_options='FBX_SCALE_NONE', path_mode='RELATIVE', embed_textures=False,
-          mesh_smooth_type='FACE',
-          use_mesh_modifiers=False, bake_anim=False, add_leaf_bones=False, use_custom_props=False)
+    _call(
+        bpy.ops.export_scene.fbx,
+        path,
+        use_selection=True,
+        object_types={'MESH'},
+        axis_forward='-Z',
+        axis_up='Y',
+        bake_space_transform=True,
+        apply_unit_scale=True,
+        apply_scale_options='FBX_SCALE_NONE',
+        path_mode='RELATIVE',
+        embed_textures=False,
+        mesh_smooth_type='FACE',
+        use_mesh_modifiers=False,
+        bake_anim=False,
+        add_leaf_bones=False,
+        use_custom_props=False,
+    )
 
 
 def _obj(path: Path) -> None:
-    _call(bpy.ops.wm.obj_export, path, export_selected_objects=True, forward_axis='NEGATIVE_Z', up_axis='Y',
-          export_materials=True, export_pbr_extensions=True, path_mode='RELATIVE', apply_modifiers=False)
+    _call(
+        bpy.ops.wm.obj_export,
+        path,
+        export_selected_objects=True,
+        forward_axis='NEGATIVE_Z',
+        up_axis='Y',
+        export_materials=True,
+        export_pbr_extensions=True,
+        path_mode='RELATIVE',
+        apply_modifiers=False,
+    )
 
 
 def _call(operator, path: Path, **options) -> None:
     """Calls an exporter with those of the options that it has. Its own error becomes a Problem."""
     known = operator.get_rna_type().properties.keys()
     try:
-        operator('EXEC_DEFAULT', filepath=str(path), check_existing=False,
-                 **{name: value for name, value in options.items() if name in known})
+        operator(
+            'EXEC_DEFAULT',
+            filepath=str(path),
+            check_existing=False,
+            **{name: value for name, value in options.items() if name in known},
+        )
     except RuntimeError as error:
-        raise Problem(f"Blender's exporter failed: {str(error).strip().splitlines()[-1]}",
-                      "Free some space or choose another folder or format.") from error
+        raise Problem(
+            f"Blender's exporter failed: {str(error).strip().splitlines()[-1]}",
+            "Free some space or choose another folder or format.",
+        ) from error

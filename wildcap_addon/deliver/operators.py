@@ -31,8 +31,11 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         """What is written where, what of an older delivery goes, and what the format drops."""
         plan = planned(bpy.context)
         where = iface_("{} with its maps, for {}, goes to {}").format(plan.mesh, plan.preset.title, plan.target)
-        replaced = ((iface_("The delivery that is there is replaced once the new one is complete; files that you added "
-                            "stay."),) if plan.target.exists() else ())
+        replaced = (
+            (iface_("The delivery that is there is replaced once the new one is complete; files that you added stay."),)
+            if plan.target.exists()
+            else ()
+        )
         obj = captures.head(bpy.context, captures.require(bpy.context))
         left = stand.left_behind(obj, plan.what, plan.format.suffix)
         return (where, *replaced, *plan.format.drops, *left, plan.preset.hint)
@@ -42,13 +45,23 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         plan, root = planned(context), captures.root(item)
         delivery_plan.check_target(plan)
         stand.require_eyes(plan, captures.head(context, item))
-        chosen = {**properties.job_settings(item)["deliver"], "roughness": roughness(captures.head(context, item)),
-                  "whole": False}
+        chosen = {
+            **properties.job_settings(item)["deliver"],
+            "roughness": roughness(captures.head(context, item)),
+            "whole": False,
+        }
         until_it_ends = ExitStack()
         at = until_it_ends.enter_context(read_only.stand_in(captures.folder(item), chosen["folder"]))
         try:
-            jobs.start_tool(item, "deliver", "deliver", then=lambda: waiting.maps_made(root, plan), at=at,
-                            ended=until_it_ends.close, deliver=chosen)
+            jobs.start_tool(
+                item,
+                "deliver",
+                "deliver",
+                then=lambda: waiting.maps_made(root, plan),
+                at=at,
+                ended=until_it_ends.close,
+                deliver=chosen,
+            )
         except BaseException:
             until_it_ends.close()
             raise

@@ -25,10 +25,13 @@ from ..data_blocks import read_field
 SCENE = "WildCap Delivery"
 HEAD_TILE = 1001
 FACTORS = {"m": 1.0, "cm": 100.0}
-LINKED = {".glb": ("base_color", "normal"), ".gltf": ("base_color", "normal"),
-          ".usdc": ("base_color", "normal", "roughness"),
-          ".fbx": ("base_color", "normal", "roughness", "specular"),
-          ".obj": ("base_color", "normal", "roughness", "specular")}
+LINKED = {
+    ".glb": ("base_color", "normal"),
+    ".gltf": ("base_color", "normal"),
+    ".usdc": ("base_color", "normal", "roughness"),
+    ".fbx": ("base_color", "normal", "roughness", "specular"),
+    ".obj": ("base_color", "normal", "roughness", "specular"),
+}
 """What each format's exporter writes as it is. glTF's would make new pictures of roughness and specular."""
 HAIR_IN = ".usdc"
 """The format that holds hair curves."""
@@ -44,8 +47,10 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
     """The copy to export, selected and active in a scene of its own; `source` is the object in the scene, or the mesh
     file. The packing in plan.staged says which maps there are."""
     packing = json.loads((plan.staged / PACKING).read_text(encoding="utf-8"))
-    before = {name: set(getattr(bpy.data, name))
-              for name in ("materials", "images", "meshes", "hair_curves", "objects", "scenes", "shape_keys")}
+    before = {
+        name: set(getattr(bpy.data, name))
+        for name in ("materials", "images", "meshes", "hair_curves", "objects", "scenes", "shape_keys")
+    }
     window, shown, seen = context.window, context.window.scene, _looks(context)
     try:
         scene = bpy.data.scenes.new(SCENE)
@@ -84,7 +89,7 @@ def left_behind(obj: bpy.types.Object | None, what: str, suffix: str) -> tuple[s
         return ()
     hair = ("The hair stays here: of these formats only USD holds it.",)
     eyes = ("The close-up eyes and mouth stay here: the delivered head has its plain ones.",)
-    return ((hair if captures.hair(obj) and suffix != HAIR_IN else ()) + (eyes if captures.close_up(obj) else ()))
+    return (hair if captures.hair(obj) and suffix != HAIR_IN else ()) + (eyes if captures.close_up(obj) else ())
 
 
 def _looks(context) -> tuple[list, str, list[str]]:
@@ -93,8 +98,11 @@ def _looks(context) -> tuple[list, str, list[str]]:
     spaces = [area.spaces.active for area in context.window.screen.areas if area.type == 'VIEW_3D']
     views = [(space, space.region_3d.view_perspective, space.camera) for space in spaces]
     active = context.view_layer.objects.active
-    return (views, active.name if active else "",
-            [thing.name for thing in context.view_layer.objects if thing.select_get()])
+    return (
+        views,
+        active.name if active else "",
+        [thing.name for thing in context.view_layer.objects if thing.select_get()],
+    )
 
 
 def _look_again(context, views: list, active: str, selected: list[str]) -> None:
@@ -134,14 +142,19 @@ def _mean_colour(data: bpy.types.Curves) -> list[float]:
 def require_eyes(plan: DeliveryPlan, obj: bpy.types.Object | None) -> None:
     """Raises Problem where the target wants open eyes and the head has lids that cannot open."""
     if plan.what == "head" and plan.preset.open_eyes and (obj is None or not _lids(obj.data)):
-        raise Problem(f"{plan.preset.title} wants a head with open eyes, and this one's lids are closed.",
-                      "Click Add Face Units, under Face Units, and then Deliver again.")
+        raise Problem(
+            f"{plan.preset.title} wants a head with open eyes, and this one's lids are closed.",
+            "Click Add Face Units, under Face Units, and then Deliver again.",
+        )
 
 
 def _lids(mesh) -> list:
     """The shape keys that open the lids: those that the head's face units bring along."""
-    return ([mesh.shape_keys.key_blocks[name] for name in LIDS if name in mesh.shape_keys.key_blocks]
-            if mesh.shape_keys is not None else [])
+    return (
+        [mesh.shape_keys.key_blocks[name] for name in LIDS if name in mesh.shape_keys.key_blocks]
+        if mesh.shape_keys is not None
+        else []
+    )
 
 
 def _open_eyes(obj) -> None:
@@ -177,8 +190,9 @@ def _materials(mesh, plan: DeliveryPlan, packing: dict) -> None:
     mesh.materials.clear()  # and every polygon is in the first slot
     for tile in tiles:
         maps = [entry for entry in packing["maps"] if entry["tile"] == tile]
-        mesh.materials.append(_skin(plan.material(tile, several), plan, maps, packing["roughness"],
-                                    mesh.uv_layers[0].name))
+        mesh.materials.append(
+            _skin(plan.material(tile, several), plan, maps, packing["roughness"], mesh.uv_layers[0].name)
+        )
     for other in others:
         mesh.materials.append(_plain(other, plan))
     layer = mesh.uv_layers[0].uv

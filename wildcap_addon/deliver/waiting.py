@@ -50,8 +50,11 @@ def finish(context, item) -> Path:
     if plan is None or not (plan.staged / PACKING).is_file():
         raise Problem("The maps of this delivery are not there any more.", "Click Deliver again.")
     try:
-        mesh = (captures.require_head(context, item) if plan.what == "head"
-                else delivery_plan.needs(captures.folder(item), plan.what))
+        mesh = (
+            captures.require_head(context, item)
+            if plan.what == "head"
+            else delivery_plan.needs(captures.folder(item), plan.what)
+        )
         files.check(plan.format.suffix)
         if plan.what == "head":
             stand.require_eyes(plan, mesh)

@@ -114,7 +114,8 @@ def _made(name: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray)
     _attribute(data, "radius", 'FLOAT', 'POINT').data.foreach_set("value", radius.astype(np.float32).ravel())
     rgba = np.concatenate([colour, np.ones((count, 1))], 1)
     _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR', 'CURVE').data.foreach_set(
-        "color", rgba.astype(np.float32).ravel())
+        "color", rgba.astype(np.float32).ravel()
+    )
     return data
 
 
@@ -137,7 +138,7 @@ def _rooting_uvs(mesh) -> str:
     if head.OUTER in mesh and head.HAIR_UVS not in mesh.uv_layers:
         active = mesh.uv_layers.active_index
         uv = read_field(mesh.uv_layers[0].data, "uv", 2)
-        uv[mesh.polygons[mesh[head.OUTER]].loop_start:] += INNER_TILE
+        uv[mesh.polygons[mesh[head.OUTER]].loop_start :] += INNER_TILE
         mesh.uv_layers.new(name=head.HAIR_UVS, do_init=False).data.foreach_set("uv", uv.ravel())
         mesh.uv_layers.active_index = active
     return head.HAIR_UVS if head.OUTER in mesh else mesh.uv_layers[0].name
@@ -173,8 +174,10 @@ def _skin(mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Triangles [F, 3] of the head's own skin at rest, the places of all vertices [V, 3], and the triangles' UVs [F, 3,
     2]."""
     mesh.calc_loop_triangles()
-    corners, loops, polygons = (read_field(mesh.loop_triangles, field, width, np.int32)
-                                for field, width in (("vertices", 3), ("loops", 3), ("polygon_index", 1)))
+    corners, loops, polygons = (
+        read_field(mesh.loop_triangles, field, width, np.int32)
+        for field, width in (("vertices", 3), ("loops", 3), ("polygon_index", 1))
+    )
     places = read_field(mesh.shape_keys.reference_key.data if mesh.shape_keys else mesh.vertices, "co", 3)
     uvs = read_field(mesh.uv_layers[0].data, "uv", 2)
     skin = polygons < mesh.get(head.OUTER, len(mesh.polygons))
@@ -189,8 +192,9 @@ def _deform_group() -> bpy.types.NodeTree:
         group.is_modifier = True
         for side in ('INPUT', 'OUTPUT'):
             group.interface.new_socket("Geometry", in_out=side, socket_type='NodeSocketGeometry')
-        source, deform, target = (group.nodes.new(kind) for kind in (
-            'NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface', 'NodeGroupOutput'))
+        source, deform, target = (
+            group.nodes.new(kind) for kind in ('NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface', 'NodeGroupOutput')
+        )
         deform.location, target.location = (200, 0), (420, 0)
         group.links.new(source.outputs[0], deform.inputs["Curves"])
         group.links.new(deform.outputs["Curves"], target.inputs[0])

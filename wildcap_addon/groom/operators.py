@@ -30,16 +30,22 @@ class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     beard_mm: bpy.props.FloatProperty(
-        name="Beard Length (mm)", default=0.0, min=0.0, max=60.0,
+        name="Beard Length (mm)",
+        default=0.0,
+        min=0.0,
+        max=60.0,
         description="Mean length of the beard's hairs; 0: as long as stubble's strokes are in the albedo, and 6 mm for "
-                    "a beard, whose length its picture does not tell")
-    length: bpy.props.FloatProperty(name="Length", description="Times the length of brows and lashes", default=1.0,
-                                    min=0.2, max=3.0)
-    thickness: bpy.props.FloatProperty(name="Thickness",
-                                       description="Times the thickness of the hairs, 0.08 to 0.11 mm", default=1.0,
-                                       min=0.2, max=4.0)
-    share: bpy.props.FloatProperty(name="Share", description="How many of the hairs are grown", default=1.0, min=0.02,
-                                   max=1.0, subtype='FACTOR')
+        "a beard, whose length its picture does not tell",
+    )
+    length: bpy.props.FloatProperty(
+        name="Length", description="Times the length of brows and lashes", default=1.0, min=0.2, max=3.0
+    )
+    thickness: bpy.props.FloatProperty(
+        name="Thickness", description="Times the thickness of the hairs, 0.08 to 0.11 mm", default=1.0, min=0.2, max=4.0
+    )
+    share: bpy.props.FloatProperty(
+        name="Share", description="How many of the hairs are grown", default=1.0, min=0.02, max=1.0, subtype='FACTOR'
+    )
 
     def work(self, context):
         item = captures.require(context)
@@ -56,8 +62,7 @@ class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
                 combed.append(curves.TITLES[part])
         show_skin_below(captures.folder(item))
         if combed:
-            self.report({'INFO'},
-                        f"{', '.join(combed)}: left as you combed them; delete them to grow them anew")
+            self.report({'INFO'}, f"{', '.join(combed)}: left as you combed them; delete them to grow them anew")
 
 
 def mean_length_mm(points: np.ndarray) -> float:
@@ -86,15 +91,19 @@ def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np
     [M, 3]. Raises Problem where there are none, or the file is damaged."""
     path = find_newest_maps(capture)[0].with_name(STRANDS)
     if not path.is_file():
-        raise Problem("This capture has no hair to grow yet.",
-                      "Switch on Hair among the settings of 4K Maps, and run that stage.")
+        raise Problem(
+            "This capture has no hair to grow yet.", "Switch on Hair among the settings of 4K Maps, and run that stage."
+        )
     try:
         with zipfile.ZipFile(path) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > MOST_BYTES:
                 raise ValueError(f"it holds more than {MOST_BYTES >> 20} MB")
         with np.load(path, allow_pickle=False) as stored:
-            hairs = {part: tuple(stored[f"{part}_{name}"].astype(np.float32) for name in ("points", "radius", "colour"))
-                     for part in curves.TITLES if f"{part}_points" in stored.files}
+            hairs = {
+                part: tuple(stored[f"{part}_{name}"].astype(np.float32) for name in ("points", "radius", "colour"))
+                for part in curves.TITLES
+                if f"{part}_points" in stored.files
+            }
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise Problem(f"{path} is damaged ({error}).", AGAIN) from error
     for points, radius, colour in hairs.values():
@@ -110,8 +119,10 @@ def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np
         ):
             raise Problem(f"{path} is damaged (it holds no hair strands).", AGAIN)
     if not hairs:
-        raise Problem("No brows and no beard were found on this face.",
-                      "Hair that is as light as the skin cannot be told from it: add curves of your own.")
+        raise Problem(
+            "No brows and no beard were found on this face.",
+            "Hair that is as light as the skin cannot be told from it: add curves of your own.",
+        )
     return hairs
 
 

@@ -26,8 +26,10 @@ def _core(*words: str | Path) -> int:
     exit code. Raises Problem where no solver is set up."""
     python = preferences.python()
     if python is None:
-        raise Problem("The solver is not set up on this machine.",
-                      "Click Install Solver in the Setup panel of Blender's window, once.")
+        raise Problem(
+            "The solver is not set up on this machine.",
+            "Click Install Solver in the Setup panel of Blender's window, once.",
+        )
     return subprocess.run([str(python), "-E", "-s", str(jobs.ROOT), *map(str, words)]).returncode
 
 
@@ -38,12 +40,14 @@ def _of_run(kind) -> None:
 
 def _of_solve(kind) -> None:
     kind.add_argument("capture", help="the face's folder, usually NAME.wildcap")
-    kind.add_argument("options", nargs=argparse.REMAINDER,
-                      help="as `python -m core run --help` tells them, --quality film among them")
+    kind.add_argument(
+        "options", nargs=argparse.REMAINDER, help="as `python -m core run --help` tells them, --quality film among them"
+    )
 
 
 COMMANDS = (
-    Command("run", "from a video or photographs to the maps; a second run continues where the first stopped", _of_run,
-            _run),
+    Command(
+        "run", "from a video or photographs to the maps; a second run continues where the first stopped", _of_run, _run
+    ),
     Command("solve", "the maps again, from the texture and the mask", _of_solve, _solve),
 )

@@ -21,8 +21,9 @@ class WILDCAP_OT_make_my_head(JobOperator, bpy.types.Operator):
         item = captures.require(context)
         capture = captures.folder(item)
         if not capture.source and not capture.texture.is_file():
-            raise Problem("This capture has no video: there is nothing to make a head of.",
-                          "Choose the video of your own face.")
+            raise Problem(
+                "This capture has no video: there is nothing to make a head of.", "Choose the video of your own face."
+            )
         results.begin(item)
 
 

@@ -90,6 +90,9 @@ def _finish(context, item) -> None:
     status.refresh(context)
     if captures.head(context, item) is not None and bpy.ops.wildcap.render.poll():
         bpy.ops.wildcap.render('EXEC_DEFAULT')
-    problems.show(captures.root(item),
-                  problems.Notice("Your head is ready.",
-                                  "Choose another light under Relight, or paint its shadow mask and solve again."))
+    problems.show(
+        captures.root(item),
+        problems.Notice(
+            "Your head is ready.", "Choose another light under Relight, or paint its shadow mask and solve again."
+        ),
+    )

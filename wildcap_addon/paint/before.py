@@ -25,9 +25,11 @@ def remember(context, head: bpy.types.Object) -> dict:
     return {
         "paint": {name: _plain(getattr(paint, name)) for name in _SETTINGS},
         "views": view.remember(context.screen) if context.screen is not None else [],
-        "mode": context.mode, "active": active.name if active else "",
+        "mode": context.mode,
+        "active": active.name if active else "",
         "selected": [o.name for o in context.view_layer.objects if o.select_get()],
-        "head": head.name, "mirrored": head.data.use_mirror_x,
+        "head": head.name,
+        "mirrored": head.data.use_mirror_x,
         "pose": [head.show_only_shape_key, head.active_shape_key_index],
     }
 
@@ -59,5 +61,10 @@ def put_back(context, before: dict) -> None:
 
 
 def _plain(value):
-    return (value.name if isinstance(value, bpy.types.Image) else value if isinstance(value, (str, bool, type(None)))
-            else tuple(value))
+    return (
+        value.name
+        if isinstance(value, bpy.types.Image)
+        else value
+        if isinstance(value, (str, bool, type(None)))
+        else tuple(value)
+    )

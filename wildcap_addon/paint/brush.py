@@ -16,17 +16,22 @@ RADIUS_PX = 40  # of the brush at first
 def activate(context) -> dict:
     """Makes the mask brush the active one in Texture Paint mode; returns what `restore` needs."""
     paint = context.scene.tool_settings.image_paint
-    before = {"brush": paint.brush.name if paint.brush else "", "reference": _reference(paint),
-              "brushes": [b.name for b in bpy.data.brushes]}
+    before = {
+        "brush": paint.brush.name if paint.brush else "",
+        "reference": _reference(paint),
+        "brushes": [b.name for b in bpy.data.brushes],
+    }
     brush = bpy.data.brushes.get(NAME) or bpy.data.brushes.new(NAME, mode='TEXTURE_PAINT')
     setattr(brush, _type_property(brush), 'MASK')
     brush.weight = 1.0
     brush.strength = 1.0
     _use(context, brush)
     unified = _unified(context.scene)
-    before["unified"] = {name: getattr(unified, name)
-                         for name in ("use_unified_size", "use_unified_strength", "use_unified_weight")
-                         if hasattr(unified, name)}
+    before["unified"] = {
+        name: getattr(unified, name)
+        for name in ("use_unified_size", "use_unified_strength", "use_unified_weight")
+        if hasattr(unified, name)
+    }
     for name in before["unified"]:
         setattr(unified, name, False)
     brush.size = RADIUS_PX * (2 if bpy.app.version >= (5, 0, 0) else 1)  # 5.0 counts diameters

@@ -60,8 +60,14 @@ def settle() -> None:
             session.after_undo(bpy.context)
 
 
-_HANDLERS = (("save_pre", before_save), ("save_post", after_save), ("load_pre", before_load), ("load_post", after_load),
-             ("undo_post", after_undo), ("redo_post", after_undo))
+_HANDLERS = (
+    ("save_pre", before_save),
+    ("save_post", after_save),
+    ("load_pre", before_load),
+    ("load_post", after_load),
+    ("undo_post", after_undo),
+    ("redo_post", after_undo),
+)
 
 
 def register():

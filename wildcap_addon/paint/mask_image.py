@@ -42,8 +42,10 @@ def load(capture: Capture, mask_kind: str = 'SHADOW') -> bpy.types.Image:
     colours.as_data(image)
     if not image.size[0]:  # asking for the size reads the file
         bpy.data.images.remove(image)
-        raise Problem(f"{path} is not a picture that can be read.",
-                      "Restore it from mask_history, or delete it to start from the proposal.")
+        raise Problem(
+            f"{path} is not a picture that can be read.",
+            "Restore it from mask_history, or delete it to start from the proposal.",
+        )
     # The proposal is never overwritten: should Blender save the image itself, it goes where masks of artists go.
     image.filepath_raw = str(kept)
     if mask_kind == 'PROTECT' and not kept.is_file():
@@ -79,13 +81,15 @@ def refresh(image: bpy.types.Image, capture: Capture, mask_kind: str) -> None:
         image.reload()
     elif capture.shadow_mask_auto.is_file():
         image.source = 'FILE'
-        set_values(image,
-                   proposal(image, capture.shadow_mask_auto) if mask_kind == 'SHADOW'
-                   else np.zeros_like(mask_values(image)))
+        set_values(
+            image,
+            proposal(image, capture.shadow_mask_auto) if mask_kind == 'SHADOW' else np.zeros_like(mask_values(image)),
+        )
     colours.as_data(image)
     if not image.size[0]:
-        raise Problem("The mask that was being painted is gone.",
-                      "Click Paint on the Head, under Masks: it is looked for again.")
+        raise Problem(
+            "The mask that was being painted is gone.", "Click Paint on the Head, under Masks: it is looked for again."
+        )
 
 
 def mask_values(image: bpy.types.Image) -> np.ndarray:
@@ -111,7 +115,7 @@ def set_values(image: bpy.types.Image, mask: np.ndarray) -> None:
     """Puts a mask [H, W] in [0, 1], rows from the top, into the image."""
     width, height = image.size
     pixels = np.ones((height, width, image.channels), np.float32)
-    pixels[..., :min(3, image.channels)] = np.flipud(mask)[..., None]
+    pixels[..., : min(3, image.channels)] = np.flipud(mask)[..., None]
     image.pixels.foreach_set(pixels.ravel())
     image.update()
 
@@ -119,8 +123,9 @@ def set_values(image: bpy.types.Image, mask: np.ndarray) -> None:
 def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
     """The mask of a file [H, W], at the image's size. Raises Problem where there is none."""
     if not path.is_file():
-        raise Problem("This capture has no proposal for its shadow mask.",
-                      "Click Reconstruct, or paint the mask by hand.")
+        raise Problem(
+            "This capture has no proposal for its shadow mask.", "Click Reconstruct, or paint the mask by hand."
+        )
     other = bpy.data.images.load(str(path))
     try:
         colours.as_data(other)

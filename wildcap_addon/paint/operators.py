@@ -11,8 +11,14 @@ from .. import captures, jobs
 from ..base_operator import BaseOperator, CaptureOperator
 from . import edits, mask_image, session
 
-EDITS = {"GROW": edits.grow, "SHRINK": edits.shrink, "SOFTEN": edits.soften, "MIRROR": edits.mirror,
-         "INVERT": edits.invert, "CLEAR": edits.clear}
+EDITS = {
+    "GROW": edits.grow,
+    "SHRINK": edits.shrink,
+    "SOFTEN": edits.soften,
+    "MIRROR": edits.mirror,
+    "INVERT": edits.invert,
+    "CLEAR": edits.clear,
+}
 
 
 class WILDCAP_OT_paint_mask(CaptureOperator, bpy.types.Operator):
@@ -24,14 +30,24 @@ class WILDCAP_OT_paint_mask(CaptureOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     on: bpy.props.EnumProperty(
-        name="On", items=[('HEAD', "Head", "Paint on the head"), ('SHEET', "Sheet", "Paint on the flat texture")],
-        default='HEAD', options={'SKIP_SAVE'},
+        name="On",
+        items=[('HEAD', "Head", "Paint on the head"), ('SHEET', "Sheet", "Paint on the flat texture")],
+        default='HEAD',
+        options={'SKIP_SAVE'},
     )
     mask: bpy.props.EnumProperty(
-        name="Mask", default='SHADOW', options={'SKIP_SAVE'},
-        items=[('SHADOW', "Shadow", "Where a shadow is baked into the texture"),
-               ('PROTECT', "Protect",
-                "Moles, scars and make-up that the solver must not take for shadow; it wins over the shadow mask")])
+        name="Mask",
+        default='SHADOW',
+        options={'SKIP_SAVE'},
+        items=[
+            ('SHADOW', "Shadow", "Where a shadow is baked into the texture"),
+            (
+                'PROTECT',
+                "Protect",
+                "Moles, scars and make-up that the solver must not take for shadow; it wins over the shadow mask",
+            ),
+        ],
+    )
 
     def work(self, context):
         session.begin_painting(context, captures.require(context), self.on == 'SHEET', self.mask)
@@ -59,14 +75,20 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
     bl_label = "Edit Mask"
     bl_options = {'REGISTER'}  # a step of the image's own undo is pushed below: the global one knows nothing of pixels
 
-    kind: bpy.props.EnumProperty(name="Change", options={'SKIP_SAVE'}, items=[
-        ('GROW', "Grow", "Wider by a few texels"), ('SHRINK', "Shrink", "Narrower by a few texels"),
-        ('SOFTEN', "Soften", "Fade the borders"),
-        ('MIRROR', "Mirror", "What is masked on one side is masked on the other, too"),
-        ('INVERT', "Invert", "Shadow where there was none"),
-        ('CLEAR', "Clear", "No shadow anywhere"),
-        ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found automatically"),
-        ('SNAPPED', "Take Snapped Mask", "The mask that was painted, laid on the shadow's edges")])
+    kind: bpy.props.EnumProperty(
+        name="Change",
+        options={'SKIP_SAVE'},
+        items=[
+            ('GROW', "Grow", "Wider by a few texels"),
+            ('SHRINK', "Shrink", "Narrower by a few texels"),
+            ('SOFTEN', "Soften", "Fade the borders"),
+            ('MIRROR', "Mirror", "What is masked on one side is masked on the other, too"),
+            ('INVERT', "Invert", "Shadow where there was none"),
+            ('CLEAR', "Clear", "No shadow anywhere"),
+            ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found automatically"),
+            ('SNAPPED', "Take Snapped Mask", "The mask that was painted, laid on the shadow's edges"),
+        ],
+    )
 
     @classmethod
     def description(cls, context, properties):
@@ -74,8 +96,9 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.allowed(session.active(),
-                           "Click Paint on the Head, under Masks, first: the mask is changed while it is painted")
+        return cls.allowed(
+            session.active(), "Click Paint on the Head, under Masks, first: the mask is changed while it is painted"
+        )
 
     def work(self, context):
         capture = Capture(session.root())
@@ -102,10 +125,10 @@ class ToolOperator(BaseOperator):
 
     @classmethod
     def poll(cls, context):
-        return (cls.allowed(session.painted_kind() == 'SHADOW',
-                            "Click Paint on the Head, under Masks, and choose Shadow: only the shadow mask is found "
-                            "by itself")
-                and jobs.can_start(cls, context))
+        return cls.allowed(
+            session.painted_kind() == 'SHADOW',
+            "Click Paint on the Head, under Masks, and choose Shadow: only the shadow mask is found by itself",
+        ) and jobs.can_start(cls, context)
 
 
 class WILDCAP_OT_detect_mask(ToolOperator, bpy.types.Operator):
@@ -120,9 +143,10 @@ class WILDCAP_OT_detect_mask(ToolOperator, bpy.types.Operator):
         stage = stages.by_name(stages.MASK_STAGE)
         lacking = [name for name in stage.reads if not captures.folder(item).has(name)]
         if lacking:
-            raise Problem(f"Shadows are looked for in {lacking[0]}, which this capture does not have.",
-                          "Paint by hand: the sample head comes without it. Your own video brings it, once it is "
-                          "reconstructed.")
+            raise Problem(
+                f"Shadows are looked for in {lacking[0]}, which this capture does not have.",
+                "Paint by hand: the sample head comes without it. Your own video brings it, once it is reconstructed.",
+            )
         jobs.start(item, "tool", first=stage.name, last=stage.name, then=lambda: session.offer('PROPOSAL'))
 
 
@@ -138,5 +162,10 @@ class WILDCAP_OT_snap_mask(ToolOperator, bpy.types.Operator):
         jobs.start_tool(item, "mask_edges", then=lambda: session.offer('SNAPPED'))
 
 
-CLASSES = (WILDCAP_OT_paint_mask, WILDCAP_OT_finish_mask, WILDCAP_OT_edit_mask, WILDCAP_OT_detect_mask,
-           WILDCAP_OT_snap_mask)
+CLASSES = (
+    WILDCAP_OT_paint_mask,
+    WILDCAP_OT_finish_mask,
+    WILDCAP_OT_edit_mask,
+    WILDCAP_OT_detect_mask,
+    WILDCAP_OT_snap_mask,
+)

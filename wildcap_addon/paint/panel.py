@@ -23,13 +23,16 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         layout = self.layout
         column = layout.column(align=True)
         here = 'SHEET' if session.on_sheet() else 'HEAD'
-        for name, choices in (("mask", (("Shadow", 'SHADOW'), ("Protect", 'PROTECT'))),
-                              ("on", (("On the Head", 'HEAD'), ("On the Flat Sheet", 'SHEET')))):
+        for name, choices in (
+            ("mask", (("Shadow", 'SHADOW'), ("Protect", 'PROTECT'))),
+            ("on", (("On the Head", 'HEAD'), ("On the Flat Sheet", 'SHEET'))),
+        ):
             row = column.row(align=True)
             for text, value in choices:
                 options = {"mask": session.painted_kind(), "on": here, name: value}
-                button = row.operator("wildcap.paint_mask", text=text,
-                                      depress=options == {"mask": session.painted_kind(), "on": here})
+                button = row.operator(
+                    "wildcap.paint_mask", text=text, depress=options == {"mask": session.painted_kind(), "on": here}
+                )
                 button.mask, button.on = options["mask"], options["on"]
         brush = context.scene.tool_settings.image_paint.brush
         if brush is not None:

@@ -71,8 +71,10 @@ def mask() -> bpy.types.Image:
     """The image that is painted. Raises Problem when it is gone."""
     image = bpy.data.images.get(_session.mask) if _session else None
     if image is None:
-        raise Problem("The mask is not in this file any more.",
-                      "Leave the painting, and click Paint on the Head, under Masks, again.")
+        raise Problem(
+            "The mask is not in this file any more.",
+            "Leave the painting, and click Paint on the Head, under Masks, again.",
+        )
     return image
 
 
@@ -118,8 +120,9 @@ def begin_painting(context, item, use_sheet: bool, mask_kind: str = 'SHADOW') ->
     if texture is None:
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
     image = mask_image.load(capture, mask_kind)
-    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, mask_kind,
-                       before=before.remember(context, obj))
+    _session = Session(
+        str(capture.root), context.scene.name, obj.name, image.name, mask_kind, before=before.remember(context, obj)
+    )
     before.at_rest(obj)
     props, paint = context.scene.wildcap, context.scene.tool_settings.image_paint
     view.set_up(_session.before["views"], props.tint_strength)
@@ -175,8 +178,12 @@ def after_undo(context) -> None:
         _session.written = ()
     elif _session is not None:
         places.face(_session, sheet.is_there())
-    elif (_ended is not None and context.mode == 'PAINT_TEXTURE' and active is not None
-          and active.name in (_ended.head, sheet.NAME)):
+    elif (
+        _ended is not None
+        and context.mode == 'PAINT_TEXTURE'
+        and active is not None
+        and active.name in (_ended.head, sheet.NAME)
+    ):
         places.leave(context, _ended)
         before.put_back(context, _ended.before)
 
@@ -193,8 +200,9 @@ def save() -> None:
     wait()
     image = bpy.data.images.get(_session.mask) if _session else None
     if image is not None:
-        _session.written = keeping.store_painting(mask_image.mask_values(image), Capture(_session.root), _session.which,
-                                                  _session.written)
+        _session.written = keeping.store_painting(
+            mask_image.mask_values(image), Capture(_session.root), _session.which, _session.written
+        )
 
 
 def keep_up(stroking: bool) -> None:

@@ -10,16 +10,21 @@ SHADING = {"type": 'SOLID', "light": 'FLAT', "color_type": 'TEXTURE'}
 
 def remember(screen: bpy.types.Screen) -> list[dict]:
     """How every 3D view of the screen looks (names and values only)."""
-    return [{
-        "screen": screen.name, "area": index,
-        "shading": {name: getattr(area.spaces.active.shading, name) for name in SHADING},
-        "overlays": area.spaces.active.overlay.show_overlays,
-        "opacity": area.spaces.active.overlay.texture_paint_mode_opacity,
-        "perspective": area.spaces.active.region_3d.view_perspective,
-        "rotation": tuple(area.spaces.active.region_3d.view_rotation),
-        "location": tuple(area.spaces.active.region_3d.view_location),
-        "distance": area.spaces.active.region_3d.view_distance,
-    } for index, area in enumerate(screen.areas) if area.type == 'VIEW_3D']
+    return [
+        {
+            "screen": screen.name,
+            "area": index,
+            "shading": {name: getattr(area.spaces.active.shading, name) for name in SHADING},
+            "overlays": area.spaces.active.overlay.show_overlays,
+            "opacity": area.spaces.active.overlay.texture_paint_mode_opacity,
+            "perspective": area.spaces.active.region_3d.view_perspective,
+            "rotation": tuple(area.spaces.active.region_3d.view_rotation),
+            "location": tuple(area.spaces.active.region_3d.view_location),
+            "distance": area.spaces.active.region_3d.view_distance,
+        }
+        for index, area in enumerate(screen.areas)
+        if area.type == 'VIEW_3D'
+    ]
 
 
 def set_up(before: list[dict], opacity: float) -> None:
@@ -60,9 +65,15 @@ def face_sheet(before: list[dict], centre, size: float) -> None:
     for kept in before:
         space = _space(kept)
         if space is not None:
-            _look(space,
-                  {"perspective": 'ORTHO', "rotation": (1, 0, 0, 0), "location": centre,
-                   "distance": size * 1.25 * space.lens / 36})
+            _look(
+                space,
+                {
+                    "perspective": 'ORTHO',
+                    "rotation": (1, 0, 0, 0),
+                    "location": centre,
+                    "distance": size * 1.25 * space.lens / 36,
+                },
+            )
 
 
 def face_head(before: list[dict]) -> None:

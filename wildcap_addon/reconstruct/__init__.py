@@ -7,13 +7,19 @@ import bpy
 from . import choices, delighters, operators, panel, sending
 
 _register, _unregister = bpy.utils.register_classes_factory(
-    (*operators.CLASSES, *choices.CLASSES, *sending.CLASSES, *panel.CLASSES))
+    (*operators.CLASSES, *choices.CLASSES, *sending.CLASSES, *panel.CLASSES)
+)
 
 
 def register():
     _register()
     bpy.types.WindowManager.wildcap_wipe = bpy.props.FloatProperty(
-        name="Wipe", subtype='FACTOR', min=0, max=1, default=0.5, options={'SKIP_SAVE'},
+        name="Wipe",
+        subtype='FACTOR',
+        min=0,
+        max=1,
+        default=0.5,
+        options={'SKIP_SAVE'},
         description="Left of the edge the frame as it was shot, right of it without its light",
         update=lambda manager, _: delighters.move(manager.wildcap_wipe),
     )

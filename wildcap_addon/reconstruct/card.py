@@ -11,8 +11,15 @@ from ...core.contract import switchlight_api as service
 from .. import preferences, problems, status
 
 COLUMNS = 3
-LOOKS = {"best_for": 'CHECKMARK', "leaves": 'HIDE_OFF', "costs": 'DISC', "runs": 'MEMORY', "shadows": 'LIGHT_SUN',
-         "weights": 'FILE_BLANK', "licence": 'TEXT'}
+LOOKS = {
+    "best_for": 'CHECKMARK',
+    "leaves": 'HIDE_OFF',
+    "costs": 'DISC',
+    "runs": 'MEMORY',
+    "shadows": 'LIGHT_SUN',
+    "weights": 'FILE_BLANK',
+    "licence": 'TEXT',
+}
 FOLDED = ("runs", "shadows", "weights", "licence")
 """Facts of a card that are shown when it is unfolded."""
 
@@ -56,8 +63,9 @@ def lacks(item, name: str) -> list[str]:
 def _draw_facts(layout, card: delighter_cards.Card, width: int, folded: bool) -> None:
     for field, label in delighter_cards.FACTS:
         if (field in FOLDED) == folded:
-            problems.draw_text(layout, iface_("{}: {}").format(iface_(label), iface_(getattr(card, field))), width,
-                               LOOKS[field])
+            problems.draw_text(
+                layout, iface_("{}: {}").format(iface_(label), iface_(getattr(card, field))), width, LOOKS[field]
+            )
 
 
 def _draw_sending(layout, item, width: int) -> None:
@@ -65,17 +73,28 @@ def _draw_sending(layout, item, width: int) -> None:
     known = status.of(item)
     plan = known.sending if known is not None else None
     if plan is None:
-        problems.draw_text(layout,
-                           "Which frames are sent is known once Reconstruct has chosen them: it stops then, and asks.",
-                           width, 'INFO')
+        problems.draw_text(
+            layout,
+            "Which frames are sent is known once Reconstruct has chosen them: it stops then, and asks.",
+            width,
+            'INFO',
+        )
     elif not plan.frames:
-        problems.draw_text(layout,
-                           iface_("All {} answers are here. Nothing will be sent or charged.").format(plan.kept), width,
-                           'CHECKMARK')
+        problems.draw_text(
+            layout,
+            iface_("All {} answers are here. Nothing will be sent or charged.").format(plan.kept),
+            width,
+            'CHECKMARK',
+        )
     else:
-        words = ("You agreed: {} frames go to {} for {}." if known.agreed
-                 else "{} frames would go to {} for {}. Nothing is sent before you agree.")
+        words = (
+            "You agreed: {} frames go to {} for {}."
+            if known.agreed
+            else "{} frames would go to {} for {}. Nothing is sent before you agree."
+        )
         text = iface_(words).format(len(plan.frames), service.COMPANY, service.amount(plan.credits))
         problems.draw_text(layout, text, width, 'UNLOCKED' if known.agreed else 'LOCKED')
-        layout.operator("wildcap.withdraw_consent" if known.agreed else "wildcap.allow_sending",
-                        icon='X' if known.agreed else 'UNLOCKED')
+        layout.operator(
+            "wildcap.withdraw_consent" if known.agreed else "wildcap.allow_sending",
+            icon='X' if known.agreed else 'UNLOCKED',
+        )

@@ -49,8 +49,15 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
         for other in context.view_layer.objects:
             other.select_set(other == thing)
         try:
-            bpy.ops.wm.obj_export(filepath=str(path), export_selected_objects=True, apply_modifiers=False,
-                                  export_materials=False, export_normals=False, forward_axis='Y', up_axis='Z')
+            bpy.ops.wm.obj_export(
+                filepath=str(path),
+                export_selected_objects=True,
+                apply_modifiers=False,
+                export_materials=False,
+                export_normals=False,
+                forward_axis='Y',
+                up_axis='Z',
+            )
         finally:
             for other in context.view_layer.objects:
                 other.select_set(other in selected)
@@ -71,12 +78,17 @@ class WILDCAP_OT_choose_template(FileOperator, CaptureOperator, bpy.types.Operat
     def work(self, context):
         path = Path(bpy.path.abspath(self.filepath)).absolute()
         if not self.filepath or not (path.is_file() and path.suffix.lower() == ".obj" or path.is_dir()):
-            raise Problem(f"{path} is neither an OBJ nor a folder.",
-                          "Choose an OBJ of a head, or a folder with a neutral OBJ and its shapes.")
-        if path.is_dir() and not any("neutral" in file.name.lower()
-                                     for file in (*path.glob("*.obj"), *path.glob("*/*.obj"))):
-            raise Problem(f"{path} holds no OBJ with 'neutral' in its name.",
-                          "Choose the OBJ itself, or the folder of shapes (FaceXModel in ICT-FaceKit).")
+            raise Problem(
+                f"{path} is neither an OBJ nor a folder.",
+                "Choose an OBJ of a head, or a folder with a neutral OBJ and its shapes.",
+            )
+        if path.is_dir() and not any(
+            "neutral" in file.name.lower() for file in (*path.glob("*.obj"), *path.glob("*/*.obj"))
+        ):
+            raise Problem(
+                f"{path} holds no OBJ with 'neutral' in its name.",
+                "Choose the OBJ itself, or the folder of shapes (FaceXModel in ICT-FaceKit).",
+            )
         captures.require(context).registration.template = str(path)
 
 
@@ -90,7 +102,8 @@ class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         return cls.with_capture(context) and cls.allowed(
-            captures.active(context).registration.template, "The built-in head is fitted alone already")
+            captures.active(context).registration.template, "The built-in head is fitted alone already"
+        )
 
     def work(self, context):
         captures.require(context).registration.template = ""
@@ -102,8 +115,9 @@ class WILDCAP_OT_compare_delit(CaptureOperator, bpy.types.Operator):
     bl_idname = "wildcap.compare_delit"
     bl_label = "Before and After"
 
-    which: bpy.props.IntProperty(name="Frame", default=-1, options={'SKIP_SAVE'},
-                                 description="Which of the delit frames; -1: the next one")
+    which: bpy.props.IntProperty(
+        name="Frame", default=-1, options={'SKIP_SAVE'}, description="Which of the delit frames; -1: the next one"
+    )
 
     def work(self, context):
         item = captures.require(context)
@@ -116,5 +130,9 @@ class WILDCAP_OT_compare_delit(CaptureOperator, bpy.types.Operator):
         delighters.show(capture, self.which if self.which >= 0 else following, context.window_manager.wildcap_wipe)
 
 
-CLASSES = (WILDCAP_OT_use_active_mesh, WILDCAP_OT_choose_template, WILDCAP_OT_use_built_in_head,
-           WILDCAP_OT_compare_delit)
+CLASSES = (
+    WILDCAP_OT_use_active_mesh,
+    WILDCAP_OT_choose_template,
+    WILDCAP_OT_use_built_in_head,
+    WILDCAP_OT_compare_delit,
+)

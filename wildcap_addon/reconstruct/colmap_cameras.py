@@ -47,11 +47,13 @@ def read(folder: Path) -> list[FrameCamera]:
             _check(camera)
         return cameras
     except FileNotFoundError as error:
-        raise Problem("This capture has no cameras yet.",
-                      "Click Reconstruct: they are found from the frames.") from error
+        raise Problem(
+            "This capture has no cameras yet.", "Click Reconstruct: they are found from the frames."
+        ) from error
     except (OSError, struct.error, KeyError, UnicodeDecodeError, ValueError) as error:
-        raise Problem(f"The cameras in {folder} cannot be read ({type(error).__name__}: {error}).",
-                      advise_again("cameras")) from error
+        raise Problem(
+            f"The cameras in {folder} cannot be read ({type(error).__name__}: {error}).", advise_again("cameras")
+        ) from error
 
 
 def _check(camera: FrameCamera) -> None:
@@ -71,7 +73,7 @@ def _read(folder: Path) -> list[FrameCamera]:
     for _ in range(count):
         *pose, lens = struct.unpack_from("<7dI", data, at + 4)
         end = data.index(b"\0", at + 64)
-        name = data[at + 64:end].decode("utf-8")
+        name = data[at + 64 : end].decode("utf-8")
         (points,) = struct.unpack_from("<Q", data, end + 1)
         at = end + 9 + 24 * points
         to_camera = Matrix.Translation(pose[4:]) @ Quaternion(pose[:4]).normalized().to_matrix().to_4x4()

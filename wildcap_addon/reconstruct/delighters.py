@@ -73,7 +73,7 @@ def mixed(before: np.ndarray, after: np.ndarray, wipe: float) -> np.ndarray:
     edge = round(wipe * width)
     out = np.concatenate([before[:, :edge], after[:, edge:]], 1)
     if 0 < edge < width:
-        out[:, edge - 1:edge + 1, :3] = 1
+        out[:, edge - 1 : edge + 1, :3] = 1
     return out
 
 
@@ -98,6 +98,6 @@ def _read(path: Path) -> np.ndarray:
     square = np.zeros((SIDE_PX, SIDE_PX, 4), np.float32)
     height, width = pixels.shape[:2]
     left, low = (SIDE_PX - width) // 2, (SIDE_PX - height) // 2
-    square[low:low + height, left:left + width, :3] = pixels[..., :3]
-    square[low:low + height, left:left + width, 3] = 1
+    square[low : low + height, left : left + width, :3] = pixels[..., :3]
+    square[low : low + height, left : left + width, 3] = 1
     return square

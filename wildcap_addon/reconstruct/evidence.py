@@ -80,11 +80,15 @@ def bring_in_scan(context, item) -> bpy.types.Object:
     return scan
 
 
-def _camera(context, item, capture: Capture, camera: colmap_cameras.FrameCamera,
-            thing: bpy.types.Object | None) -> bpy.types.Object:
+def _camera(
+    context, item, capture: Capture, camera: colmap_cameras.FrameCamera, thing: bpy.types.Object | None
+) -> bpy.types.Object:
     """The camera of a frame, made where there is none: what was tied to it (markers, constraints) stays so."""
-    lens = thing.data if thing is not None and thing.data.users == 1 else (
-        bpy.data.cameras.new(f"{item.name} {camera.name}"))  # another one's is a copy of the artist's
+    lens = (
+        thing.data
+        if thing is not None and thing.data.users == 1
+        else (bpy.data.cameras.new(f"{item.name} {camera.name}"))
+    )  # another one's is a copy of the artist's
     lens.sensor_fit, lens.sensor_width = 'HORIZONTAL', SENSOR_MM
     lens.lens = camera.focal / camera.width * SENSOR_MM
     lens.shift_x = (camera.width / 2 - camera.centre[0]) / camera.width
@@ -100,8 +104,9 @@ def _camera(context, item, capture: Capture, camera: colmap_cameras.FrameCamera,
             behind.image, behind.alpha = image, 1.0
         # the frame's width is the sensor's: of a wider picture the height is cut, of a narrower one there is more
         render = context.scene.render
-        behind.frame_method = ('CROP' if camera.width * render.resolution_y <= camera.height * render.resolution_x
-                               else 'FIT')
+        behind.frame_method = (
+            'CROP' if camera.width * render.resolution_y <= camera.height * render.resolution_x else 'FIT'
+        )
     if thing is None:
         thing = bpy.data.objects.new(lens.name, lens)
     thing.data = lens
@@ -118,8 +123,11 @@ def _belongs(obj: bpy.types.Object, context, item, kind: str) -> None:
 
 def _brought_in(item, kind: str) -> list[bpy.types.Object]:
     """What was brought in before, without copies of the artist's."""
-    return [t for t in bpy.data.objects if t.get(KIND_KEY) == kind and t.get(captures.HEAD_KEY) == item.path
-            and t.get(MADE_KEY, t.name) == t.name]
+    return [
+        t
+        for t in bpy.data.objects
+        if t.get(KIND_KEY) == kind and t.get(captures.HEAD_KEY) == item.path and t.get(MADE_KEY, t.name) == t.name
+    ]
 
 
 def _remove(things: Iterable[bpy.types.Object]) -> None:

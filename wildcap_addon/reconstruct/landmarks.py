@@ -25,12 +25,35 @@ MOVED_M = 1e-4  # less is rounding, and no landmark that was moved
 
 # Numbers in MediaPipe's face mesh. Left and right are the person's.
 NAMES = {
-    33: "Right Eye Outer", 133: "Right Eye Inner", 159: "Right Upper Lid", 145: "Right Lower Lid",
-    362: "Left Eye Inner", 263: "Left Eye Outer", 386: "Left Upper Lid", 374: "Left Lower Lid",
-    70: "Right Brow Outer", 105: "Right Brow", 107: "Right Brow Inner", 336: "Left Brow Inner", 334: "Left Brow",
-    300: "Left Brow Outer", 168: "Nose Bridge", 1: "Nose Tip", 2: "Nose Base", 98: "Right Nostril", 327: "Left Nostril",
-    61: "Right Mouth Corner", 0: "Upper Lip", 17: "Lower Lip", 291: "Left Mouth Corner",
-    152: "Chin", 10: "Forehead", 234: "Right Cheek Bone", 454: "Left Cheek Bone", 172: "Right Jaw", 397: "Left Jaw",
+    33: "Right Eye Outer",
+    133: "Right Eye Inner",
+    159: "Right Upper Lid",
+    145: "Right Lower Lid",
+    362: "Left Eye Inner",
+    263: "Left Eye Outer",
+    386: "Left Upper Lid",
+    374: "Left Lower Lid",
+    70: "Right Brow Outer",
+    105: "Right Brow",
+    107: "Right Brow Inner",
+    336: "Left Brow Inner",
+    334: "Left Brow",
+    300: "Left Brow Outer",
+    168: "Nose Bridge",
+    1: "Nose Tip",
+    2: "Nose Base",
+    98: "Right Nostril",
+    327: "Left Nostril",
+    61: "Right Mouth Corner",
+    0: "Upper Lip",
+    17: "Lower Lip",
+    291: "Left Mouth Corner",
+    152: "Chin",
+    10: "Forehead",
+    234: "Right Cheek Bone",
+    454: "Left Cheek Bone",
+    172: "Right Jaw",
+    397: "Left Jaw",
 }
 
 
@@ -66,8 +89,11 @@ def shown_landmarks(item) -> list[bpy.types.Object]:
 def keep_moved(item) -> int:
     """Writes the landmarks that were moved to the capture, where they win over what the frames say. Returns how
     many."""
-    moved = {o[INDEX_KEY]: tuple(o.location) for o in shown_landmarks(item)
-             if (o.location - Vector(o[FOUND_KEY])).length > MOVED_M}
+    moved = {
+        o[INDEX_KEY]: tuple(o.location)
+        for o in shown_landmarks(item)
+        if (o.location - Vector(o[FOUND_KEY])).length > MOVED_M
+    }
     if moved:
         artist_landmarks.put(captures.folder(item), moved)
     return len(moved)
@@ -87,9 +113,11 @@ def _known(capture: Capture) -> dict[int, list[float]]:
         detected = read_json(capture.landmarks)["points"]
         points = {int(index): [float(v) for v in point] for index, point in detected.items()}
     except FileNotFoundError as error:
-        raise Problem("This capture has no landmarks.",
-                      "Click Reconstruct first: they are found in the frames.") from error
+        raise Problem(
+            "This capture has no landmarks.", "Click Reconstruct first: they are found in the frames."
+        ) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise Problem(f"{capture.landmarks} cannot be read ({type(error).__name__}: {error}).",
-                      advise_again("registration")) from error
+        raise Problem(
+            f"{capture.landmarks} cannot be read ({type(error).__name__}: {error}).", advise_again("registration")
+        ) from error
     return points | {index: list(point) for index, point in artist_landmarks.read(capture.landmarks_artist).items()}

@@ -18,11 +18,14 @@ class WILDCAP_OT_reconstruct(JobOperator, bpy.types.Operator):
     bl_label = "Reconstruct"
 
     first: bpy.props.StringProperty(
-        name="From", options={'SKIP_SAVE'},
-        description="The stage to begin with, done again even if it is fresh; empty: what is not done yet")
+        name="From",
+        options={'SKIP_SAVE'},
+        description="The stage to begin with, done again even if it is fresh; empty: what is not done yet",
+    )
 
     to_end: bpy.props.BoolProperty(
-        name="To the End", options={'SKIP_SAVE'}, description="Go on past the mask, to what is delivered")
+        name="To the End", options={'SKIP_SAVE'}, description="Go on past the mask, to what is delivered"
+    )
 
     @classmethod
     def description(cls, context, properties):
@@ -36,13 +39,22 @@ class WILDCAP_OT_reconstruct(JobOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        after_mask = self.to_end or self.first and stages.NAMES.index(
-            stages.by_name(self.first).name) > stages.NAMES.index(stages.MASK_STAGE)
+        after_mask = (
+            self.to_end
+            or self.first
+            and stages.NAMES.index(stages.by_name(self.first).name) > stages.NAMES.index(stages.MASK_STAGE)
+        )
         if not after_mask and not captures.folder(item).source:
-            raise Problem("This capture has no video: there is nothing to reconstruct it from.",
-                          "Choose the video of your own face.")
-        jobs.start(item, "solve" if after_mask else "reconstruct", first=self.first or None,
-                   last=None if after_mask else stages.MASK_STAGE)
+            raise Problem(
+                "This capture has no video: there is nothing to reconstruct it from.",
+                "Choose the video of your own face.",
+            )
+        jobs.start(
+            item,
+            "solve" if after_mask else "reconstruct",
+            first=self.first or None,
+            last=None if after_mask else stages.MASK_STAGE,
+        )
 
 
 class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
@@ -51,9 +63,11 @@ class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
     bl_idname = "wildcap.cancel"
     bl_label = "Cancel"
 
-    capture: bpy.props.StringProperty(name="Capture",
-                                      description="Folder of the capture whose job is meant; empty: the active one",
-                                      options={'SKIP_SAVE'})
+    capture: bpy.props.StringProperty(
+        name="Capture",
+        description="Folder of the capture whose job is meant; empty: the active one",
+        options={'SKIP_SAVE'},
+    )
 
     @classmethod
     def poll(cls, context):
@@ -88,8 +102,9 @@ class WILDCAP_OT_bring_in_cameras(HeadOperator, bpy.types.Operator):
     bl_label = "Bring In Cameras"
     bl_options = {'REGISTER', 'UNDO'}
 
-    every: bpy.props.BoolProperty(name="Every Frame", default=False,
-                                  description="All registered frames; off: those that the texture is made from")
+    every: bpy.props.BoolProperty(
+        name="Every Frame", default=False, description="All registered frames; off: those that the texture is made from"
+    )
 
     def work(self, context):
         item = captures.require(context)
@@ -130,7 +145,8 @@ class WILDCAP_OT_hide_landmarks(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         return cls.in_object_mode(context) and cls.allowed(
-            landmarks.shown_landmarks(captures.active(context)), "No landmarks are shown: click Show Landmarks first")
+            landmarks.shown_landmarks(captures.active(context)), "No landmarks are shown: click Show Landmarks first"
+        )
 
     def work(self, context):
         landmarks.hide(captures.require(context))
@@ -146,17 +162,27 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         shown = cls.in_object_mode(context) and cls.allowed(
-            landmarks.shown_landmarks(captures.active(context)), "No landmarks are shown: click Show Landmarks first")
+            landmarks.shown_landmarks(captures.active(context)), "No landmarks are shown: click Show Landmarks first"
+        )
         return shown and jobs.can_start(cls, context)
 
     def work(self, context):
         item = captures.require(context)
         if not landmarks.keep_moved(item):
-            raise Problem("No landmark was moved.",
-                          "Move a sphere to where it belongs on the face, then click Fit Head Again.")
+            raise Problem(
+                "No landmark was moved.", "Move a sphere to where it belongs on the face, then click Fit Head Again."
+            )
         jobs.start(item, "reconstruct", first="registration", last=stages.MASK_STAGE)
         landmarks.hide(item)
 
 
-CLASSES = (WILDCAP_OT_reconstruct, WILDCAP_OT_cancel, WILDCAP_OT_bring_in_head, WILDCAP_OT_bring_in_cameras,
-           WILDCAP_OT_bring_in_scan, WILDCAP_OT_show_landmarks, WILDCAP_OT_hide_landmarks, WILDCAP_OT_fit_landmarks)
+CLASSES = (
+    WILDCAP_OT_reconstruct,
+    WILDCAP_OT_cancel,
+    WILDCAP_OT_bring_in_head,
+    WILDCAP_OT_bring_in_cameras,
+    WILDCAP_OT_bring_in_scan,
+    WILDCAP_OT_show_landmarks,
+    WILDCAP_OT_hide_landmarks,
+    WILDCAP_OT_fit_landmarks,
+)

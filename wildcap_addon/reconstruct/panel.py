@@ -26,10 +26,11 @@ class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
         for name, icon in (("head", 'MESH_MONKEY'), ("cameras", 'CAMERA_DATA'), ("scan", 'OUTLINER_DATA_POINTCLOUD')):
             row.operator(f"wildcap.bring_in_{name}", text=name.title(), icon=icon)
         row = layout.row(align=True)
-        row.operator("wildcap.hide_landmarks" if landmarks.shown_landmarks(item) else "wildcap.show_landmarks",
-                     icon='EMPTY_AXIS')
+        row.operator(
+            "wildcap.hide_landmarks" if landmarks.shown_landmarks(item) else "wildcap.show_landmarks", icon='EMPTY_AXIS'
+        )
         row.operator("wildcap.fit_landmarks")
-        for stage in stages.STAGES[:stages.NAMES.index(stages.MASK_STAGE) + 1]:
+        for stage in stages.STAGES[: stages.NAMES.index(stages.MASK_STAGE) + 1]:
             if stage.name != "delight":  # all of its settings stand below
                 draw_settings(layout, item, stage, without=("template", "new_atlas"))
 
@@ -67,8 +68,13 @@ class WILDCAP_PT_delighter(CapturePanel, bpy.types.Panel):
         name = delighters.shown_frame(capture)
         if name:
             layout.template_icon(icon_value=delighters.icon(), scale=11)
-            layout.prop(context.window_manager, "wildcap_wipe", text=iface_("Frame {}").format(name), translate=False,
-                        slider=True)
+            layout.prop(
+                context.window_manager,
+                "wildcap_wipe",
+                text=iface_("Frame {}").format(name),
+                translate=False,
+                slider=True,
+            )
 
 
 CLASSES = (WILDCAP_PT_reconstruct, WILDCAP_PT_head_mesh, WILDCAP_PT_delighter)

@@ -29,7 +29,8 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
     def poll(cls, context):
         return cls.with_capture(context) and cls.allowed(
             captures.active(context).delight.delighter == "switchlight",
-            "Only SwitchLight sends anything: choose it as the delighter first")
+            "Only SwitchLight sends anything: choose it as the delighter first",
+        )
 
     def tell(self) -> tuple[str, ...]:
         item = captures.require(bpy.context)
@@ -47,8 +48,10 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
         item = captures.require(context)
         now = plan(item)
         if self.sending_plan is not None and now != self.sending_plan:
-            raise Problem("The frames changed while the question was open.",
-                          "Click Allow Sending again, and look at what would be sent now.")
+            raise Problem(
+                "The frames changed while the question was open.",
+                "Click Allow Sending again, and look at what would be sent now.",
+            )
         consent.give(captures.folder(item), now)
 
 

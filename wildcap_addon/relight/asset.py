@@ -26,8 +26,9 @@ def mark(group: bpy.types.NodeTree) -> None:
         group["wildcap_asset"] = True
         group.asset_mark()
         data = group.asset_data
-        data.description = ("Skin for solved heads: albedo, specular and normal in, a Principled BSDF with subsurface "
-                            "scattering out")
+        data.description = (
+            "Skin for solved heads: albedo, specular and normal in, a Principled BSDF with subsurface scattering out"
+        )
         data.author = "WildCap for Blender"
         data.license = "GPL-3.0-or-later"
         for tag in ("skin", "head", "relight"):

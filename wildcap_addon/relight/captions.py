@@ -49,6 +49,8 @@ def _fill(picture: np.ndarray, triangle: np.ndarray) -> None:
     if (high <= low).any():
         return
     x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
-    sides = [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
-             for a, b in zip(triangle, np.roll(triangle, -1, 0), strict=True)]
-    picture[low[1]:high[1], low[0]:high[0]] |= (np.min(sides, 0) >= 0) | (np.max(sides, 0) <= 0)
+    sides = [
+        (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
+        for a, b in zip(triangle, np.roll(triangle, -1, 0), strict=True)
+    ]
+    picture[low[1] : high[1], low[0] : high[0]] |= (np.min(sides, 0) >= 0) | (np.max(sides, 0) <= 0)

@@ -9,13 +9,17 @@ from . import headless
 
 
 def _relight(arguments) -> list[Path]:
-    return headless.render_relit(arguments.capture, arguments.lights or headless.ALL, resolution=arguments.resolution,
-                                 samples=arguments.samples)
+    return headless.render_relit(
+        arguments.capture, arguments.lights or headless.ALL, resolution=arguments.resolution, samples=arguments.samples
+    )
 
 
 def _contact_sheet(arguments) -> list[Path]:
-    return [headless.render_contact_sheet(arguments.capture, view=arguments.view, resolution=arguments.resolution,
-                                          samples=arguments.samples)]
+    return [
+        headless.render_contact_sheet(
+            arguments.capture, view=arguments.view, resolution=arguments.resolution, samples=arguments.samples
+        )
+    ]
 
 
 def _turntable(arguments) -> list[Path]:
@@ -40,8 +44,12 @@ def _sized(kind) -> None:
 
 def _of_relight(kind) -> None:
     _sized(kind)
-    kind.add_argument("lights", nargs="*", metavar="LIGHT",
-                      help=f"{', '.join(headless.ALL)}, or one of Blender's worlds; default: all presets")
+    kind.add_argument(
+        "lights",
+        nargs="*",
+        metavar="LIGHT",
+        help=f"{', '.join(headless.ALL)}, or one of Blender's worlds; default: all presets",
+    )
 
 
 def _of_contact_sheet(kind) -> None:

@@ -16,11 +16,16 @@ SHOWN = {
     'FILMED': ("As Filmed", "filmed.png", "The texture with all of its light, as it was filmed"),
     'DELIT': ("Delit", "delit.png", "The texture that the delighter left, with the shadows that stayed in it"),
     'SOLVED': ("Albedo", "diffuse_albedo.png", "What the solver found"),
-    'SKIN': ("Skin Below Hair", "clean_albedo.png",
-             "The albedo without brows, lashes and beard, for hair to grow over"),
+    'SKIN': (
+        "Skin Below Hair",
+        "clean_albedo.png",
+        "The albedo without brows, lashes and beard, for hair to grow over",
+    ),
 }
-REMEDIES = ("Click Solve: it writes the pictures to compare, as long as the frames are there.",
-            "Switch on Hair among the settings of 4K Maps, and run that stage.")
+REMEDIES = (
+    "Click Solve: it writes the pictures to compare, as long as the frames are there.",
+    "Switch on Hair among the settings of 4K Maps, and run that stage.",
+)
 
 
 class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
@@ -31,8 +36,9 @@ class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
     bl_label = "Compare"
     bl_options = {'REGISTER', 'UNDO'}
 
-    show: bpy.props.EnumProperty(name="Show", items=[(kind, label, tip) for kind, (label, _, tip) in SHOWN.items()],
-                                 default='SOLVED')
+    show: bpy.props.EnumProperty(
+        name="Show", items=[(kind, label, tip) for kind, (label, _, tip) in SHOWN.items()], default='SOLVED'
+    )
 
     @classmethod
     def poll(cls, context):

@@ -45,7 +45,7 @@ def render(obj: bpy.types.Object, folder: Path, wait: bool, settings: picture.Re
     scene, first = reel.each_light(obj, presets, settings)
     size = settings.resolution
     names = {name: iface_(label) for name, label, *_ in LIGHTS}
-    rows = [[names[p] for p in presets[i:i + COLUMNS]] for i in range(0, len(presets), COLUMNS)]
+    rows = [[names[p] for p in presets[i : i + COLUMNS]] for i in range(0, len(presets), COLUMNS)]
     about = [iface_("{} · {} · Cycles, {} samples").format(obj.name, output.view_label(scene), settings.samples)]
     paths, sheet = [folder / f"{name}.png" for name in presets], folder / NAME
     output.make_room(sheet)
@@ -59,7 +59,7 @@ def _joined(paths: list[Path], strips: list[np.ndarray], size: int) -> np.ndarra
     strips = [GROUND_SRGB + (1 - GROUND_SRGB) * np.repeat(strip, 3, 2) for strip in strips]
     rows = []
     for i, strip in zip(range(0, len(paths), COLUMNS), strips, strict=False):
-        cells = [load_pixels(path)[..., :3] for path in paths[i:i + COLUMNS]]
+        cells = [load_pixels(path)[..., :3] for path in paths[i : i + COLUMNS]]
         cells += [np.full((size, size, 3), GROUND_SRGB, np.float32)] * (COLUMNS - len(cells))
         rows += [np.hstack(cells), strip]
     return np.vstack([*rows, strips[-1]][::-1])

@@ -19,8 +19,9 @@ ALL = tuple(lights.PRESETS)
 FRAMES_PER_SECOND = 24
 
 
-def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolution: int = 640,
-                 samples: int = 32) -> list[Path]:
+def render_relit(
+    capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolution: int = 640, samples: int = 32
+) -> list[Path]:
     """Brings in the head, assembles its material and renders renders/NAME.png and the linear renders/NAME.exr for each
     light. Empties the open file first.
 
@@ -42,12 +43,14 @@ def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolu
     """
     chosen = [light_of(name) for name in names]
     obj, item = open_head(capture_folder)
-    return [render_light(obj, captures.folder(item).renders, light, RenderSettings(resolution, samples))
-            for light in chosen]
+    return [
+        render_light(obj, captures.folder(item).renders, light, RenderSettings(resolution, samples)) for light in chosen
+    ]
 
 
-def render_contact_sheet(capture_folder: Path, resolution: int = 512, samples: int = 32,
-                         view: str = colours.VIEWS[0]) -> Path:
+def render_contact_sheet(
+    capture_folder: Path, resolution: int = 512, samples: int = 32, view: str = colours.VIEWS[0]
+) -> Path:
     """As `render_relit`, in all presets, joined in one picture.
 
     Parameters
@@ -61,13 +64,19 @@ def render_contact_sheet(capture_folder: Path, resolution: int = 512, samples: i
     renders/contact_sheet.png.
     """
     obj, item = open_head(capture_folder)
-    return contact_sheet.render(obj, captures.folder(item).renders, True,
-                                RenderSettings(resolution, samples, view=view))
+    return contact_sheet.render(
+        obj, captures.folder(item).renders, True, RenderSettings(resolution, samples, view=view)
+    )
 
 
 def render_turntable(
-    capture_folder: Path, name: str | Hdri = ALL[0], turns: str = 'HEAD', frames: int = 48, film: bool = False,
-    resolution: int = 512, samples: int = 32,
+    capture_folder: Path,
+    name: str | Hdri = ALL[0],
+    turns: str = 'HEAD',
+    frames: int = 48,
+    film: bool = False,
+    resolution: int = 512,
+    samples: int = 32,
 ) -> Path:
     """The head or its light once around.
 
@@ -88,8 +97,9 @@ def render_turntable(
     """
     light = light_of(name)
     obj, item = open_head(capture_folder)
-    return turntable(obj, captures.folder(item).renders, light, Turn(turns, frames, film),
-                     RenderSettings(resolution, samples), True)
+    return turntable(
+        obj, captures.folder(item).renders, light, Turn(turns, frames, film), RenderSettings(resolution, samples), True
+    )
 
 
 @dataclass(frozen=True)
@@ -127,8 +137,10 @@ def turntable(obj, renders: Path, light: str | Hdri, turn: Turn, settings: Rende
     if turn.film and settings.resolution % 2:
         raise Problem("MP4 needs a resolution that is even.", "Choose an even one, or PNG frames.")
     if turn.turns == 'LIGHT' and isinstance(light, str) and not lights.preset(light).lamps:
-        raise Problem("This light is the same from every side: turning it changes nothing.",
-                      "Choose another light, or turn the head.")
+        raise Problem(
+            "This light is the same from every side: turning it changes nothing.",
+            "Choose another light, or turn the head.",
+        )
     scene = reel.animate_turn(obj, light, turn.turns, turn.frames, settings)
     if turn.film:
         reel.as_film(scene, FRAMES_PER_SECOND)

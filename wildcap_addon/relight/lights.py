@@ -45,28 +45,39 @@ class LightingPreset:
 
 
 PRESETS = {
-    "three_point": LightingPreset((
-        Lamp("Key", (-0.9, -1.0, 0.7), 16.0, (1.0, 0.96, 0.92), size=3.0),
-        Lamp("Fill", (1.2, -0.8, 0.1), 4.0, (0.92, 0.96, 1.0), size=4.0),
-        Lamp("Rim", (0.9, 1.2, 0.5), 6.0, size=2.0),
-    ), sky.even((0.02, 0.02, 0.022))),
-    "window": LightingPreset((
-        Lamp("Window", (-1.3, -0.45, 0.25), 22.0, (0.93, 0.97, 1.0), size=5.0, distance=5.0),
-    ), sky.even((0.012, 0.011, 0.01))),
-    "sun": LightingPreset((
-        Lamp("Sun", (0.75, -1.0, 0.7), 4.2, (1.0, 0.9, 0.76)),
-    ), sky.Sky((0.14, 0.21, 0.34), (0.2, 0.24, 0.29), (0.13, 0.11, 0.085))),
+    "three_point": LightingPreset(
+        (
+            Lamp("Key", (-0.9, -1.0, 0.7), 16.0, (1.0, 0.96, 0.92), size=3.0),
+            Lamp("Fill", (1.2, -0.8, 0.1), 4.0, (0.92, 0.96, 1.0), size=4.0),
+            Lamp("Rim", (0.9, 1.2, 0.5), 6.0, size=2.0),
+        ),
+        sky.even((0.02, 0.02, 0.022)),
+    ),
+    "window": LightingPreset(
+        (Lamp("Window", (-1.3, -0.45, 0.25), 22.0, (0.93, 0.97, 1.0), size=5.0, distance=5.0),),
+        sky.even((0.012, 0.011, 0.01)),
+    ),
+    "sun": LightingPreset(
+        (Lamp("Sun", (0.75, -1.0, 0.7), 4.2, (1.0, 0.9, 0.76)),),
+        sky.Sky((0.14, 0.21, 0.34), (0.2, 0.24, 0.29), (0.13, 0.11, 0.085)),
+    ),
     "overcast": LightingPreset((), sky.Sky((2.1, 2.16, 2.25), (0.7, 0.72, 0.75), (0.26, 0.24, 0.22))),
-    "rim": LightingPreset((
-        Lamp("Left Rim", (1.0, 0.85, 0.3), 18.0, (1.0, 0.97, 0.94), size=1.6, distance=5.0),
-        Lamp("Right Rim", (-1.0, 0.95, 0.35), 14.0, (0.9, 0.95, 1.0), size=1.6, distance=5.0),
-        Lamp("Front", (0.1, -1.0, 0.35), 1.6, size=4.0),
-    ), sky.even((0.006, 0.006, 0.007))),
-    "coloured": LightingPreset((
-        Lamp("Teal", (-1.2, -0.7, 0.25), 12.0, (0.05, 0.62, 0.9), size=2.5),
-        Lamp("Magenta", (1.15, -0.55, 0.2), 12.0, (1.0, 0.1, 0.42), size=2.5),
-        Lamp("Above", (0.0, -0.5, 1.3), 3.0, size=2.0),
-    ), sky.even((0.008, 0.007, 0.012))),
+    "rim": LightingPreset(
+        (
+            Lamp("Left Rim", (1.0, 0.85, 0.3), 18.0, (1.0, 0.97, 0.94), size=1.6, distance=5.0),
+            Lamp("Right Rim", (-1.0, 0.95, 0.35), 14.0, (0.9, 0.95, 1.0), size=1.6, distance=5.0),
+            Lamp("Front", (0.1, -1.0, 0.35), 1.6, size=4.0),
+        ),
+        sky.even((0.006, 0.006, 0.007)),
+    ),
+    "coloured": LightingPreset(
+        (
+            Lamp("Teal", (-1.2, -0.7, 0.25), 12.0, (0.05, 0.62, 0.9), size=2.5),
+            Lamp("Magenta", (1.15, -0.55, 0.2), 12.0, (1.0, 0.1, 0.42), size=2.5),
+            Lamp("Above", (0.0, -0.5, 1.3), 3.0, size=2.0),
+        ),
+        sky.even((0.008, 0.007, 0.012)),
+    ),
 }
 """By the identifiers of properties.LIGHTS, which has their names and tooltips"""
 NAMED_BEFORE = {"studio": "three_point"}
@@ -77,8 +88,9 @@ def preset(name: str) -> LightingPreset:
     return PRESETS[NAMED_BEFORE.get(name, name)]
 
 
-def build_light(scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float,
-                turn: float = 0.0) -> None:
+def build_light(
+    scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float, turn: float = 0.0
+) -> None:
     """Replaces the lamps and the world of a scene.
 
     Parameters

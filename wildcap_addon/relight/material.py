@@ -46,8 +46,14 @@ def assemble(context, item) -> tuple[bpy.types.Material, str]:
     regions.write(obj.data)
     height = capture.delivery / DISPLACEMENT[1]
     _build(material, {path.name: path for path in (*maps, height) if path.is_file()}, obj)
-    _set(material, {"Specular Amount": _specular_amount(capture),
-                    "Subsurface Scale": node_group.SCATTERING_M * data_blocks.scale_of(obj)}, before)
+    _set(
+        material,
+        {
+            "Specular Amount": _specular_amount(capture),
+            "Subsurface Scale": node_group.SCATTERING_M * data_blocks.scale_of(obj),
+        },
+        before,
+    )
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
     try:
         told = head.complete(obj, capture)
@@ -91,8 +97,11 @@ def _material(obj) -> bpy.types.Material:
 
 
 def _is_another_face_s(material, obj) -> bool:
-    return any(other.data.materials[:1] == [material] and other.get(captures.HEAD_KEY) != obj.get(captures.HEAD_KEY)
-               for other in bpy.data.objects if other.type == 'MESH' and captures.HEAD_KEY in other)
+    return any(
+        other.data.materials[:1] == [material] and other.get(captures.HEAD_KEY) != obj.get(captures.HEAD_KEY)
+        for other in bpy.data.objects
+        if other.type == 'MESH' and captures.HEAD_KEY in other
+    )
 
 
 def _build(material, paths: dict, obj) -> None:
@@ -134,10 +143,13 @@ def _build(material, paths: dict, obj) -> None:
     output = next((n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL'), None)
     output = output or _node(tree, "Material Output", 'ShaderNodeOutputMaterial', (340, 0))
     for source, socket, target, name in (
-        ("WildCap Albedo", "Color", skin, "Albedo"), ("WildCap Specular", "Color", skin, "Specular"),
-        ("WildCap Normal", "Color", normal, "Color"), ("WildCap Normal Map", "Normal", skin, "Normal"),
+        ("WildCap Albedo", "Color", skin, "Albedo"),
+        ("WildCap Specular", "Color", skin, "Specular"),
+        ("WildCap Normal", "Color", normal, "Color"),
+        ("WildCap Normal Map", "Normal", skin, "Normal"),
         ("WildCap Skin", "BSDF", output, "Surface"),
-        ("WildCap Regions", "Fac", skin, "Region"), ("WildCap Displacement", "Color", skin, "Height"),
+        ("WildCap Regions", "Fac", skin, "Region"),
+        ("WildCap Displacement", "Color", skin, "Height"),
         ("WildCap Skin", "Displacement", output, "Displacement"),
     ):
         if source in tree.nodes and (name != "Displacement" or "WildCap Displacement" in tree.nodes):
@@ -151,8 +163,11 @@ def _build(material, paths: dict, obj) -> None:
 def _has_picture(node) -> bool:
     """Whether the picture of an image node is in the .blend or on the disk."""
     image = node.image
-    return image is not None and (image.packed_file is not None or image.source != 'FILE'
-                                  or Path(bpy.path.abspath(image.filepath, library=image.library)).is_file())
+    return image is not None and (
+        image.packed_file is not None
+        or image.source != 'FILE'
+        or Path(bpy.path.abspath(image.filepath, library=image.library)).is_file()
+    )
 
 
 def _node(tree, name: str, kind: str, location):
@@ -175,8 +190,11 @@ def _set_before(material, obj) -> dict[str, float]:
     if KEY not in material:
         return {}
     # of the group's version 1
-    return (material[SET].to_dict() if SET in material
-            else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * data_blocks.scale_of(obj)})
+    return (
+        material[SET].to_dict()
+        if SET in material
+        else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * data_blocks.scale_of(obj)}
+    )
 
 
 def _set(material, inputs: dict[str, float], before: dict[str, float]) -> None:

@@ -17,8 +17,9 @@ class WILDCAP_OT_assemble_material(HeadOperator, bpy.types.Operator):
     bl_label = "Assemble Material"
     bl_options = {'REGISTER', 'UNDO'}
 
-    unless_edited: bpy.props.BoolProperty(description="Leave a material alone that somebody changed",
-                                          options={'HIDDEN', 'SKIP_SAVE'})
+    unless_edited: bpy.props.BoolProperty(
+        description="Leave a material alone that somebody changed", options={'HIDDEN', 'SKIP_SAVE'}
+    )
 
     def work(self, context):
         item = captures.require(context)
@@ -35,8 +36,11 @@ class Render(BaseOperator):
 
     @classmethod
     def poll(cls, context):
-        return (cls.in_object_mode(context) and cls.with_capture(context)
-                and cls.allowed(not output.busy(), "Blender is rendering: wait for it, or press Esc in its window"))
+        return (
+            cls.in_object_mode(context)
+            and cls.with_capture(context)
+            and cls.allowed(not output.busy(), "Blender is rendering: wait for it, or press Esc in its window")
+        )
 
     def work(self, context):
         item = captures.require(context)

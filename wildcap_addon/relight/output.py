@@ -56,8 +56,9 @@ def render_still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
     _render(scene, wait, write_still=True)
 
 
-def render_stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable[[], None],
-                  first: int = 1) -> None:
+def render_stills(
+    scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable[[], None], first: int = 1
+) -> None:
     """As `render_still`, for frames of the scene, from `first` on.
 
     Parameters
@@ -73,8 +74,9 @@ def render_stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: C
     scene.frame_start, scene.frame_end = first, first + len(paths) - 1
     as_linear(scene)
     scene.render.filepath = str(paths[0].with_name(".frame_####.exr"))
-    _running = Running(stills={paths[0].with_name(f".frame_{i:04d}.exr"): path for i, path in enumerate(paths, first)},
-                       then=then)
+    _running = Running(
+        stills={paths[0].with_name(f".frame_{i:04d}.exr"): path for i, path in enumerate(paths, first)}, then=then
+    )
     scene.render.use_persistent_data = True  # the head and its maps are the same in all frames
     _render(scene, wait, animation=True)
 
@@ -215,8 +217,11 @@ def _free() -> None:
 def let_go(scene: bpy.types.Scene) -> None:
     """Takes the head and what it wears out of the relight scene, which nobody looks at: a head that the artist deletes
     is to be gone from the file. Camera and lights stay."""
-    for thing in [o for o in scene.collection.objects if o.type not in ('CAMERA', 'LIGHT')
-                  and not (o.type == 'EMPTY' and o.name.startswith(lights.RIG))]:
+    for thing in [
+        o
+        for o in scene.collection.objects
+        if o.type not in ('CAMERA', 'LIGHT') and not (o.type == 'EMPTY' and o.name.startswith(lights.RIG))
+    ]:
         scene.collection.objects.unlink(thing)
 
 
@@ -232,8 +237,9 @@ def _picture(path: Path) -> None:
     data = _hidden(path).read_bytes()
     note = b"tEXtNote\0" + view_label(scene).encode("latin-1", "replace")
     header = 8 + 25  # the signature and IHDR, which comes first
-    _hidden(path).write_bytes(data[:header] + struct.pack(">I", len(note) - 4) + note
-                              + struct.pack(">I", zlib.crc32(note)) + data[header:])
+    _hidden(path).write_bytes(
+        data[:header] + struct.pack(">I", len(note) - 4) + note + struct.pack(">I", zlib.crc32(note)) + data[header:]
+    )
     place_file(_hidden(path), path)
 
 

@@ -36,8 +36,14 @@ class RenderSettings:
         return set_up_scene(obj, light, self.resolution, self.samples, self.turn, self.view)
 
 
-def set_up_scene(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, samples: int, turn: float = 0.0,
-                 view: str = colours.VIEWS[0]) -> bpy.types.Scene:
+def set_up_scene(
+    obj: bpy.types.Object,
+    light: str | Hdri | None,
+    resolution: int,
+    samples: int,
+    turn: float = 0.0,
+    view: str = colours.VIEWS[0],
+) -> bpy.types.Scene:
     """The relight scene with this head and what it wears alone in it, framed and lit.
 
     Parameters

@@ -20,8 +20,9 @@ SLOWEST = 64
 """Frames to one of the artist's where time is to stand still: keys that lie closer than 1/100 replace each other."""
 
 
-def each_light(obj: bpy.types.Object, presets: tuple[str, ...],
-               settings: picture.RenderSettings) -> tuple[bpy.types.Scene, int]:
+def each_light(
+    obj: bpy.types.Object, presets: tuple[str, ...], settings: picture.RenderSettings
+) -> tuple[bpy.types.Scene, int]:
     """The relight scene in which the head is as it is now, and the first of the frames that have the lights `presets`
     in turn. Raises Problem before frame 0, where Blender renders no row of frames."""
     scene = settings.scene(obj, presets[0])
@@ -46,8 +47,10 @@ def _slow_down(scene: bpy.types.Scene, count: int) -> tuple[int, list[float]]:
     them, and the moments that they show. By a power of two, so that the first shows this very moment."""
     now, last = scene.frame_current_final, scene.bl_rna.properties["frame_end"].hard_max
     if now < 0:
-        raise Problem(f"Frame {now:g} lies before frame 0, where Blender renders no row of pictures.",
-                      "Go to frame 0 or a later one, or render one light after the other.")
+        raise Problem(
+            f"Frame {now:g} lies before frame 0, where Blender renders no row of pictures.",
+            "Go to frame 0 or a later one, or render one light after the other.",
+        )
     steps = SLOWEST
     while steps > 1 and now * steps + count > last:
         steps //= 2
@@ -56,8 +59,9 @@ def _slow_down(scene: bpy.types.Scene, count: int) -> tuple[int, list[float]]:
     return first, [(first + i) / steps for i in range(count)]
 
 
-def animate_turn(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int,
-                 settings: picture.RenderSettings) -> bpy.types.Scene:
+def animate_turn(
+    obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int, settings: picture.RenderSettings
+) -> bpy.types.Scene:
     """The relight scene in which the head or the light goes once around, counter-clockwise from above.
 
     Parameters
@@ -73,8 +77,9 @@ def animate_turn(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: i
     rig, camera = lights.rig(scene), scene.camera
     moved = [o for o in (rig, camera if turns == 'HEAD' else None) if o is not None]
     start = {o: o.matrix_world.copy() for o in moved}
-    mapping = (next((n for n in scene.world.node_tree.nodes if n.type == 'MAPPING'), None) if isinstance(light, Hdri)
-               else None)
+    mapping = (
+        next((n for n in scene.world.node_tree.nodes if n.type == 'MAPPING'), None) if isinstance(light, Hdri) else None
+    )
     first = mapping.inputs["Rotation"].default_value[2] if mapping else 0.0
     for i in range(frames):
         angle = tau * i / frames * (-1 if turns == 'HEAD' else 1)

@@ -40,11 +40,14 @@ def write(mesh: bpy.types.Mesh) -> None:
 @cache
 def _shares() -> np.ndarray:
     """[S, S], rows from the bottom as v goes."""
-    masks = {name: load_pixels(MASKS / f"{name}.png")[::STEP_TEXELS, ::STEP_TEXELS, 0]
-             for name in ("face", "brows", "neck", "ears", "scalp", "nose", "eyes", "lips")}
+    masks = {
+        name: load_pixels(MASKS / f"{name}.png")[::STEP_TEXELS, ::STEP_TEXELS, 0]
+        for name in ("face", "brows", "neck", "ears", "scalp", "nose", "eyes", "lips")
+    }
     rows = np.arange(len(masks["face"]))
-    above = np.clip((rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max())
-                    / (skin_regions.FOREHEAD_FADE * len(rows)), 0, 1)
+    above = np.clip(
+        (rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max()) / (skin_regions.FOREHEAD_FADE * len(rows)), 0, 1
+    )
     masks["forehead"] = masks["face"] * above[:, None]
     result = np.zeros_like(masks["face"])
     for name, share in SHARES.items():

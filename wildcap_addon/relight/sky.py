@@ -54,11 +54,26 @@ def show(world: bpy.types.World, sky: Sky, frame: Matrix) -> None:
     """Makes the sky the world's background, upright with the head whose place is `frame` [4, 4]."""
     nodes, links = world.node_tree.nodes, world.node_tree.links
     background = next(n for n in nodes if n.type == 'BACKGROUND')
-    coordinates, upright, split, edge, rise = (nodes.new(kind) for kind in (
-        'ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeSeparateXYZ', 'ShaderNodeMapRange', 'ShaderNodeClamp'))
+    coordinates, upright, split, edge, rise = (
+        nodes.new(kind)
+        for kind in (
+            'ShaderNodeTexCoord',
+            'ShaderNodeMapping',
+            'ShaderNodeSeparateXYZ',
+            'ShaderNodeMapRange',
+            'ShaderNodeClamp',
+        )
+    )
     above, below = _mix(nodes, "WildCap Sky"), _mix(nodes, "WildCap Ground")
-    for node, x in ((coordinates, -1100), (upright, -920), (split, -740), (rise, -560), (edge, -560), (above, -380),
-                    (below, -200)):
+    for node, x in (
+        (coordinates, -1100),
+        (upright, -920),
+        (split, -740),
+        (rise, -560),
+        (edge, -560),
+        (above, -380),
+        (below, -200),
+    ):
         node.location = (x, -160 if node == edge else 0)
     upright.inputs["Rotation"].default_value = frame.to_quaternion().inverted().to_euler()
     edge.inputs["From Min"].default_value, edge.inputs["From Max"].default_value = -HORIZON_BLEND, HORIZON_BLEND

@@ -8,7 +8,8 @@ import bpy
 from . import checking, install, operators, panel, report, self_test
 
 _register, _unregister = bpy.utils.register_classes_factory(
-    (*install.CLASSES, *operators.CLASSES, *report.CLASSES, *self_test.CLASSES, *panel.CLASSES))
+    (*install.CLASSES, *operators.CLASSES, *report.CLASSES, *self_test.CLASSES, *panel.CLASSES)
+)
 
 
 def register():

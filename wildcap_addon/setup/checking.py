@@ -30,9 +30,10 @@ def judge(python: Path, importing: bool) -> tuple[str, str]:
 
 def refuse(python: Path, faults: list[str]) -> None:
     if faults:
-        raise Problem(f"{python} cannot run the solver. {' '.join(faults[:3])}",
-                      f"Install what {REQUIREMENTS / 'worker.txt'} lists; or click Install Solver, which brings it up "
-                      "to date.")
+        raise Problem(
+            f"{python} cannot run the solver. {' '.join(faults[:3])}",
+            f"Install what {REQUIREMENTS / 'worker.txt'} lists; or click Install Solver, which brings it up to date.",
+        )
 
 
 def accept(python: Path) -> None:

@@ -32,8 +32,11 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
         compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is None:
-            asking.find_answer(("plan", compute, source, wheels),
-                               lambda task: look_up_plan(task, compute, source, wheels, folder), "install_solver")
+            asking.find_answer(
+                ("plan", compute, source, wheels),
+                lambda task: look_up_plan(task, compute, source, wheels, folder),
+                "install_solver",
+            )
             return None
         return describe_plan(plan, compute, folder, index.check_space(plan, folder))
 
@@ -43,9 +46,14 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
         if plan is not None:
             index.check_space(plan, folder)
         log = folder.with_name(f"{folder.name}.wildcap-install.log")
-        task = installation.installation(folder, REQUIREMENTS, log, None,
-                                         installation.PackageSource(compute, source, wheels),
-                                         len(plan.packages) if plan is not None else 0)
+        task = installation.installation(
+            folder,
+            REQUIREMENTS,
+            log,
+            None,
+            installation.PackageSource(compute, source, wheels),
+            len(plan.packages) if plan is not None else 0,
+        )
         asking.forget(("size", str(folder)))
         jobs.start_worker("", "install", task, lambda: accept(environment.python_of(folder)))
 
@@ -59,9 +67,11 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return (cls.allowed(jobs.of("") is None, "The solver is being installed: wait for it, or click Cancel")
-                and cls.allowed(preferences.environment_folder().is_dir(),
-                                "Install Solver has made no folder on this machine"))
+        return cls.allowed(
+            jobs.of("") is None, "The solver is being installed: wait for it, or click Cancel"
+        ) and cls.allowed(
+            preferences.environment_folder().is_dir(), "Install Solver has made no folder on this machine"
+        )
 
     @staticmethod
     def tell() -> tuple[str, ...] | None:
@@ -70,8 +80,10 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
         if size is None:
             asking.find_answer(("size", str(folder)), lambda task: measure(task, folder), "remove_solver")
             return None
-        return (iface_("Deletes {} and frees {}.").format(folder, index.gigabytes(size)),
-                "Captures, masks and maps stay; what pip keeps in its own cache stays, too.")
+        return (
+            iface_("Deletes {} and frees {}.").format(folder, index.gigabytes(size)),
+            "Captures, masks and maps stay; what pip keeps in its own cache stays, too.",
+        )
 
     def work(self, context):
         folder = preferences.environment_folder()
@@ -97,11 +109,14 @@ def describe_plan(plan: index.InstallationPlan, compute: str, folder: Path, free
     The dialog's lines.
     """
     torch, others = plan.packages.get("torch", ""), len(plan.packages) - 1
-    return (iface_("PyTorch {} for {} and {} more packages.").format(torch, iface_(COMPUTES[compute]), others),
-            iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
-            iface_("{} on disk in {}, where {} are free.").format(
-                index.gigabytes(plan.disk), folder, index.gigabytes(free)),
-            "You can go on working meanwhile, cancel, and continue later.")
+    return (
+        iface_("PyTorch {} for {} and {} more packages.").format(torch, iface_(COMPUTES[compute]), others),
+        iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
+        iface_("{} on disk in {}, where {} are free.").format(
+            index.gigabytes(plan.disk), folder, index.gigabytes(free)
+        ),
+        "You can go on working meanwhile, cancel, and continue later.",
+    )
 
 
 def chosen_packages() -> tuple[str, str, Path | None]:
@@ -109,8 +124,9 @@ def chosen_packages() -> tuple[str, str, Path | None]:
     here, and while Blender is to stay off a network that is needed."""
     source = preferences.get().packages
     if source != 'folder':
-        preferences.require_online("choose A Folder of Wheels under Packages From, or use a Python that has the "
-                                   "packages already")
+        preferences.require_online(
+            "choose A Folder of Wheels under Packages From, or use a Python that has the packages already"
+        )
     return pip_steps.compute_of(preferences.get().compute), source, preferences.wheels_folder()
 
 

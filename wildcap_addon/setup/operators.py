@@ -30,8 +30,9 @@ class WILDCAP_OT_use_python(FileOperator, bpy.types.Operator):
     def work(self, context):
         python = interpreter(Path(bpy.path.abspath(self.filepath)))
         if self.options.is_invoke:
-            jobs.start_worker("", "ask", BackgroundTask("setup", lambda task: try_out(task, python)),
-                              lambda: checking.accept(python))
+            jobs.start_worker(
+                "", "ask", BackgroundTask("setup", lambda task: try_out(task, python)), lambda: checking.accept(python)
+            )
         else:  # a script waits for the answer
             checking.judge(python, importing=False)
             preferences.set_python(python)
@@ -48,8 +49,9 @@ def interpreter(path: Path) -> Path:
     for candidate in (path, environment.python_of(path), path / "python.exe"):
         if candidate.is_file() and os.access(candidate, os.X_OK):
             return candidate
-    raise Problem(f"There is no Python at {path}.",
-                  "Choose the python file itself, or the folder of a virtual environment.")
+    raise Problem(
+        f"There is no Python at {path}.", "Choose the python file itself, or the folder of a virtual environment."
+    )
 
 
 CLASSES = (WILDCAP_OT_use_python,)

@@ -25,10 +25,13 @@ class WILDCAP_OT_self_test(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return (cls.allowed(preferences.python() is not None, "There is no solver to test yet: click Install Solver")
-                and cls.allowed(jobs.of("") is None, "The solver is being set up: wait for it, or click Cancel")
-                and cls.allowed(not jobs.elsewhere(""),
-                                "The solver is at work: wait for it, so that the seconds mean something"))
+        return (
+            cls.allowed(preferences.python() is not None, "There is no solver to test yet: click Install Solver")
+            and cls.allowed(jobs.of("") is None, "The solver is being set up: wait for it, or click Cancel")
+            and cls.allowed(
+                not jobs.elsewhere(""), "The solver is at work: wait for it, so that the seconds mean something"
+            )
+        )
 
     def work(self, context):
         preferences.get().tested = ""
@@ -41,12 +44,15 @@ class WILDCAP_OT_self_test(BaseOperator, bpy.types.Operator):
 def tell(figures: dict) -> None:
     """Shows how the test went, and keeps it in the preferences."""
     said = iface_("The solver works: {} dB where {} or more were expected, in {} s.").format(
-        *(f"{figures[name]:.1f}" for name in ("score_db", "expected_db")), f"{figures['seconds']:.0f}")
+        *(f"{figures[name]:.1f}" for name in ("score_db", "expected_db")), f"{figures['seconds']:.0f}"
+    )
     preferences.get().tested = said
-    problems.show("",
-                  problems.Notice(said,
-                                  "The sample head was solved again on this machine, and compared with the one that is "
-                                  "shipped."))
+    problems.show(
+        "",
+        problems.Notice(
+            said, "The sample head was solved again on this machine, and compared with the one that is shipped."
+        ),
+    )
 
 
 CLASSES = (WILDCAP_OT_self_test,)

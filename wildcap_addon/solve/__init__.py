@@ -9,7 +9,8 @@ from . import eyedropper, live, operators, panel, preview, white_card
 
 RESULTS = incoming.Results(live.take, live.waits)
 _register, _unregister = bpy.utils.register_classes_factory(
-    (*operators.CLASSES, *eyedropper.CLASSES, *white_card.CLASSES, *panel.CLASSES))
+    (*operators.CLASSES, *eyedropper.CLASSES, *white_card.CLASSES, *panel.CLASSES)
+)
 
 
 def register():

@@ -26,14 +26,16 @@ class WILDCAP_OT_pick_skin_tone(BaseOperator, bpy.types.Operator):
     bl_label = "Pick Skin Tone"
     bl_options = {'REGISTER', 'UNDO'}
 
-    uv: bpy.props.FloatVectorProperty(name="UV", size=2,
-                                      description="Where on the texture to look; a click in the 3D view says it")
+    uv: bpy.props.FloatVectorProperty(
+        name="UV", size=2, description="Where on the texture to look; a click in the 3D view says it"
+    )
 
     @classmethod
     def poll(cls, context):
         item = captures.active(context)
         return cls.with_capture(context) and cls.allowed(
-            captures.head(context, item) is not None, "The head is not in this scene: click Bring In Head")
+            captures.head(context, item) is not None, "The head is not in this scene: click Bring In Head"
+        )
 
     def invoke(self, context, event):
         context.window.cursor_modal_set('EYEDROPPER')
@@ -45,8 +47,9 @@ class WILDCAP_OT_pick_skin_tone(BaseOperator, bpy.types.Operator):
             context.window.cursor_modal_restore()
             return {'CANCELLED'}
         if event.type != 'LEFTMOUSE' or event.value != 'PRESS':
-            return {'PASS_THROUGH' if event.type in ('MIDDLEMOUSE', 'WHEELUPMOUSE', 'WHEELDOWNMOUSE')
-                    else 'RUNNING_MODAL'}
+            return {
+                'PASS_THROUGH' if event.type in ('MIDDLEMOUSE', 'WHEELUPMOUSE', 'WHEELDOWNMOUSE') else 'RUNNING_MODAL'
+            }
         context.window.cursor_modal_restore()
         uv = uv_under(context.window, event, captures.require_head(context, captures.require(context)))
         if uv is None:
@@ -65,13 +68,17 @@ def uv_under(window, event, head) -> tuple[float, float] | None:
     """Where on the texture the mouse points, in whichever 3D view it is over."""
     for area in window.screen.areas:
         region = next((r for r in area.regions if r.type == 'WINDOW'), None)
-        if area.type != 'VIEW_3D' or not (0 <= event.mouse_x - region.x < region.width
-                                          and 0 <= event.mouse_y - region.y < region.height):
+        if area.type != 'VIEW_3D' or not (
+            0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
+        ):
             continue
         at = event.mouse_x - region.x, event.mouse_y - region.y
         region_3d = area.spaces.active.region_3d
-        return uv_on(head, view3d_utils.region_2d_to_origin_3d(region, region_3d, at),
-                     view3d_utils.region_2d_to_vector_3d(region, region_3d, at))
+        return uv_on(
+            head,
+            view3d_utils.region_2d_to_origin_3d(region, region_3d, at),
+            view3d_utils.region_2d_to_vector_3d(region, region_3d, at),
+        )
     return None
 
 
@@ -88,8 +95,10 @@ def uv_on(head, origin: Vector, direction: Vector) -> tuple[float, float] | None
     for triangle in (t for t in mesh.loop_triangles if t.polygon_index == face):
         corners = [mesh.vertices[v].co for v in triangle.vertices]
         weights = barycentric_transform(point, *corners, Vector((1, 0, 0)), Vector((0, 1, 0)), Vector((0, 0, 1)))
-        uv = sum((w * mesh.uv_layers[0].data[loop].uv for w, loop in zip(weights, triangle.loops, strict=True)),
-                 Vector((0, 0)))
+        uv = sum(
+            (w * mesh.uv_layers[0].data[loop].uv for w, loop in zip(weights, triangle.loops, strict=True)),
+            Vector((0, 0)),
+        )
         candidates.append((min(weights), tuple(uv)))
     u, v = max(candidates)[1]  # the one triangle of the polygon that the point is inside of
     return (u, v) if 0 <= u <= 1 and 0 <= v <= 1 else None
@@ -101,8 +110,10 @@ def shown_image(head) -> bpy.types.Image:
     node = material.node_tree.nodes.active if material is not None and material.node_tree is not None else None
     image = getattr(node, "image", None)
     if image is None or not image.size[0]:
-        raise Problem("The head shows no texture to pick from.",
-                      "Click Bring In Head or Assemble Material, or set the colour by hand.")
+        raise Problem(
+            "The head shows no texture to pick from.",
+            "Click Bring In Head or Assemble Material, or set the colour by hand.",
+        )
     return image
 
 
@@ -112,12 +123,13 @@ def colour_at(image: bpy.types.Image, uv) -> tuple[float, float, float]:
     column, row = int(uv[0] * width), int(uv[1] * height)  # Blender's rows go up
     reach = max(1, round(PATCH_SIDE_SHARE * width))
     top, left = max(0, row - reach), max(0, column - reach)
-    patch = read_pixels(image)[top:row + reach + 1, left:column + reach + 1, :3]
+    patch = read_pixels(image)[top : row + reach + 1, left : column + reach + 1, :3]
     if not image.is_float:  # bytes are as in the file, sRGB; float images are in the scene's working space already
         patch = np.where(patch <= 0.04045, patch / 12.92, ((patch + 0.055) / 1.055) ** 2.4)
     mean = colours.from_working(patch.mean((0, 1))) if image.is_float else patch.mean((0, 1))
-    return tuple(float(c)
-                 for c in np.where(mean <= 0.0031308, 12.92 * mean, 1.055 * np.clip(mean, 0, 1) ** (1 / 2.4) - 0.055))
+    return tuple(
+        float(c) for c in np.where(mean <= 0.0031308, 12.92 * mean, 1.055 * np.clip(mean, 0, 1) ** (1 / 2.4) - 0.055)
+    )
 
 
 CLASSES = (WILDCAP_OT_pick_skin_tone,)

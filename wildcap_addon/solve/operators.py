@@ -37,8 +37,9 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
         if not jobs.can_start(cls, context):
             return False
         known = status.of(captures.active(context))
-        return (cls.allowed(known is not None, "Looking at the capture ...")
-                and cls.allowed(not known.whole_solve, f"{known.whole_solve} Click Solve for the whole map"))
+        return cls.allowed(known is not None, "Looking at the capture ...") and cls.allowed(
+            not known.whole_solve, f"{known.whole_solve} Click Solve for the whole map"
+        )
 
     def work(self, context):
         begin(context, captures.require(context), edited_part=True)

@@ -53,7 +53,7 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("wildcap.solve")
         row.operator("wildcap.solve_edited")
-        for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1:]:
+        for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1 :]:
             if stage.name != "transfer":  # it stands under Deliver
                 draw_settings(layout, item, stage, without=("skin_tone", "white_point", "together"))
 
@@ -61,16 +61,23 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
 def tone_words(item, known: status.Status | None) -> str:
     """Where the skin tone comes from and how sure it is."""
     if not item.use_skin_tone:
-        findings = [finding for finding in (known.findings if known else ())
-                    if finding["stage"] == "solve" and not finding["stopped"]]
-        return (" ".join(iface_(findings[-1][part]) for part in ("problem", "remedy")) if findings
-                else iface_("Estimated from the frames when the maps are solved"))
+        findings = [
+            finding
+            for finding in (known.findings if known else ())
+            if finding["stage"] == "solve" and not finding["stopped"]
+        ]
+        return (
+            " ".join(iface_(findings[-1][part]) for part in ("problem", "remedy"))
+            if findings
+            else iface_("Estimated from the frames when the maps are solved")
+        )
     if max(abs(a - b) for a, b in zip(item.skin_tone, item.estimated_tone, strict=True)) > 1e-4:
         return iface_("Chosen by you: this wins")
     if item.tone_source != "white point":
         return " ".join(map(iface_, describe_estimate(item.tone_deviation)))
-    return iface_("{}, ± {} L*, by {}").format(iface_(item.tone_group), round(item.tone_deviation),
-                                               iface_(item.tone_source))
+    return iface_("{}, ± {} L*, by {}").format(
+        iface_(item.tone_group), round(item.tone_deviation), iface_(item.tone_source)
+    )
 
 
 def _draw_white_point(layout, item) -> None:

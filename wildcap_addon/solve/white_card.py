@@ -42,9 +42,9 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
     bl_label = "Pick White Point"
     bl_options = {'REGISTER', 'UNDO'}
 
-    card: bpy.props.EnumProperty(name="Card",
-                                 items=[('grey', "Grey Card", "Of 18 percent"),
-                                        ('white', "White Paper", "Plain paper, not glossy")])
+    card: bpy.props.EnumProperty(
+        name="Card", items=[('grey', "Grey Card", "Of 18 percent"), ('white', "White Paper", "Plain paper, not glossy")]
+    )
     frame: bpy.props.StringProperty(name="Frame", description="Name of the frame's file")
     uv: bpy.props.FloatVectorProperty(name="UV", size=2, description="Where on the frame to look; a click says it")
 
@@ -81,8 +81,9 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
             return
         path = captures.folder(item).frames / self.frame
         if not self.frame or not path.is_file():
-            raise Problem("There is no such frame in this capture.",
-                          "Click Reconstruct first: the frames come with it.")
+            raise Problem(
+                "There is no such frame in this capture.", "Click Reconstruct first: the frames come with it."
+            )
         if not all(0 <= c < 1 for c in self.uv):
             raise Problem("That click was outside the frame: nothing was measured.", "Click on the card.")
         image = bpy.data.images.load(str(path))
@@ -91,8 +92,10 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
         finally:
             bpy.data.images.remove(image)
         if colour.max() > BURNT_SRGB or colour.min() < BLACK_SRGB:
-            raise Problem("The card is burnt out or black there.",
-                          "Choose another frame or place, or a grey card instead of white paper.")
+            raise Problem(
+                "The card is burnt out or black there.",
+                "Choose another frame or place, or a grey card instead of white paper.",
+            )
         linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4) / CARDS[self.card]
         set_white(captures.root(item), linear.tolist())
 

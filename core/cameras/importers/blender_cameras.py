@@ -26,8 +26,10 @@ def read(text: str, name: str) -> list[Calibrated]:
     except ValueError as error:
         raise Problem(f"{name} is damaged ({error}).", "Write the cameras from Blender again.") from error
     if not isinstance(record, dict) or not isinstance(record.get("cameras"), list):
-        raise Problem(f"{name} is a JSON file, but not a list of Blender's cameras.",
-                      "Write the cameras from Blender's scene with the add-on.")
+        raise Problem(
+            f"{name} is a JSON file, but not a list of Blender's cameras.",
+            "Write the cameras from Blender's scene with the add-on.",
+        )
     cameras = []
     for index, camera in enumerate(record["cameras"]):
         label = str(camera.get("name", camera.get("frame", index))) if isinstance(camera, dict) else str(index)
@@ -38,8 +40,11 @@ def read(text: str, name: str) -> list[Calibrated]:
             matrix = np.array(camera["matrix_world"], float).reshape(4, 4) @ np.diag([1.0, -1.0, -1.0, 1.0])
             frame = int(camera["frame"]) if "frame" in camera else trailing_number(label)
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise Problem(f"Camera {label} in {name} is incomplete ({error}).",
-                          "Each camera needs matrix_world and, once or for each, width, height, focal_px.") from error
-        cameras.append(Calibrated(label, frame, "PINHOLE", (focal, focal, *centre), width, height,
-                                  *rigid(matrix, label)))
+            raise Problem(
+                f"Camera {label} in {name} is incomplete ({error}).",
+                "Each camera needs matrix_world and, once or for each, width, height, focal_px.",
+            ) from error
+        cameras.append(
+            Calibrated(label, frame, "PINHOLE", (focal, focal, *centre), width, height, *rigid(matrix, label))
+        )
     return cameras

@@ -52,8 +52,11 @@ def grow_beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random
 
 def beard_density(kind: str, on: Canvas, rng: np.random.Generator) -> np.ndarray:
     """Where it grows on a canvas, [N] in [0, 1], with the gaps that beards have."""
-    region = (_moustache(on) if kind == "moustache"
-              else np.maximum(beard_region(on), 0.9 * _sideburns(on) * (1 - regions(on)["ears"])))
+    region = (
+        _moustache(on)
+        if kind == "moustache"
+        else np.maximum(beard_region(on), 0.9 * _sideburns(on) * (1 - regions(on)["ears"]))
+    )
     patchy = on.soft(lambda at: octaves(at, [16.0, 9.0], rng, smooth=True))
     return np.clip(region * (1.05 + 0.15 * patchy) - 0.05, 0, 1)
 
@@ -63,8 +66,11 @@ def beard_region(on: Canvas) -> np.ndarray:
     ears, down to below the jaw."""
     x, y, z = np.abs(on.position[:, 0]), on.position[:, 1], on.position[:, 2]
     nose, corner, chin, ear = (on.landmarks[mark] for mark in (2, 291, 152, 454))
-    line = np.interp(x, [0, 13, 24, 36, 52, ear[0]],
-                     [nose[2] + 1, nose[2] - 2, nose[2] - 2, corner[2] + 15, corner[2] + 25, ear[2] - 5])
+    line = np.interp(
+        x,
+        [0, 13, 24, 36, 52, ear[0]],
+        [nose[2] + 1, nose[2] - 2, nose[2] - 2, corner[2] + 15, corner[2] + 25, ear[2] - 5],
+    )
     jaw = np.interp(y, [chin[1], ear[1] - 10], [chin[2] - 10, corner[2] - 22])
     below, before = np.clip((line - z) / 9 + 0.4, 0, 1), np.clip((ear[1] + 4 - y) / 8, 0, 1)
     soft = below * before * np.clip((z - jaw) / 14 + 0.5, 0, 1)
@@ -81,9 +87,12 @@ def _moustache(on: Canvas) -> np.ndarray:
 
 def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:
     """Closeness [N] in [0, 1] to the lines before the ears."""
-    lines = [on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a]) for side in SIDEBURNS
-             for a, b in zip(side, side[1:], strict=False)
-             for t in np.linspace(0, 1, 6)]
+    lines = [
+        on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a])
+        for side in SIDEBURNS
+        for a, b in zip(side, side[1:], strict=False)
+        for t in np.linspace(0, 1, 6)
+    ]
     forward = np.array([0, -9.0, 0])
     square = np.min([((on.position - at - forward) ** 2).sum(1) for at in lines], axis=0)
     return np.exp(-0.5 * square / radius**2).astype(np.float32)

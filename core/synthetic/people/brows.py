@@ -38,10 +38,15 @@ def grow_brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random
     count = len(roots.at)
     tail = np.clip(np.abs(roots.at[:, 0]) / np.abs(on.landmarks[[70, 300], 0]).mean(), 0, 1.2)
     length = rng.uniform(0.0045, 0.0085, count) * (1.05 - 0.25 * tail)
-    points = grow(roots, length, rng.normal(0.32, 0.1, count).clip(0.05), skin, -0.35 * roots.normal,
-                  np.full(count, 0.0003), 6)
-    return Strands(points, np.full(count, RADIUS_M, np.float32),
-                   coloured(count, np.asarray(person.brow_colour), 0.4 * person.grey, rng), "brows")
+    points = grow(
+        roots, length, rng.normal(0.32, 0.1, count).clip(0.05), skin, -0.35 * roots.normal, np.full(count, 0.0003), 6
+    )
+    return Strands(
+        points,
+        np.full(count, RADIUS_M, np.float32),
+        coloured(count, np.asarray(person.brow_colour), 0.4 * person.grey, rng),
+        "brows",
+    )
 
 
 def grow_lashes(person: Person, head: OpenHead, rng: np.random.Generator) -> Strands:
@@ -72,5 +77,6 @@ def grow_lashes(person: Person, head: OpenHead, rng: np.random.Generator) -> Str
 def _bowed(roots: Roots, length: np.ndarray, bow: np.ndarray, steps: int = 6) -> np.ndarray:
     """Points [M, steps, 3] along the roots' directions, bent by `bow` [3] (a share of the length at the tip)."""
     t = np.linspace(0, 1, steps)[None, :, None]
-    return (roots.position[:, None] + length[:, None, None]
-            * (t * roots.direction[:, None] + t**2 * bow)).astype(np.float32)
+    return (roots.position[:, None] + length[:, None, None] * (t * roots.direction[:, None] + t**2 * bow)).astype(
+        np.float32
+    )

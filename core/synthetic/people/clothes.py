@@ -17,12 +17,22 @@ COLLAR_Z = -0.160  # of the shirt's upper edge, higher where the neck is cut off
 OVER_CUT = 0.008  # that the edge is above the neck's cut
 LOWER_THAN_FACE = -0.09
 # metres: wider than the neck at the sides, deeper than it, drop at the sides, drop in front and behind
-PROFILE = np.array([
-    (-0.005, -0.005, 0.030, 0.030), (0.000, 0.000, -0.003, -0.003), (0.003, 0.003, -0.004, -0.004),
-    (0.005, 0.005, 0.002, 0.002), (0.006, 0.006, 0.014, 0.014),
-    (0.020, 0.015, 0.022, 0.028), (0.050, 0.030, 0.036, 0.050), (0.090, 0.040, 0.052, 0.080),
-    (0.125, 0.046, 0.070, 0.110), (0.145, 0.050, 0.100, 0.150),
-    (0.150, 0.055, 0.170, 0.220), (0.150, 0.055, 0.300, 0.320)])
+PROFILE = np.array(
+    [
+        (-0.005, -0.005, 0.030, 0.030),
+        (0.000, 0.000, -0.003, -0.003),
+        (0.003, 0.003, -0.004, -0.004),
+        (0.005, 0.005, 0.002, 0.002),
+        (0.006, 0.006, 0.014, 0.014),
+        (0.020, 0.015, 0.022, 0.028),
+        (0.050, 0.030, 0.036, 0.050),
+        (0.090, 0.040, 0.052, 0.080),
+        (0.125, 0.046, 0.070, 0.110),
+        (0.145, 0.050, 0.100, 0.150),
+        (0.150, 0.055, 0.170, 0.220),
+        (0.150, 0.055, 0.300, 0.320),
+    ]
+)
 ROWS = 44
 
 
@@ -31,8 +41,9 @@ def shirt(person: Person, head: Mesh) -> Mesh:
     rng = np.random.default_rng([person.seed, 67])
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
     front = np.clip(-np.sin(turn), 0, 1)  # sin = -1 towards the face
-    edge = np.maximum(COLLAR_Z - (0.010 * front**2 if person.collar == "crew" else 0.018 * front**4),
-                      _cut(head, turn) + OVER_CUT)
+    edge = np.maximum(
+        COLLAR_Z - (0.010 * front**2 if person.collar == "crew" else 0.018 * front**4), _cut(head, turn) + OVER_CUT
+    )
     radius = _neck(head, turn, edge)
     at = np.linspace(0, len(PROFILE) - 1, ROWS)
     side, deep, low, ahead = (np.interp(at, np.arange(len(PROFILE)), column)[:, None] for column in PROFILE.T)

@@ -18,8 +18,9 @@ EYES = ((33, 133), (362, 263))
 RIMS = 0.1
 
 
-def paint_backdrop(directions: np.ndarray, environment: Environment, light: float,
-                   rng: np.random.Generator) -> np.ndarray:
+def paint_backdrop(
+    directions: np.ndarray, environment: Environment, light: float, rng: np.random.Generator
+) -> np.ndarray:
     """What is behind the person: the panorama out of focus, or walls and cloth of any colour, with or without things
     before them.
 
@@ -49,14 +50,25 @@ def paint_backdrop(directions: np.ndarray, environment: Environment, light: floa
             ground = ground * np.clip(blobs, 0.1, 5)
     if rng.random() < 0.6:
         for _ in range(int(rng.integers(1, 14))):
-            ground = _thing(ground, rng.uniform(-0.1, 1.1, 2) * size,
-                            np.exp(rng.uniform(np.log(0.02), np.log(0.4))) * size, light, rng)[0]
+            ground = _thing(
+                ground,
+                rng.uniform(-0.1, 1.1, 2) * size,
+                np.exp(rng.uniform(np.log(0.02), np.log(0.4))) * size,
+                light,
+                rng,
+            )[0]
     blur = np.exp(rng.uniform(np.log(0.4), np.log(9.0)))
     return cv2.GaussianBlur(np.maximum(ground, 0), (0, 0), blur)
 
 
-def cover_person(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light: float,
-                 rng: np.random.Generator, rims: float = RIMS) -> tuple[np.ndarray, np.ndarray]:
+def cover_person(
+    radiance: np.ndarray,
+    shares: np.ndarray,
+    landmarks: np.ndarray,
+    light: float,
+    rng: np.random.Generator,
+    rims: float = RIMS,
+) -> tuple[np.ndarray, np.ndarray]:
     """Things before the person, a hat or the rims of glasses, now and then: they are background.
 
     Parameters
@@ -81,8 +93,14 @@ def cover_person(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray
     if rng.random() < 0.08:
         crown, chin = landmarks[10], landmarks[152]
         up = (crown - chin) / max(np.linalg.norm(crown - chin), 1e-6)
-        radiance, over = _thing(radiance, crown + up * face * rng.uniform(0.15, 0.6), face * rng.uniform(0.4, 0.75),
-                                light, rng, kind="ellipse")
+        radiance, over = _thing(
+            radiance,
+            crown + up * face * rng.uniform(0.15, 0.6),
+            face * rng.uniform(0.4, 0.75),
+            light,
+            rng,
+            kind="ellipse",
+        )
         hidden = np.maximum(hidden, over)
     if rng.random() < rims:
         radiance, over = _glasses(radiance, landmarks, light, rng)
@@ -92,8 +110,9 @@ def cover_person(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray
     return radiance, shares
 
 
-def open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray,
-               rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def open_mouth(
+    albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """A mouth that stands open on a quarter of the people: dark, with teeth or without; it belongs to the lips.
 
     Parameters
@@ -119,9 +138,17 @@ def open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray,
     lower = middle + np.cos(turn)[:, None] * half + np.sin(turn)[:, None] * down * gape
     upper = middle - np.cos(turn)[:, None] * half - np.sin(turn)[:, None] * down * gape * rng.uniform(0.0, 0.5)
     opening = _filled(size, np.concatenate([lower, upper]))
-    teeth = _filled(size,
-                    np.concatenate([middle + np.cos(turn)[:, None] * half * 0.9 + np.sin(turn)[:, None] * down * gape
-                                    * rng.uniform(0.2, 0.8), upper]))
+    teeth = _filled(
+        size,
+        np.concatenate(
+            [
+                middle
+                + np.cos(turn)[:, None] * half * 0.9
+                + np.sin(turn)[:, None] * down * gape * rng.uniform(0.2, 0.8),
+                upper,
+            ]
+        ),
+    )
     teeth = teeth * opening * (rng.random() < 0.75)
     there = 1 - shares[..., -1]
     inner = np.float32([0.03, 0.012, 0.01]) * np.float32(rng.uniform(0.3, 2.5))
@@ -132,8 +159,9 @@ def open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray,
     return albedo * (1 - share) + colour * share, shares * (1 - share) + lips * share
 
 
-def _thing(ground: np.ndarray, at: np.ndarray, reach: float, light: float, rng: np.random.Generator,
-           kind: str = "") -> tuple[np.ndarray, np.ndarray]:
+def _thing(
+    ground: np.ndarray, at: np.ndarray, reach: float, light: float, rng: np.random.Generator, kind: str = ""
+) -> tuple[np.ndarray, np.ndarray]:
     """One thing drawn onto a picture, and where it is [S, S]."""
     size = len(ground)
     kind = kind or str(rng.choice(["ellipse", "polygon", "bar"]))
@@ -148,17 +176,28 @@ def _thing(ground: np.ndarray, at: np.ndarray, reach: float, light: float, rng: 
         outline = at + np.stack([along * np.cos(turn), across * np.sin(turn)], 1) @ np.array([[c, s], [-s, c]])
     where = cv2.GaussianBlur(_filled(size, outline), (0, 0), rng.uniform(0.3, 1.5))
     drawn = rng.random()
-    colour = (SKINS[rng.integers(len(SKINS))] if drawn < 0.25 else BROWS[rng.integers(len(BROWS))] if drawn < 0.4
-              else rng.uniform(0.01, 0.9, 3))
-    texture = np.exp(cv2.resize(rng.normal(0, rng.uniform(0.05, 0.5), (24, 24, 1)).astype(np.float32), (size, size),
-                                interpolation=cv2.INTER_CUBIC))[..., None]
+    colour = (
+        SKINS[rng.integers(len(SKINS))]
+        if drawn < 0.25
+        else BROWS[rng.integers(len(BROWS))]
+        if drawn < 0.4
+        else rng.uniform(0.01, 0.9, 3)
+    )
+    texture = np.exp(
+        cv2.resize(
+            rng.normal(0, rng.uniform(0.05, 0.5), (24, 24, 1)).astype(np.float32),
+            (size, size),
+            interpolation=cv2.INTER_CUBIC,
+        )
+    )[..., None]
     shade = np.float32(light * np.exp(rng.normal(-0.2, 0.6)))
     painted = np.asarray(colour, np.float32) * texture * shade
     return ground * (1 - where[..., None]) + painted * where[..., None], where
 
 
-def _glasses(radiance: np.ndarray, landmarks: np.ndarray, light: float,
-             rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _glasses(
+    radiance: np.ndarray, landmarks: np.ndarray, light: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """The rims of a pair of glasses, and where they are [S, S]."""
     size = len(radiance)
     over = np.zeros((size, size), np.uint8)

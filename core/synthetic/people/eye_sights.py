@@ -38,8 +38,17 @@ FAR_DEG, NEAR_DEG = 40.0, 65.0
 SHUT = 0.08
 """Share of the sights with closed lids."""
 EYES, SKIN = PARTS.index("eyes"), PARTS.index("skin")
-IRISES = np.array([[0.010, 0.006, 0.004], [0.035, 0.018, 0.008], [0.09, 0.05, 0.02], [0.10, 0.10, 0.05],
-                   [0.09, 0.14, 0.15], [0.08, 0.14, 0.24], [0.20, 0.24, 0.27]])
+IRISES = np.array(
+    [
+        [0.010, 0.006, 0.004],
+        [0.035, 0.018, 0.008],
+        [0.09, 0.05, 0.02],
+        [0.10, 0.10, 0.05],
+        [0.09, 0.14, 0.15],
+        [0.08, 0.14, 0.24],
+        [0.20, 0.24, 0.27],
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -81,12 +90,17 @@ def see_eye(scene: Scene, left: bool, rng: np.random.Generator) -> EyeSight:
     iris = np.sin(np.minimum(angle, np.pi / 2)) * 1000 * scene.figure.opened.balls[0].radius < IRIS_MM
     ball[on_ball] = np.stack([~iris, iris], 1)
     ball = ball.reshape(SIZE, OVER, SIZE, OVER, 2).mean((1, 3))
-    return EyeSight(unlit.trace_unlit(scene, view, rng, OVER), np.round(255 * ball).astype(np.uint8),
-                    view.project(ends)[0].astype(np.float32), left)
+    return EyeSight(
+        unlit.trace_unlit(scene, view, rng, OVER),
+        np.round(255 * ball).astype(np.uint8),
+        view.project(ends)[0].astype(np.float32),
+        left,
+    )
 
 
-def photograph_eye(sight: EyeSight, rng: np.random.Generator,
-                   panoramas: list[np.ndarray] = ()) -> tuple[np.ndarray, np.ndarray]:
+def photograph_eye(
+    sight: EyeSight, rng: np.random.Generator, panoramas: list[np.ndarray] = ()
+) -> tuple[np.ndarray, np.ndarray]:
     """An sRGB picture [S, S, 3] of an eye and how much of a pixel is white and iris [S, S, 2], float32 in [0, 1]."""
     ball = sight.ball.astype(np.float32) / 255
     albedo = images.srgb_to_linear(sight.unlit.albedo.astype(np.float32) / 255)
@@ -111,8 +125,9 @@ def save(path: Path, sight: EyeSight) -> None:
 
 def load(path: Path) -> EyeSight:
     with np.load(path, allow_pickle=False) as stored:
-        return EyeSight(unlit.load(path.with_suffix(".unlit.npz")), stored["ball"], stored["corners"],
-                        bool(stored["left"]))
+        return EyeSight(
+            unlit.load(path.with_suffix(".unlit.npz")), stored["ball"], stored["corners"], bool(stored["left"])
+        )
 
 
 def _around(far: View, ends: np.ndarray) -> View:
@@ -123,8 +138,9 @@ def _around(far: View, ends: np.ndarray) -> View:
     frontal = focal * np.linalg.norm(ends[1] - ends[0]) / depth.mean()
     enlarged = SIZE / (SPAN * max(np.linalg.norm(pixels[1] - pixels[0]), 0.6 * frontal))
     shift = SIZE / 2 - enlarged * (pixels.mean(0) - at)
-    camera = pycolmap.Camera(model="PINHOLE", width=SIZE, height=SIZE,
-                             params=[enlarged * focal, enlarged * focal, *shift])
+    camera = pycolmap.Camera(
+        model="PINHOLE", width=SIZE, height=SIZE, params=[enlarged * focal, enlarged * focal, *shift]
+    )
     return View("", Path(), camera, far.rotation, far.translation, True)
 
 
@@ -143,22 +159,26 @@ def _coloured(albedo: np.ndarray, ball: np.ndarray, corners: np.ndarray, rng: np
     if rng.random() < 0.4 and opening.any():
         width = float(np.linalg.norm(corners[1] - corners[0]))
         off = cv2.distanceTransform(1 - opening, cv2.DIST_L2, 3) / width
-        y = np.mgrid[0:len(ball), 0:len(ball)][0]
-        line = np.exp(-(off / rng.uniform(0.02, 0.10)) ** 2)
+        y = np.mgrid[0 : len(ball), 0 : len(ball)][0]
+        line = np.exp(-((off / rng.uniform(0.02, 0.10)) ** 2))
         sides = np.where(y < np.average(y, weights=opening), 1.0, float(rng.random() < 0.3))
         tint = rng.uniform(1.0, 3.5) * np.exp(rng.normal(0, 0.15, 3))
         log -= (line * sides * lids)[..., None] * tint
     return np.clip(albedo * np.exp(log), 0.002, 0.92).astype(np.float32)
 
 
-def _with_reflections(radiance: np.ndarray, ball: np.ndarray, width: float, light: float,
-                      rng: np.random.Generator) -> np.ndarray:
+def _with_reflections(
+    radiance: np.ndarray, ball: np.ndarray, width: float, light: float, rng: np.random.Generator
+) -> np.ndarray:
     """What a wet ball mirrors: a window with its bars, lamps."""
     seen = ball.sum(-1)
     if seen.max() < 0.5:
         return radiance
-    middle = np.average(np.indices(seen.shape).reshape(2, -1).T[:, ::-1], axis=0,
-                        weights=(ball[..., 1] + 0.05 * ball[..., 0]).ravel() + 1e-9)
+    middle = np.average(
+        np.indices(seen.shape).reshape(2, -1).T[:, ::-1],
+        axis=0,
+        weights=(ball[..., 1] + 0.05 * ball[..., 0]).ravel() + 1e-9,
+    )
     glare = np.zeros_like(seen)
     for _ in range(rng.integers(0, 4)):
         at = middle + rng.normal(0, 0.12 * width, 2)

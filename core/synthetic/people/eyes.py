@@ -34,11 +34,13 @@ def paint_eyes(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512)
     rim = np.arcsin(IRIS_MM / (1000 * ball_radius))
     pupil = rim * rng.uniform(0.36, 0.52)
     inward = np.clip((angle - pupil) / (rim - pupil), 0, 1)  # 0 at the pupil ... 1 at the rim
-    fibres = sum(np.interp(turn, np.linspace(-np.pi, np.pi, n), np.append(v := rng.normal(size=n - 1), v[0]))
-                 for n in (60, 140, 260)) / np.sqrt(3)
+    fibres = sum(
+        np.interp(turn, np.linspace(-np.pi, np.pi, n), np.append(v := rng.normal(size=n - 1), v[0]))
+        for n in (60, 140, 260)
+    ) / np.sqrt(3)
     rough = gaussian_filter(rng.normal(size=(size, size)), 3) * 8
     light = np.exp(0.22 * fibres * (1 - 0.5 * inward) + 0.10 * rough)
-    light = light * (1 + 0.35 * np.exp(-((inward - 0.25) / 0.15) ** 2))
+    light = light * (1 + 0.35 * np.exp(-(((inward - 0.25) / 0.15) ** 2)))
     coloured = np.asarray(iris) * (light * (1 - 0.65 * _step(inward, 0.93, 0.10)))[..., None]
     coloured = coloured * (1 - 0.97 * (1 - _step(angle, pupil, 0.025)))[..., None] + 0.002
     vessel = np.clip(gaussian_filter(rng.normal(size=(size, size)), 1.2) * 4 - 0.9, 0, 1)

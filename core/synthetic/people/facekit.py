@@ -20,10 +20,76 @@ from scipy.spatial import cKDTree
 from ...face import template
 
 FACE_AND_HEAD = 11144  # its first vertices; sockets, teeth, eyes and lashes follow
-OURS = (162, 234, 93, 58, 172, 136, 149, 148, 152, 377, 378, 365, 397, 288, 323, 454, 389, 71, 63, 105, 66, 107, 336,
-        296, 334, 293, 301, 168, 197, 5, 4, 75,
-        97, 2, 326, 305, 33, 160, 158, 133, 153, 144, 362, 385, 387, 263, 373, 380, 61, 39, 37, 0, 267, 269, 291, 405,
-        314, 17, 84, 181, 78, 82, 13, 312, 308, 317, 14, 87)
+OURS = (
+    162,
+    234,
+    93,
+    58,
+    172,
+    136,
+    149,
+    148,
+    152,
+    377,
+    378,
+    365,
+    397,
+    288,
+    323,
+    454,
+    389,
+    71,
+    63,
+    105,
+    66,
+    107,
+    336,
+    296,
+    334,
+    293,
+    301,
+    168,
+    197,
+    5,
+    4,
+    75,
+    97,
+    2,
+    326,
+    305,
+    33,
+    160,
+    158,
+    133,
+    153,
+    144,
+    362,
+    385,
+    387,
+    263,
+    373,
+    380,
+    61,
+    39,
+    37,
+    0,
+    267,
+    269,
+    291,
+    405,
+    314,
+    17,
+    84,
+    181,
+    78,
+    82,
+    13,
+    312,
+    308,
+    317,
+    14,
+    87,
+)
 """MediaPipe's counterparts of the 68 landmarks; along the jaw they slide, so that those count for the pose only."""
 JAW = 17
 NEIGHBOURS = 8
@@ -39,11 +105,12 @@ def fields(folder: Path) -> np.ndarray:
     mesh = template.load()
     ours = template.landmark_points(mesh)[list(OURS)]
     scale, turn, shift = _similarity(ours, marks)
-    warp = RBFInterpolator(scale * ours[JAW:] @ turn.T + shift, marks[JAW:] - (scale * ours[JAW:] @ turn.T + shift),
-                           smoothing=1e-3)
+    warp = RBFInterpolator(
+        scale * ours[JAW:] @ turn.T + shift, marks[JAW:] - (scale * ours[JAW:] @ turn.T + shift), smoothing=1e-3
+    )
     placed = scale * mesh.vertices @ turn.T + shift
     # centimetres: away from the landmarks the warp knows nothing
-    fade = np.exp(-(cKDTree(marks).query(placed)[0] / 6.0) ** 2)[:, None]
+    fade = np.exp(-((cKDTree(marks).query(placed)[0] / 6.0) ** 2))[:, None]
     distance, nearest = cKDTree(neutral[:FACE_AND_HEAD]).query(placed + fade * warp(placed), NEIGHBOURS)
     weight = 1 / (distance + 0.05)
     weight /= weight.sum(1, keepdims=True)
@@ -55,8 +122,10 @@ def fields(folder: Path) -> np.ndarray:
 
 
 def _vertices(path: Path) -> np.ndarray:
-    return np.array([line.split()[1:4] for line in path.read_text(encoding="ascii").splitlines()
-                     if line.startswith("v ")], np.float64)
+    return np.array(
+        [line.split()[1:4] for line in path.read_text(encoding="ascii").splitlines() if line.startswith("v ")],
+        np.float64,
+    )
 
 
 def _landmarks(path: Path) -> list[int]:

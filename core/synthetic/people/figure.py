@@ -55,9 +55,17 @@ def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = N
     opened = open_lids(head, person.openness if person.openness >= OPENEST else 0.0, np.array(person.gaze))
     skin, seen, growth = paint(person, size)
     cloth = shirt(person, head)
-    return Figure(person, head, opened, cloth, skin, seen,
-                  eyes.paint_eyes(np.array(person.iris), opened.balls[0].radius, person.seed),
-                  growth, grow_hair(person, head, opened, cloth))
+    return Figure(
+        person,
+        head,
+        opened,
+        cloth,
+        skin,
+        seen,
+        eyes.paint_eyes(np.array(person.iris), opened.balls[0].radius, person.seed),
+        growth,
+        grow_hair(person, head, opened, cloth),
+    )
 
 
 def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.ndarray]]:
@@ -90,8 +98,10 @@ def grow_hair(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tupl
     cloth : on which long hair lies
     """
     ground, skin = ground_of(head), SkinSurface(head)
-    strands = [brows.grow_brows(person, ground, skin, _rng(person, 0)),
-               brows.grow_lashes(person, opened, _rng(person, 1))]
+    strands = [
+        brows.grow_brows(person, ground, skin, _rng(person, 0)),
+        brows.grow_lashes(person, opened, _rng(person, 1)),
+    ]
     if person.beard != "none":
         strands.append(beards.grow_beard(person, ground, skin, _rng(person, 2)))
     if person.hair != "none":

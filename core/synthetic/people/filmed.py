@@ -22,8 +22,9 @@ TRACED = f"{__package__}.render"
 """The module that traces every frame's light anew."""
 
 
-def render(work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot, bare: bool = False,
-           module: str = TRACED) -> None:
+def render(
+    work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot, bare: bool = False, module: str = TRACED
+) -> None:
     """Renders a person to work/NNNNN.exr, linear; files that exist are kept.
 
     Parameters
@@ -35,20 +36,35 @@ def render(work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot
     bare : without hair, lashes and clothes
     module : what is run to do the job
     """
-    parts = {"skin": write_skin(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen,
-                                figure.skin.specular, figure.skin.normal)}
+    parts = {
+        "skin": write_skin(
+            work,
+            figure.opened.skin,
+            figure.skin.diffuse if bare else figure.seen,
+            figure.skin.specular,
+            figure.skin.normal,
+        )
+    }
     for side, ball in zip(("left", "right"), figure.opened.balls, strict=True):
         parts[f"{side}_eye"] = _written(work, f"{side}_eye", ball.mesh, "eyes", figure.eye)
     strands = []
     if not bare:
-        parts["shirt"] = _written(work, "shirt", figure.shirt, "cloth",
-                                  np.full((2, 2, 3), figure.person.clothes, np.float32))
+        parts["shirt"] = _written(
+            work, "shirt", figure.shirt, "cloth", np.full((2, 2, 3), figure.person.clothes, np.float32)
+        )
         strands = [_write_strands(work, growth) for growth in figure.strands]
     render_parts(work, figure.person.seed, parts, strands, light, shot, module)
 
 
-def render_parts(work: Path, seed: int, mesh_jobs: dict[str, dict], strands: list[Path], light: scene.SceneLight,
-                 shot: scene.Shot, module: str = TRACED) -> None:
+def render_parts(
+    work: Path,
+    seed: int,
+    mesh_jobs: dict[str, dict],
+    strands: list[Path],
+    light: scene.SceneLight,
+    shot: scene.Shot,
+    module: str = TRACED,
+) -> None:
     """As `render`, of meshes and strands that are files already.
 
     Parameters
@@ -66,17 +82,35 @@ def render_parts(work: Path, seed: int, mesh_jobs: dict[str, dict], strands: lis
         images.write_linear(work / "sky.exr", sky)
         sky = str(work / "sky.exr")
     still = np.tile(np.eye(4), (len(shot.cameras), 1, 1))
-    write_json(work / "job.json", {
-        "seed": seed, "room": shot.room, "meshes": mesh_jobs, "strands": [str(path) for path in strands],
-        "leaves": str(work / "leaves.obj") if light.blockers else None, "suffix": ".exr", "out": str(work),
-        "frames": list(shot.frames), "samples": shot.samples,
-        "cameras": shot.cameras.tolist(), "poses": (still if shot.poses is None else shot.poses).tolist(),
-        "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
-        "lamps": [asdict(lamp) for lamp in light.lamps], "flash": light.flash,
-        "width": round(scene.WIDTH * shot.scale), "height": round(scene.HEIGHT * shot.scale),
-        "focal_px": scene.FOCAL * shot.scale * shot.focal})
-    subprocess.run([sys.executable, "-m", module, str(work / "job.json")], cwd=Path(__file__).parents[3], check=True,
-                   stdout=subprocess.DEVNULL)
+    write_json(
+        work / "job.json",
+        {
+            "seed": seed,
+            "room": shot.room,
+            "meshes": mesh_jobs,
+            "strands": [str(path) for path in strands],
+            "leaves": str(work / "leaves.obj") if light.blockers else None,
+            "suffix": ".exr",
+            "out": str(work),
+            "frames": list(shot.frames),
+            "samples": shot.samples,
+            "cameras": shot.cameras.tolist(),
+            "poses": (still if shot.poses is None else shot.poses).tolist(),
+            "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None,
+            "sky": sky,
+            "lamps": [asdict(lamp) for lamp in light.lamps],
+            "flash": light.flash,
+            "width": round(scene.WIDTH * shot.scale),
+            "height": round(scene.HEIGHT * shot.scale),
+            "focal_px": scene.FOCAL * shot.scale * shot.focal,
+        },
+    )
+    subprocess.run(
+        [sys.executable, "-m", module, str(work / "job.json")],
+        cwd=Path(__file__).parents[3],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
 
 
 def write_skin(work: Path, mesh: Mesh, albedo: np.ndarray, specular: np.ndarray, normal: np.ndarray) -> dict:

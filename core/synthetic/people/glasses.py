@@ -21,8 +21,19 @@ EYES, BRIDGE, SIDES = ((33, 133), (263, 362)), (168, 6), (234, 454)
 KINDS = ("thick", "thin", "half", "rimless", "sunglasses")
 OFTEN = (0.3, 0.35, 0.12, 0.13, 0.1)
 STEPS, OVER = 96, 3  # points of a rim; drawn pixels along a pixel's side
-COLOURS = np.array([[0.006, 0.006, 0.007], [0.02, 0.012, 0.008], [0.09, 0.035, 0.012], [0.45, 0.33, 0.14],
-                    [0.5, 0.5, 0.52], [0.12, 0.12, 0.13], [0.02, 0.04, 0.15], [0.25, 0.02, 0.03], [0.6, 0.55, 0.5]])
+COLOURS = np.array(
+    [
+        [0.006, 0.006, 0.007],
+        [0.02, 0.012, 0.008],
+        [0.09, 0.035, 0.012],
+        [0.45, 0.33, 0.14],
+        [0.5, 0.5, 0.52],
+        [0.12, 0.12, 0.13],
+        [0.02, 0.04, 0.15],
+        [0.25, 0.02, 0.03],
+        [0.6, 0.55, 0.5],
+    ]
+)
 """Linear albedo of black, dark brown, tortoise, gold, silver, gunmetal, blue, red, clear."""
 
 
@@ -74,23 +85,37 @@ def sample_glasses(landmarks: np.ndarray, rng: np.random.Generator, kind: str = 
         share = np.linspace(0, 1, 40)[:, None]
         corner = begin + [side * rng.uniform(0.002, 0.006), 0.004, 0.0]
         bars.append(np.concatenate([[begin], corner + share * (end - corner)]))
-    rim = (np.exp(rng.uniform(*np.log([0.0025, 0.007]))) if kind in ("thick", "sunglasses")
-           else np.exp(rng.uniform(*np.log([0.0008, 0.0025]))))
+    rim = (
+        np.exp(rng.uniform(*np.log([0.0025, 0.007])))
+        if kind in ("thick", "sunglasses")
+        else np.exp(rng.uniform(*np.log([0.0008, 0.0025])))
+    )
     solid = np.ones(STEPS)
     if kind == "half":
         solid = np.clip(0.5 + 3 * (up + 0.2), 0.12, 1)
     if kind == "rimless":
         rim, solid = 0.0012, np.full(STEPS, rng.uniform(0.1, 0.35))
     colour = COLOURS[rng.integers(len(COLOURS))] * np.exp(rng.normal(0, 0.25)) * np.exp(rng.normal(0, 0.08, 3))
-    passes = (rng.uniform(0.86, 0.98) * np.exp(rng.normal(0, 0.02, 3)) if kind != "sunglasses"
-              else rng.uniform(0.03, 0.35) * np.exp(rng.normal(0, 0.2, 3)))
-    return Glasses(rims, tuple(bars), float(rim),
-                   float(max(0.0011, rim * rng.uniform(0.6, 1.1)) if kind != "rimless" else rng.uniform(0.001, 0.002)),
-                   solid, np.clip(colour, 0.003, 0.85), float(rng.random()), passes)
+    passes = (
+        rng.uniform(0.86, 0.98) * np.exp(rng.normal(0, 0.02, 3))
+        if kind != "sunglasses"
+        else rng.uniform(0.03, 0.35) * np.exp(rng.normal(0, 0.2, 3))
+    )
+    return Glasses(
+        rims,
+        tuple(bars),
+        float(rim),
+        float(max(0.0011, rim * rng.uniform(0.6, 1.1)) if kind != "rimless" else rng.uniform(0.001, 0.002)),
+        solid,
+        np.clip(colour, 0.003, 0.85),
+        float(rng.random()),
+        passes,
+    )
 
 
-def put_on(radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses, light: float,
-           rng: np.random.Generator) -> np.ndarray:
+def put_on(
+    radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses, light: float, rng: np.random.Generator
+) -> np.ndarray:
     """The picture of a head with the glasses before it.
 
     Parameters
@@ -123,10 +148,14 @@ def put_on(radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses
             lens = np.maximum(lens, _filled(radiance.shape[:2], pixels))
     colour = colour / np.maximum(frame, 1e-4)[..., None]
     away = rng.normal(0, 0.012, 2) * len(frame) + [0, 0.01 * len(frame)]
-    shadow = cv2.GaussianBlur(cv2.warpAffine(frame, np.float32([[1, 0, away[0]], [0, 1, away[1]]]), frame.shape[::-1]),
-                              (0, 0), rng.uniform(0.6, 3))
-    picture = radiance * (1 - (rng.random() < 0.6) * rng.uniform(0.1, 0.6) * shadow[..., None]
-                          * (1 - lens[..., None] * 0.3))
+    shadow = cv2.GaussianBlur(
+        cv2.warpAffine(frame, np.float32([[1, 0, away[0]], [0, 1, away[1]]]), frame.shape[::-1]),
+        (0, 0),
+        rng.uniform(0.6, 3),
+    )
+    picture = radiance * (
+        1 - (rng.random() < 0.6) * rng.uniform(0.1, 0.6) * shadow[..., None] * (1 - lens[..., None] * 0.3)
+    )
     passes = np.float32(glasses.passes)
     picture = picture * (1 + lens[..., None] * (passes - 1)) + lens[..., None] * _reflected(frame.shape, light, rng)
     return picture * (1 - frame[..., None]) + colour * frame[..., None]
@@ -135,9 +164,11 @@ def put_on(radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses
 def _curves(glasses: Glasses) -> list[tuple]:
     """(curve, closed, thickness, opacity along it), from the back to the front."""
     bridge, *others = glasses.bars
-    return [*((bar, False, glasses.bar, np.ones(len(bar))) for bar in others),
-            *((rim, True, glasses.rim, glasses.solid) for rim in glasses.rims),
-            (bridge, False, glasses.bar, np.ones(len(bridge)))]
+    return [
+        *((bar, False, glasses.bar, np.ones(len(bar))) for bar in others),
+        *((rim, True, glasses.rim, glasses.solid) for rim in glasses.rims),
+        (bridge, False, glasses.bar, np.ones(len(bridge))),
+    ]
 
 
 @dataclass(frozen=True)
@@ -151,8 +182,9 @@ class SeenCurve:
     closed: bool
 
 
-def _drawn(shape: tuple, curve: SeenCurve, glasses: Glasses, light: float,
-           rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _drawn(
+    shape: tuple, curve: SeenCurve, glasses: Glasses, light: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """How much of each pixel [H, W] a curve covers, and its radiance there [H, W, 3]."""
     big = (shape[0] * OVER, shape[1] * OVER)
     where, shade = np.zeros(big, np.float32), np.zeros((*big, 3), np.float32)
@@ -174,8 +206,13 @@ def _drawn(shape: tuple, curve: SeenCurve, glasses: Glasses, light: float,
         cv2.line(shade, points[step].tolist(), points[other].tolist(), value, thick + 2)
         if thick > 3:
             shift = np.round(lean * thick).astype(int)
-            cv2.line(shade, (points[step] + shift).tolist(), (points[other] + shift).tolist(),
-                     (np.array(value) * edge).tolist(), thick // 3)
+            cv2.line(
+                shade,
+                (points[step] + shift).tolist(),
+                (points[other] + shift).tolist(),
+                (np.array(value) * edge).tolist(),
+                thick // 3,
+            )
     size = shape[::-1]
     return cv2.resize(where, size, interpolation=cv2.INTER_AREA), cv2.resize(shade, size, interpolation=cv2.INTER_AREA)
 

@@ -32,8 +32,11 @@ def ground_of(skin: Mesh) -> Ground:
     """Of a person's closed head, in the template's topology."""
     on, (face, bary) = canvas(GROUND), _texels()
     normals = raster.interpolate(vertex_normals(skin), skin.faces, face, bary)
-    return Ground(on, raster.interpolate(skin.vertices, skin.faces, face, bary),
-                  normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))
+    return Ground(
+        on,
+        raster.interpolate(skin.vertices, skin.faces, face, bary),
+        normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9),
+    )
 
 
 def strew_roots(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.random.Generator) -> Roots:
@@ -56,8 +59,9 @@ def strew_roots(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.ra
 def turned(roots: Roots, radians: np.ndarray) -> Roots:
     """The same roots with their directions turned about the skin's normal by `radians` [M]."""
     c, s = np.cos(radians)[:, None], np.sin(radians)[:, None]
-    return Roots(roots.position, roots.normal, c * roots.direction + s * np.cross(roots.normal, roots.direction),
-                 roots.at)
+    return Roots(
+        roots.position, roots.normal, c * roots.direction + s * np.cross(roots.normal, roots.direction), roots.at
+    )
 
 
 def _flat(way: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -66,24 +66,34 @@ def grow_head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.ra
     clearance = rng.uniform(0.0005, 1.0, count)
     if style == "cropped":
         length = length * np.interp(roots.at[:, 2], [-60, 70], [0.45, 1.0])  # shorter at the sides
-        points = grow(roots, length, rng.normal(0.75, 0.15, count).clip(0.2), skin, -0.3 * roots.normal, 0.25 * length,
-                      STEPS[style])
+        points = grow(
+            roots,
+            length,
+            rng.normal(0.75, 0.15, count).clip(0.2),
+            skin,
+            -0.3 * roots.normal,
+            0.25 * length,
+            STEPS[style],
+        )
     elif style == "short":
         length = length * np.interp(roots.at[:, 2], [-70, 20, 80], [0.22, 0.5, 1.0])
         if person.fringe:
             length = np.where(front > 0.4, np.minimum(1.25 * length, _to_brows(roots.at)), length)
         above = 0.001 + 0.24 * clearance * length
-        points = grow(roots, length, rng.normal(0.55, 0.12, count).clip(0.1), skin, _weight(front, 0.55, 0.9), above,
-                      STEPS[style])
+        points = grow(
+            roots, length, rng.normal(0.55, 0.12, count).clip(0.1), skin, _weight(front, 0.55, 0.9), above, STEPS[style]
+        )
     else:
         fringe = (front > 0.4) & (np.abs(roots.at[:, 0]) < FRINGE_MM) & person.fringe
         length = np.where(fringe, np.minimum(length, _to_brows(roots.at)), length)
         pull = np.where(fringe[:, None], [0, 0.1, -1.2], [0, 0.15, -3.6])
-        points = grow(roots, length, rng.normal(0.3, 0.08, count).clip(0.05), skin, pull, 0.002 + 0.007 * clearance,
-                      STEPS[style])
+        points = grow(
+            roots, length, rng.normal(0.3, 0.08, count).clip(0.05), skin, pull, 0.002 + 0.007 * clearance, STEPS[style]
+        )
         points = np.where(fringe[:, None, None], points, _beside_the_face(points))
-    points = waved(points, roots.at, person.curl * {"cropped": 0.0008, "short": 0.004, "long": 0.006}[style], 14.0, rng,
-                   0.2)
+    points = waved(
+        points, roots.at, person.curl * {"cropped": 0.0008, "short": 0.004, "long": 0.006}[style], 14.0, rng, 0.2
+    )
     if style != "cropped":
         points = clumped(points, 26, 0.55, rng)
         points = clumped(points, 8, 0.35, rng)
@@ -144,5 +154,6 @@ def _beside_the_face(points: np.ndarray) -> np.ndarray:
     below = np.clip((0.055 - z) / 0.03, 0, 1)
     inside = np.clip((FACE[1] - y) / 0.01, 0, 1) * below
     aside = np.where(x < 0, -1, 1) * np.maximum(np.abs(x), FACE[0] + 0.006 * np.abs(np.sin(700 * x)))
-    return np.stack([x * (1 - inside) + aside * inside, y * (1 - inside) + np.maximum(y, FACE[1] - 0.008) * inside, z],
-                    -1).astype(np.float32)
+    return np.stack(
+        [x * (1 - inside) + aside * inside, y * (1 - inside) + np.maximum(y, FACE[1] - 0.008) * inside, z], -1
+    ).astype(np.float32)

@@ -33,7 +33,9 @@ def sample_sway(frames: int, millimetres: float, degrees: float, rng: np.random.
     -------
     Head-to-world matrices [frames, 4, 4], in metres.
     """
-    path = gaussian_filter1d(rng.normal(size=(frames + 8 * PERIOD, 6)), PERIOD, axis=0)[4 * PERIOD:4 * PERIOD + frames]
+    path = gaussian_filter1d(rng.normal(size=(frames + 8 * PERIOD, 6)), PERIOD, axis=0)[
+        4 * PERIOD : 4 * PERIOD + frames
+    ]
     path = (path - path.mean(0)) / np.maximum(path.std(0), 1e-9)
     turn = Rotation.from_rotvec(np.radians(degrees) * path[:, :3]).as_matrix()
     poses = np.tile(np.eye(4), (frames, 1, 1))
@@ -42,8 +44,9 @@ def sample_sway(frames: int, millimetres: float, degrees: float, rng: np.random.
     return poses
 
 
-def measure_image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray,
-                         coarse: float = 0.125) -> np.ndarray:
+def measure_image_motion(
+    caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray, coarse: float = 0.125
+) -> np.ndarray:
     """How far each pixel of the middle view moves in a frame's time; all but the head stands still.
 
     Parameters
@@ -63,8 +66,9 @@ def measure_image_motion(caster: raster.RayCaster, views: tuple[View, View, View
     pixels = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) * [now.width / width, now.height / height]
     rays = now.rays(pixels)
     back = np.linalg.inv(poses[1])
-    _, _, depth = caster.first_hits(np.repeat((back[:3, :3] @ now.centre + back[:3, 3])[None], len(rays), 0),
-                                    rays @ back[:3, :3].T)
+    _, _, depth = caster.first_hits(
+        np.repeat((back[:3, :3] @ now.centre + back[:3, 3])[None], len(rays), 0), rays @ back[:3, :3].T
+    )
     head = np.isfinite(depth)
     points = now.centre + rays * np.where(head, depth, FAR_M)[:, None]
     moved = []
@@ -85,12 +89,15 @@ def rolling_shutter(picture: np.ndarray, flow: np.ndarray, readout: float) -> np
 def motion_blur(picture: np.ndarray, flow: np.ndarray, shutter: float) -> np.ndarray:
     """The mean of a picture [H, W, C] over an exposure of `shutter` of a frame's time, along the flow [H, W, 2] in
     pixels per frame."""
-    return np.mean([shifted(picture, flow * t) for t in shutter * (np.arange(TAPS) + 0.5 - TAPS / 2) / TAPS], axis=0,
-                   dtype=np.float32)
+    return np.mean(
+        [shifted(picture, flow * t) for t in shutter * (np.arange(TAPS) + 0.5 - TAPS / 2) / TAPS],
+        axis=0,
+        dtype=np.float32,
+    )
 
 
 def shifted(picture: np.ndarray, by: np.ndarray) -> np.ndarray:
     """The picture with what is at x moved to x + by, [H, W, 2] in pixels."""
-    y, x = np.mgrid[0:picture.shape[0], 0:picture.shape[1]]
+    y, x = np.mgrid[0 : picture.shape[0], 0 : picture.shape[1]]
     from_x, from_y = (x - by[..., 0]).astype(np.float32), (y - by[..., 1]).astype(np.float32)
     return cv2.remap(picture, from_x, from_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(picture.shape)

@@ -10,11 +10,13 @@ import numpy as np
 
 from ..parameters import SkinParameters, adorned, sample_parameters
 
-IRISES = np.array([[0.022, 0.010, 0.005], [0.050, 0.024, 0.010], [0.065, 0.045, 0.018], [0.055, 0.065, 0.070],
-                   [0.048, 0.078, 0.115]])
+IRISES = np.array(
+    [[0.022, 0.010, 0.005], [0.050, 0.024, 0.010], [0.065, 0.045, 0.018], [0.055, 0.065, 0.070], [0.048, 0.078, 0.115]]
+)
 """Linear albedo: dark brown, brown, hazel, grey, blue."""
-BROWS = np.array([[0.013, 0.010, 0.009], [0.05, 0.03, 0.018], [0.16, 0.06, 0.02], [0.30, 0.20, 0.11],
-                  [0.42, 0.40, 0.37]])
+BROWS = np.array(
+    [[0.013, 0.010, 0.009], [0.05, 0.03, 0.018], [0.16, 0.06, 0.02], [0.30, 0.20, 0.11], [0.42, 0.40, 0.37]]
+)
 """Linear albedo of black, brown, red, fair and white hair."""
 DYED = 0.2  # share of people whose brows have one of these colours, whatever their skin
 HAIR = ("none", "cropped", "short", "long")
@@ -70,20 +72,38 @@ def sample_person(seed: int) -> Person:
         brow_colour = BROWS[dye.integers(len(BROWS))]
     bare = replace(skin, beard=0.0, brow_density=0.0, scalp_hair=0.0)
     return Person(
-        seed=seed, skin=bare, male=male, iris=_tuple(iris * np.exp(rng.normal(0, 0.2))),
+        seed=seed,
+        skin=bare,
+        male=male,
+        iris=_tuple(iris * np.exp(rng.normal(0, 0.2))),
         openness=0.0 if rng.random() < 0.2 else float(rng.uniform(0.72, 0.98)),
         gaze=(float(np.clip(rng.normal(0, 3), -6, 6)), float(np.clip(rng.normal(0, 2), -4, 4))),
-        brow=skin.brow_density, brow_colour=_tuple(brow_colour), hair=hair,
-        hair_length={"none": 0.0, "cropped": rng.uniform(0.004, 0.012), "short": rng.uniform(0.03, 0.06),
-                     "long": rng.uniform(0.16, 0.26)}[hair],
-        hair_colour=skin.hair_colour, fringe=bool(rng.random() < 0.5),
+        brow=skin.brow_density,
+        brow_colour=_tuple(brow_colour),
+        hair=hair,
+        hair_length={
+            "none": 0.0,
+            "cropped": rng.uniform(0.004, 0.012),
+            "short": rng.uniform(0.03, 0.06),
+            "long": rng.uniform(0.16, 0.26),
+        }[hair],
+        hair_colour=skin.hair_colour,
+        fringe=bool(rng.random() < 0.5),
         parting=float(rng.choice([0.0, rng.uniform(0.01, 0.035) * rng.choice([-1, 1])])),
-        curl=float(rng.uniform(0.1, 0.8)), grey=float(np.clip((skin.age - 42) / 40, 0, 1) * rng.random()), beard=beard,
-        beard_length={"none": 0.0, "stubble": rng.uniform(0.0006, 0.002), "moustache": rng.uniform(0.006, 0.012),
-                      "full": rng.uniform(0.008, 0.022)}[beard],
-        shade=float(male * dark * rng.uniform(0.3, 1.0)), tan=float(rng.random() * (rng.random() < 0.5)),
+        curl=float(rng.uniform(0.1, 0.8)),
+        grey=float(np.clip((skin.age - 42) / 40, 0, 1) * rng.random()),
+        beard=beard,
+        beard_length={
+            "none": 0.0,
+            "stubble": rng.uniform(0.0006, 0.002),
+            "moustache": rng.uniform(0.006, 0.012),
+            "full": rng.uniform(0.008, 0.022),
+        }[beard],
+        shade=float(male * dark * rng.uniform(0.3, 1.0)),
+        tan=float(rng.random() * (rng.random() < 0.5)),
         clothes=_tuple(np.exp(rng.normal(np.log(0.12), 0.8)) * rng.uniform(0.5, 1.2, 3)),
-        collar=str(rng.choice(["crew", "v"])))
+        collar=str(rng.choice(["crew", "v"])),
+    )
 
 
 def _tuple(colour: np.ndarray) -> tuple[float, float, float]:

@@ -45,14 +45,22 @@ def sample_phone(seed: int) -> Phone:
     """A phone at random, from a plain one in good light to a heavy hand in the dark."""
     rng = np.random.default_rng([seed, 70])
     noise = np.exp(rng.uniform(np.log(0.002), np.log(0.012)))
-    return Phone(shot=float(noise**2 * 4), read=float(noise / 4), reduction=float(rng.uniform(0.2, 0.9)),
-                 contrast=float(rng.uniform(0.0, 0.45)),
-                 shoulder=float(rng.uniform(0.72, 0.9)), local=float(rng.uniform(0.0, 0.25)),
-                 local_radius=float(rng.uniform(0.02, 0.06)),
-                 sharpening=float(rng.uniform(0.1, 0.8)), sharpening_px=float(rng.uniform(0.7, 1.4)),
-                 crf=int(rng.integers(17, 24)),
-                 readout=float(rng.uniform(0.2, 0.7)), shutter=float(rng.uniform(0.1, 0.5)),
-                 sway_mm=float(rng.uniform(0.4, 1.6)), sway_degrees=float(rng.uniform(0.1, 0.6)))
+    return Phone(
+        shot=float(noise**2 * 4),
+        read=float(noise / 4),
+        reduction=float(rng.uniform(0.2, 0.9)),
+        contrast=float(rng.uniform(0.0, 0.45)),
+        shoulder=float(rng.uniform(0.72, 0.9)),
+        local=float(rng.uniform(0.0, 0.25)),
+        local_radius=float(rng.uniform(0.02, 0.06)),
+        sharpening=float(rng.uniform(0.1, 0.8)),
+        sharpening_px=float(rng.uniform(0.7, 1.4)),
+        crf=int(rng.integers(17, 24)),
+        readout=float(rng.uniform(0.2, 0.7)),
+        shutter=float(rng.uniform(0.1, 0.5)),
+        sway_mm=float(rng.uniform(0.4, 1.6)),
+        sway_degrees=float(rng.uniform(0.1, 0.6)),
+    )
 
 
 def develop(linear: np.ndarray, phone: Phone, gain: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -85,8 +93,9 @@ def add_noise(linear: np.ndarray, shot: float, read: float, rng: np.random.Gener
     read : deviation without light
     rng : of the noise
     """
-    return (linear + rng.standard_normal(linear.shape, np.float32)
-            * np.sqrt(shot * np.maximum(linear, 0) + read**2)).astype(np.float32)
+    return (
+        linear + rng.standard_normal(linear.shape, np.float32) * np.sqrt(shot * np.maximum(linear, 0) + read**2)
+    ).astype(np.float32)
 
 
 def reduce_noise(linear: np.ndarray, strength: float, shot: float, read: float) -> np.ndarray:

@@ -62,8 +62,9 @@ def colours_of(stage: RelightableView, rng: np.random.Generator) -> Colours:
     return Colours(*open_mouth(albedo, shares, stage.unlit.landmarks, rng))
 
 
-def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator,
-            panoramas: list[np.ndarray] = ()) -> Portrait:
+def portray(
+    stage: RelightableView, colours: Colours, rng: np.random.Generator, panoramas: list[np.ndarray] = ()
+) -> Portrait:
     """A person under a random light.
 
     Parameters
@@ -79,14 +80,17 @@ def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator,
     0 off the bare head.
     """
     sight, (albedo, shares) = stage.unlit, (colours.albedo, colours.shares)
-    environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
-                   and rng.random() < 0.6 else made_environment(rng))
+    environment = (
+        panorama_environment(panoramas[rng.integers(len(panoramas))], rng)
+        if len(panoramas) and rng.random() < 0.6
+        else made_environment(rng)
+    )
     sky = (BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)).astype(np.float32)
     lamps, tints, before = _lamps(stage, environment, rng)
     radius = np.exp(rng.uniform(np.log(0.2), np.log(2.5)))
-    (diffuse, shine), (own,
-                       own_shine) = (_lit(stage, surface, sky, lamps, tints, before, radius)
-                                     for surface in _surfaces(stage, shares, sky, rng))
+    (diffuse, shine), (own, own_shine) = (
+        _lit(stage, surface, sky, lamps, tints, before, radius) for surface in _surfaces(stage, shares, sky, rng)
+    )
     seen = shares[..., :-1].sum(-1) > 0.5
     light = float(np.mean(diffuse[seen])) if seen.any() else 1.0
     behind = shares[..., -1:]
@@ -109,23 +113,35 @@ def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator,
     # what nobody can tell is not asked for
     skin = np.clip(head - shares[..., PARTS.index("hair")] - shares[..., PARTS.index("clothes")], 0, 1)
     shadow, strong = _shadow(stage, lamps, tints, before, grown, sky)
-    return Portrait(develop(picture, rng), albedo * head[..., None], shading.astype(np.float32), even, shadow, strong,
-                    skin, skin, skin, _fitted(stage, environment, lamps, tints, tone * gains, rng))
+    return Portrait(
+        develop(picture, rng),
+        albedo * head[..., None],
+        shading.astype(np.float32),
+        even,
+        shadow,
+        strong,
+        skin,
+        skin,
+        skin,
+        _fitted(stage, environment, lamps, tints, tone * gains, rng),
+    )
 
 
-def _lamps(stage: RelightableView, environment: Environment,
-           rng: np.random.Generator) -> tuple[list[int], list[np.ndarray], list]:
+def _lamps(
+    stage: RelightableView, environment: Environment, rng: np.random.Generator
+) -> tuple[list[int], list[np.ndarray], list]:
     """Which of the sight's lamps shine, their colours [3] as irradiance over pi, and what gobos let through [S, S] or
     1."""
     chosen, tints, before = [], [], []
     side = len(stage.position)
-    for k in rng.permutation(len(stage.unlit.lamps))[:rng.choice([0, 1, 1, 1, 1, 2])]:
+    for k in rng.permutation(len(stage.unlit.lamps))[: rng.choice([0, 1, 1, 1, 1, 2])]:
         strength, warm = np.exp(rng.uniform(np.log(0.35), np.log(STRONGEST))), rng.normal(0.12, 0.22)
         tint = strength * np.exp([0.6 * warm, rng.normal(0, 0.04), -warm])
         if environment.colour.any() and rng.random() < 0.5:
             tint = strength * environment.colour / max(float(environment.colour.mean()), 1e-6)
-        lost = cast_gobo(stage.position.reshape(-1, 3).astype(np.float32), stage.unlit.lamps[k], 0.01,
-                         str(rng.choice(GOBOS)), rng)
+        lost = cast_gobo(
+            stage.position.reshape(-1, 3).astype(np.float32), stage.unlit.lamps[k], 0.01, str(rng.choice(GOBOS)), rng
+        )
         chosen.append(int(k))
         tints.append(tint.astype(np.float32))
         before.append(1 - np.reshape(lost, (side, side)).astype(np.float32) if np.ndim(lost) else 1.0)
@@ -146,8 +162,9 @@ class _Surface:
     reflectance: np.ndarray
 
 
-def _surfaces(stage: RelightableView, shares: np.ndarray, sky: np.ndarray,
-              rng: np.random.Generator) -> tuple[_Surface, _Surface]:
+def _surfaces(
+    stage: RelightableView, shares: np.ndarray, sky: np.ndarray, rng: np.random.Generator
+) -> tuple[_Surface, _Surface]:
     """What is seen, and the bare head below."""
     sight, lambert = stage.unlit, np.float32(per_function(LAMBERT))
     normal, smooth = sight.normal.astype(np.float32) / 127, stage.normal.astype(np.float32) / 127
@@ -163,13 +180,29 @@ def _surfaces(stage: RelightableView, shares: np.ndarray, sky: np.ndarray,
     gloss = np.float32([GLOSS[name] for name in PARTS])
     rough, reflectance = shares @ gloss[:, 0] * rougher, (shares @ gloss[:, 1])[..., None] * brighter
     skin = np.broadcast_to(gloss[SKIN], (*stage.here.shape, 2))
-    return (_Surface(normal, sight.reach.astype(np.float32) / 255, seen, free, 1 - shares[..., -1], rough, reflectance),
-            _Surface(smooth, stage.reach.astype(np.float32) / 255, own, own_free, stage.here.astype(np.float32),
-                     skin[..., 0] * rougher, skin[..., 1:] * brighter))
+    return (
+        _Surface(normal, sight.reach.astype(np.float32) / 255, seen, free, 1 - shares[..., -1], rough, reflectance),
+        _Surface(
+            smooth,
+            stage.reach.astype(np.float32) / 255,
+            own,
+            own_free,
+            stage.here.astype(np.float32),
+            skin[..., 0] * rougher,
+            skin[..., 1:] * brighter,
+        ),
+    )
 
 
-def _lit(stage: RelightableView, surface: _Surface, sky: np.ndarray, lamps: list[int], tints: list, before: list,
-         radius: float) -> tuple[np.ndarray, np.ndarray]:
+def _lit(
+    stage: RelightableView,
+    surface: _Surface,
+    sky: np.ndarray,
+    lamps: list[int],
+    tints: list,
+    before: list,
+    radius: float,
+) -> tuple[np.ndarray, np.ndarray]:
     """Irradiance over pi [S, S, 3] of a surface, and what shines on it [S, S, 3]; radius: in pixels, how far red light
     spreads in it."""
     towards = -directions(stage.unlit)
@@ -198,8 +231,9 @@ def _softened(direct: np.ndarray, scatters: np.ndarray, radius: float) -> np.nda
     return np.stack(channels, -1)
 
 
-def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list, grown: np.ndarray,
-            sky: np.ndarray) -> tuple[np.ndarray, float]:
+def _shadow(
+    stage: RelightableView, lamps: list[int], tints: list, before: list, grown: np.ndarray, sky: np.ndarray
+) -> tuple[np.ndarray, float]:
     """The lost share [S, S] of the lamps' light, weighted by their strength, and how much of all light they are, facing
     them, beside the sky's [9, 3]."""
     side = len(stage.here)
@@ -209,8 +243,9 @@ def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list,
     lost = np.zeros((side, side), np.float32)
     for k, share, through in zip(lamps, strength, before, strict=True):
         lamp = stage.unlit.lamps[k]
-        facing = [np.clip(1 + (n.astype(np.float32) / 127 @ lamp) / 0.06, 0, 1)
-                  for n in (stage.unlit.normal, stage.normal)]
+        facing = [
+            np.clip(1 + (n.astype(np.float32) / 127 @ lamp) / 0.06, 0, 1) for n in (stage.unlit.normal, stage.normal)
+        ]
         reach = [r[..., k].astype(np.float32) / 255 for r in (stage.unlit.reach, stage.reach)]
         arrives = [f * r * through for f, r in zip(facing, reach, strict=True)]
         lost += share * (1 - (1 - grown[..., 0]) * arrives[0] - grown[..., 0] * arrives[1])
@@ -219,13 +254,21 @@ def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list,
     return lost / np.float32(main), float(main / (main + ambient))
 
 
-def _fitted(stage: RelightableView, environment: Environment, lamps: list[int], tints: list, tone: np.ndarray,
-            rng: np.random.Generator) -> FittedLight:
+def _fitted(
+    stage: RelightableView,
+    environment: Environment,
+    lamps: list[int],
+    tints: list,
+    tone: np.ndarray,
+    rng: np.random.Generator,
+) -> FittedLight:
     here = stage.here.ravel()
     transfer = stage.transfer.reshape(-1, 9).astype(np.float32)
     smooth = stage.normal.reshape(-1, 3).astype(np.float32) / 127
-    shining = [LampOnHead(stage.unlit.lamps[k], tint, stage.reach[..., k].ravel().astype(np.float32)[here] / 255)
-               for k, tint in zip(lamps, tints, strict=True)]
+    shining = [
+        LampOnHead(stage.unlit.lamps[k], tint, stage.reach[..., k].ravel().astype(np.float32)[here] / 255)
+        for k, tint in zip(lamps, tints, strict=True)
+    ]
     light = fitted_light(transfer[here], smooth[here], shining, environment, tone, rng)
     whole = [np.zeros((len(here), 3), np.float32) for _ in range(3)]
     for target, pixels in zip(whole, (light.ambient, light.sunlit, light.normal), strict=True):

@@ -62,8 +62,14 @@ class Sitter:
         normal[here], transfer[here] = towards, raster.interpolate(self.transfer, mesh.faces, face[here], bary[here])
         for k, lamp in enumerate(unlit.lamps):
             reach[here, k] = ~self.bald.blocked(points, np.repeat(lamp[None], len(points), 0))
-        return RelightableView(unlit, self._position(view), here, np.round(127 * normal).astype(np.int8),
-                               transfer.astype(np.float16), np.round(255 * reach).astype(np.uint8))
+        return RelightableView(
+            unlit,
+            self._position(view),
+            here,
+            np.round(127 * normal).astype(np.int8),
+            transfer.astype(np.float16),
+            np.round(255 * reach).astype(np.uint8),
+        )
 
     def _position(self, view: View) -> np.ndarray:
         face, bary, _ = raster.render_view(self.scene.whole, view, 1)

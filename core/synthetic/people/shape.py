@@ -95,8 +95,9 @@ def _random_field(rng: np.random.Generator) -> np.ndarray:
     mirrored = points * [-1, 1, 1]
 
     def field(at: np.ndarray, seed: int) -> np.ndarray:
-        return np.stack([octaves(at, WAVELENGTHS_MM, np.random.default_rng([seed, axis]), smooth=True)
-                         for axis in range(3)], 1)
+        return np.stack(
+            [octaves(at, WAVELENGTHS_MM, np.random.default_rng([seed, axis]), smooth=True) for axis in range(3)], 1
+        )
 
     even, odd = rng.integers(2**31, size=2)
     symmetric = field(points, even) + field(mirrored, even) * [-1, 1, 1]

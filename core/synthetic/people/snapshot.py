@@ -24,15 +24,25 @@ from .clutter import RIMS, cover_person, open_mouth, paint_backdrop
 from .person import BROWS
 from .unlit import Unlit
 
-GLOSS = {"skin": (0.45, 0.028), "lips": (0.3, 0.05), "brows": (0.4, 0.03), "beard": (0.4, 0.03), "hair": (0.38, 0.05),
-         "eyes": (0.12, 0.05), "clothes": (0.8, 0.01), "background": (1.0, 0.0)}
+GLOSS = {
+    "skin": (0.45, 0.028),
+    "lips": (0.3, 0.05),
+    "brows": (0.4, 0.03),
+    "beard": (0.4, 0.03),
+    "hair": (0.38, 0.05),
+    "eyes": (0.12, 0.05),
+    "clothes": (0.8, 0.01),
+    "background": (1.0, 0.0),
+}
 """Roughness, and reflectance at normal incidence."""
-SKIN, HAIR, BROW, BEARD, LIPS, CLOTHES = (PARTS.index(name)
-                                          for name in ("skin", "hair", "brows", "beard", "lips", "clothes"))
+SKIN, HAIR, BROW, BEARD, LIPS, CLOTHES = (
+    PARTS.index(name) for name in ("skin", "hair", "brows", "beard", "lips", "clothes")
+)
 
 
-def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarray] = (),
-               worn: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
+def photograph(
+    sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarray] = (), worn: Callable | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """A photograph of a sight.
 
     Parameters
@@ -51,8 +61,11 @@ def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarra
     shares /= np.maximum(shares.sum(-1, keepdims=True), 1e-6)
     albedo = recoloured(images.srgb_to_linear(sight.albedo.astype(np.float32) / 255), shares, rng)
     albedo, shares = open_mouth(albedo, shares, sight.landmarks, rng)
-    environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
-                   and rng.random() < 0.6 else made_environment(rng))
+    environment = (
+        panorama_environment(panoramas[rng.integers(len(panoramas))], rng)
+        if len(panoramas) and rng.random() < 0.6
+        else made_environment(rng)
+    )
     radiance, light = _lit(sight, albedo, shares, environment, rng)
     behind = shares[..., -1:]
     radiance = radiance * (1 - behind) + paint_backdrop(directions(sight), environment, light, rng) * behind
@@ -70,7 +83,7 @@ def recoloured(albedo: np.ndarray, shares: np.ndarray, rng: np.random.Generator)
     log = np.zeros_like(albedo)
 
     def move(part: int, gain: np.ndarray) -> None:
-        log[:] += shares[..., part:part + 1] * np.log(np.clip(gain, 0.02, 40)).astype(np.float32)
+        log[:] += shares[..., part : part + 1] * np.log(np.clip(gain, 0.02, 40)).astype(np.float32)
 
     def towards(part: int, colour: np.ndarray) -> np.ndarray:
         weight = shares[..., part]
@@ -92,7 +105,7 @@ def recoloured(albedo: np.ndarray, shares: np.ndarray, rng: np.random.Generator)
     cloth = np.exp(rng.uniform(np.log(0.01), np.log(0.8))) * np.exp(rng.normal(0, 0.45, 3))
     move(CLOTHES, towards(CLOTHES, np.clip(cloth, 0.005, 0.85)) if rng.random() < 0.8 else np.ones(3))
     if rng.random() < 0.5:
-        log += shares[..., CLOTHES:CLOTHES + 1] * weave(albedo.shape[0], rng)
+        log += shares[..., CLOTHES : CLOTHES + 1] * weave(albedo.shape[0], rng)
     return np.clip(albedo * np.exp(log), 0.002, 0.92).astype(np.float32)
 
 
@@ -104,14 +117,16 @@ def weave(size: int, rng: np.random.Generator) -> np.ndarray:
     kind = rng.integers(3)
     if kind == 2:
         count = int(rng.integers(6, 60))
-        return strength * cv2.resize(rng.normal(0, 0.8, (count, count, 3)).astype(np.float32), (size, size),
-                                     interpolation=cv2.INTER_CUBIC)
+        return strength * cv2.resize(
+            rng.normal(0, 0.8, (count, count, 3)).astype(np.float32), (size, size), interpolation=cv2.INTER_CUBIC
+        )
     wavy = np.sin(2 * np.pi * along / wave) + (np.sin(2 * np.pi * across / wave) if kind else 0)
     return (strength * np.clip(3 * wavy, -1, 1))[..., None] * rng.uniform(0.3, 1.0, 3).astype(np.float32)
 
 
-def _lit(sight: Unlit, albedo: np.ndarray, shares: np.ndarray, environment: Environment,
-         rng: np.random.Generator) -> tuple[np.ndarray, float]:
+def _lit(
+    sight: Unlit, albedo: np.ndarray, shares: np.ndarray, environment: Environment, rng: np.random.Generator
+) -> tuple[np.ndarray, float]:
     """The person's radiance [S, S, 3] and how bright the light is."""
     normal = sight.normal.astype(np.float32) / 127
     towards = -directions(sight)

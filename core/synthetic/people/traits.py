@@ -33,11 +33,16 @@ def broad_traits(person: Person, on: Canvas) -> tuple[np.ndarray, np.ndarray]:
         + rng.normal(0.05, 0.10) * area["cheeks"]
     )
     melanin = melanin + abs(rng.normal(0, 0.12)) * area["sockets"] - person.tan * _shaded(on, rng)
-    blood = (abs(rng.normal(0, 0.35)) * area["cheeks"] + abs(rng.normal(0, 0.45)) * area["nose"]
-             + abs(rng.normal(0, 0.4)) * area["ears"]
-             + rng.normal(0, 0.2) * area["chin"] + rng.normal(0, 0.12) * area["forehead"])
-    return tuple(_with_sides(field + share * _even_noise(on, rng), on, rng)
-                 for field, share in ((melanin, 0.06), (blood, 0.10)))
+    blood = (
+        abs(rng.normal(0, 0.35)) * area["cheeks"]
+        + abs(rng.normal(0, 0.45)) * area["nose"]
+        + abs(rng.normal(0, 0.4)) * area["ears"]
+        + rng.normal(0, 0.2) * area["chin"]
+        + rng.normal(0, 0.12) * area["forehead"]
+    )
+    return tuple(
+        _with_sides(field + share * _even_noise(on, rng), on, rng) for field, share in ((melanin, 0.06), (blood, 0.10))
+    )
 
 
 def shaded(person: Person, on: Canvas, diffuse: np.ndarray) -> np.ndarray:

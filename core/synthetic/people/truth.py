@@ -46,8 +46,10 @@ class Scene:
     def __init__(self, figure: Figure, blockers: Mesh | None = None):
         body = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)]
         meshes, tags = [*body, figure.shirt], [SKIN, EYES, EYES, CLOTHES]
-        flat = [*(np.zeros((len(mesh.faces), 3), np.float32) for mesh in body),
-                np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
+        flat = [
+            *(np.zeros((len(mesh.faces), 3), np.float32) for mesh in body),
+            np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32),
+        ]
         for strands in figure.strands:
             mesh = prisms(strands)
             meshes.append(mesh)
@@ -72,8 +74,9 @@ class Scene:
         return out
 
 
-def trace_truth(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3,
-                pose: np.ndarray | None = None) -> Truth:
+def trace_truth(
+    scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3, pose: np.ndarray | None = None
+) -> Truth:
     """The truth through a view.
 
     Parameters
@@ -104,8 +107,15 @@ def trace_truth(scene: Scene, view: View, sun: np.ndarray | None = None, over: i
         dark[hit] = (normal @ sun <= 0) | _blocked(scene, points + 5e-4 * normal, sun, pose)
     bare, normal = _bare(scene, view, over)
     cover = _shrunk(hit.astype(np.float32), over)
-    return Truth(_shrunk(seen, over) / np.maximum(cover, 1e-6)[..., None], bare, cover, _shrunk(parts, over),
-                 (_shrunk(in_face, over) > 0.5) & (cover > 0.99), normal, _shrunk(dark, over) > 0.5)
+    return Truth(
+        _shrunk(seen, over) / np.maximum(cover, 1e-6)[..., None],
+        bare,
+        cover,
+        _shrunk(parts, over),
+        (_shrunk(in_face, over) > 0.5) & (cover > 0.99),
+        normal,
+        _shrunk(dark, over) > 0.5,
+    )
 
 
 def _blocked(scene: Scene, points: np.ndarray, sun: np.ndarray, pose: np.ndarray | None) -> np.ndarray:
@@ -138,4 +148,4 @@ def _of_uv(scene: Scene, name: str, face: np.ndarray, bary: np.ndarray) -> np.nd
 def _shrunk(image: np.ndarray, factor: int) -> np.ndarray:
     """The mean of each factor x factor block."""
     h, w = image.shape[0] // factor, image.shape[1] // factor
-    return image[:h * factor, :w * factor].reshape(h, factor, w, factor, *image.shape[2:]).mean((1, 3))
+    return image[: h * factor, : w * factor].reshape(h, factor, w, factor, *image.shape[2:]).mean((1, 3))

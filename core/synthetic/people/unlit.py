@@ -28,8 +28,16 @@ from .truth import Scene
 SIZE, OVER = 288, 2  # of the square in pixels; rays along a pixel's side
 WIDER = 1.33  # than the crop in which a parser looks: what shifts and turns of it may show
 LAMPS = 2
-OF_TRUTH = {"skin": "skin", "lips": "lips", "brows": "brows", "lashes": "eyes", "beard": "beard", "hair": "hair",
-            "eyes": "eyes", "clothes": "clothes"}
+OF_TRUTH = {
+    "skin": "skin",
+    "lips": "lips",
+    "brows": "brows",
+    "lashes": "eyes",
+    "beard": "beard",
+    "hair": "hair",
+    "eyes": "eyes",
+    "clothes": "clothes",
+}
 """The part of face/parts.py that each part of the truth belongs to."""
 THICKER = {"hair": (1.0, 2.6), "beard": (0.9, 1.8), "brows": (0.9, 1.5), "lashes": (0.8, 1.4)}
 """Factors on the hairs' radii: people have four times as many hairs as figures."""
@@ -56,8 +64,10 @@ class Unlit:
 
 def scene_of(figure: Figure, rng: np.random.Generator) -> Scene:
     """A figure ready for rays, its hair as dense as some people's is."""
-    dense = [replace(strands, radius=(strands.radius * rng.uniform(*THICKER[strands.part])).astype(np.float32))
-             for strands in figure.strands]
+    dense = [
+        replace(strands, radius=(strands.radius * rng.uniform(*THICKER[strands.part])).astype(np.float32))
+        for strands in figure.strands
+    ]
     return Scene(replace(figure, strands=tuple(dense)))
 
 
@@ -79,8 +89,9 @@ def random_view(
     size : pixels along a side
     margin : side of the picture in sides of the face's landmarks
     """
-    yaw, pitch, roll = np.radians([rng.uniform(-100, 100) if rng.random() < 0.45 else rng.normal(0, 25),
-                                   rng.normal(0, 13), rng.normal(0, 6)])
+    yaw, pitch, roll = np.radians(
+        [rng.uniform(-100, 100) if rng.random() < 0.45 else rng.normal(0, 25), rng.normal(0, 13), rng.normal(0, 6)]
+    )
     back = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
     right = np.cross([0, 0, 1.0], back)
     right /= np.linalg.norm(right)
@@ -122,13 +133,22 @@ def trace_unlit(scene: Scene, view: View, rng: np.random.Generator, over: int = 
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
     points = (corners * weight[..., None]).sum(1) + 5e-4 * flat
     lamps = _lamps(view, rng)
-    reach = [((normal @ lamp > 0)
-              & ~scene.whole.blocked(points, np.repeat(lamp[None], len(points), 0))).astype(np.float32)
-             for lamp in lamps]
+    reach = [
+        ((normal @ lamp > 0) & ~scene.whole.blocked(points, np.repeat(lamp[None], len(points), 0))).astype(np.float32)
+        for lamp in lamps
+    ]
     sky = normal + _unit(rng.normal(size=normal.shape))  # cosine-weighted about the normal
     free = ~scene.whole.blocked(points, _unit(sky))
-    layers = np.concatenate([scene.albedo(triangle, weight, scene.figure.seen), _shares(scene, triangle, weight),
-                             normal, np.stack(reach, 1), free[:, None]], 1)
+    layers = np.concatenate(
+        [
+            scene.albedo(triangle, weight, scene.figure.seen),
+            _shares(scene, triangle, weight),
+            normal,
+            np.stack(reach, 1),
+            free[:, None],
+        ],
+        1,
+    )
     picture = np.zeros((*hit.shape, layers.shape[1] + 1), np.float32)
     picture[hit, :-1], picture[hit, -1] = layers, 1
     size = view.height
@@ -138,10 +158,18 @@ def trace_unlit(scene: Scene, view: View, rng: np.random.Generator, over: int = 
     shares = shares * picture[..., -1:]
     shares[..., -1] = 1 - picture[..., -1]
     length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-    return Unlit(_bytes(images.linear_to_srgb(albedo)), _bytes(shares), np.round(127 * normal / length).astype(np.int8),
-                 _bytes(reach), _bytes(free[..., 0]), lamps.astype(np.float32), view.rotation.astype(np.float32),
-                 view.centre.astype(np.float32), np.float32(view.camera.params[0]),
-                 view.project(landmarks_of(scene.figure))[0].astype(np.float32))
+    return Unlit(
+        _bytes(images.linear_to_srgb(albedo)),
+        _bytes(shares),
+        np.round(127 * normal / length).astype(np.int8),
+        _bytes(reach),
+        _bytes(free[..., 0]),
+        lamps.astype(np.float32),
+        view.rotation.astype(np.float32),
+        view.centre.astype(np.float32),
+        np.float32(view.camera.params[0]),
+        view.project(landmarks_of(scene.figure))[0].astype(np.float32),
+    )
 
 
 def true_shares(coverage: np.ndarray) -> np.ndarray:

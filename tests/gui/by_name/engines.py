@@ -43,8 +43,9 @@ def flow():
         found[light] = {"surface": surface}
         for method in ("random_walk_skin", "random_walk"):
             found[light][method] = yield from ratio(root, light, 1.0, method)
-        d.say(light,
-              *(f"{what} {' '.join(f'{r:.3f}' for r in ratios.values())}" for what, ratios in found[light].items()))
+        d.say(
+            light, *(f"{what} {' '.join(f'{r:.3f}' for r in ratios.values())}" for what, ratios in found[light].items())
+        )
     (d.OUT / "engines.json").write_text(json.dumps(found), encoding="utf-8")
     for light in LIGHTS[:2]:
         for what, limit in (("surface", SURFACE_AGREES), ("random_walk_skin", SKIN_AGREES)):
@@ -86,7 +87,7 @@ def cheek(path: Path) -> np.ndarray:
     pixels = np.array(image.pixels[:]).reshape(height, width, 4)[..., :3]
     bpy.data.images.remove(image)
     edge = round((RENDERED - MEASURED) * SIDE)
-    return pixels[edge:height - edge, edge:width - edge].mean((0, 1))
+    return pixels[edge : height - edge, edge : width - edge].mean((0, 1))
 
 
 d.play(flow(), limit_s=900)

@@ -39,8 +39,9 @@ def drop(folder: Path):
     shutil.copytree(PHOTOGRAPHS, folder)
     d.act()
     with d.in_view('UI'):
-        bpy.ops.wm.drop_import_file('INVOKE_DEFAULT', directory=str(folder),
-                                    files=[{"name": path.name} for path in sorted(folder.iterdir())])
+        bpy.ops.wm.drop_import_file(
+            'INVOKE_DEFAULT', directory=str(folder), files=[{"name": path.name} for path in sorted(folder.iterdir())]
+        )
     yield 1.0
     d.screenshot("photographs_1_drop_menu")
     yield from d.key('C')  # Blender asks: a reference, or Choose Video

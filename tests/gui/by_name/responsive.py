@@ -44,10 +44,14 @@ class Watch:
         ticks, draws = (np.array([t for t in moments if start <= t <= end]) for moments in (self.ticks, self.draws))
         late = 1000 * np.maximum(np.diff(ticks) - PERIOD_S, 0)
         middle, p99 = np.percentile(late, (50, 99))
-        return {"seconds": round(end - start, 1), "late_p50_ms": round(float(middle), 1),
-                "late_p99_ms": round(float(p99), 1),
-                "late_max_ms": round(float(late.max()), 1), "redraws_per_s": round(len(draws) / (end - start), 1),
-                "worst_redraw_gap_ms": round(1000 * float(np.diff(draws).max()), 1) if len(draws) > 1 else None}
+        return {
+            "seconds": round(end - start, 1),
+            "late_p50_ms": round(float(middle), 1),
+            "late_p99_ms": round(float(p99), 1),
+            "late_max_ms": round(float(late.max()), 1),
+            "redraws_per_s": round(len(draws) / (end - start), 1),
+            "worst_redraw_gap_ms": round(1000 * float(np.diff(draws).max()), 1) if len(draws) > 1 else None,
+        }
 
 
 def flow():
@@ -74,8 +78,11 @@ def flow():
     yield from d.until(lambda: bpy.context.mode == 'OBJECT', "leaving", 10)
     yield 2.0
     bpy.ops.wildcap.solve()
-    yield from d.until(lambda: jobs.of(root) is None or jobs.of(root).progress is not None
-                       and jobs.of(root).progress.done >= 1, "the first step", 600)
+    yield from d.until(
+        lambda: jobs.of(root) is None or jobs.of(root).progress is not None and jobs.of(root).progress.done >= 1,
+        "the first step",
+        600,
+    )
     assert jobs.of(root) is not None, str(module("problems").of(root))
     bpy.ops.wildcap.paint_mask()
     yield 1.0
@@ -84,8 +91,10 @@ def flow():
     assert jobs.of(root) is not None, "the solver ran all the time"
     d.screenshot("responsive")
     d.say("solving", json.dumps(busy))
-    d.say(f"redraw rate {busy['redraws_per_s'] / idle['redraws_per_s']:.2f} of idle, p99 lateness "
-          f"{busy['late_p99_ms']} ms against {idle['late_p99_ms']} ms")
+    d.say(
+        f"redraw rate {busy['redraws_per_s'] / idle['redraws_per_s']:.2f} of idle, p99 lateness "
+        f"{busy['late_p99_ms']} ms against {idle['late_p99_ms']} ms"
+    )
 
     bpy.ops.wildcap.finish_mask()
     yield 1.0

@@ -20,8 +20,9 @@ def flow():
     yield 1.0
     d.screenshot("self_test_1_offered")
     yield from d.press("wildcap.self_test")
-    yield from d.until(lambda: job() is not None and job().progress is not None, "the test's start",
-                       addon.START_LIMIT_S)
+    yield from d.until(
+        lambda: job() is not None and job().progress is not None, "the test's start", addon.START_LIMIT_S
+    )
     yield 1.0
     d.screenshot("self_test_2_running")
     yield from d.press("wildcap.cancel")

@@ -30,8 +30,9 @@ def flow():
     assert addon.problem() == "", addon.problem()
     yield from confirmed("set_up_1_asked")
 
-    yield from d.until(lambda: addon.job("").progress is not None and addon.job("").progress.done >= 5,
-                       "the first packages", 300)
+    yield from d.until(
+        lambda: addon.job("").progress is not None and addon.job("").progress.done >= 5, "the first packages", 300
+    )
     d.screenshot("set_up_2_installing")
     yield from d.lead("wildcap.cancel")
     yield from d.until(lambda: addon.job("") is None, "the end of it", 5)

@@ -58,14 +58,14 @@ def flow():
 def draw_card(frames: Path) -> None:
     """A grey square into the frames around the middle one, which is shown first."""
     paths = sorted(frames.glob("*.jpg"))
-    for path in paths[len(paths) // 2 - 1:len(paths) // 2 + 3]:
+    for path in paths[len(paths) // 2 - 1 : len(paths) // 2 + 3]:
         image = bpy.data.images.load(str(path))
         width, height = image.size
         pixels = np.empty(width * height * 4, np.float32)
         image.pixels.foreach_get(pixels)
         picture = pixels.reshape(height, width, 4)
         column, row, reach = int(CARD[0] * width), int(CARD[1] * height), width // 12
-        picture[row - reach:row + reach, column - reach:column + reach, :3] = GREY
+        picture[row - reach : row + reach, column - reach : column + reach, :3] = GREY
         image.pixels.foreach_set(picture.ravel())
         image.file_format = 'JPEG'
         image.save(filepath=str(path))

@@ -32,8 +32,9 @@ def flow():
     assert keys().key_blocks["eyesOpenLeft"].value > 0.99, "the slider does not open the lids"
     d.screenshot("acting_open")
     yield from d.press("wildcap.rest_face")
-    yield from d.until(lambda: keys().key_blocks["jawOpen"].value == 0 and keys()["eyesOpen"] == 0, "the face at rest",
-                       20)
+    yield from d.until(
+        lambda: keys().key_blocks["jawOpen"].value == 0 and keys()["eyesOpen"] == 0, "the face at rest", 20
+    )
     d.say(f"{len(keys().key_blocks) - 1} units")
     yield from grow_hair()
     yield from d.move(d.middle())

@@ -25,8 +25,11 @@ from core.contract.settings import from_json, preset  # noqa: E402
 from tests import batch_faces  # noqa: E402
 
 NAMES = ("anna", "bert")
-QUICK = {"solve": {"size": 128, "steps": 4, "skin_tone": "0.69,0.54,0.45", "white_point": "1,1,1"},
-         "upscale": {"size": 1024}, "transfer": {"scan": False}}
+QUICK = {
+    "solve": {"size": 128, "steps": 4, "skin_tone": "0.69,0.54,0.45", "white_point": "1,1,1"},
+    "upscale": {"size": 1024},
+    "transfer": {"scan": False},
+}
 
 
 def flow():
@@ -61,8 +64,9 @@ def plan(root: Path) -> Path:
 def found(root: Path):
     """By itself, though no .blend knows of it; a click lists its faces."""
     batches = addon.module("batches")
-    yield from d.until(lambda: batches.current() == root and batches.line(batches.view()), "finding the batch at work",
-                       30)
+    yield from d.until(
+        lambda: batches.current() == root and batches.line(batches.view()), "finding the batch at work", 30
+    )
     d.say("found:", batches.line(batches.view()))
     yield from d.park()
     yield from d.press("wildcap.open_batch")
@@ -76,8 +80,11 @@ def found(root: Path):
 def result(root: Path):
     """The head comes in when its face is done, the maps by the next click."""
     yield from d.until(lambda: "anna" in bpy.data.objects, "the first face's head", addon.START_LIMIT_S)
-    yield from d.until(lambda: addon.next_step().operator == "wildcap.assemble_material",
-                       f"its maps instead of {addon.next_step()}", 20)
+    yield from d.until(
+        lambda: addon.next_step().operator == "wildcap.assemble_material",
+        f"its maps instead of {addon.next_step()}",
+        20,
+    )
     yield from d.lead("wildcap.assemble_material")
     yield 1.0
     assert "WildCap Skin" in bpy.data.objects["anna"].data.materials[0].node_tree.nodes

@@ -44,8 +44,12 @@ def again_and_cancelled(root: Path, target: Path):
     """A second delivery over the first, stopped on its way: the first one stays."""
     before = {path: path.stat().st_mtime_ns for path in target.rglob("*")}
     yield from click_deliver(root)
-    yield from d.until(lambda: addon.job(root) is not None and addon.job(root).progress is not None,
-                       "the worker's start", 120, every_s=0.02)
+    yield from d.until(
+        lambda: addon.job(root) is not None and addon.job(root).progress is not None,
+        "the worker's start",
+        120,
+        every_s=0.02,
+    )
     bpy.ops.wildcap.cancel()
     yield from d.until(lambda: addon.job(root) is None, "the cancel", 5)
     assert {path: path.stat().st_mtime_ns for path in target.rglob("*")} == before
@@ -58,8 +62,11 @@ def click_deliver(root: Path):
     yield 1.0
     d.screenshot("deliver_2_question")
     yield from d.key('RET')
-    yield from d.until(lambda: addon.job(root) is not None or addon.problem(root) or (root / "exports").is_dir(),
-                       "the delivery's start", 20)
+    yield from d.until(
+        lambda: addon.job(root) is not None or addon.problem(root) or (root / "exports").is_dir(),
+        "the delivery's start",
+        20,
+    )
 
 
 d.play(flow(), limit_s=900)

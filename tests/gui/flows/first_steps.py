@@ -145,8 +145,9 @@ def missed():
     """The tab of that face says that its folder is gone."""
     bpy.context.view_layer.objects.active = bpy.data.objects["other face"]
     status = addon.module("status")
-    yield from d.until(lambda: status.of(items()[1]) is not None and status.of(items()[1]).missing, "that it is missed",
-                       10)
+    yield from d.until(
+        lambda: status.of(items()[1]) is not None and status.of(items()[1]).missing, "that it is missed", 10
+    )
     yield from d.park()
 
 

@@ -106,8 +106,11 @@ def autosave(root: Path):
     bpy.ops.ed.undo_push()
     started = time.time()
     folder = Path(tempfile.gettempdir())
-    yield from d.until(lambda: any(path.stat().st_mtime > started for path in folder.glob("*autosave.blend")),
-                       f"an autosave in {folder}", 100)
+    yield from d.until(
+        lambda: any(path.stat().st_mtime > started for path in folder.glob("*autosave.blend")),
+        f"an autosave in {folder}",
+        100,
+    )
     assert addon.job(root) is not None, addon.problem(root)
     d.say(f"autosaved after {time.time() - started:.0f} s, the job running")
 
@@ -151,14 +154,16 @@ def cancelled(root: Path):
     position = yield from d.find("wildcap.cancel")
     clicked = time.monotonic()
     yield from d.click(position)
-    yield from d.until(lambda: addon.job(root) is None and process.poll() is not None, "the end after Cancel", 30,
-                       every_s=d.TICK_S)
+    yield from d.until(
+        lambda: addon.job(root) is None and process.poll() is not None, "the end after Cancel", 30, every_s=d.TICK_S
+    )
     _cancelled.append(time.monotonic() - clicked)
     d.say(f"cancelled {_cancelled[-1]:.1f} s after the click")
 
 
 def stepped(root: Path, steps: int):
     """Waits until the solver has gone that many steps on."""
+
     def step() -> float:
         assert addon.job(root) is not None, f"the job is gone: {addon.problem(root)}"
         progress = addon.job(root).progress

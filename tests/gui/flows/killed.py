@@ -50,8 +50,11 @@ def closed_after_a_stroke(root: Path, folder: Path):
     yield from ended(told["worker"])
     yield from same(root, folder)
     d.say("closed in the moment of a stroke: it is in the capture")
-    yield from d.until(lambda: addon.next_step().label == "Solve",
-                       f"a solve anew, of the mask with the stroke, instead of {addon.next_step()}", 10)
+    yield from d.until(
+        lambda: addon.next_step().label == "Solve",
+        f"a solve anew, of the mask with the stroke, instead of {addon.next_step()}",
+        10,
+    )
 
 
 def killed_while_solving(root: Path, folder: Path):

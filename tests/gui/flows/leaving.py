@@ -82,18 +82,36 @@ def state() -> dict:
     """All there is to read of the brush, the paint settings, shading, overlays and mode, as plain values."""
     space, tools = d.view().spaces.active, bpy.context.scene.tool_settings
     paint = tools.image_paint
-    things = {"paint": paint, "brush": paint.brush, "unified": tools.unified_paint_settings,
-              "asset": paint.brush_asset_reference,
-              "weights": tools.weight_paint, "sculpting": tools.sculpt, "shading": space.shading,
-              "overlay": space.overlay}
-    values = {f"{name}.{key}": value for name, thing in things.items() if thing is not None
-              for key, value in plain(thing).items()}
+    things = {
+        "paint": paint,
+        "brush": paint.brush,
+        "unified": tools.unified_paint_settings,
+        "asset": paint.brush_asset_reference,
+        "weights": tools.weight_paint,
+        "sculpting": tools.sculpt,
+        "shading": space.shading,
+        "overlay": space.overlay,
+    }
+    values = {
+        f"{name}.{key}": value
+        for name, thing in things.items()
+        if thing is not None
+        for key, value in plain(thing).items()
+    }
     layer = bpy.context.view_layer
     for thing in layer.objects:
-        values[thing.name] = (thing.mode, thing.select_get(), thing.hide_get(),
-                              thing.data.use_mirror_x if thing.type == 'MESH' else None)
-    return {**values, "mode": bpy.context.mode, "active": layer.objects.active.name,
-            "brushes": sorted(b.name for b in bpy.data.brushes)}
+        values[thing.name] = (
+            thing.mode,
+            thing.select_get(),
+            thing.hide_get(),
+            thing.data.use_mirror_x if thing.type == 'MESH' else None,
+        )
+    return {
+        **values,
+        "mode": bpy.context.mode,
+        "active": layer.objects.active.name,
+        "brushes": sorted(b.name for b in bpy.data.brushes),
+    }
 
 
 def plain(thing) -> dict:
@@ -104,8 +122,9 @@ def plain(thing) -> dict:
         if each.type == 'POINTER':
             found[each.identifier] = value.name if isinstance(value, bpy.types.ID) else None
         elif each.type != 'COLLECTION':
-            found[each.identifier] = (tuple(value) if getattr(each, "is_array", False) else sorted(value)
-                                      if isinstance(value, set) else value)
+            found[each.identifier] = (
+                tuple(value) if getattr(each, "is_array", False) else sorted(value) if isinstance(value, set) else value
+            )
     return found
 
 
@@ -141,8 +160,12 @@ def killed(root: Path):
     found = Path(tempfile.mkdtemp()) / "found.png"
     shutil.copyfile(root / "shadow_mask.png", found)
     (found.parent / "find.py").write_text(FIND)
-    subprocess.run(["blender", "-b", "--factory-startup", "-P", str(found.parent / "find.py"), "--", str(found)],
-                   check=True, timeout=120, capture_output=True)
+    subprocess.run(
+        ["blender", "-b", "--factory-startup", "-P", str(found.parent / "find.py"), "--", str(found)],
+        check=True,
+        timeout=120,
+        capture_output=True,
+    )
     assert np.abs(np.load(f"{found}.npy") - painting.mask()).max() < 0.01
     d.say("six seconds after a stroke another Blender finds it")
 

@@ -71,8 +71,11 @@ def open_sample_head():
 def shade(root: Path) -> None:
     """Casts a shadow on the left cheek of the capture's texture: what a mask is there for, in a place that is known."""
     place = painting.uv_under(head(), painting.facing(head(), CHEEK))
-    subprocess.run([addon.CHECKOUT / ".venv" / "bin" / "python", "-c", SHADE, root,
-                    *map(str, (*place, RADIUS, SHADOW))], cwd=addon.CHECKOUT, check=True)
+    subprocess.run(
+        [addon.CHECKOUT / ".venv" / "bin" / "python", "-c", SHADE, root, *map(str, (*place, RADIUS, SHADOW))],
+        cwd=addon.CHECKOUT,
+        check=True,
+    )
 
 
 def paint(root: Path):
@@ -132,8 +135,11 @@ def paint(root: Path):
     yield from d.until(lambda: bpy.context.mode == 'OBJECT', "leaving", 5)
     saved = on_disk(root / "shadow_mask.png")
     assert np.abs(saved - painted).max() < 0.01
-    assert (d.view().spaces.active.shading.type, d.view().spaces.active.shading.light,
-            d.view().spaces.active.shading.color_type) == shading
+    assert (
+        d.view().spaces.active.shading.type,
+        d.view().spaces.active.shading.light,
+        d.view().spaces.active.shading.color_type,
+    ) == shading
     # where Blender has a library of brushes, it links one as it enters the mode
     own = bpy.context.scene.tool_settings.image_paint.brush
     assert {b.name for b in bpy.data.brushes} == brushes | ({own.name} if own is not None else set())
@@ -167,12 +173,16 @@ def lit_as_painted(root: Path) -> None:
     u, v = painting.uv_under(head(), painting.facing(head(), CHEEK))
     found = {}
     for side, across in (("left", u), ("right", 1 - u)):
-        rows, columns = np.mgrid[:len(shading), :len(shading)] + 0.5
+        rows, columns = np.mgrid[: len(shading), : len(shading)] + 0.5
         distance = np.hypot(columns / len(shading) - across, 1 - rows / len(shading) - v)
-        found[side] = float(np.median(shading[distance < 0.6 * RADIUS])
-                            / np.median(shading[(distance > 1.4 * RADIUS) & (distance < 2.2 * RADIUS)]))
-    d.say(f"Light inside of the place against around it: left cheek {found['left']:.2f}, right cheek "
-          f"{found['right']:.2f}; the shadow left {SHADOW}")
+        found[side] = float(
+            np.median(shading[distance < 0.6 * RADIUS])
+            / np.median(shading[(distance > 1.4 * RADIUS) & (distance < 2.2 * RADIUS)])
+        )
+    d.say(
+        f"Light inside of the place against around it: left cheek {found['left']:.2f}, right cheek "
+        f"{found['right']:.2f}; the shadow left {SHADOW}"
+    )
     assert abs(found["left"] - SHADOW) < 0.15 and 0.95 < found["right"] < 1.05, found
 
 

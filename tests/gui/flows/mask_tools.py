@@ -22,9 +22,18 @@ def flow():
     yield from mirrored()
     x, y = d.middle()
     states = [mask()]
-    for step in (button('MIRROR'), stroke(x + 30, y), button('GROW'), button('SHRINK'), stroke(x - 30, y - 60, 'SHEET'),
-                 button('INVERT'),
-                 stroke(x + 20, y - 80, 'HEAD'), button('SOFTEN'), button('CLEAR'), button('PROPOSAL')):
+    for step in (
+        button('MIRROR'),
+        stroke(x + 30, y),
+        button('GROW'),
+        button('SHRINK'),
+        stroke(x - 30, y - 60, 'SHEET'),
+        button('INVERT'),
+        stroke(x + 20, y - 80, 'HEAD'),
+        button('SOFTEN'),
+        button('CLEAR'),
+        button('PROPOSAL'),
+    ):
         yield from step
         states.append(mask())
     changes = [np.abs(a - b).max() for a, b in zip(states, states[1:], strict=False)]
@@ -84,8 +93,10 @@ def mirrored():
             yield 0.3
             yield from dab(x + 50, y - 30)
             halves = [int((half > 0.5).sum()) for half in np.split(mask(), 2, axis=1)]
-            d.say(f"a stroke to the right, {on}, {'mirrored' if both else 'plain'}: texels of the left and right half "
-                  f"{halves}")
+            d.say(
+                f"a stroke to the right, {on}, {'mirrored' if both else 'plain'}: texels of the left and right half "
+                f"{halves}"
+            )
             assert halves[1] > 100 and (halves[0] > 100) == both
     bpy.ops.wildcap.paint_mask(on='HEAD')
     bpy.ops.wildcap.edit_mask(kind='PROPOSAL')

@@ -57,8 +57,11 @@ def contact_sheet(root: Path):
     yield from d.until(sheet.is_file, "the contact sheet", 180)
     image = bpy.data.images.load(str(sheet))
     assert tuple(image.size) == (192, 2 * 64 + 3 * 8), tuple(image.size)
-    assert all((root / "renders" / f"{name}.{kind}").is_file() for name in ("three_point", "coloured")
-               for kind in ("png", "exr"))
+    assert all(
+        (root / "renders" / f"{name}.{kind}").is_file()
+        for name in ("three_point", "coloured")
+        for kind in ("png", "exr")
+    )
     d.say("contact sheet")
 
 
@@ -74,8 +77,18 @@ def turntable(root: Path):
 
 def from_a_terminal(root: Path) -> None:
     (root / "renders" / "window.png").unlink()
-    command = ["blender", "--command", "wildcap", "relight", str(root), "window", "--resolution", "32", "--samples",
-               "1"]
+    command = [
+        "blender",
+        "--command",
+        "wildcap",
+        "relight",
+        str(root),
+        "window",
+        "--resolution",
+        "32",
+        "--samples",
+        "1",
+    ]
     done = subprocess.run(command, env=os.environ, capture_output=True, text=True, timeout=180)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     assert (root / "renders" / "window.png").is_file(), done.stdout[-2000:]
@@ -105,8 +118,9 @@ def escape() -> None:
     x11.XOpenDisplay.restype = ctypes.c_void_p
     x11.XKeysymToKeycode.argtypes, x11.XKeysymToKeycode.restype = [ctypes.c_void_p, ctypes.c_ulong], ctypes.c_ubyte
     display = ctypes.c_void_p(x11.XOpenDisplay(None))
-    test.XTestFakeMotionEvent(display, 0, *(side // 2 for side in (d.window().width, d.window().height)),
-                              ctypes.c_ulong(0))
+    test.XTestFakeMotionEvent(
+        display, 0, *(side // 2 for side in (d.window().width, d.window().height)), ctypes.c_ulong(0)
+    )
     for pressed in (1, 0):
         test.XTestFakeKeyEvent(display, x11.XKeysymToKeycode(display, ESCAPE), pressed, ctypes.c_ulong(0))
     x11.XCloseDisplay(display)

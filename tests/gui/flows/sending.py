@@ -61,8 +61,11 @@ def artist(server: Service):
     d.screenshot("sending_5_agreed")
     started = time.monotonic()
     yield from d.lead("wildcap.reconstruct")
-    yield from d.until(lambda: len(server.charged) == 2 and (root / "delit" / "00002.png").is_file(), "the answers",
-                       addon.START_LIMIT_S)
+    yield from d.until(
+        lambda: len(server.charged) == 2 and (root / "delit" / "00002.png").is_file(),
+        "the answers",
+        addon.START_LIMIT_S,
+    )
     d.say(f"two frames were sent and answered {time.monotonic() - started:.0f} s after the click")
     if addon.job(root) is not None:
         addon.module("jobs").cancel(str(root))
@@ -112,7 +115,7 @@ def registered(root: Path, item) -> None:
     captures, properties, stages = addon.module("captures"), addon.module("properties"), addon.module("jobs").stages
     capture, settings = captures.folder(item), properties.settings(item)
     capture.set_source(root.parent / "face.mp4")
-    for stage in stages.STAGES[:stages.NAMES.index("delight")]:
+    for stage in stages.STAGES[: stages.NAMES.index("delight")]:
         capture.finish(stage, capture.conditions(stage, settings), 1.0, settings, {}, "0.1.0")
 
 

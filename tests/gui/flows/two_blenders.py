@@ -70,8 +70,9 @@ def both_paint(blender, folder: Path, root: Path):
 
 
 def in_history(root: Path, mask: np.ndarray) -> bool:
-    return any(np.abs(painting.on_disk(path) - mask).max() < 0.01
-               for path in (root / "mask_history").glob("shadow_mask_*.png"))
+    return any(
+        np.abs(painting.on_disk(path) - mask).max() < 0.01 for path in (root / "mask_history").glob("shadow_mask_*.png")
+    )
 
 
 d.play(flow(), limit_s=600)

@@ -50,8 +50,13 @@ def of(obj, number: int) -> RiggedEyeball:
     centre, pupil = fit[:3], rows[out.argmin()]
     pitch, yaw = _angles(rest[pupil] - centre)
     turned = {way: _angles(places(keys[f"eyeLook{way}{SIDES[number]}"])[pupil] - centre) for way in WAYS}
-    return RiggedEyeball(centre, float(np.sqrt(fit[3] + centre @ centre)), pitch, yaw,
-                         {way: (a - pitch, b - yaw) for way, (a, b) in turned.items()})
+    return RiggedEyeball(
+        centre,
+        float(np.sqrt(fit[3] + centre @ centre)),
+        pitch,
+        yaw,
+        {way: (a - pitch, b - yaw) for way, (a, b) in turned.items()},
+    )
 
 
 def rims(asset: FaceUnits, number: int) -> LidRims:

@@ -61,15 +61,21 @@ def remove(obj) -> None:
     if nodes.SOCKET in obj.data.attributes:
         obj.data.attributes.remove(obj.data.attributes[nodes.SOCKET])
     things = of(obj)
-    made = {slot.material for thing in things for slot in thing.material_slots if slot.material is not None
-            and of_the_head.KEY in slot.material}
+    made = {
+        slot.material
+        for thing in things
+        for slot in thing.material_slots
+        if slot.material is not None and of_the_head.KEY in slot.material
+    }
     data = [thing.data for thing in things]
     for thing in things:
         bpy.data.objects.remove(thing)
     _drop(bpy.data.meshes, data)
     _drop(bpy.data.materials, made)
-    for blocks, names in ((bpy.data.images, (pictures.IRIS, pictures.WHITE)),
-                          (bpy.data.node_groups, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE))):
+    for blocks, names in (
+        (bpy.data.images, (pictures.IRIS, pictures.WHITE)),
+        (bpy.data.node_groups, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE)),
+    ):
         _drop(blocks, filter(None, [data_blocks.find(blocks, name) for name in names]))
 
 
@@ -82,8 +88,11 @@ def keep_up(obj, _capture) -> str:
         left = add(bpy.context, obj)
     elif of(obj) and not mesh.has(obj):
         remove(obj)
-    return rpt_("{}: changed since, and left as they are; delete them to have them made anew").format(
-        ", ".join(left)) if left else ""
+    return (
+        rpt_("{}: changed since, and left as they are; delete them to have them made anew").format(", ".join(left))
+        if left
+        else ""
+    )
 
 
 def _drop(collection, blocks) -> None:

@@ -40,8 +40,12 @@ def build(obj, keep, iris_m: tuple[float, float]) -> None:
 
         def finish_inner(thing, eye=eye, side=side):
             _place(thing, obj, eye, side)
-            materials.fill(thing, materials.white(obj.name), materials.iris(obj.name, of_the_head.colour_of(obj)),
-                           materials.pupil(obj.name))
+            materials.fill(
+                thing,
+                materials.white(obj.name),
+                materials.iris(obj.name, of_the_head.colour_of(obj)),
+                materials.pupil(obj.name),
+            )
 
         def finish_shell(thing, eye=eye, side=side):
             _place(thing, obj, eye, side)
@@ -49,8 +53,9 @@ def build(obj, keep, iris_m: tuple[float, float]) -> None:
             _let_light_in(thing)
 
         keep(f"{side} Eye", _turned(f"{obj.name} {side} Eye", shapes.inner(eye.radius, edge), number), finish_inner)
-        shell = keep(f"{side} Cornea", _turned(f"{obj.name} {side} Cornea", shapes.shell(eye.radius, edge), 0),
-                     finish_shell)
+        shell = keep(
+            f"{side} Cornea", _turned(f"{obj.name} {side} Cornea", shapes.shell(eye.radius, edge), 0), finish_shell
+        )
 
         def finish_margin(thing, shell=shell):
             materials.fill(thing, obj.data.materials[0])  # the head's skin, in the colour of the rim
@@ -74,8 +79,13 @@ def build(obj, keep, iris_m: tuple[float, float]) -> None:
         shells.append(shell)
     inner = len(asset.template) + len(asset.copies)
     _mark(obj.data, inner + np.setdiff1d(sockets(asset), lining(asset)))
-    nodes.modify(obj, nodes.lids_on_eyes(), Left=shells[0], Right=shells[1],
-                 First=inner + int(np.flatnonzero(asset.kind == LEFT_EYE)[0]))
+    nodes.modify(
+        obj,
+        nodes.lids_on_eyes(),
+        Left=shells[0],
+        Right=shells[1],
+        First=inner + int(np.flatnonzero(asset.kind == LEFT_EYE)[0]),
+    )
 
 
 def _mark(mesh, rows: np.ndarray) -> None:
@@ -109,9 +119,16 @@ def _along_lids(name: str, rims: ball.LidRims, constant: dict[str, float]):
         _grid(len(rims.upper), VERTICES_ACROSS, flipped=True),
         len(rims.upper) * VERTICES_ACROSS + _grid(len(rims.lower), VERTICES_ACROSS),
     ]
-    return _strip(name, np.concatenate(strips),
-                  {"rim": rim.repeat(VERTICES_ACROSS), "opposite": opposite.repeat(VERTICES_ACROSS), "across": across,
-                   **{key: np.full(len(across), value) for key, value in constant.items()}})
+    return _strip(
+        name,
+        np.concatenate(strips),
+        {
+            "rim": rim.repeat(VERTICES_ACROSS),
+            "opposite": opposite.repeat(VERTICES_ACROSS),
+            "across": across,
+            **{key: np.full(len(across), value) for key, value in constant.items()},
+        },
+    )
 
 
 def _margin(name: str, rims: ball.LidRims, head):
@@ -137,9 +154,17 @@ def _caruncle(name: str, rims: ball.LidRims, asset: FaceUnits):
     t = np.clip((along.repeat(rows) * early - 0.3) / 0.7, 0, 1)
     onto = t * t * (3 - 2 * t)
     hump = np.sin(np.pi * across) * (1 - 0.5 * onto)
-    return _strip(name, _grid(count + 1, rows, flipped=True),
-                  {"rim": upper.repeat(rows), "opposite": lower.repeat(rows), "across": across, "onto": onto,
-                   "lift": LIFT_SHARE * hump})
+    return _strip(
+        name,
+        _grid(count + 1, rows, flipped=True),
+        {
+            "rim": upper.repeat(rows),
+            "opposite": lower.repeat(rows),
+            "across": across,
+            "onto": onto,
+            "lift": LIFT_SHARE * hump,
+        },
+    )
 
 
 def _grid(count: int, rows: int, flipped: bool = False) -> np.ndarray:

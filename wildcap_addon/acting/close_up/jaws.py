@@ -59,8 +59,9 @@ def find_jaws(obj, shape: mouth_shapes.Mouth) -> Jaws:
     head = ball.places(keys[0])
     rest = head[first:]
     moves = {name: ball.places(keys[name])[first:] - rest for name in asset.units}
-    moves = {name: moved for name, moved in moves.items()
-             if np.abs(moved[np.concatenate([lower, tongue])]).max() > LEAST_M}
+    moves = {
+        name: moved for name, moved in moves.items() if np.abs(moved[np.concatenate([lower, tongue])]).max() > LEAST_M
+    }
     jaws = Jaws(asset, upper, lower, tongue, rest, moves, np.zeros(3))
     return replace(jaws, lowered_by=_lowering(asset, head, jaws.placed(shape.vertices[~shape.lower])))
 

@@ -28,12 +28,21 @@ def _digest(thing) -> str:
     attributes."""
     mesh = thing.data
     keys = mesh.shape_keys.key_blocks if mesh.shape_keys else ()
-    names = ([key.name for key in keys], [group.name for group in thing.vertex_groups],
-             sorted(attribute.name for attribute in mesh.attributes
-                    if not attribute.is_internal and attribute.name not in BLENDERS_OWN))
-    arrays = [np.array(thing.location, np.float32), read_field(mesh.vertices, "co", 3),
-              read_field(mesh.loops, "vertex_index", kind=np.int32),
-              *(read_field(layer.data, "uv", 2) for layer in mesh.uv_layers),
-              *(read_field(key.data, "co", 3) for key in keys)]
+    names = (
+        [key.name for key in keys],
+        [group.name for group in thing.vertex_groups],
+        sorted(
+            attribute.name
+            for attribute in mesh.attributes
+            if not attribute.is_internal and attribute.name not in BLENDERS_OWN
+        ),
+    )
+    arrays = [
+        np.array(thing.location, np.float32),
+        read_field(mesh.vertices, "co", 3),
+        read_field(mesh.loops, "vertex_index", kind=np.int32),
+        *(read_field(layer.data, "uv", 2) for layer in mesh.uv_layers),
+        *(read_field(key.data, "co", 3) for key in keys),
+    ]
     told = repr(names).encode() + b"".join(array.tobytes() for array in arrays)
     return hashlib.blake2b(told, digest_size=16).hexdigest()

@@ -36,16 +36,25 @@ def white(name: str) -> bpy.types.Material:
         return material
     tree = material.node_tree
     told = _told(tree, pictures.white())
-    pink = _mixed(tree, told["Green"], materials.rgba(WHITE_COLOUR),
-                  materials.rgba(tuple(a * b for a, b in zip(WHITE_COLOUR, PINK, strict=True))))
-    tree.links.new(_mixed(tree, math(tree, 'MULTIPLY', told["Red"], 0.75), pink, materials.rgba(VESSEL_COLOUR)),
-                   shader.inputs["Base Color"])
+    pink = _mixed(
+        tree,
+        told["Green"],
+        materials.rgba(WHITE_COLOUR),
+        materials.rgba(tuple(a * b for a, b in zip(WHITE_COLOUR, PINK, strict=True))),
+    )
+    tree.links.new(
+        _mixed(tree, math(tree, 'MULTIPLY', told["Red"], 0.75), pink, materials.rgba(VESSEL_COLOUR)),
+        shader.inputs["Base Color"],
+    )
     _moist(shader, 0.35, (1.0, 0.45, 0.3), 0.0012, 0.0)  # its wet layer is the shell
     _bumped(tree, shader, told["Blue"], 0.25, 0.0001)
     uv = add(tree, 'ShaderNodeUVMap').outputs[0]
-    fading = add(tree, 'ShaderNodeMapRange',
-                 {"Value": add(tree, 'ShaderNodeSeparateXYZ', (uv,)).outputs[1], "From Min": 0.0, "From Max": OPAQUE_V},
-                 interpolation_type='SMOOTHSTEP').outputs[0]
+    fading = add(
+        tree,
+        'ShaderNodeMapRange',
+        {"Value": add(tree, 'ShaderNodeSeparateXYZ', (uv,)).outputs[1], "From Min": 0.0, "From Max": OPAQUE_V},
+        interpolation_type='SMOOTHSTEP',
+    ).outputs[0]
     _seen_through(tree, shader, fading)
     return material
 
@@ -178,8 +187,9 @@ def _shaded_by_lips(tree, shader, front: float) -> None:
     """In EEVEE the deeper the darker, by an output of its own; Cycles finds it out."""
     _output(tree).target = 'CYCLES'
     depth = add(tree, 'ShaderNodeSeparateXYZ', (add(tree, 'ShaderNodeTexCoord').outputs["Object"],)).outputs[1]
-    dark = add(tree, 'ShaderNodeMapRange',
-               {"Value": depth, "From Min": front, "From Max": front + DEEP_M, "To Max": DEEP_DARK}).outputs[0]
+    dark = add(
+        tree, 'ShaderNodeMapRange', {"Value": depth, "From Min": front, "From Max": front + DEEP_M, "To Max": DEEP_DARK}
+    ).outputs[0]
     black = add(tree, 'ShaderNodeBsdfDiffuse', {"Color": (0, 0, 0, 1)}).outputs[0]
     mixed = add(tree, 'ShaderNodeMixShader', (dark, shader.outputs[0], black)).outputs[0]
     add(tree, 'ShaderNodeOutputMaterial', {"Surface": mixed}, target='EEVEE').location = (300, -200)
@@ -187,8 +197,13 @@ def _shaded_by_lips(tree, shader, front: float) -> None:
 
 def _uneven(tree, shader, scale: float, strength: float, distance: float) -> None:
     place = add(tree, 'ShaderNodeTexCoord').outputs["Object"]
-    _bumped(tree, shader, add(tree, 'ShaderNodeTexNoise', {"Vector": place, "Scale": scale, "Detail": 2.0}).outputs[0],
-            strength, distance)
+    _bumped(
+        tree,
+        shader,
+        add(tree, 'ShaderNodeTexNoise', {"Vector": place, "Scale": scale, "Detail": 2.0}).outputs[0],
+        strength,
+        distance,
+    )
 
 
 def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
@@ -235,17 +250,23 @@ def _output(tree):
 
 
 def _seen_through(tree, shader, opaque) -> None:
-    mixed = add(tree, 'ShaderNodeMixShader',
-                (opaque, add(tree, 'ShaderNodeBsdfTransparent').outputs[0], shader.outputs[0]))
+    mixed = add(
+        tree, 'ShaderNodeMixShader', (opaque, add(tree, 'ShaderNodeBsdfTransparent').outputs[0], shader.outputs[0])
+    )
     tree.links.new(mixed.outputs[0], _output(tree).inputs["Surface"])
 
 
 def _pane(tree, ior: float):
     """Clear, with the reflections of a surface."""
-    return add(tree, 'ShaderNodeMixShader',
-               (add(tree, 'ShaderNodeFresnel', {"IOR": ior}).outputs[0],
-                add(tree, 'ShaderNodeBsdfTransparent').outputs[0],
-                add(tree, 'ShaderNodeBsdfGlossy', {"Roughness": 0.03}).outputs[0])).outputs[0]
+    return add(
+        tree,
+        'ShaderNodeMixShader',
+        (
+            add(tree, 'ShaderNodeFresnel', {"IOR": ior}).outputs[0],
+            add(tree, 'ShaderNodeBsdfTransparent').outputs[0],
+            add(tree, 'ShaderNodeBsdfGlossy', {"Roughness": 0.03}).outputs[0],
+        ),
+    ).outputs[0]
 
 
 def _clear(material) -> None:

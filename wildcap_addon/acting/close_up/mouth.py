@@ -45,8 +45,10 @@ def _faces(asset: FaceUnits, rows: np.ndarray) -> list[list[int]]:
     """Those of some inner vertices, counted by themselves."""
     first = len(asset.template) + len(asset.copies)
     inside = np.isin(asset.faces[:, 0] - first, rows)
-    return [[int(where) for where in np.searchsorted(rows, [i - first for i in face if i >= 0])]
-            for face in asset.faces[inside].tolist()]
+    return [
+        [int(where) for where in np.searchsorted(rows, [i - first for i in face if i >= 0])]
+        for face in asset.faces[inside].tolist()
+    ]
 
 
 def _data(name: str, vertices: np.ndarray, faces: list, slots: np.ndarray):

@@ -55,8 +55,9 @@ class Arch:
         """Places [..., 3] and ways outwards [..., 3], level, at distances from the middle."""
         place = np.stack([np.interp(along, self.along, column) for column in self.places.T], -1)
         step = 0.004
-        before, after = (np.stack([np.interp(along + s, self.along, column) for column in self.places.T], -1)
-                         for s in (-step, step))
+        before, after = (
+            np.stack([np.interp(along + s, self.along, column) for column in self.places.T], -1) for s in (-step, step)
+        )
         run = after - before
         out = np.stack([run[..., 1], -run[..., 0], 0 * run[..., 0]], -1)
         return place, out / np.linalg.norm(out, axis=-1, keepdims=True)
@@ -156,10 +157,20 @@ def _teeth(jaw: str, arch: Arch, up: float) -> list[tuple[np.ndarray, np.ndarray
     for number in range(len(WIDTHS_MM[jaw])):
         h = np.concatenate([np.linspace(-0.45, 0.9, ALONG), [0.965, 1.0]])  # 0 at the gum, 1 at the edge
         front = number <= CANINE
-        swell = np.interp(h, [-0.45, 0, 0.35, 0.75, 0.93, 1.0],
-                          [0.62, 0.86, 0.98, 1.0, 0.93, 0.72] if front else [0.66, 0.90, 1.0, 1.0, 0.86, 0.55])
-        deep = np.interp(h, [-0.45, 0, 0.3, 0.7, 0.95, 1.0], [0.7, 1.0, 0.92, 0.5, 0.26, 0.14] if number < INCISORS else
-                         [0.7, 1.0, 0.98, 0.66, 0.36, 0.16] if front else [0.75, 0.94, 1.0, 0.95, 0.70, 0.40])
+        swell = np.interp(
+            h,
+            [-0.45, 0, 0.35, 0.75, 0.93, 1.0],
+            [0.62, 0.86, 0.98, 1.0, 0.93, 0.72] if front else [0.66, 0.90, 1.0, 1.0, 0.86, 0.55],
+        )
+        deep = np.interp(
+            h,
+            [-0.45, 0, 0.3, 0.7, 0.95, 1.0],
+            [0.7, 1.0, 0.92, 0.5, 0.26, 0.14]
+            if number < INCISORS
+            else [0.7, 1.0, 0.98, 0.66, 0.36, 0.16]
+            if front
+            else [0.75, 0.94, 1.0, 0.95, 0.70, 0.40],
+        )
         width, depth = (ends[number + 1] - ends[number]) * 0.985, DEPTHS_MM[jaw][number] / 1000 * larger
         length = LENGTHS_MM[jaw][number] / 1000 * larger
         tip = np.abs(square[0]) * (0.14 if number == CANINE else 0.02)  # the edge of a canine is a point
@@ -167,7 +178,7 @@ def _teeth(jaw: str, arch: Arch, up: float) -> list[tuple[np.ndarray, np.ndarray
             place, out = arch.at(np.array(side * (ends[number] + ends[number + 1]) / 2))
             run = np.array([-out[1], out[0], 0])
             lean = 0.10 if number < INCISORS else 0.04  # the crowns of front teeth lean towards the lips
-            reach = (h[:, None] - tip[None] * np.clip(h[:, None] - 0.6, 0, 1) / 0.4)
+            reach = h[:, None] - tip[None] * np.clip(h[:, None] - 0.6, 0, 1) / 0.4
             away = (
                 -INSET_M[jaw]
                 - depth / 2 * deep[:, None] * (1 - square[1][None])
@@ -179,9 +190,18 @@ def _teeth(jaw: str, arch: Arch, up: float) -> list[tuple[np.ndarray, np.ndarray
             points = place + along + away[..., None] * out + down[..., None] * [0, 0, 1.0]
             points = points.reshape(-1, 3)
             k = np.arange(AROUND)
-            quads = [np.stack([r * AROUND + k, r * AROUND + (k + 1) % AROUND, (r + 1) * AROUND + (k + 1) % AROUND,
-                               (r + 1) * AROUND + k], 1)
-                     for r in range(len(h) - 1)]
+            quads = [
+                np.stack(
+                    [
+                        r * AROUND + k,
+                        r * AROUND + (k + 1) % AROUND,
+                        (r + 1) * AROUND + (k + 1) % AROUND,
+                        (r + 1) * AROUND + k,
+                    ],
+                    1,
+                )
+                for r in range(len(h) - 1)
+            ]
             last = (len(h) - 1) * AROUND
             half = np.arange(AROUND // 2 - 1)
             cap = np.stack([last + half, last + half + 1, last + (AROUND - 2 - half), last + (AROUND - 1 - half)], 1)

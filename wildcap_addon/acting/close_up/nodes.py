@@ -47,8 +47,9 @@ def vector(tree, operation: str, *inputs):
 
 
 def scaled(tree, direction, factor):
-    return add(tree, 'ShaderNodeVectorMath', {"Vector": direction, "Scale": factor},
-               operation='SCALE').outputs["Vector"]
+    return add(tree, 'ShaderNodeVectorMath', {"Vector": direction, "Scale": factor}, operation='SCALE').outputs[
+        "Vector"
+    ]
 
 
 def group(name: str, inputs: dict[str, str], build) -> bpy.types.NodeTree:
@@ -90,9 +91,16 @@ def lids_on_eyes() -> bpy.types.NodeTree:
 
     With the lining half a millimetre behind it, a lid would be a slab thinner than the way of red and green light in
     skin: the sun would shine through its rim, yellow on dark skin."""
-    return group(LIDS,
-                 {"Left": 'NodeSocketObject', "Right": 'NodeSocketObject', "First": 'NodeSocketInt',
-                  "Lining": 'NodeSocketMaterial'}, _lids)
+    return group(
+        LIDS,
+        {
+            "Left": 'NodeSocketObject',
+            "Right": 'NodeSocketObject',
+            "First": 'NodeSocketInt',
+            "Lining": 'NodeSocketMaterial',
+        },
+        _lids,
+    )
 
 
 def lid_margin() -> bpy.types.NodeTree:
@@ -122,30 +130,42 @@ def _lids(tree, inputs):
         near, out, centre = _on_shell(tree, inputs[side], place)
         above = vector(tree, 'DOT_PRODUCT', vector(tree, 'SUBTRACT', place, near), out)
         short = math(tree, 'SUBTRACT', CLEAR_M, above)
-        ahead = math(tree, 'MULTIPLY',
-                     add(tree, 'ShaderNodeSeparateXYZ', (vector(tree, 'SUBTRACT', place, centre),)).outputs[1], -1.0)
-        lid = math(tree, 'MULTIPLY', math(tree, 'GREATER_THAN', ahead, AHEAD_M),
-                   math(tree, 'MULTIPLY', math(tree, 'LESS_THAN', short, MOST_M),
-                        math(tree, 'GREATER_THAN', short, 0.0)))
+        ahead = math(
+            tree,
+            'MULTIPLY',
+            add(tree, 'ShaderNodeSeparateXYZ', (vector(tree, 'SUBTRACT', place, centre),)).outputs[1],
+            -1.0,
+        )
+        lid = math(
+            tree,
+            'MULTIPLY',
+            math(tree, 'GREATER_THAN', ahead, AHEAD_M),
+            math(tree, 'MULTIPLY', math(tree, 'LESS_THAN', short, MOST_M), math(tree, 'GREATER_THAN', short, 0.0)),
+        )
         lid = math(tree, 'MULTIPLY', lid, math(tree, 'LESS_THAN', index, inputs["First"]))
-        geometry = add(tree, 'GeometryNodeSetPosition',
-                       {"Geometry": geometry, "Selection": lid, "Offset": scaled(tree, out, short)}).outputs[0]
+        geometry = add(
+            tree,
+            'GeometryNodeSetPosition',
+            {"Geometry": geometry, "Selection": lid, "Offset": scaled(tree, out, short)},
+        ).outputs[0]
     beyond = math(tree, 'GREATER_THAN', index, math(tree, 'SUBTRACT', inputs["First"], 0.5))
-    gone = add(tree, 'FunctionNodeBooleanMath', (beyond, _attribute(tree, SOCKET, 'BOOLEAN')),
-               operation='OR').outputs[0]
-    kept = add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": gone},
-               domain='POINT').outputs[0]
+    gone = add(tree, 'FunctionNodeBooleanMath', (beyond, _attribute(tree, SOCKET, 'BOOLEAN')), operation='OR').outputs[
+        0
+    ]
+    kept = add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": gone}, domain='POINT').outputs[0]
     mouth = math(tree, 'COMPARE', add(tree, 'GeometryNodeInputMaterialIndex').outputs[0], float(MOUTH_SLOT), 0.5)
-    return add(tree, 'GeometryNodeSetMaterial',
-               {"Geometry": kept, "Selection": mouth, "Material": inputs["Lining"]}).outputs[0]
+    return add(
+        tree, 'GeometryNodeSetMaterial', {"Geometry": kept, "Selection": mouth, "Material": inputs["Lining"]}
+    ).outputs[0]
 
 
 def _margin(tree, inputs):
     lid, _, across = _lid(tree, inputs["Head"])
     below, out, _ = _on_shell(tree, inputs["Shell"], lid)
     foot = vector(tree, 'SUBTRACT', below, scaled(tree, out, FOOT_M))
-    return add(tree, 'GeometryNodeSetPosition',
-               {"Geometry": inputs["Geometry"], "Position": _between(tree, lid, foot, across)}).outputs[0]
+    return add(
+        tree, 'GeometryNodeSetPosition', {"Geometry": inputs["Geometry"], "Position": _between(tree, lid, foot, across)}
+    ).outputs[0]
 
 
 def _wet(tree, inputs):
@@ -153,8 +173,12 @@ def _wet(tree, inputs):
     reach = _attribute(tree, "reach", 'FLOAT')
     towards = vector(tree, 'NORMALIZE', vector(tree, 'SUBTRACT', other, rim))
     below, _, _ = _on_shell(tree, inputs["Shell"], rim)
-    down = math(tree, 'MAXIMUM', 0.0,
-                math(tree, 'SUBTRACT', 1.0, math(tree, 'DIVIDE', reach, vector(tree, 'DISTANCE', rim, below))))
+    down = math(
+        tree,
+        'MAXIMUM',
+        0.0,
+        math(tree, 'SUBTRACT', 1.0, math(tree, 'DIVIDE', reach, vector(tree, 'DISTANCE', rim, below))),
+    )
     lid = _between(tree, rim, below, down)
     ball, out, _ = _on_shell(tree, inputs["Shell"], vector(tree, 'ADD', lid, scaled(tree, towards, reach)))
     ball = vector(tree, 'SUBTRACT', ball, scaled(tree, out, 0.00003))  # its edge lies below the shell, not above it
@@ -188,9 +212,16 @@ def _lid(tree, head) -> tuple:
     """Where a vertex' rim is, the one opposite, and its share of the way across."""
     surface = add(tree, 'GeometryNodeObjectInfo', {"Object": head}, transform_space='RELATIVE').outputs["Geometry"]
     place = add(tree, 'GeometryNodeInputPosition').outputs[0]
-    positions = [add(tree, 'GeometryNodeSampleIndex',
-                     {"Geometry": surface, "Value": place, "Index": _attribute(tree, name, 'INT')},
-                     data_type='FLOAT_VECTOR', domain='POINT').outputs[0] for name in ("rim", "opposite")]
+    positions = [
+        add(
+            tree,
+            'GeometryNodeSampleIndex',
+            {"Geometry": surface, "Value": place, "Index": _attribute(tree, name, 'INT')},
+            data_type='FLOAT_VECTOR',
+            domain='POINT',
+        ).outputs[0]
+        for name in ("rim", "opposite")
+    ]
     return *positions, _attribute(tree, "across", 'FLOAT')
 
 

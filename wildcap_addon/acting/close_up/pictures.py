@@ -73,12 +73,14 @@ def white_pattern() -> np.ndarray:
     inner = (0.12 + 0.88 * np.abs(np.cos(turn)) ** 1.5) * _smooth(out, 0.06, 0.6) * (0.6 + 0.8 * mottled)
     pink = inner + 0.12 * np.exp(-(((out - 0.13) / 0.07) ** 2))
     red = np.clip(0.9 * _blur(vessels, 0.6) + 0.45 * deep, 0, 1)
-    return np.stack([red, np.clip(pink, 0, 1), np.clip(0.5 + 0.3 * red + 0.06 * _noise(rng, WHITE_SIZE, 20, 60), 0, 1)],
-                    -1)
+    return np.stack(
+        [red, np.clip(pink, 0, 1), np.clip(0.5 + 0.3 * red + 0.06 * _noise(rng, WHITE_SIZE, 20, 60), 0, 1)], -1
+    )
 
 
-def _vessel(rng: np.random.Generator, around: float, row: float, width: float,
-            ends: float) -> list[tuple[float, float, float]]:
+def _vessel(
+    rng: np.random.Generator, around: float, row: float, width: float, ends: float
+) -> list[tuple[float, float, float]]:
     """Column, row and width in pixels of the dots along a vessel from a row inwards to where it ends, winding, with
     branches."""
     rows, columns = WHITE_SIZE
@@ -119,7 +121,7 @@ def _noise(rng: np.random.Generator, size: tuple[int, int], rows: float, columns
     white = np.fft.rfft2(rng.normal(size=(2 * size[0], size[1])))
     down, round_ = np.fft.fftfreq(2 * size[0])[:, None] * size[0], np.fft.rfftfreq(size[1])[None] * size[1]
     soft = np.exp(-0.5 * ((down / rows) ** 2 + (round_ / columns) ** 2)) * (round_ > 0)
-    noise = np.fft.irfft2(white * soft, s=(2 * size[0], size[1]))[:size[0]]
+    noise = np.fft.irfft2(white * soft, s=(2 * size[0], size[1]))[: size[0]]
     return noise / noise.std()
 
 
@@ -127,8 +129,9 @@ def _blur(picture: np.ndarray, sigma: float) -> np.ndarray:
     """Gaussian, of a sigma in pixels; closed around, mirrored at the ends."""
     twice = np.concatenate([picture, picture[::-1]])
     down, round_ = np.fft.fftfreq(len(twice))[:, None], np.fft.rfftfreq(picture.shape[1])[None]
-    return np.fft.irfft2(np.fft.rfft2(twice) * np.exp(-2 * (np.pi * sigma) ** 2 * (down**2 + round_**2)),
-                         s=twice.shape)[:len(picture)]
+    return np.fft.irfft2(
+        np.fft.rfft2(twice) * np.exp(-2 * (np.pi * sigma) ** 2 * (down**2 + round_**2)), s=twice.shape
+    )[: len(picture)]
 
 
 def _smooth(x: np.ndarray, low: np.ndarray | float, high: np.ndarray | float) -> np.ndarray:

@@ -66,10 +66,19 @@ def shell(radius: float, edge: float) -> Turned:
 def inner(radius: float, edge: float) -> Turned:
     """White, iris and the dark behind the pupil."""
     white = radius - FILM_M
-    angle = np.concatenate([np.linspace(edge - SOFT_RAD, edge + SOFT_RAD, 8), np.linspace(edge + SOFT_RAD, 1.6, 14)[1:],
-                            np.linspace(1.6, BACK_RAD, 6)[1:]])
-    outside = (white * np.sin(angle), -white * np.cos(angle),
-               np.clip((angle - edge + SOFT_RAD) / (1.6 - edge + SOFT_RAD), 0.002, 0.998), WHITE)
+    angle = np.concatenate(
+        [
+            np.linspace(edge - SOFT_RAD, edge + SOFT_RAD, 8),
+            np.linspace(edge + SOFT_RAD, 1.6, 14)[1:],
+            np.linspace(1.6, BACK_RAD, 6)[1:],
+        ]
+    )
+    outside = (
+        white * np.sin(angle),
+        -white * np.cos(angle),
+        np.clip((angle - edge + SOFT_RAD) / (1.6 - edge + SOFT_RAD), 0.002, 0.998),
+        WHITE,
+    )
     rim, plane = white * np.sin(edge), -white * np.cos(edge) + ROOT_M
     across = np.linspace(0, 1.04, 20)  # a little farther than the white begins
     hole = PUPIL_SHARE * rim
@@ -86,13 +95,21 @@ def _turn(profiles: list[tuple]) -> Turned:
     n, turn = (k + 1) % TURNS, k * 2 * np.pi / TURNS
     vertices, faces, uvs, slots = [], [], [], []
     for away, y, v, slot in profiles:
-        vertices.append(np.stack([away[:, None] * np.cos(turn), y[:, None] + 0 * turn, away[:, None] * np.sin(turn)],
-                                 -1).reshape(-1, 3))
+        vertices.append(
+            np.stack([away[:, None] * np.cos(turn), y[:, None] + 0 * turn, away[:, None] * np.sin(turn)], -1).reshape(
+                -1, 3
+            )
+        )
         for ring in range(len(away) - 1):
             a, b = first + ring * TURNS, first + (ring + 1) * TURNS
             quad = np.stack([a + k, b + k, b + n, a + n], 1)
-            uv = np.stack([np.stack([(k + step) / TURNS, 0 * k + v[row]], 1)
-                           for step, row in ((0, ring), (0, ring + 1), (1, ring + 1), (1, ring))], 1)
+            uv = np.stack(
+                [
+                    np.stack([(k + step) / TURNS, 0 * k + v[row]], 1)
+                    for step, row in ((0, ring), (0, ring + 1), (1, ring + 1), (1, ring))
+                ],
+                1,
+            )
             order = slice(None, None, -1 if slot == PUPIL_SLOT else 1)
             faces.append(quad[:, order])
             uvs.append(uv[:, order])
