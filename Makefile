@@ -31,6 +31,7 @@ demo: $(VENV)/installed
 
 test: $(VENV)/installed
 	$(BIN)/ruff check core wildcap_addon tests benchmarks
+	$(BIN)/ruff format --check --quiet .
 	rm -rf .reached
 	$(BIN)/python -m pytest tests --ignore=tests/gui --ignore=tests/test_messages_reached.py --numprocesses auto --maxprocesses 4 --dist loadfile --reached .reached
 	$(BIN)/python -m pytest tests/test_messages_reached.py --messages --reached .reached

@@ -17,9 +17,9 @@ def rasterization_2dgs(
     opacities,
     colors,
     viewmats,
-    Ks,
+    Ks,  # noqa: N803
     width,
-    height,  # noqa: N803
+    height,
     render_mode,
     distloss,
     near_plane=0.01,

@@ -14,6 +14,7 @@ from core.contract import stages
 ROOT = Path(__file__).resolve().parent.parent
 TOP = {
     ".ci",
+    ".git-blame-ignore-revs",
     ".github",
     ".gitignore",
     "CHANGELOG.md",
@@ -60,7 +61,6 @@ ROOMS = {
 LOOSE = {"README.md", "__init__.py", "__main__.py"}
 """What of core lies in no room."""
 VAGUE = {"util", "utils", "helper", "helpers", "common", "manager", "service", "misc"}
-LONGEST = 300
 TREE_BYTES = 66_000_000
 
 
@@ -90,12 +90,6 @@ def test_the_rooms_of_core_are_closed():
     inside = [path for path in tracked() if path.parts[0] == "core"]
     assert {path.parts[1] for path in inside if len(path.parts) > 2} <= ROOMS
     assert {path.name for path in inside if len(path.parts) == 2} == LOOSE
-
-
-def test_files_are_read_in_one_sitting():
-    counts = {path.as_posix(): len((ROOT / path).read_text(encoding="utf-8").splitlines()) for path in sources()}
-    long = {path: count for path, count in counts.items() if count > LONGEST}
-    assert not long
 
 
 def test_names_say_what_is_in_them():

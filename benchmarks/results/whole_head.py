@@ -69,7 +69,7 @@ def sections(record: Figures, cost: Figures) -> Sections:
                             f"{people.brows:.2f}",
                         ],
                         [
-                            "the same for the beard (0 where it was not found: fair or grey hair on light or mottled skin)",
+                            "the same for the beard (0 where it was not found: fair or grey hair on light skin)",
                             f"{people.beard:.2f}",
                         ],
                         ["beard found on a bare chin", f"{people.bare_chin:.0f} cm^2"],
