@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, batch, deliver, settings, stages, delighters, presets, status, delete, slim, mask, landmarks,
-doctor, self-test, install, wheels, report-problem, train.
+"""python -m core: run, batch, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks, doctor,
+self-test, install, wheels, report-problem, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -237,12 +237,10 @@ def _white(options: argparse.Namespace) -> int:
         )
     if options.frame:
         path = capture.frames / options.frame
-        capture.require("frames/")
         if not path.is_file():
             raise Problem(f"There is no frame {path}.", "Name one of the pictures in the capture's frames folder.")
         white = white_point.measure_card_white(read_srgb(path), *options.at, options.card).tolist()
     else:
-        capture.require("frames/")
         report = Reporter("white_point")
         white_point.run(capture, settings.Settings(), report)
         white = report.figures["white_point"]

@@ -4,11 +4,6 @@
 
 import pytest
 
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.hashes import hash_tree
-from core.contract.settings import Settings
-
 from . import standin
 from .standin import CENTRE, FOCAL, HEIGHT, WIDTH
 
@@ -138,28 +133,6 @@ def test_what_is_missing_or_damaged_is_told_and_nothing_comes_in_while_painting(
     with pytest.raises(RuntimeError, match="no scan yet"):
         bpy.ops.wildcap.bring_in_scan()
     assert not cameras()
-
-
-@pytest.mark.parametrize(
-    "ask",
-    [
-        lambda: bpy.ops.wildcap.bring_in_cameras(),
-        lambda: bpy.ops.wildcap.compare_delit(),
-        lambda: bpy.ops.wildcap.pick_white_point(frame="00000.jpg", uv=(0.5, 0.5)),
-    ],
-    ids=["cameras", "delit", "card"],
-)
-def test_what_was_slimmed_away_is_made_again_for_whoever_looks_at_it(addon, reconstructed, monkeypatch, ask):
-    folder, frames = Capture(reconstructed), stages.by_name("frames")
-    folder.finish(frames, folder.conditions(frames, Settings()), 1.0, Settings(), {}, "0.2.0")
-    folder.keep_hashes({"frames": {"frames/": hash_tree(folder.frames)}})
-    for path in [*folder.frames.iterdir()]:
-        path.unlink()
-    started = []
-    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool: started.append(tool))
-    ask()
-    assert started == ["bring_back"] and not cameras()
-    assert addon("status").look(folder, Settings()).problem is None
 
 
 def test_landmarks_that_were_moved_on_one_head_stay_when_another_ones_are_shown(addon, reconstructed, tmp_path):

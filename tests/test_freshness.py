@@ -49,6 +49,18 @@ def test_what_a_system_leaves_in_a_folder_that_was_looked_into_changes_nothing(c
     assert states(capture) == ["done", "stale"]
 
 
+@pytest.mark.parametrize("unknown", [{"frames/": {"a.bin": "a hash"}}, []])
+def test_a_stage_whose_outputs_are_gone_is_to_do_whatever_else_its_entry_holds(capture, unknown):
+    """As "slimmed", which development versions of 0.2.0 wrote."""
+    known = capture.read()
+    known["stages"]["frames"]["slimmed"] = unknown
+    write_json(capture.json, known)
+    assert states(capture) == ["done", "done"]
+    shutil.rmtree(capture.frames)
+    assert states(capture) == ["to do", "stale"]
+    assert capture.verdict(CAMERAS, Settings()).reason() == "frames/ changed"
+
+
 def test_a_changed_setting_makes_its_own_stage_stale_and_is_named(capture):
     other = from_json({"cameras": {"matching": "exhaustive"}})
     assert states(capture, other) == ["done", "stale"]

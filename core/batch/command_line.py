@@ -20,7 +20,6 @@ from ..contract.messages import Cancelled, Failed, Problem
 from ..worker import command_settings
 from ..worker.commands import add_command
 from ..worker.terminal import ProgressLine, print_message
-from . import slim_command
 from .gate import accept_mask
 from .groups import GROUPS, group_named
 from .known_hashes import known_hashes
@@ -38,8 +37,7 @@ NONE = "none"
 
 
 def add_commands(commands) -> None:
-    """Adds `batch` and `slim` to the subparsers of `python -m core`."""
-    slim_command.add_commands(commands)
+    """Adds `batch` to the subparsers of `python -m core`."""
     many = commands.add_parser(
         "batch", help="many faces: plan them from a table, run them here or on a farm, review them"
     )

@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection
 from dataclasses import asdict
 from pathlib import Path
 
-from . import capture_record, format_1, freshness, lease, ownership, slimmed, stages
+from . import capture_record, format_1, freshness, lease, ownership, stages
 from .files import storage_problem, write_json
 from .freshness import Verdict
 from .hashes import hash_source, same_source
@@ -227,40 +227,6 @@ class Capture:
             return Verdict(freshness.TO_DO)
         return freshness.judge_stage(self.root, self.read(), stage, settings)
 
-    def require_source(self) -> Path:
-        """The source. Raises Problem where it is gone or holds something else than it did: what is made of it could not
-        be made again."""
-        source = self.source
-        if source is None or not source.exists():
-            raise Problem(
-                f"{source or 'The video'} is not there any more, and frames that are slimmed away can be "
-                "made from it alone.",
-                f"Connect the disk that it is on, or choose it where it is now (`python -m core run VIDEO "
-                f"{self.root}`).",
-            )
-        if not self.made_from(source):
-            raise Problem(
-                f"{source} is not the video that this capture was made from: the same frames could not be "
-                "taken from it.",
-                f"Choose the right one where it is now (`python -m core run VIDEO {self.root}`).",
-            )
-        return source
-
-    def keep_hashes(self, trees: dict[str, dict]) -> None:
-        """Records what is about to be slimmed away: stage -> {name it writes: what `hash_tree` gives for it}."""
-        record = self.read()
-        entries = {
-            name: {**entry, "slimmed": trees[name]} if name in trees else entry
-            for name, entry in record["stages"].items()
-        }
-        write_json(self.json, {**record, "stages": entries})
-
-    def drop_hashes(self, stage: stages.Stage) -> None:
-        """Records that what was slimmed away of a stage is back, as it was."""
-        record = self.read()
-        entry = {key: value for key, value in record["stages"][stage.name].items() if key != "slimmed"}
-        write_json(self.json, {**record, "stages": {**record["stages"], stage.name: entry}})
-
     def state(self, stage: stages.Stage, settings: Settings) -> str:
         """The `verdict`'s state alone."""
         return self.verdict(stage, settings).state
@@ -281,21 +247,9 @@ class Capture:
             shutil.rmtree(folder, ignore_errors=True)
 
     def has(self, name: str) -> bool:
-        """Whether an artefact is there, or was slimmed away: then whatever needs it has it made again."""
-        return self.holds(name) or name in slimmed.hashes_of(self.read())
-
-    def holds(self, name: str) -> bool:
         """Whether an artefact is there."""
         path = self.root / name
         return any(path.iterdir()) if name.endswith("/") and path.is_dir() else path.is_file()
-
-    def require(self, name: str) -> None:
-        """Raises Problem where an artefact was slimmed away, for what cannot have it made again."""
-        if not self.holds(name) and self.has(name):
-            raise Problem(
-                f"{name} was slimmed away from this capture.",
-                f"Have it made again: `python -m core slim --undo {self.root}`.",
-            )
 
     def claim(self) -> None:
         """Makes the folder a capture, if it is not one yet. Raises Problem for a folder that holds something else, and

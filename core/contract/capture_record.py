@@ -46,7 +46,7 @@ def _is_entry(entry) -> bool:
         return False
     typed = all(isinstance(entry.get(field, kind()), kind) for field, kind in ENTRY.items())
     complete = "inputs" not in entry or entry.keys() >= SINCE_2
-    return typed and complete and _are_findings(entry.get("findings", [])) and _are_hashes(entry.get("slimmed", {}))
+    return typed and complete and _are_findings(entry.get("findings", []))
 
 
 def _is_stop(stopped) -> bool:
@@ -72,14 +72,6 @@ def _names_file(name) -> bool:
     """Whether it may be a file's name on some system: none has a slash in it, and what else one takes, as a colon or a
     backslash, another does not."""
     return isinstance(name, str) and "/" not in name and name not in ("", ".", "..")
-
-
-def _are_hashes(hashes) -> bool:
-    """Whether it tells what was slimmed away: name -> content hash, or {file: hash} of a folder."""
-    return isinstance(hashes, dict) and all(
-        isinstance(tree, str) or isinstance(tree, dict) and all(isinstance(each, str) for each in tree.values())
-        for tree in hashes.values()
-    )
 
 
 def _are_findings(findings) -> bool:

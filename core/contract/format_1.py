@@ -16,7 +16,6 @@ from pathlib import Path
 
 from .hashes import hash_tree, hash_value
 from .settings import Settings
-from .slimmed import hash_artefact
 from .stages import Stage
 
 INDIFFERENT = ("checkpoint_every", "low_memory")
@@ -67,7 +66,7 @@ def is_unchanged(root: Path, record: dict, stage: Stage, settings: Settings) -> 
         parts.append(hash_tree(Path(named).expanduser()))
         if stage.name == "solve":
             parts += [[name, hash_tree(root / name)] for name in ("own_head.obj", "own_head.json")]
-    parts += [[name, hash_artefact(root, record, name)] for name in made["inputs"]]
+    parts += [[name, hash_tree(root / name)] for name in made["inputs"]]
     parts += made["data"]
     return finished.get("key") == hash_value(parts)
 

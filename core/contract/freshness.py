@@ -18,7 +18,6 @@ from .code_key import code_key
 from .hashes import hash_source, hash_tree, hash_value, same_source, sample_file
 from .portable_paths import read_portable
 from .settings import Settings, result_paths, result_settings
-from .slimmed import hash_artefact
 from .stages import Stage
 from .together import hash_told
 
@@ -63,7 +62,7 @@ def describe_conditions(root: Path, record: dict, stage: Stage, settings: Settin
 
 
 def judge_stage(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict:
-    """The state of a stage whose outputs are there, or were slimmed away.
+    """The state of a stage whose outputs are there.
 
     Parameters
     ----------
@@ -98,7 +97,7 @@ def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> 
         *stage.optional_reads,
         *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()),
     )
-    hashes = {name: _digest(hash_artefact(root, record, name)) for name in names}
+    hashes = {name: _digest(hash_tree(root / name)) for name in names}
     hashes |= {
         f"{stage.name}.{name}": _digest(_hash_place(name, path))
         for name, path in result_paths(getattr(settings, stage.name)).items()

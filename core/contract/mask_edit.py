@@ -17,9 +17,9 @@ from pathlib import Path
 from . import stages
 from .capture import Capture
 from .code_key import code_key
+from .hashes import hash_tree
 from .regular_files import require_regular
 from .settings import Settings, result_settings
-from .slimmed import hash_artefact
 
 FIELD = "conditions"  # of the file's metadata
 PAINTED = ("shadow_mask.png", "protect_mask.png")
@@ -39,12 +39,10 @@ def obstacle(capture: Capture, settings: Settings) -> str:
 
 def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     """All that a solve depends on beside the painted masks: name -> hash."""
-    stage, record = stages.by_name("solve"), capture.read()
+    stage = stages.by_name("solve")
     chosen = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
     files = {
-        name: hash_artefact(capture.root, record, name)
-        for name in (*stage.reads, *stage.optional_reads)
-        if name not in PAINTED
+        name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.optional_reads) if name not in PAINTED
     }
     inputs = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
     return {

@@ -130,12 +130,6 @@ STAGES = (
     ),
 )
 
-SLIMMED = ("frames/", "delit/")
-"""What of a finished face may go, and is made again when a stage needs it (slimming.py). Of the sample's 404 MB these
-are 66, made again in 30 of 207 seconds (docs/figures/costs.json); cameras and scan are another 9 MB, and take 44 s;
-cameras are moreover not the same bytes twice. All else is maps (309 MB, with the state that a solve of an edited part
-goes on from), masks, landmarks, heads, and what is painted on, delivered or looked at."""
-
 TOOLS = (
     Stage(
         "mask_edges",
@@ -162,7 +156,6 @@ TOOLS = (
         "core.solve.self_test",
         on_device=True,
     ),
-    Stage("bring_back", "Slimmed Files", SLIMMED, (), "core.frames.back"),
     Stage(
         "deliver",
         "Deliver",

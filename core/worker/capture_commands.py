@@ -73,7 +73,6 @@ def _status(options: argparse.Namespace) -> int:
             f"{stage.name:13} {verdict.state:6}"
             + (f" {finished['seconds']:8.1f} s  {finished.get('finished', '')}" if finished else "")
             + (f"  {verdict.reason()}" if verdict.reason() else "")
-            + ("  slimmed away" if (finished or {}).get("slimmed") else "")
         )
     if capture.shadow_mask.is_file():
         print("shadow mask   painted")

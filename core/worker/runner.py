@@ -12,12 +12,11 @@ import importlib
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from .. import __version__
-from ..contract import report, slimmed, unforeseen
-from ..contract.capture import Capture
+from ..contract import report, unforeseen
 from ..contract.files import storage_problem
 from ..contract.freshness import FINISHED, OLDER
 from ..contract.messages import (
@@ -32,9 +31,8 @@ from ..contract.messages import (
     StageDone,
     out_of_memory,
 )
-from ..contract.portable_paths import convert_settings, read_portable
 from ..contract.setting_paths import check_paths
-from ..contract.settings import Settings, from_json
+from ..contract.settings import Settings
 from ..contract.stages import Stage
 from .job import JobRequest, read_job
 from .stage_log import at_work
@@ -57,7 +55,6 @@ def run_job(
             _check_device(job.settings.device)
             if job.tool is None:
                 _check_paths(job)
-            _check_slimmed(job)
             if job.tool is not None:
                 stage = job.tool.name
                 _run_tool(job.tool, job, emit, cancelled)
@@ -108,13 +105,15 @@ def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], ca
         return state
     with at_work(stage, capture, emit, cancelled) as reporter:
         try:
-            _bring_back(stage, job, emit, cancelled)
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
             capture.forget([stage.name])
             settings = _with_device(stage, settings, reporter)
             conditions = capture.conditions(stage, settings)
             started = time.monotonic()
-            _make(stage, capture, settings, reporter)
+            _room(stage).run(capture, settings, reporter)
+            lost = [name for name in stage.writes if not capture.has(name)]
+            if lost:
+                raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
             seconds = time.monotonic() - started
             capture.finish(stage, conditions, seconds, settings, reporter.figures, __version__, reporter.findings)
             report.write(capture, settings)
@@ -131,86 +130,8 @@ def _run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], can
     """Runs one of stages.TOOLS and sends its figures. Raises whatever it raises."""
     started = time.monotonic()
     with at_work(tool, job.capture, emit, cancelled) as reporter:
-        _bring_back(tool, job, emit, cancelled)
         _room(tool).run(job.capture, _with_device(tool, job.settings, reporter), reporter)
     emit(StageDone(tool.name, round(time.monotonic() - started, 2), False, reporter.figures))
-
-
-def _bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
-    """Has made again what a stage or tool reads and was slimmed away, with the settings that it was made with. Where
-    the same comes out, it is as if it had never gone; where not, for the code is another or what it is made from has
-    changed, it counts as new. Raises whatever the stages raise."""
-    capture = job.capture
-    for stage in slimmed.makers(capture.read(), [step]):
-        entry = capture.read()["stages"][stage.name]
-        if not slimmed.is_back(capture.root, entry):  # as where a worker was killed just before it could say so
-            emit(Log(f"{stage.label}: slimmed away, and made again for {step.label}."))
-            with at_work(stage, capture, emit, cancelled) as reporter:
-                settings = _with_device(stage, _as_before(stage, entry, job), reporter)
-                conditions, started = capture.conditions(stage, settings), time.monotonic()
-                _make(stage, capture, settings, reporter)
-                seconds = time.monotonic() - started
-            emit(StageDone(stage.name, round(seconds, 2), False, reporter.figures))
-            if not slimmed.is_back(capture.root, entry):
-                capture.finish(stage, conditions, seconds, settings, reporter.figures, __version__, reporter.findings)
-                emit(
-                    Log(
-                        f"{stage.label}: not what they were before, for other code made them, or from other inputs. "
-                        "What was made from them is out of date."
-                    )
-                )
-                continue
-        capture.drop_hashes(stage)
-
-
-def _as_before(stage: Stage, entry: dict, job: JobRequest) -> Settings:
-    """The settings that a stage was last run with, by its entry in capture.json, on the same device where this machine
-    has it."""
-    then = convert_settings({stage.name: entry["settings"]}, lambda path: str(read_portable(path, job.capture.root)))[
-        stage.name
-    ]
-    known = asdict(getattr(job.settings, stage.name))
-    settings = from_json(
-        {stage.name: {name: value for name, value in then.items() if name in known}, "seed": entry["seed"]},
-        job.settings,
-    )
-    with contextlib.suppress(Problem):
-        there = from_json({"device": entry["device"]}, settings)
-        _check_device(there.device)
-        return there
-    return settings
-
-
-def _make(stage: Stage, capture: Capture, settings: Settings, reporter: Reporter) -> None:
-    """Runs a stage's room, and sees to it that all that it writes is there."""
-    _room(stage).run(capture, settings, reporter)
-    lost = [name for name in stage.writes if not capture.holds(name)]
-    if lost:
-        raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
-
-
-def _check_slimmed(job: JobRequest) -> None:
-    """Raises Problem, before anything is changed, where the job needs what was slimmed away and the source that it is
-    made from is gone."""
-    capture = job.capture
-    record = capture.read()
-    if slimmed.hashes_of(record):
-        chain = (job.tool,) if job.tool else job.chain
-        first = next(
-            (
-                i
-                for i, step in enumerate(chain)
-                if job.tool or job.force or capture.state(step, job.settings) not in FINISHED
-            ),
-            len(chain),
-        )
-        if not all(stage.reads for stage in slimmed.makers(record, chain[first:])):
-            try:
-                capture.require_source()
-            except Problem as problem:
-                if not job.tool:
-                    capture.stop(chain[first].name, problem)
-                raise
 
 
 def explained(error: Exception, stage: str, log: Path) -> Problem:

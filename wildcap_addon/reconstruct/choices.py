@@ -9,7 +9,7 @@ import bpy
 
 from ...core.contract.files import storage_problem
 from ...core.contract.messages import Problem
-from .. import bring_back, captures
+from .. import captures
 from ..base_operator import BaseOperator, CaptureOperator, FileOperator
 from . import delighters
 
@@ -120,10 +120,7 @@ class WILDCAP_OT_compare_delit(CaptureOperator, bpy.types.Operator):
     )
 
     def work(self, context):
-        item = captures.require(context)
-        if bring_back.begin(self, item, "frames/", "delit/"):
-            return
-        capture = captures.folder(item)
+        capture = captures.folder(captures.require(context))
         names = delighters.frames(capture)
         before = delighters.shown_frame(capture)
         following = names.index(before) + 1 if before in names else len(names) // 2

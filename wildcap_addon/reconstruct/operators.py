@@ -6,7 +6,7 @@ import bpy
 
 from ...core.contract import stages
 from ...core.contract.messages import Problem
-from .. import bring_back, captures, head, jobs
+from .. import captures, head, jobs
 from ..base_operator import BaseOperator, HeadOperator, JobOperator
 from . import evidence, landmarks
 
@@ -107,9 +107,7 @@ class WILDCAP_OT_bring_in_cameras(HeadOperator, bpy.types.Operator):
     )
 
     def work(self, context):
-        item = captures.require(context)
-        if not bring_back.begin(self, item, "frames/"):
-            evidence.bring_in_cameras(context, item, self.every)
+        evidence.bring_in_cameras(context, captures.require(context), self.every)
 
 
 class WILDCAP_OT_bring_in_scan(HeadOperator, bpy.types.Operator):

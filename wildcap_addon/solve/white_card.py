@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract.messages import Problem
 from ...core.contract.settings import CARDS
-from .. import bring_back, captures, jobs, undo
+from .. import captures, jobs, undo
 from ..base_operator import CaptureOperator, JobOperator
 from .eyedropper import colour_at
 
@@ -77,8 +77,6 @@ class WILDCAP_OT_pick_white_point(CaptureOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        if bring_back.begin(self, item, "frames/"):
-            return
         path = captures.folder(item).frames / self.frame
         if not self.frame or not path.is_file():
             raise Problem(
