@@ -199,10 +199,8 @@ def measure(captures: list[Filmed]) -> tuple[Scores, dict[str, dict[str, Figures
 def code_of(captures: list[Filmed]) -> dict[str, str]:
     """What made the figures: the keys of the stages' code in the captures' records, and the hash of the measures'."""
     stages = [filmed.capture.read()["stages"] for filmed in captures]
-    # a stage of 0.1.0 has no key of its code alone, and benchmarks/earlier.py takes one commit of it
     keys = {
-        name: " ".join(sorted({each[name].get("code", "0.1.0")[:12] for each in stages if name in each}))
-        for name in freeze.STAGES
+        name: " ".join(sorted({each[name]["code"][:12] for each in stages if name in each})) for name in freeze.STAGES
     }
     return {**keys, "measures": hash_value(measuring())[:12]}
 

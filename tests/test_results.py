@@ -112,8 +112,6 @@ def test_the_page_of_the_state_says_whom_the_fitted_lights_weight_was_chosen_on(
     assert len(people - chosen_on) == 6
     page = (ROOT / "docs" / "results" / "state.md").read_text(encoding="utf-8").replace("\n", " ")
     assert "chosen on these people but the six bald" in page and "[the page of answers](answers.md)" in page
-    earlier = (ROOT / "docs" / "results" / "state_0_1_0.md").read_text(encoding="utf-8")
-    assert "fitted light counts" not in earlier, "which weighed nothing"
 
 
 def test_what_survives_the_solve_is_told_of_captures_that_both_records_hold():

@@ -35,7 +35,6 @@ GROUPS = {
         "sample",
         "relit",
         "state",
-        "state_0_1_0",
         "split",
         "scan",
         "gallery",
