@@ -47,7 +47,7 @@ GROUPS = {
     ),
     "Before the solve": ("geometry", "eyes", "delighters", "answers", "photographs", "shadows", "skin_tone"),
     "After the solve": ("head", "upscale", "whole_head", "hair", "even_light", "engines", "delivery", "reimported"),
-    "Time and memory": ("costs", "png_levels", "blender"),
+    "Time and memory": ("costs", "blender"),
 }
 ELSEWHERE = """
     - **Elsewhere**: [promises](../promises.md), [farm](../farm.md), [growth](../growth.md), [cameras](../cameras.md),

@@ -48,9 +48,8 @@ TURNS = {
 (OpenImageIO's reorient mistakes 5 for 7.)"""
 
 QUICK = {"level": 1, "filter": 0x20}
-"""zlib's level and libpng's filter (each row less the one above it) of pictures that are not shipped: of what was tried
-on the solved maps (`python -m benchmarks.png_levels`) the quickest that is hardly larger than libpng's own choice of
-filters."""
+"""zlib's level and libpng's filter (each row less the one above it) of pictures that are not shipped: on solved maps
+the quickest that is hardly larger than libpng's own choice of filters."""
 
 ROWS_BETWEEN_CHECKS = 256
 """Rows that are encoded between two looks at a cancel: 0.3 s of a map of 4096; a multiple of what EXR packs together
