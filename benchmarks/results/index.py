@@ -50,8 +50,8 @@ GROUPS = {
     "Time and memory": ("costs", "blender"),
 }
 ELSEWHERE = """
-    - **Elsewhere**: [promises](../promises.md), [farm](../farm.md), [growth](../growth.md), [cameras](../cameras.md),
-      [scan and head](../scan_and_head.md), [parts](../parts.md)
+    - **Elsewhere**: [promises](../promises.md), [farm](../farm.md), [cameras](../cameras.md), [scan and
+      head](../scan_and_head.md), [parts](../parts.md)
     """
 
 
