@@ -36,7 +36,7 @@ test: $(VENV)/installed
 	$(BIN)/python -m pytest tests --ignore=tests/gui --ignore=tests/test_messages_reached.py --numprocesses auto --maxprocesses 4 --dist loadfile --reached .reached
 	$(BIN)/python -m pytest tests/test_messages_reached.py --messages --reached .reached
 
-# The pages of docs/results and the README's figures, out of the records that the benchmarks left in docs/figures.
+# The pages of docs/results, out of the records that the benchmarks left in docs/figures.
 results: $(VENV)/installed
 	$(BIN)/python -m benchmarks.results
 

@@ -4,8 +4,8 @@
 file each.
 
 Benchmarks write it where their --json says; what is published lies in docs/figures/NAME.json, and the pages of
-docs/results and the README's figures come from there (benchmarks/results). Figures are nested dicts of plain numbers;
-null is one that was not measured. Rows of a table are printed in the order in which they were written.
+docs/results come from there (benchmarks/results). Figures are nested dicts of plain numbers; null is one that was not
+measured. Rows of a table are printed in the order in which they were written.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pages of docs/results and the figures of hand-written texts, out of the records in docs/figures (`make results`):
+"""The pages of docs/results, out of the records in docs/figures (`make results`):
 
     python -m benchmarks.results [--check] [--captures FOLDER]
 
 Runs no benchmark: each leaves its record by its own --json (benchmarks/figures.py). NAME.py in here is the page
 docs/results/NAME.md: TITLE, SAYS (what it shows, below the title), RECORDS, and `sections`, which takes the figures of
-these records in that order and gives headings with Markdown. told.py has the phrases with figures in the README and
-elsewhere. --check writes nothing and ends with code 1 where a text is not as the records have it.
+these records in that order and gives headings with Markdown. --check writes nothing and ends with code 1 where a page
+is not as the records have it.
 
 No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures:
 --captures names a folder with sample.wildcap (as `make demo` leaves it) and NAME.wildcap (benchmarks/people.py). Others
@@ -28,10 +28,9 @@ from core.contract.messages import Problem
 
 from .. import figures
 from ..pages import page_text, replace_text
-from . import told
 
 ROOT = figures.ROOT
-NAMES = tuple(module.name for module in iter_modules(__path__) if module.name not in ("__main__", "told"))
+NAMES = tuple(module.name for module in iter_modules(__path__) if module.name != "__main__")
 """The pages' names."""
 
 
@@ -41,7 +40,7 @@ def main() -> int:
     parser.add_argument("--captures", type=Path, help="solved captures, for teaser.jpg and the gallery's pictures")
     asked = parser.parse_args()
     try:
-        new = {**pages(), **told.texts(ROOT)}
+        new = pages()
     except Problem as problem:
         print(problem, file=sys.stderr)
         return 1
