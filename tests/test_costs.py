@@ -119,7 +119,7 @@ def test_a_process_alone_is_measured_to_its_end_or_its_limit():
     assert ended.code is None and time.monotonic() - began < 10
 
 
-@pytest.mark.parametrize("record", ["costs", "solver_speed", "opendelight_cost", "blender_memory"])
+@pytest.mark.parametrize("record", ["costs", "solver_speed", "blender_memory"])
 def test_a_record_is_made_by_a_command_that_exists(record, capsys):
     word = figures.read_record(record)["command"].removeprefix("python -m benchmarks.costs ").split()[0]
     assert f"benchmarks.costs {word} " in costs.__doc__ and f"docs/figures/{record}.json" in costs.__doc__

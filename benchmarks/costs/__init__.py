@@ -4,7 +4,6 @@
 
     python -m benchmarks.costs chain WORK --json docs/figures/costs.json
     python -m benchmarks.costs solver --json docs/figures/solver_speed.json
-    python -m benchmarks.costs opendelight --json docs/figures/opendelight_cost.json
     python -m benchmarks.costs blender CAPTURE --json docs/figures/blender_memory.json
     python -m benchmarks.costs acting CAPTURE --json docs/figures/acting_costs.json
 

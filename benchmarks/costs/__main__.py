@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m benchmarks.costs chain | solver | opendelight | blender | acting | stage: one module each, loaded when it
-is asked for, so that its libraries do not count as another's memory."""
+"""python -m benchmarks.costs chain | solver | blender | acting | stage: one module each, loaded when it is asked for,
+so that its libraries do not count as another's memory."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from importlib import import_module
 
 from .. import costs
 
-COMMANDS = ("chain", "solver", "opendelight", "blender", "acting", "stage")
+COMMANDS = ("chain", "solver", "blender", "acting", "stage")
 
 
 def main(arguments: list[str]) -> None:

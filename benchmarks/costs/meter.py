@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,11 +30,10 @@ class Spent:
 
 
 @contextmanager
-def spending(settle: Callable[[], None] = lambda: None) -> Iterator[Spent]:
-    """What its block takes, known when it has ended; `settle` waits for what the block only began, as a GPU's work."""
+def spending() -> Iterator[Spent]:
+    """What its block takes, known when it has ended."""
     spent, began, own = Spent(), time.perf_counter(), own_s()[0]
     yield spent
-    settle()
     spent.seconds, spent.processor_s = time.perf_counter() - began, own_s()[0] - own
 
 
