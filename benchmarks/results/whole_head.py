@@ -10,10 +10,10 @@ from .split import OLDER
 
 TITLE = "The whole head, and the hair's masks"
 SAYS = "Neck, ears and scalp that no camera saw; the masks of brows, lashes and beard, and the skin below."
-RECORDS = ("whole_head", "completing")
+RECORDS = ("whole_head",)
 
 
-def sections(record: Figures, cost: Figures) -> Sections:
+def sections(record: Figures) -> Sections:
     people, sample, scan = record.synthetic, record.sample, record.scan
 
     def both(digits: int, *rows: Figures) -> list[str]:
@@ -83,8 +83,6 @@ def sections(record: Figures, cost: Figures) -> Sections:
         These are by the strokes alone, without the face parser that is asked today; [hair](hair.md) has what is grown
         with it. Sample: brows {sample.hair.brows:.1f} cm^2, beard {sample.hair.beard:.1f} cm^2 (painted: 15 % of a full
         one). Head scan: brows {scan.hair.brows:.1f}, lashes {scan.hair.lashes:.1f}, beard {scan.hair.beard:.1f} cm^2.
-        On maps of 1024 the processor is busy for about {cost.completing_seconds} s with completing, {cost.hair_seconds}
-        s with the hair and {cost.layout_seconds} s with laying out the head; {cost.peak_gb:.1f} GB at most.
         """,
             ),
         ),
