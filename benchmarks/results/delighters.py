@@ -16,7 +16,7 @@ from ..state_scores import mean_of
 
 TITLE = "Delighters"
 SAYS = "The network, shading and others on real photographs, portraits of six tones, the scan and the sample."
-RECORDS = ("delight", "state", "state_sky")
+RECORDS = ("delight", "state", "state_sky")  # the last one is cut down to the rows that this page shows
 PEOPLE = ("bearded_overcast", "closed_overcast", "dark_overcast", "fringed_overcast", "stubbled_below", "light_below")
 SURVIVING = {
     name: state.TABLES[title][name]
