@@ -4,7 +4,6 @@
 
 import json
 
-import numpy as np
 import pytest
 
 from benchmarks import figures, shadow_mask, skin_tone, whole_chain
@@ -14,13 +13,13 @@ from core.contract.capture import Capture
 def test_tones_are_summed_up_by_group():
     rows = {
         "scene": [("tan", 2.0, 4.0, 1.5), ("tan", -1.0, 2.0, 1.5), ("dark", 3.0, 6.0, 1.0)],
-        "before": [("tan", 5.0, 7.0, np.nan)],
+        "measured": [("tan", 5.0, 7.0, 2.0)],
     }
     found = skin_tone.summary(rows, {"tan": 1, "dark": 1})
     assert found["tan"]["scene"] == pytest.approx(
         {"lightness": 0.5, "rms": 2.5**0.5, "delta_e": 3.0, "stated": 1.5, "within_two": 1.0}
     )
-    assert found["tan"]["before"]["stated"] is None and "before" not in found["dark"]
+    assert found["tan"]["measured"]["within_two"] == 0 and "measured" not in found["dark"]
     assert (
         found["all"]["subjects"] == 2
         and found["all"]["scene"]["delta_e"] == 4

@@ -45,7 +45,7 @@ def test_every_platform_and_python_that_has_a_lock_is_tested():
 def test_its_commands_are_those_of_the_makefile():
     tests = MAKEFILE[MAKEFILE.index("\ntest:") : MAKEFILE.index("\n# The pages of docs/results")]
     ours = commands(tests + MAKEFILE[MAKEFILE.index("$(VENV)/installed: ") :], "$(BIN)")
-    assert len(ours) == 5 and sorted(ours) == sorted(commands(WORKFLOW, '"$PYTHON"'))
+    assert len(ours) == 6 and sorted(ours) == sorted(commands(WORKFLOW, '"$PYTHON"'))
     assert (
         "-m core install $(VENV) --compute cpu" in MAKEFILE
         and "python -m core install .venv --compute cpu\n" in WORKFLOW
