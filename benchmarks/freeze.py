@@ -97,9 +97,7 @@ def freeze(folder: Path, out: Path, only: tuple[str, ...] = ("",)) -> list[str]:
         stages = Capture(source).read()["stages"]
         record[name] = {
             "commit": commit(),
-            "stages": {
-                stage: {key: stages[stage].get(key) for key in STAGE_KEYS} for stage in STAGES if stage in stages
-            },
+            "stages": {stage: {key: stages[stage][key] for key in STAGE_KEYS} for stage in STAGES if stage in stages},
             "files": hashes,
         }
         write_json(out / RECORD, record)

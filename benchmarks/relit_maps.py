@@ -16,9 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
+from core import __version__
+from core.contract import stages
 from core.contract.capture import Capture
 from core.contract.files import write_json
 from core.contract.newest_maps import find_newest_maps
+from core.contract.settings import Settings
 from core.face import template
 from core.face.head import read_head
 from core.geometry.baking import Source, bake, bake_normals, places
@@ -118,12 +121,13 @@ def write_row(folder: Path, capture: Capture, worn: Worn) -> None:
     how glossy these maps are."""
     row, record = Capture(folder), capture.read()
     seen = _sized(images.read_data(capture.texture_confidence)[..., 0], len(worn.specular))
-    upscaled = record["stages"].setdefault("upscale", {"key": "", "seconds": 0.0})
-    upscaled.setdefault("figures", {})["specular_mean"] = on_cheeks_and_forehead(worn.specular, seen)
+    figures = record["stages"].get("upscale", {}).get("figures", {})
+    figures |= {"specular_mean": on_cheeks_and_forehead(worn.specular, seen)}
     shutil.rmtree(folder, ignore_errors=True)
     row.maps.mkdir(parents=True)
     shutil.copyfile(capture.head, row.head)
     write_json(row.json, record)
+    row.finish(stages.by_name("upscale"), {"inputs": {}, "code": ""}, 0.0, Settings(), figures, __version__)
     images.write_srgb(row.maps / "diffuse_albedo.png", images.linear_to_srgb(worn.albedo), bits=16)
     images.write_data(row.maps / "specular_albedo.png", worn.specular, bits=16)
     images.write_data(row.maps / "normal.png", worn.normal / 2 + 0.5, bits=16)

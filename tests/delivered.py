@@ -19,6 +19,7 @@ from core.worker.job import write_job
 from core.worker.runner import run_job
 
 from . import standin
+from .recorded import make_entry
 
 SIDE = 16
 NORMALS = (
@@ -70,19 +71,18 @@ def with_face_units(capture: Capture):
 
 def record_solve(capture: Capture) -> None:
     """capture.json of one whose maps were solved from what lies there now, by older code."""
-    record = {"format": 2, "source": "/home/anna/film.mp4", "source_stamp": [["film.mp4", 7, 1]], "stages": {}}
-    chosen = Settings()
-    record["stages"]["solve"] = {
-        **capture.conditions(stages.by_name("solve"), chosen),
-        "code": "of before",
-        "finished": "2026-11-22T00:00:00",
-        "version": "0.1.0",
-        "seed": chosen.seed,
-        "device": "cpu",
-        "seconds": 1.0,
-        "figures": {},
-        "settings": {"steps": chosen.solve.steps, "prior": "/home/anna/prior"},
+    record = {
+        "format": 2,
+        "source": "/home/anna/film.mp4",
+        "source_stamp": [["film.mp4", 7, "of before"]],
+        "stages": {},
     }
+    chosen = Settings()
+    record["stages"]["solve"] = make_entry(
+        inputs=capture.conditions(stages.by_name("solve"), chosen)["inputs"],
+        code="of before",
+        settings={"steps": chosen.solve.steps, "prior": "/home/anna/prior"},
+    )
     capture.json.write_text(json.dumps(record))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Vector
 
 from . import standin
+from .recorded import make_entry
 
 
 def make(root):
@@ -20,7 +21,8 @@ def make(root):
     root.joinpath("head.obj").write_text(
         "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n", encoding="ascii"
     )
-    record = {"format": 1, "source": "", "stages": {"upscale": {"figures": {"specular_mean": 0.4}, "seconds": 1}}}
+    upscaled = make_entry(figures={"specular_mean": 0.4})
+    record = {"format": 2, "source": "", "stages": {"upscale": upscaled}}
     (root / "capture.json").write_text(json.dumps(record), encoding="utf-8")
     bpy.ops.wildcap.open_capture(directory=str(root))
     return root

@@ -36,6 +36,23 @@ def record(capture: Capture, stage: Stage, settings: Settings) -> None:
     capture.finish(stage, capture.conditions(stage, settings), 1.5, settings, {"count": 3}, "0.2.0")
 
 
+def make_entry(**told) -> dict:
+    """What capture.json keeps of a finished stage, as a test writes it by hand: `told`, and the rest empty."""
+    return {
+        "inputs": {},
+        "code": "",
+        "seconds": 1.0,
+        "finished": "2026-11-22T00:00:00",
+        "version": "0.2.0",
+        "settings": {},
+        "seed": 0,
+        "device": "cpu",
+        "figures": {},
+        "findings": [],
+        **told,
+    }
+
+
 def changed(capture: Capture, stage: Stage, settings: Settings) -> tuple[str, ...]:
     """The inputs and settings of a recorded stage that have changed since."""
     return freshness.judge_stage(capture.root, capture.read(), stage, settings).changed

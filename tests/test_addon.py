@@ -13,6 +13,7 @@ import pytest
 from core.contract.capture import Capture
 
 from . import standin
+from .recorded import make_entry
 
 bpy = pytest.importorskip("bpy")
 
@@ -231,7 +232,7 @@ def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeyp
     status = addon("status")
     monkeypatch.setattr(status.Capture, "verdict", lambda *_: status.freshness.Verdict("stale"))
     record = Capture(capture).read()
-    record["stages"]["scan"] = {"seconds": 12.0, "findings": []}
+    record["stages"]["scan"] = make_entry(seconds=12.0)
     addon("status")._known.clear()
     (capture / "capture.json").write_text(json.dumps(record), encoding="utf-8")
     addon("status").refresh(bpy.context)

@@ -25,7 +25,7 @@ MOUTH_CORNER = 61
 @pytest.fixture
 def capture(tmp_path):
     capture = Capture(tmp_path / "Zoë.wildcap")
-    write_json(capture.json, {"format": 1, "source": "", "stages": {}})
+    write_json(capture.json, {"format": 2, "source": "", "stages": {}})
     return capture
 
 
@@ -88,7 +88,7 @@ def test_registration_is_stale_after_an_edit(capture):
 def test_a_moved_landmark_takes_the_surface_along(tmp_path, monkeypatch, known):  # noqa: F811
     model, truth, points, _ = known
     capture, report = _capture(tmp_path / "c", truth, model, points, monkeypatch), Reporter("registration")
-    write_json(capture.json, {"format": 1, "source": "", "stages": {}})
+    write_json(capture.json, {"format": 2, "source": "", "stages": {}})
     wish = points[MOUTH_CORNER] + [-0.005, 0, 0.003]
     artist_landmarks.put(capture, {MOUTH_CORNER: wish})
     registration.run(capture, from_json({"registration": {"iterations": 8}}), report)

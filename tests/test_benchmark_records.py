@@ -9,6 +9,8 @@ import pytest
 from benchmarks import figures, shadow_mask, skin_tone, whole_chain
 from core.contract.capture import Capture
 
+from .recorded import make_entry
+
 
 def test_tones_are_summed_up_by_group():
     rows = {
@@ -31,7 +33,7 @@ def test_tones_are_summed_up_by_group():
 def test_a_chains_rows_are_those_of_its_table(tmp_path):
     capture = Capture(tmp_path / "scan.wildcap")
     capture.root.mkdir()
-    record = {"stages": {"delight": {"seconds": 1.0, "figures": {"delighter": "network"}}}}
+    record = {"format": 2, "stages": {"delight": make_entry(figures={"delighter": "network"})}}
     (capture.root / "capture.json").write_text(json.dumps(record), encoding="utf-8")
 
     def score(psnr):

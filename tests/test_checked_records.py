@@ -27,6 +27,7 @@ from core.worker.job import write_job  # noqa: E402
 from core.worker.runner import run_job  # noqa: E402
 
 from . import delivered  # noqa: E402
+from .recorded import make_entry  # noqa: E402
 from .refused import refused  # noqa: E402
 
 FRAME = {"name": "00000.jpg", "sharpness": 0.5, "selected": True}
@@ -135,14 +136,22 @@ WRONG = [
     [
         *WRONG,
         '{"stages": null}',
-        '{"stages": {"solve": null}}',
-        '{"stages": {"solve": {"seconds": "1"}}}',
-        '{"stages": {}, "source": 3}',
+        '{"stages": {}}',
         '{"stages": {}, "format": "2"}',
-        '{"stages": {}, "stopped": {}}',
-        '{"stages": {}, "source_stamp": [[1, 2]]}',
-        '{"stages": {"solve": {"seconds": 1, "inputs": {}}}}',
-        '{"stages": {"solve": {"seconds": 1, "findings": [3]}}}',
+        *(
+            json.dumps({"format": 2, "stages": {}, **wrong})
+            for wrong in (
+                {"source": 3},
+                {"stopped": {}},
+                {"source_stamp": [[1, 2]]},
+                {"source_stamp": [["film.mp4", 6, 1]]},
+                {"stages": {"solve": None}},
+                {"stages": {"solve": make_entry(seconds="1")}},
+                {"stages": {"solve": make_entry(inputs=None)}},
+                {"stages": {"solve": make_entry(findings=[3])}},
+                {"stages": {"solve": {"seconds": 1}}},
+            )
+        ),
     ],
     ids=count(),
 )

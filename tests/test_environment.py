@@ -135,7 +135,7 @@ def test_wherever_pip_is_set_up_to_put_packages_this_environment_gets_them(local
 def test_an_environment_of_an_older_wildcap_is_brought_up_to_date(local, made_before, tmp_path):
     folder = tmp_path / "env"
     assert isinstance(install(folder, local)[-1], Done)
-    (folder / installation.COMPUTE_FILE).write_text("cpu")  # as 0.1.0 wrote it
+    (folder / installation.COMPUTE_FILE).write_text("cpu pytorch older_lock.txt")
     (local / "worker.txt").write_text("tinytorch==2.0\n")
     assert verify(python_of(folder), local) == ["tinytorch is 1.0, not 2.0."]
     write_lock(local, write_wheel(tmp_path / "wheels", "tinytorch", "2.0"))

@@ -10,6 +10,8 @@ from benchmarks import freeze
 from core.contract.capture import Capture
 from core.contract.messages import Problem
 
+from .recorded import make_entry
+
 
 @pytest.fixture
 def captures(tmp_path):
@@ -17,7 +19,7 @@ def captures(tmp_path):
         root = tmp_path / "in" / f"{name}.wildcap"
         Capture(root).claim()
         record = json.loads((root / "capture.json").read_text())
-        record["stages"]["texture"] = {"version": "0.1.0", "code": "abc", "seconds": 3}
+        record["stages"]["texture"] = make_entry(code="abc")
         (root / "capture.json").write_text(json.dumps(record))
         for path in (
             "head.obj",
@@ -39,7 +41,7 @@ def test_what_is_kept_stays_and_is_what_was_there(captures):
     assert sorted(path.name for path in out.iterdir()) == ["anna.wildcap", "ben.wildcap", "frozen.json"]
     assert (out / "anna.wildcap" / "delit" / "shadow" / "00000.png").read_text() == "anna delit/shadow/00000.png"
     assert not (out / "anna.wildcap" / "checkpoints").exists()
-    recorded = {"version": "0.1.0", "code": "abc", "finished": None, "seed": None, "settings": None}
+    recorded = {"version": "0.2.0", "code": "abc", "finished": "2026-11-22T00:00:00", "seed": 0, "settings": {}}
     assert freeze.read_record(out)["anna"]["stages"] == {"texture": recorded}
     (captures / "in" / "ben.wildcap" / "texture.exr").write_text("another delighter's")
     assert freeze.freeze(captures / "in", out) == ["ben"]

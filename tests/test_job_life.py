@@ -200,7 +200,7 @@ def test_a_killed_worker_is_a_problem_with_a_remedy_and_the_lock_is_taken_over(a
 def test_a_capture_that_another_blender_works_on_is_refused_by_name(addon, jobs, tmp_path):
     capture = a_capture(tmp_path, "a")
     capture.lock.write_text(
-        json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "start": "2026-01-01T00:00:00"})
+        json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "since": "2026-01-01T00:00:00"})
     )
     with pytest.raises(RuntimeError, match=f"process {os.getpid()}"):
         bpy.ops.wildcap.solve()

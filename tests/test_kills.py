@@ -35,6 +35,8 @@ from core.solve import checkpoint  # noqa: E402
 from core.solve.lighting import Lights  # noqa: E402
 from core.solve.problem import State  # noqa: E402
 
+from .recorded import make_entry  # noqa: E402
+
 ROOT = Path(__file__).resolve().parents[1]
 TRIALS = 5
 
@@ -67,7 +69,7 @@ def place(tmp_path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     (place / BESIDE).write_bytes(STRANGERS["shopping.txt"])
-    capture_at(place).json.write_text(json.dumps({"format": 2, "source": "", "stages": {"frames": {"seconds": 1.0}}}))
+    capture_at(place).json.write_text(json.dumps({"format": 2, "source": "", "stages": {"frames": make_entry()}}))
     (capture_at(place).frames / "00000.jpg").write_bytes(b"a frame")
     return place
 

@@ -62,8 +62,6 @@ def test_one_that_has_ended_is_replaced_at_once_also_where_its_number_went_to_an
         written_by(pid=dead.pid),
         written_by(began="long ago"),
         written_by(host=processes.name_host().partition("/")[0] + "/00000000/1"),
-        # the last by 0.1.0
-        json.dumps({"pid": dead.pid, "host": processes.name_host().partition("/")[0], "start": "2026-11-22T00:00:00"}),
     ]
     for text in texts:
         capture.lock.write_text(text)

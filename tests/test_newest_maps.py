@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which maps a head wears is told by what was recorded of them: a copy of a capture has files of any times."""
 
-import json
 import os
 import shutil
 
@@ -69,13 +68,8 @@ def test_solved_maps_that_are_gone_do_not_take_the_large_ones_away(enlarged):
     assert is_at_4k(enlarged)
 
 
-@pytest.mark.parametrize("entry", [None, {"key": "0" * 32, "seconds": 3.0}], ids=["no record", "of 0.1.0"])
-def test_where_no_record_tells_the_times_do(enlarged, entry):
+def test_where_no_record_tells_the_times_do(enlarged):
     enlarged.forget(["upscale"])
-    if entry is not None:
-        told = enlarged.read()
-        told["stages"]["upscale"] = entry
-        enlarged.json.write_text(json.dumps(told), encoding="utf-8")
     date(enlarged.maps, 1e9), date(enlarged.maps_4k, 2e9)
     assert is_at_4k(enlarged)
     date(enlarged.maps, 3e9)

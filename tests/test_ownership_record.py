@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record of what WildCap wrote into a capture: of 0.1.0's captures, damaged, lost, long and copied."""
+"""The record of what WildCap wrote into a capture: damaged, lost, long and copied."""
 
 import json
 import shutil
@@ -20,63 +20,8 @@ def capture(tmp_path) -> Capture:
     return make(tmp_path / "anna.wildcap")
 
 
-def test_a_capture_of_0_1_0_gets_a_record_of_what_it_wrote_and_of_nothing_else(tmp_path):
-    root = tmp_path / "old.wildcap"
-    (root / "frames").mkdir(parents=True)
-    for name, text in (
-        ("frames/00000.jpg", "frame"),
-        ("frames/frames.json", "{}"),
-        ("frames/2026 holiday.jpg", "a picture"),
-        ("head.obj", "head"),
-        ("notes.txt", "mine"),
-        (".scan.99999999.tmp.ply", "half"),
-        ("frames/.00001.99999999.tmp.jpg", "half"),
-        ("frames/.mine.1.tmp.jpg", "mine"),
-        (".notes.old", "mine"),
-    ):
-        (root / name).write_text(text)
-    (root / ".maps.99999999.tmp").mkdir()
-    (root / "capture.json").write_text(json.dumps({"format": 1, "source": "", "stages": {"frames": {}}}))
-    capture = Capture(root)
-    with capture.locked():
-        pass
-    assert not any(
-        (root / name).exists()
-        for name in (".scan.99999999.tmp.ply", "frames/.00001.99999999.tmp.jpg", ".maps.99999999.tmp")
-    )
-    assert (root / "frames" / ".mine.1.tmp.jpg").read_text() == (root / ".notes.old").read_text() == "mine", (
-        "such names are not 0.1.0's alone"
-    )
-    make_frames(capture, "00000.jpg", text="new")
-    with replacing(capture.head) as temporary:
-        temporary.write_text("new")
-    assert contents(root).keys() == {
-        "capture.json",
-        "frames/00000.jpg",
-        "frames/2026 holiday.jpg",
-        "head.obj",
-        "notes.txt",
-        ".notes.old",
-        "frames/.mine.1.tmp.jpg",
-    }
-
-
-def test_the_first_thing_written_into_a_capture_of_0_1_0_does_not_hide_what_it_wrote(tmp_path):
-    root = tmp_path / "old.wildcap"
-    root.mkdir()
-    (root / "capture.json").write_text(json.dumps({"format": 1, "source": "", "stages": {"solve": {}}}))
-    capture = Capture(root)
-    for path in (capture.shadow_mask, capture.head):
-        path.write_text("by 0.1.0")
-    for path in (capture.shadow_mask, capture.head):  # a mask painted in Blender, before any worker
-        with replacing(path) as temporary:
-            temporary.write_text("new")
-    assert not (root / "kept").exists()
-
-
-def test_a_capture_of_today_whose_record_was_lost_is_not_taken_for_one_of_0_1_0(capture):
+def test_what_lies_in_a_capture_whose_record_was_lost_may_be_anybodys(capture):
     make_frames(capture, "00000.jpg")
-    capture.json.write_text(json.dumps({"format": 2, "source": "", "stages": {"frames": {}}}))
     (capture.root / ownership.RECORD).unlink()
     left = capture.frames / ".00001.99999999.tmp.jpg"
     left.write_text("anybody's")

@@ -57,7 +57,7 @@ def capture(tmp_path) -> Capture:
             "text": "<script>alert(1)</script>",
             "by_view": {"0001": True},
         }
-        capture.finish(stage, capture.conditions(stage, settings), 75.0, settings, figures, "0.1.0")
+        capture.finish(stage, capture.conditions(stage, settings), 75.0, settings, figures, "0.2.0")
     grey = np.full((8, 8, 3), 0.5, np.float32)
     images.write_srgb(capture.picture("cameras", "around_the_head"), grey)
     images.write_srgb(capture.renders / "three lights.png", grey)
@@ -105,7 +105,7 @@ def test_findings_of_all_stages_and_what_stopped_it_come_first(capture):
     reporter = Reporter("scan")
     reporter.finding("The light <changed>.", "Lock the exposure.", [f"{i:05d}.jpg" for i in range(14)])
     scan = stages.by_name("scan")
-    capture.finish(scan, capture.conditions(scan, Settings()), 1.0, Settings(), {}, "0.1.0", reporter.findings)
+    capture.finish(scan, capture.conditions(scan, Settings()), 1.0, Settings(), {}, "0.2.0", reporter.findings)
     capture.stop(
         "cameras",
         Problem("The frames do not fit together.", "Film again."),

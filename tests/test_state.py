@@ -21,6 +21,8 @@ from core.face import template  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.light.spherical_harmonics import sh_basis  # noqa: E402
 
+from .recorded import make_entry  # noqa: E402
+
 SKIN = np.float32([0.45, 0.28, 0.2])
 
 
@@ -245,17 +247,7 @@ def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
     captures = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
     before = state.code_of(captures)
     record = captures[0].capture.read()
-    record["stages"]["solve"] = {
-        "finished": "2026-11-22T00:00:00",
-        "seconds": 1.0,
-        "settings": {},
-        "seed": 0,
-        "device": "cpu",
-        "figures": {},
-        "inputs": {},
-        "code": "1234567890abcdef",
-        "version": "0.2.0",
-    }
+    record["stages"]["solve"] = make_entry(code="1234567890abcdef")
     captures[0].capture.json.write_text(json.dumps(record))
     after = state.code_of(captures)
     assert before["solve"] == "" and after["solve"] == "1234567890ab" and after["delight"] == ""

@@ -49,9 +49,9 @@ def test_what_is_put_together_is_looked_up_before_names_and_figures_come_in(mark
         "beside" in text and not translate
         for text, translate in drawn(marked("reconstruct.panel").WILDCAP_PT_head_mesh)
     )
-    known = marked("status").Status(seconds={"solve": 30.0}, versions={"solve": "0.1.0"})
+    known = marked("status").Status(seconds={"solve": 30.0}, versions={"solve": "0.2.0"})
     assert marked("panel")._words("done", known, "solve") == "»done, 30 s«"
-    assert marked("panel")._words("older", known, "solve") == "»made by 0.1.0«"
+    assert marked("panel")._words("older", known, "solve") == "»made by 0.2.0«"
     assert any(text.startswith("»") for text, _ in drawn(marked("panel").WILDCAP_PT_main)), "the line of state"
 
 

@@ -3,7 +3,6 @@
 """An update of the extension loses nobody a head: what older code made is shown as such, painted on, assembled and
 rendered, and nothing runs by itself."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -101,15 +100,3 @@ def test_a_mask_painted_after_the_update_asks_for_a_solve_alone(addon, updated):
     assert next_operator(addon) == "wildcap.solve"
     older = {name for name, state in states.items() if state == "older"}
     assert older == set(states) - {"solve"}, "what lies under the mask stays as it is"
-
-
-def test_a_capture_of_0_1_0_opens_with_all_its_work(addon, tmp_path):
-    root = standin.make(tmp_path / "old.wildcap")
-    told = json.loads(Path(__file__).with_name("capture_0_1_0.json").read_text(encoding="utf-8"))
-    (root / "capture.json").write_text(json.dumps(told), encoding="utf-8")
-    bpy.ops.wildcap.open_capture(directory=str(root))
-    known = look(addon)
-    assert known.problem is None and known.has_head and known.has_maps
-    bpy.ops.wildcap.bring_in_head()
-    bpy.ops.wildcap.assemble_material()
-    assert addon("captures").head(bpy.context, addon("captures").active(bpy.context)).active_material is not None

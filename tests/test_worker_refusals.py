@@ -20,6 +20,8 @@ from core.worker.locks import Lock
 from core.worker.pip_steps import PipStep
 from core.worker.runner import explained, run_job
 
+from .recorded import make_entry
+
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 
 
@@ -47,7 +49,7 @@ def test_a_job_over_another_source_than_before(capture, tmp_path):
         (tmp_path / name).write_bytes(name.encode() * 9)
     capture.set_source(tmp_path / "a.mp4")
     record = capture.read()
-    record["stages"]["frames"] = {"key": "", "seconds": 1.0}
+    record["stages"]["frames"] = make_entry()
     capture.json.write_text(json.dumps(record), encoding="utf-8")
     assert "made from a.mp4, not from this b.mp4" in ended(capture, source=tmp_path / "b.mp4")
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection
 from dataclasses import asdict
 from pathlib import Path
 
-from . import capture_record, format_1, freshness, lease, ownership, stages
+from . import capture_record, freshness, lease, ownership, stages
 from .files import storage_problem, write_json
 from .freshness import Verdict
 from .hashes import hash_source, same_source
@@ -25,8 +25,8 @@ from .portable_paths import convert_settings, write_portable
 from .settings import Settings
 
 FORMAT = 2
-"""Version of the capture folder's layout; a capture of a newer format is refused. Format 1 is that of WildCap 0.1.0
-(format_1.py)."""
+"""Version of the capture folder's layout; a capture of another format is refused. Format 1 was a
+pre-release's."""
 
 
 class Capture:
@@ -87,7 +87,7 @@ class Capture:
     # -- capture.json
 
     def read(self) -> dict:
-        """capture.json, or an empty record. Raises Problem when it is damaged or of a newer format."""
+        """capture.json, or an empty record. Raises Problem when it is damaged or of another format."""
         try:
             record = read_json(self.json)
         except FileNotFoundError:
@@ -101,6 +101,11 @@ class Capture:
             raise Problem(
                 "This capture was made by a newer version of WildCap.",
                 "Update the extension to open it; nothing was changed.",
+            )
+        if isinstance(record, dict) and is_number(record.get("format"), high=FORMAT - 1):
+            raise Problem(
+                "This capture was made by a pre-release of WildCap.",
+                "Make it again from its video, in a new folder; nothing was changed.",
             )
         if fault := capture_record.find_fault(record):
             raise Problem(
@@ -132,7 +137,6 @@ class Capture:
         stamp, path = record.get("source_stamp", []), Path(source) if str(source) else None
         changed = {
             **record,
-            **format_1.keep_stamp(stamp),
             "format": FORMAT,
             "source": self._portable(path) if path else "",
             "source_stamp": hash_source(path) or stamp,
@@ -255,17 +259,9 @@ class Capture:
         """Makes the folder a capture, if it is not one yet. Raises Problem for a folder that holds something else, and
         where it cannot be written."""
         if not self.json.is_file():
-            if not self._was_capture():
+            if not (self.root / ownership.RECORD).is_file():  # nor has been one, whose damaged capture.json was deleted
                 self.refuse_strangers()
             write_json(self.json, {"format": FORMAT, "source": "", "stages": {}})
-
-    def _was_capture(self) -> bool:
-        """Whether a folder without capture.json, which a damaged one may be deleted from to start anew, has been a
-        capture: by our record, or by a job."""
-        with contextlib.suppress(OSError, ValueError, TypeError):
-            today = {"capture", "from", "until", "quality"}
-            return (self.root / ownership.RECORD).is_file() or today <= set(read_json(self.job))
-        return False
 
     def refuse_strangers(self) -> None:
         """Raises Problem where the folder, which is no capture yet, holds something."""

@@ -20,9 +20,7 @@ ENTRY = {
     "inputs": dict,
     "code": str,
 }
-"""What is told of a finished stage, beside its seconds."""
-SINCE_2 = {"inputs", "code", "settings", "seed", "device", "finished", "figures"}
-"""What is never missing where `inputs` are told, as since format 2: freshness.py and the report count on it."""
+"""What is told of every finished stage, beside its seconds: freshness.py and the report count on it."""
 
 
 def find_fault(record) -> str:
@@ -32,9 +30,9 @@ def find_fault(record) -> str:
         return "it has no stages"
     source = record.get("source", "")
     right = {
-        "format": type(record.get("format", 0)) is int,
+        "format": type(record.get("format")) is int,
         "source": isinstance(source, str) and "\0" not in source,
-        **{field: _is_stamp(record.get(field, [])) for field in ("source_stamp", "format_1_stamp")},
+        "source_stamp": _is_stamp(record.get("source_stamp", [])),
         **{f"stages.{name}": _is_entry(entry) for name, entry in record["stages"].items()},
         "stopped": _is_stop(record.get("stopped")),
     }
@@ -44,9 +42,8 @@ def find_fault(record) -> str:
 def _is_entry(entry) -> bool:
     if not isinstance(entry, dict) or not is_number(entry.get("seconds"), 0):
         return False
-    typed = all(isinstance(entry.get(field, kind()), kind) for field, kind in ENTRY.items())
-    complete = "inputs" not in entry or entry.keys() >= SINCE_2
-    return typed and complete and _are_findings(entry.get("findings", []))
+    complete = all(isinstance(entry.get(field), kind) for field, kind in ENTRY.items())
+    return complete and _are_findings(entry["findings"])
 
 
 def _is_stop(stopped) -> bool:
@@ -57,13 +54,13 @@ def _is_stop(stopped) -> bool:
 
 
 def _is_stamp(stamp) -> bool:
-    """Whether it is a source's stamp: [name, size, content hash, or time] of each file."""
+    """Whether it is a source's stamp: [name, size, content hash] of each file."""
     return isinstance(stamp, list) and all(
         isinstance(file, list)
         and len(file) == 3
         and _names_file(file[0])
         and is_number(file[1], 0)
-        and (isinstance(file[2], str) or is_number(file[2]))
+        and isinstance(file[2], str)
         for file in stamp
     )
 

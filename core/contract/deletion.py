@@ -119,7 +119,7 @@ def delete(capture: Capture) -> Deletion:
             ):
                 with contextlib.suppress(OSError):  # it is not there, or somebody's files are in it
                     (capture.root / folder).rmdir()
-            # a capture without its record would be taken for one of 0.1.0
+            # last what tells that the folder is a capture, and whose its files are
             for name in (capture.job.name, capture.json.name, ownership.RECORD):
                 (capture.root / name).unlink(missing_ok=True)
         except OSError as error:

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from . import format_1
 from .code_key import code_key
 from .hashes import hash_source, hash_tree, hash_value, same_source, sample_file
 from .portable_paths import read_portable
@@ -74,12 +73,7 @@ def judge_stage(root: Path, record: dict, stage: Stage, settings: Settings) -> V
     finished = record["stages"].get(stage.name)
     if finished is None:
         return Verdict(TO_DO)
-    version = str(finished.get("version", ""))
-    if "inputs" not in finished:  # by WildCap 0.1.0, which kept one hash of everything
-        same = format_1.is_unchanged(root, record, stage, settings)
-        if same and not stage.reads:
-            same = not _other_source(record.get("source_stamp", []), root, record)
-        return Verdict(OLDER, version=version) if same else Verdict(STALE, ("an input or a setting",), version)
+    version = finished["version"]
     changed = [
         *_changed_inputs(finished["inputs"], root, record, stage, settings),
         *_changed_settings(finished, stage, settings),

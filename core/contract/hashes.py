@@ -90,19 +90,11 @@ def _is_photograph(name: str) -> bool:
 
 def same_source(recorded: list, present: list) -> bool:
     """Whether two answers of `hash_source` mean the same pictures. A video may be renamed; the names of photographs
-    count, for they tell their order; what an older WildCap recorded beside them does not.
-
-    Captures of WildCap 0.1.0 recorded a time in place of the hash: of those, size and name must do.
-    """
+    count, for they tell their order."""
 
     def told(stamp: list) -> list:
-        files = [file for file in stamp if _is_photograph(file[0])] or stamp
-        return [
-            [name if len(files) > 1 or not hashed else "", size, digest if hashed else ""]
-            for name, size, digest in files
-        ]
+        return [[name if len(stamp) > 1 else "", size, digest] for name, size, digest in stamp]
 
-    hashed = all(isinstance(digest, str) for _, _, digest in (*recorded, *present))
     return told(recorded) == told(present)
 
 

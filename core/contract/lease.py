@@ -272,8 +272,6 @@ def _parse(path: Path) -> dict:
         content = json.loads(require_regular(path).read_bytes())
     except (ValueError, RecursionError):
         return {}
-    if isinstance(content, dict) and "start" in content:  # by WildCap 0.1.0
-        content["since"] = content.pop("start")
     return content if isinstance(content, dict) and {"host", "pid", "since"} <= content.keys() else {}
 
 

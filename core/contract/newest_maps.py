@@ -22,7 +22,7 @@ def find_newest_maps(capture: Capture) -> list[Path]:
     made of those in maps/, else of maps/.
 
     What it was made of tells capture.json by content, for a copy of a capture has files of any times. Only where that
-    does not say (maps of WildCap 0.1.0, or from elsewhere) must the times do. Solved maps that are gone contradict
+    does not say (maps from elsewhere) must the times do. Solved maps that are gone contradict
     nothing. Raises Problem for a damaged capture.json, OSError for files that cannot be read.
     """
     solved, enlarged = ([folder / name for name in WORN] for folder in (capture.maps, capture.maps_4k))

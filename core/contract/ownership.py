@@ -11,10 +11,8 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fnmatch
 import json
 import os
-import re
 import shutil
 from collections.abc import Iterable
 from functools import lru_cache
@@ -31,48 +29,6 @@ BOOKS = frozenset({"capture.json", "job.json", "lock", RECORD})
 """The capture's own books, which are ours whatever stands in them."""
 LONG_BYTES = 1 << 18
 """Of the record, from which on it is shortened: some thousand lines, of a long film's frames or of a day's painting."""
-DIGIT = "[0-9]"
-FIVE = 5 * DIGIT
-FIRST_FORMAT = (
-    "frames/frames.json",
-    f"frames/{FIVE}.jpg",
-    *(f"cameras/{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")),
-    "scan.ply",
-    "head.obj",
-    "own_head.obj",
-    "own_head.json",
-    "landmarks.json",
-    "landmarks_artist.json",
-    f"delit/{FIVE}.png",
-    f"delit/shadow/{FIVE}.png",
-    "texture*.exr",
-    "texture*.png",
-    "shadow_mask*.png",
-    "protect_mask.png",
-    f"mask_history/*_mask_{8 * DIGIT}_{6 * DIGIT}_{3 * DIGIT}.png",
-    "maps/*.png",
-    "maps/*.exr",
-    "maps/solved.safetensors",
-    "maps_4k/*.png",
-    "maps_4k/*.exr",
-    "delivery/delivery.json",
-    *(f"delivery/own_{name}*.png" for name in ("diffuse_albedo", "normal", "specular_albedo", "confidence")),
-    "delivery/own_head.obj",
-    "delivery/scan.obj",
-    *(f"delivery/scan_{name}.png" for name in ("lit", "albedo", "albedo_known")),
-    "delivery/displacement.exr",
-    "comparison/*.png",
-    "comparison/*.jpg",
-    "preview/*.png",
-    "report/*_*.jpg",
-    "report.html",
-    "consent.json",
-    "checkpoints/solve.safetensors",
-    "switchlight/*.png",
-)
-"""What WildCap 0.1.0 wrote, which kept no such record."""
-LEFT_BEFORE = re.compile(r"\.(?P<stem>.+)\.\d+\.tmp(?P<suffix>\..+)?|\.(?P<old>.+)\.old")
-"""Temporary names of 0.1.0, whole."""
 
 
 def root_of(path: Path) -> Path | None:
@@ -199,10 +155,8 @@ def take_back(root: Path, replaced: Path) -> None:
 
 
 def read_record(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:
-    """What was written: path -> content hashes; and what was temporary: path -> process. A capture of 0.1.0 gets its
-    record here."""
+    """What was written: path -> content hashes; and what was temporary: path -> process."""
     record = root / RECORD
-    _begin_record(root)
     try:
         info = require_regular(record).stat()
     except FileNotFoundError:
@@ -238,60 +192,8 @@ def _is_temporary_name(path: str) -> bool:
     )
 
 
-def adopt_first_format(root: Path) -> None:
-    """Makes the record of a capture of 0.1.0: what its finished stages wrote, and what killed ones left."""
-    note_written(
-        root,
-        {
-            path_inside(root, path): read_hash(path)
-            for pattern in FIRST_FORMAT
-            for path in sorted(root.glob(pattern))
-            if path.is_file()
-        },
-    )
-    gone = {**identify_process(), "pid": -1}
-    _append(
-        root,
-        [
-            {"temporary": inside, "by": gone}
-            for path in root.glob("**/.*")
-            if _was_left_before(inside := path_inside(root, path))
-        ],
-    )
-
-
-def _was_left_before(inside: str) -> bool:
-    """Whether a path is a temporary one of 0.1.0's, for a file or a folder that it wrote. Others have files of such
-    names, too."""
-    path = PurePosixPath(inside)
-    name_match = LEFT_BEFORE.fullmatch(path.name)
-    if not name_match:
-        return False
-    final = str(path.with_name(name_match["old"] or name_match["stem"] + (name_match["suffix"] or "")))
-    return any(
-        fnmatch.fnmatchcase(final, each) or PurePosixPath(final) in PurePosixPath(each).parents for each in FIRST_FORMAT
-    )
-
-
-def _begin_record(root: Path) -> None:
-    """Before the first line of any other: what 0.1.0 wrote, where this is a capture of that."""
-    if not (root / RECORD).exists() and _is_of_first_format(root):
-        (root / RECORD).touch()
-        adopt_first_format(root)
-
-
-def _is_of_first_format(root: Path) -> bool:
-    """Whether 0.1.0 wrote it, and finished a stage. A newer one whose record was lost gets none: what is in it may be
-    anybody's, and is kept aside."""
-    with contextlib.suppress(OSError, ValueError, AttributeError, TypeError):
-        record = json.loads((root / "capture.json").read_text(encoding="utf-8"))
-        return bool(record.get("stages")) and record.get("format", 0) < 2
-    return False
-
-
 def _append(root: Path, lines: Iterable[dict]) -> None:
     """In one write, so that the lines of two processes do not mix. Raises OSError where they do not fit on the disk."""
-    _begin_record(root)
     text = b"".join(json.dumps(line).encode() + b"\n" for line in lines)
     if text:
         with open(root / RECORD, "ab+", buffering=0) as file:

@@ -66,7 +66,7 @@ def is_at_work(process: dict) -> bool:
 
 
 def _place(process: dict) -> tuple[str, str, str]:
-    """Name, run and space of a process's host; '' for what is not told, as by WildCap 0.1.0."""
+    """Name, run and space of a process's host; '' for what is not told."""
     name, _, rest = str(process.get("host")).partition("/")
     run, _, space = rest.partition("/")
     return name, run, space

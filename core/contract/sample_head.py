@@ -38,7 +38,4 @@ def copy_to(folder: Path) -> Capture:
             (temporary / VERTICES).unlink()
             write_json(temporary / capture.json.name, capture.read())
             ownership.claim_all(temporary)
-    elif not capture.json.is_file():  # by WildCap 0.1.0
-        ownership.adopt_first_format(capture.root)
-        write_json(capture.json, capture.read())
     return capture

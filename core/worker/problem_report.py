@@ -32,7 +32,7 @@ from ..contract.deletion import LOGS
 from ..contract.files import replacing
 from ..contract.frame_records import read_frames
 from ..contract.messages import Problem
-from ..contract.ownership import BOOKS, FIRST_FORMAT
+from ..contract.ownership import BOOKS
 from ..contract.portable_paths import convert_settings
 from ..contract.together import captures_in
 from . import doctor
@@ -42,6 +42,49 @@ LOG_BYTES = 256 << 10
 """Of each log, its end."""
 TOLD = ("logs", "versions", "settings", "which stages ended and with what figures", "what the doctor says")
 REMOVED = "<removed>"
+DIGIT = "[0-9]"
+FIVE = 5 * DIGIT
+OWN_FILES = (
+    "frames/frames.json",
+    f"frames/{FIVE}.jpg",
+    *(f"cameras/{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")),
+    "scan.ply",
+    "head.obj",
+    "head_open.obj",
+    "eyes.json",
+    "own_head.obj",
+    "own_head.json",
+    "landmarks.json",
+    "landmarks_artist.json",
+    f"delit/{FIVE}.png",
+    f"delit/shadow/{FIVE}.png",
+    "texture*.exr",
+    "texture*.png",
+    "shadow_mask*.png",
+    "protect_mask.png",
+    f"mask_history/*_mask_{8 * DIGIT}_{6 * DIGIT}_{3 * DIGIT}.png",
+    "maps/*.png",
+    "maps/*.exr",
+    "maps/solved.safetensors",
+    "maps/irises.json",
+    "maps_4k/*.png",
+    "maps_4k/*.exr",
+    "delivery/delivery.json",
+    *(f"delivery/own_{name}*.png" for name in ("diffuse_albedo", "normal", "specular_albedo", "confidence")),
+    "delivery/own_head.obj",
+    "delivery/scan.obj",
+    *(f"delivery/scan_{name}.png" for name in ("lit", "albedo", "albedo_known")),
+    "delivery/displacement.exr",
+    "comparison/*.png",
+    "comparison/*.jpg",
+    "preview/*.png",
+    "report/*_*.jpg",
+    "report.html",
+    "consent.json",
+    "checkpoints/solve.safetensors",
+    "switchlight/*.png",
+)
+"""Files of a capture that WildCap gives their names, as patterns: they tell nothing of the user."""
 ABSOLUTE = re.compile(r"""(?<![\w<>:/\\.])(?:file:/{1,3}|[A-Za-z]:[\\/]|\\\\|~[\w.-]*[\\/]|/(?=[^\s/]))""")
 """Where an absolute path begins: POSIX, a drive, a server's share, somebody's home, a file's URL."""
 COMMON = {
@@ -160,9 +203,7 @@ def _own_file(inside: str) -> str:
     inside = re.sub(r"[\\/]+", "/", inside)
     stem = inside.rstrip(".")
     return (
-        inside
-        if stem in LOGS | BOOKS or any(fnmatch.fnmatchcase(stem, pattern) for pattern in FIRST_FORMAT)
-        else "<file>"
+        inside if stem in LOGS | BOOKS or any(fnmatch.fnmatchcase(stem, pattern) for pattern in OWN_FILES) else "<file>"
     )
 
 

@@ -116,7 +116,7 @@ def registered(root: Path, item) -> None:
     capture, settings = captures.folder(item), properties.settings(item)
     capture.set_source(root.parent / "face.mp4")
     for stage in stages.STAGES[: stages.NAMES.index("delight")]:
-        capture.finish(stage, capture.conditions(stage, settings), 1.0, settings, {}, "0.1.0")
+        capture.finish(stage, capture.conditions(stage, settings), 1.0, settings, {}, "0.2.0")
 
 
 d.play(flow(), limit_s=900)
