@@ -224,16 +224,6 @@ def test_what_cannot_act_is_told_why(addon, capture):
         bpy.ops.wildcap.add_face_units()
 
 
-def test_lids_that_were_filmed_open_are_warned_of(addon, tmp_path):
-    from types import SimpleNamespace
-
-    for seen, word in ((0.31, "open while filming"), (0.12, ""), (None, "")):
-        record = {"stages": {"registration": {"figures": {"eye_opening": seen}}}}
-        stored = SimpleNamespace(read=lambda record=record: record, eyes=tmp_path / "eyes.json")
-        told = addon("acting.operators").filmed_open(stored)
-        assert word in told and bool(told) == bool(word)
-
-
 def _triangles() -> np.ndarray:
     return np.array(
         [

@@ -102,13 +102,9 @@ def test_an_installation_is_polled_like_a_job_and_sets_the_python(addon, tmp_pat
     preferences.set_python(None)
 
 
-def test_the_solver_goes_to_a_short_folder_or_where_it_was_and_only_environments_are_removed(addon, tmp_path):
+def test_the_solver_goes_to_a_short_folder_and_only_environments_are_removed(addon, tmp_path):
     preferences = addon("preferences")
     assert preferences.environment_folder() == Path.home() / ".wildcap" / "solver"
-    earlier = Path(bpy.utils.extension_path_user("bl_ext.user_default.wildcap", path="solver", create=True))
-    (earlier / "pyvenv.cfg").write_text("home = /", encoding="utf-8")
-    assert preferences.environment_folder() == earlier, "where 0.1.0 put it"
-    (earlier / "pyvenv.cfg").unlink()
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "novel.txt").write_text("", encoding="utf-8")

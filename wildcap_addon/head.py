@@ -22,8 +22,7 @@ HAIR_UVS = "WildCap Hair"
 the lids' maps."""
 
 TEXTURE_KEY = "wildcap_texture"
-"""Custom property of a material that shows the texture until the skin is assembled: its fingerprint as it was made; by
-older versions true."""
+"""Custom property of a material that shows the texture until the skin is assembled: its fingerprint as it was made."""
 
 FOLLOWERS = []
 """Functions (head object, new mesh) of rooms that made more of a head's mesh: whether it now has the new mesh's shape,

@@ -62,9 +62,9 @@ def name(item) -> str:
 
 def find(item) -> Path | None:
     """A missing capture where it is likely to be: beside the .blend or one folder further down, among the captures of
-    the preferences, where 0.1.0 put them, or beside another one of the scene. None where there is none of its name."""
+    the preferences, or beside another one of the scene. None where there is none of its name."""
     parents = [captures.folder(other).root.parent for other in captures.listed()]
-    parents += [preferences.captures_folder(saved=False), preferences.CAPTURES_0_1]
+    parents.append(preferences.captures_folder(saved=False))
     if bpy.data.filepath:
         blend = Path(bpy.data.filepath).parent
         parents = [blend, *sorted(p for p in blend.iterdir() if p.is_dir()), *parents]

@@ -45,9 +45,6 @@ SOURCES = [
 DEVICES = {"cpu": "CPU", "cuda": "CUDA", "mps": "Metal", "": ""}
 _aside: set[str] = set()  # Pythons that were found not to answer, in this session
 
-CAPTURES_0_1 = Path.home() / "Documents" / "WildCap"
-"""Where version 0.1.0 put captures."""
-
 
 class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = extension.NAME
@@ -209,12 +206,9 @@ def set_python(path: Path | None, device: str = "", reason: str = "") -> None:
 
 
 def environment_folder() -> Path:
-    """Where Install Solver makes its environment: kept across updates, outside the extension's own files. One that
-    0.1.0 made stays where it put it, but on Windows, where paths there grow too long."""
-    chosen, earlier = get().environment, Path(bpy.utils.extension_path_user(extension.NAME, path="solver"))
-    if chosen:
-        return Path(bpy.path.abspath(chosen))
-    return earlier if os.name != "nt" and (earlier / "pyvenv.cfg").is_file() else environment.default_folder()
+    """Where Install Solver makes its environment: kept across updates, outside the extension's own files."""
+    chosen = get().environment
+    return Path(bpy.path.abspath(chosen)) if chosen else environment.default_folder()
 
 
 def wheels_folder() -> Path | None:

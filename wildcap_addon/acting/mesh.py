@@ -112,7 +112,6 @@ def follow(obj, head: np.ndarray, normals: np.ndarray) -> None:
     """Moves a head that has its units to another registered shape [V, 3]; values, animation, drivers and the artist's
     own keys stay."""
     asset = load()
-    obj.data[OUTER] = len(asset.triangles)  # a head of WildCap 0.1.0 did not say
     _shape(obj, *carrying.carried(asset, head, filmed_eyes(obj, asset)), normals)
 
 

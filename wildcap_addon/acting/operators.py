@@ -12,8 +12,6 @@ from . import gaze, materials, mesh
 from .close_up import building
 
 FILMED = ("filmed", "As Filmed", "What the frames show, where the eyes were open; brown otherwise")
-OPEN_RATIO = 0.22
-"""Height over width of an eye from which the registration takes it for open (core/registration/eyes.py)."""
 
 
 class WILDCAP_OT_add_face_units(HeadOperator, bpy.types.Operator):
@@ -39,7 +37,6 @@ class WILDCAP_OT_add_face_units(HeadOperator, bpy.types.Operator):
             )
         mesh.add(obj, "" if self.iris == FILMED[0] else self.iris)
         head.complete(obj, captures.folder(item))
-        self.warn(filmed_open(captures.folder(item)))
 
 
 class WILDCAP_OT_iris(HeadOperator, bpy.types.Operator):
@@ -104,19 +101,6 @@ class WILDCAP_OT_close_up(_Toggle, bpy.types.Operator):
     bl_idname = "wildcap.close_up"
     bl_label = "Close-Up Eyes"
     switched = building
-
-
-def filmed_open(capture) -> str:
-    """What there is to say of the lids of a face that was filmed with open eyes and reconstructed by WildCap 0.1.0, ''
-    for others."""
-    seen = capture.read()["stages"].get("registration", {}).get("figures", {}).get("eye_opening")
-    on_lids = seen is not None and seen > OPEN_RATIO and not capture.eyes.is_file()
-    return (
-        "The eyes were open while filming: the lids carry a picture of them, which shows when they move. "
-        "Reconstruct again to have them open"
-        if on_lids
-        else ""
-    )
 
 
 def _acting(context):

@@ -42,7 +42,7 @@ def assemble(context, item) -> tuple[bpy.types.Material, str]:
     if missing:
         raise Problem(f"This capture has no {', '.join(missing)} yet.", "Click Solve first.")
     material = _material(obj)
-    before = _set_before(material, obj)
+    before = _set_before(material)
     regions.write(obj.data)
     height = capture.delivery / DISPLACEMENT[1]
     _build(material, {path.name: path for path in (*maps, height) if path.is_file()}, obj)
@@ -73,7 +73,7 @@ def is_edited(obj) -> bool:
 def _is_preview(material) -> bool:
     """Whether it is what Bring In Head made to show the texture, as it made it."""
     made = material.get(head.TEXTURE_KEY)
-    return KEY not in material and bool(made) and made in (1, node_trees.fingerprint(material, head.PREVIEW))
+    return KEY not in material and bool(made) and made == node_trees.fingerprint(material, head.PREVIEW)
 
 
 def _material(obj) -> bpy.types.Material:
@@ -185,16 +185,9 @@ def _link(tree, output, socket) -> None:
         tree.links.new(output, socket)
 
 
-def _set_before(material, obj) -> dict[str, float]:
+def _set_before(material) -> dict[str, float]:
     """What Assemble Material set the last time; {} for a material that is new."""
-    if KEY not in material:
-        return {}
-    # of the group's version 1
-    return (
-        material[SET].to_dict()
-        if SET in material
-        else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * data_blocks.scale_of(obj)}
-    )
+    return material[SET].to_dict() if SET in material else {}
 
 
 def _set(material, inputs: dict[str, float], before: dict[str, float]) -> None:

@@ -83,17 +83,17 @@ INPUTS = (
 )
 OUTPUTS = (("BSDF", 'NodeSocketShader'), ("Displacement", 'NodeSocketVector'))
 
-# name, type, name it had in version 1, place
+# name, type, place
 NODES = (
-    ("WildCap Input", 'NodeGroupInput', "Group Input", (-700, 0)),
-    ("WildCap Given Back", 'ShaderNodeMix', None, (-400, 340)),
-    ("WildCap Specular Level", 'ShaderNodeMath', "Math", (-400, 80)),
-    ("WildCap Regions", 'ShaderNodeMath', None, (-400, -120)),
-    ("WildCap Oily", 'ShaderNodeMath', None, (-400, -320)),
-    ("WildCap Coat", 'ShaderNodeMath', None, (-200, -320)),
-    ("WildCap Principled", 'ShaderNodeBsdfPrincipled', "Principled BSDF", (0, 0)),
-    ("WildCap Displacement", 'ShaderNodeDisplacement', None, (0, -420)),
-    ("WildCap Output", 'NodeGroupOutput', "Group Output", (340, 0)),
+    ("WildCap Input", 'NodeGroupInput', (-700, 0)),
+    ("WildCap Given Back", 'ShaderNodeMix', (-400, 340)),
+    ("WildCap Specular Level", 'ShaderNodeMath', (-400, 80)),
+    ("WildCap Regions", 'ShaderNodeMath', (-400, -120)),
+    ("WildCap Oily", 'ShaderNodeMath', (-400, -320)),
+    ("WildCap Coat", 'ShaderNodeMath', (-200, -320)),
+    ("WildCap Principled", 'ShaderNodeBsdfPrincipled', (0, 0)),
+    ("WildCap Displacement", 'ShaderNodeDisplacement', (0, -420)),
+    ("WildCap Output", 'NodeGroupOutput', (340, 0)),
 )
 MIX_FACTOR, MIX_A, MIX_B, MIX_RESULT = 0, 6, 7, 2
 """Numbers of a Mix node's sockets for colours: its names are used several times."""
@@ -154,12 +154,10 @@ def _sockets(group) -> None:
 
 
 def _nodes(group) -> dict[str, bpy.types.Node]:
-    """Ours, by name; those of version 1 are taken over with what the artist set in them."""
-    for name, kind, before, location in NODES:
-        node = group.nodes.get(name) or (group.nodes.get(before) if before else None)
-        if node is None:
+    """Ours, by name."""
+    for name, kind, location in NODES:
+        if name not in group.nodes:
             node = group.nodes.new(kind)
-        if node.name != name:
             node.name = node.label = name
             node.location = location
     return {name: group.nodes[name] for name, *_ in NODES}
@@ -194,7 +192,7 @@ def _wire(group) -> None:
 
 
 def _is_theirs(socket) -> bool:
-    """Whether an artist's node feeds a socket of ours, or it is a coat of their own, inside of an older version."""
+    """Whether an artist's node feeds a socket of ours, or it is a coat of their own."""
     if socket.is_linked:
         return socket.links[0].from_node.name not in {name for name, *_ in NODES}
     return socket.name == "Coat Weight" and socket.default_value > 0
