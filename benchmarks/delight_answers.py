@@ -153,18 +153,11 @@ def keep_answers(path: Path, capture: Capture, albedo: np.ndarray, known: np.nda
     Parameters
     ----------
     path : of the .npz: per answer the light, natural log [N, 3] less its mean, in cells of bare skin
-    capture : with cameras and the built-in head
+    capture : with cameras and a head
     albedo : the truth, linear [S, S, 3], in the head's UVs, of any size
     known : bool [SIZE, SIZE], where that is one
-
-    Raises
-    ------
-    SystemExit
-        Where the capture has an own head.
     """
     answers = ask(capture, Settings(device="cpu"), Reporter("delight", emit=lambda message: None))
-    if not answers.head.head.built_in:
-        raise SystemExit(f"{capture.root} has an own head: the true albedo is in the built-in one's UVs.")
     albedo = np.log(np.maximum(images.resize(np.ascontiguousarray(albedo, np.float32), SIZE, SIZE), DARKEST))
     maps = np.concatenate([albedo, known[..., None]], -1).astype(np.float32)
     mesh, cells = answers.head.mesh, {key: [] for key in ANSWERS}

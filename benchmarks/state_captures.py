@@ -20,7 +20,6 @@ import numpy as np
 
 from core.contract.capture import Capture
 from core.contract.hashes import hash_file
-from core.contract.messages import Problem
 from core.contract.settings import Settings
 from core.face import template
 from core.face.head import Head, read_head
@@ -53,11 +52,7 @@ class Filmed:
 
     @cached_property
     def head(self) -> Head:
-        """Raises Problem for a head whose UVs are not the built-in one's: parts and landmarks are known there alone."""
-        head = read_head(self.capture)
-        if not head.built_in:
-            raise Problem(f"{self.capture.root} has an own head.", "Measure captures of the built-in head.")
-        return head
+        return read_head(self.capture)
 
     @cached_property
     def true_capture(self) -> Capture:

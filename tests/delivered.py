@@ -31,6 +31,7 @@ NORMALS = (
 """x and y of the normals as 16 bits store them, [S, S, 2]."""
 
 
+HEAD = Path(__file__).resolve().parent.parent / "core/assets/head.obj"
 OBJ = {"format": "obj", "whole": True}
 """The settings of a delivery that needs no Blender."""
 
@@ -43,6 +44,7 @@ def folder(capture: Capture, what: str = "head", preset: str = "blender", mesh: 
 def make(root: Path) -> Capture:
     """The capture, with a video's name on record that lies in a user's folder."""
     capture = Capture(standin.make(root))
+    shutil.copyfile(HEAD, capture.head)
     u, v = np.meshgrid((np.arange(SIDE) + 0.5) / SIDE, (np.arange(SIDE) + 0.5) / SIDE)
     albedo = np.stack([0.2 + 0.3 * u, 0.1 + 0.2 * v, 0.15 * np.ones_like(u)], -1).astype(np.float32)
     xy = NORMALS * 2 - 1
@@ -62,7 +64,7 @@ def with_face_units(capture: Capture):
 
     head = bpy.context.view_layer.objects.active
     head.shape_key_clear()
-    shutil.copyfile(Path(__file__).resolve().parent.parent / "core/assets/head.obj", capture.head)
+    shutil.copyfile(HEAD, capture.head)
     record_solve(capture)
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.add_face_units()

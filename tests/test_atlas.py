@@ -11,7 +11,7 @@ import pytest
 from core.geometry import atlas, meshes, surfaces
 from core.geometry.meshes import Mesh
 
-from .painted_egg import egg
+from .egg import egg
 
 
 @pytest.fixture(scope="module")

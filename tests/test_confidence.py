@@ -24,7 +24,7 @@ SKIN = np.full((SIZE, SIZE, 3), [0.42, 0.26, 0.18], np.float32)
 def plain_evidence(size: int, **changed: torch.Tensor) -> Evidence:
     """Of skin that was seen well all over, lit as usual."""
     ones, colours = torch.ones(size, size), torch.zeros(3, size, size)
-    plain = Evidence(colours, ones, 0 * ones, colours, ones > 0, ones, ones, ones, 0 * ones, 0 * ones, ones)
+    plain = Evidence(colours, ones, 0 * ones, colours, ones > 0, ones, ones, ones, *[0 * ones] * 2, ones, 0 * ones)
     return replace(plain, **changed)
 
 

@@ -12,12 +12,13 @@ pytest.importorskip("flip_evaluator")
 
 from benchmarks import controlled, flash_light  # noqa: E402
 from core.contract.capture import Capture  # noqa: E402
-from core.face.head import read_head  # noqa: E402
+from core.face.head import Head  # noqa: E402
 from core.geometry import meshes, raster
 from core.geometry.views import read_views  # noqa: E402
 from core.imaging import images  # noqa: E402
 
-from . import painted_egg  # noqa: E402
+from . import photographed_head  # noqa: E402
+from .egg import egg  # noqa: E402
 
 ROUGHNESS, F0 = 0.5, 0.04
 
@@ -35,8 +36,9 @@ def microfacets(normal, light, view) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def dark_room(tmp_path_factory):
-    """A capture with the lamp at each camera; per frame the true albedo, linear [H, W, 3], and where it is judged."""
-    capture, mesh, paint = Capture(tmp_path_factory.mktemp("egg")), painted_egg.egg(40, 28), painted_egg.skin(256)
+    """A capture with the lamp at each camera; its head; per frame the true albedo, linear [H, W, 3], and where it is
+    judged."""
+    capture, mesh, paint = Capture(tmp_path_factory.mktemp("egg")), egg(40, 28), photographed_head.skin(256)
     azimuths = (-36, -12, 12, 36)
     names = [f"{i:05d}.jpg" for i in range(len(azimuths))]
     capture.frames.mkdir(parents=True)
@@ -44,12 +46,11 @@ def dark_room(tmp_path_factory):
         {"name": n, "video_frame": i, "time_s": i, "sharpness": 1.0, "selected": True} for i, n in enumerate(names)
     ]
     capture.frames_json.write_text(json.dumps({"frames": records}))
-    painted_egg.write_cameras(capture.cameras, names, azimuths, 0.42, 0.05)
-    meshes.write_obj(capture.head, mesh)
+    photographed_head.write_cameras(capture.cameras, names, azimuths, 0.42, 0.05)
     caster, true = raster.RayCaster(mesh), []
     for view in read_views(capture):
         face, bary, distance = raster.render_view(caster, view)
-        hit, albedo = face >= 0, painted_egg.photograph(caster, view, paint, 1)
+        hit, albedo = face >= 0, photographed_head.photograph(caster, view, paint, 1)
         normal = raster.interpolate(meshes.vertex_normals(mesh), mesh.faces, face, bary)
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
         towards = view.centre - raster.interpolate(mesh.vertices, mesh.faces, face, bary)
@@ -60,7 +61,7 @@ def dark_room(tmp_path_factory):
         seen = reflected * cosine[..., None] * light
         images.write_srgb(view.path, images.linear_to_srgb(np.where(hit[..., None], seen, 0)), quality=98)
         true.append((albedo, hit & (cosine > 0.35)))
-    return capture, true
+    return capture, Head(mesh), true
 
 
 def error(picture: np.ndarray, albedo: np.ndarray, where: np.ndarray) -> np.ndarray:
@@ -70,7 +71,8 @@ def error(picture: np.ndarray, albedo: np.ndarray, where: np.ndarray) -> np.ndar
 
 
 def test_a_known_flash_leaves_the_albedo(dark_room, tmp_path, monkeypatch):
-    capture, true = dark_room
+    capture, head, true = dark_room
+    monkeypatch.setattr(flash_light, "read_head", lambda capture: head)
     monkeypatch.setattr(flash_light, "SIZE", 64)
     found = flash_light.write_delit(capture, tmp_path)
     assert found.roughness == ROUGHNESS
@@ -86,8 +88,7 @@ def test_a_known_flash_leaves_the_albedo(dark_room, tmp_path, monkeypatch):
 
 
 def test_without_a_highlight_none_is_found(dark_room):
-    capture, true = dark_room
-    head, frames = read_head(capture), []
+    (capture, head, true), frames = dark_room, []
     for view, (albedo, _) in zip(read_views(capture), true, strict=True):
         frame = flash_light.lit(view, albedo, head)
         frames.append(flash_light.lit(view, albedo * frame.shading[..., None], head))

@@ -5,24 +5,18 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pycolmap
 import pytest
-import trimesh
 
 from core.contract.capture import Capture
 from core.contract.files import write_json
 from core.contract.messages import Problem, Progress, Reporter
 from core.contract.settings import from_json
 from core.delight import run
-from core.delight.lit_head import fit_lit_head
-from core.delight.surface import skin_weights
 from core.face import template
-from core.face.head import Head
 from core.geometry import meshes, raster
-from core.geometry.meshes import Mesh
 from core.geometry.views import read_views
 from core.imaging import images
 from core.light.skylight import fibonacci_sphere, radiance_transfer
@@ -142,24 +136,6 @@ def test_frames_of_the_back_of_the_head_are_refused(tmp_path):
     capture = profiles(tmp_path, (170, 190))
     with pytest.raises(Problem, match="no bare skin of the face"):
         run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
-
-
-def test_the_tone_of_the_skin_does_not_depend_on_how_fine_the_head_is(capture):
-    """Of four times as many vertices every second is drawn: the same skin in the same sun."""
-    render_frames(capture, sun=SUN_COLOUR)
-    mesh, views, tones = template.load(), read_views(capture, selected_only=True), []
-    for shape in ((mesh.vertices, mesh.faces), trimesh.remesh.subdivide(mesh.vertices, mesh.faces)):
-        tones.append(fit_lit_head(Head(Mesh(*shape)), views, Reporter("delight")).best_lit)
-    assert np.abs(np.log(tones[1] / tones[0])).max() < 0.01  # 0.10 where what is not drawn counts as unlit
-
-
-def test_the_built_in_heads_masks_are_not_asked_of_a_head_with_other_uvs():
-    """The same triangles, as many, unwrapped anew: where lips were on the map is something else now."""
-    anew = replace(template.load(), uvs=1 - template.load().uvs)
-    skin, features = skin_weights(Head(template.load()))
-    assert features.max() > 0.9 and skin.min() < 0.1
-    skin, features = skin_weights(Head(anew))
-    assert features.max() == 0 and skin.min() == 1
 
 
 def test_chosen_frames_of_which_none_has_a_camera_are_a_problem_and_what_was_there_stays(capture):

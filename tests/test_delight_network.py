@@ -4,8 +4,6 @@
 
 import importlib
 import json
-from dataclasses import replace
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -17,10 +15,9 @@ from core.delight.below_hair import FITTED_SHARE, fill_hair
 from core.delight.evening import ShadingEstimate
 from core.delight.lift import lift_shading, lift_share
 from core.delight.lit_head import MAX_ALBEDO
-from core.delight.network import WEIGHTS, _landmarks, crop, divide, load_network, square_around
+from core.delight.network import WEIGHTS, crop, divide, load_network, square_around
 from core.delight.second_opinion import Weighing, continue_beyond, weigh_in
 from core.delight.unet import CHANNELS, DelightNet, network_input
-from core.face import template
 from core.geometry.meshes import vertex_normals
 from core.imaging import images
 from core.synthetic.identities import reserved_seeds
@@ -74,14 +71,6 @@ def test_a_crop_finds_a_place_again():
         assert np.abs(cut[2:-2, size // 2, 1] - (20 + at[2:-2])).max() < 0.1
     left, top, side = square_around(np.array([[100, 50], [140, 90.0]]))
     assert (left + side / 2, top + side / 2) == pytest.approx((120, 70)) and side > 40
-
-
-def test_a_head_whose_triangles_are_numbered_otherwise_is_framed_by_all_of_its_vertices():
-    """The landmarks are triangles of the built-in head: the same ones of another head lie anywhere."""
-    mesh = template.load()
-    other = replace(mesh, faces=mesh.faces[::-1], face_uvs=mesh.face_uvs[::-1])
-    points, others = (_landmarks(SimpleNamespace(mesh=m)) for m in (mesh, other))
-    assert points.shape == (468, 3) and others is other.vertices
 
 
 def test_the_input_does_not_know_the_exposure():

@@ -70,18 +70,21 @@ def test_what_needs_no_change_is_the_solvers_file_byte_for_byte(capture):
 
 
 def test_channels_are_packed_as_unity_and_unreal_read_them(capture):
-    """The specular map is 0.2 on one half and 0.4 on the other, its mean where it is sure 0.3: skin of an IOR of 1.4
+    """The specular map is 0.2 on one half and 0.4 on the other, its mean over the face 0.3: skin of an IOR of 1.4
     reflects 2.8 % there."""
+    told = deliver.maps.Sources({"albedo": capture.maps / "diffuse_albedo.png"}, SIDE, 0.4, 0.3, regions=True)
+    rough = told.channel("roughness")
     for preset in ("unity_hdrp", "unity_urp", "unreal", "arnold"):
         assert isinstance(delivered.deliver(capture, preset=preset, roughness=40, **OBJ), Done)
     mask = four_channels(folder(capture, preset="unity_hdrp") / "textures" / "Zoe_et_moi_MaskMap.png")
-    assert np.allclose(mask, [0, 1, 1, 0.6], atol=0.003)
+    assert np.allclose(mask[..., :3], [0, 1, 1], atol=0.003) and np.allclose(mask[..., 3], 1 - rough, atol=0.003)
     urp = four_channels(folder(capture, preset="unity_urp") / "textures" / "Zoe_et_moi_SpecGlossMap.png")
     assert np.allclose(
         images.srgb_to_linear(urp[:, [0, -1], 0]), [0.0278 * 2 / 3, 0.0278 * 4 / 3], atol=5e-4
-    ) and np.allclose(urp[..., 3], 0.6, atol=0.003)
+    ) and np.allclose(urp[..., 3], 1 - rough, atol=0.003)
     unreal = folder(capture, preset="unreal") / "textures"
-    assert np.allclose(images.read_data(unreal / "T_Zoe_et_moi_ORM.png"), [1, 0.4, 0], atol=0.003)
+    packed = images.read_data(unreal / "T_Zoe_et_moi_ORM.png")
+    assert np.allclose(packed[..., [0, 2]], [1, 0], atol=0.003) and np.allclose(packed[..., 1], rough, atol=0.003)
     assert np.allclose(
         images.read_data(unreal / "T_Zoe_et_moi_Specular.png")[:, [0, -1], 0] * 0.08,
         [0.0278 * 2 / 3, 0.0278 * 4 / 3],

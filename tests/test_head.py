@@ -3,6 +3,7 @@
 """The registered head: read once by each stage that works on it, and shared without being written to."""
 
 import importlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from core.contract.capture import Capture
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.face import template
-from core.face.head import Head, read_head
+from core.face.head import Head, read_filmed_head, read_head
 from core.geometry import meshes, raster
 
 from .painted_skin import SHORT
@@ -86,10 +87,25 @@ def test_what_is_shared_cannot_be_written_to(tmp_path):
     ):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
-    assert head.built_in
 
 
 def test_a_capture_without_a_head_is_a_problem(tmp_path):
     with pytest.raises(Problem, match="head.obj cannot be read") as problem:
         read_head(Capture(tmp_path))
     assert "Run the stage" in problem.value.remedy
+
+
+@pytest.mark.parametrize("change", ["other UVs", "no UVs", "other triangles"])
+def test_another_mesh_in_the_place_of_the_head_is_refused(tmp_path, change):
+    """It has as many vertices, and what works on a head would take them for the head's."""
+    mesh, capture = template.load(), Capture(tmp_path)
+    other = {
+        "other UVs": replace(mesh, uvs=1 - mesh.uvs),
+        "no UVs": replace(mesh, uvs=None, face_uvs=None),
+        "other triangles": replace(mesh, faces=mesh.faces[::-1], face_uvs=mesh.face_uvs[::-1]),
+    }[change]
+    meshes.write_obj(capture.head, other)
+    for read in (read_head, read_filmed_head):
+        with pytest.raises(Problem, match="head.obj is not WildCap's head") as problem:
+            read(capture)
+        assert "--from registration" in problem.value.remedy

@@ -16,8 +16,8 @@ from core.face import template
 from core.geometry import atlas, meshes
 from core.registration import alignment, carried, own_mesh, own_template, render_landmarks
 
+from .egg import egg
 from .own_heads import check_fitted, lay_over, person
-from .painted_egg import egg
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 TO_Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])

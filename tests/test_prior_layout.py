@@ -77,7 +77,6 @@ def put_own_head(capture: Capture, own: meshes.Mesh, skin: np.ndarray | None = N
 def capture(tmp_path):
     """Painted skin, and another head fitted beside the built-in one."""
     made = make(tmp_path / "face.wildcap", (0.6, 0.5), 0.06)
-    meshes.write_obj(made.head, front())
     put_own_head(made, other_head())
     return made
 
@@ -150,7 +149,7 @@ def round_trip(there: layout.Layout, albedo: np.ndarray, normal: np.ndarray) -> 
     up = torch.zeros(3, size, size)
     up[2] = 1
     e = layout.Evidence(
-        torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, ones, 0 * ones, 0 * ones, ones
+        torch.zeros(3, size, size), *[0 * ones] * 2, up, ones > 0, ones, ones, ones, *[0 * ones] * 2, ones, 0 * ones
     )
     return there.returned(
         solved,

@@ -20,7 +20,7 @@ from core.imaging import images
 from core.registration import alignment, landmarks, nonrigid
 from core.registration.correspondence import Scan
 
-from .painted_egg import HEIGHT, WIDTH, write_cameras
+from .photographed_head import HEIGHT, WIDTH, write_cameras
 
 AZIMUTHS = (-40, -25, -10, 5, 20, 35)
 

@@ -5,7 +5,6 @@ none."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 
 import cv2
@@ -19,10 +18,9 @@ from core.contract.files import write_json
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
 from core.face import template
-from core.face.head import Head
 from core.geometry import meshes, raster
 from core.imaging import images
-from core.shadow_mask import _evidence, run, share_on_edges
+from core.shadow_mask import run, share_on_edges
 from core.shadow_mask.tidy import tidy
 
 SIZE = 256
@@ -102,14 +100,6 @@ def test_shadow_on_the_left_cheek_is_masked_on_the_left_cheek(capture):
     for side, mask in masks.items():
         columns = mask[:, SIZE // 2 :].sum(), mask[:, : SIZE // 2].sum()  # the person's left is at u > 0.5
         assert columns[0 if side > 0 else 1] > 20 * columns[1 if side > 0 else 0]
-
-
-def test_a_head_unwrapped_anew_is_not_judged_by_the_built_in_heads_masks(capture):
-    """It has as many triangles, but where the mask has lips is something else: all that was seen is face and skin."""
-    images.write_linear(capture.texture, skin_texture())
-    head = Head(replace(template.load(), uvs=1 - template.load().uvs)).unfold(SIZE)
-    evidence = _evidence(capture, head, np.ones(len(head.mesh.vertices)))
-    assert evidence.skin.min() == 1 and evidence.brows.max() == 0 and (evidence.judged == head.covered).all()
 
 
 def test_a_beard_that_the_parser_saw_in_the_frames_is_no_shadow(capture):

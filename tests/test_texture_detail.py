@@ -21,7 +21,7 @@ from core.texture import features, foreign
 from core.texture.held_picture import hold
 from core.texture.perceptual import refine
 
-from .painted_egg import capture_of, skin
+from .photographed_head import capture_of, skin
 
 SIZE = 256
 
@@ -39,7 +39,7 @@ def fine(log):
 
 def test_the_step_brings_back_detail_that_a_mean_has_lost(tmp_path):
     paint = skin(SIZE)
-    capture = capture_of(tmp_path / "egg", paint, (-40, 0, 40))
+    capture = capture_of(tmp_path / "head", paint, (-40, 0, 40))
     observations, surface, _ = texture.observe_all(capture, read_head(capture), SIZE, Reporter("texture"))
     built = texture.build(observations, surface, from_json({}), Reporter("texture"))
     dull = cv2.GaussianBlur(built.log_texture, (0, 0), 1.5)
@@ -161,7 +161,7 @@ def test_a_texture_larger_than_its_views_maps_is_read_from_the_frames(tmp_path):
     """Observed at half the side and read at the whole, a texture shows what it does where all is done at the whole, and
     not the small one enlarged."""
     paint = skin(2 * SIZE)
-    capture = capture_of(tmp_path / "egg", paint, (-40, 0, 40))
+    capture = capture_of(tmp_path / "head", paint, (-40, 0, 40))
     head, report = read_head(capture), Reporter("texture")
 
     def made(side: int, size: int) -> texture.Built:

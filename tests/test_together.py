@@ -70,14 +70,13 @@ def test_what_cannot_be_solved_together_is_refused(two, tmp_path):
     first, second, _ = two
     (tmp_path / "nothing").mkdir()
     other = make(tmp_path / "three" / "Zoë.wildcap")
-    built_in = template.load()
-    meshes.write_obj(other.head, replace(built_in, uvs=built_in.uvs * 0.5))
+    meshes.write_obj(other.head, replace(template.load(), uvs=template.load().uvs * 0.5))
     second.texture.unlink()
     for named, problem in (
         (first.root, "this capture itself"),
         (tmp_path / "nothing", "no capture"),
         (second.root, "no texture"),
-        (other.root, "other UVs"),
+        (other.root, "not WildCap's head"),
     ):
         with pytest.raises(Problem, match=problem):
             albedo_of(first, together=str(named))

@@ -21,7 +21,8 @@ from core.geometry.meshes import Mesh, vertex_normals
 from core.imaging import images
 from core.transfer import scan
 
-from .painted_egg import capture_of, egg, skin
+from .egg import egg
+from .photographed_head import capture_of, head, skin
 
 SIZE = 256
 
@@ -155,24 +156,24 @@ def test_the_reduced_scan_is_a_clean_surface_near_the_scan():
 
 
 def test_the_displacement_is_the_known_one_in_metres():
-    head = egg(48, 32)
-    half = head.moved(head.vertices + 0.002 * vertex_normals(surfaces.welded(head)[0])[surfaces.welded(head)[1]])
+    mesh = egg(48, 32)
+    half = mesh.moved(mesh.vertices + 0.002 * vertex_normals(surfaces.welded(mesh)[0])[surfaces.welded(mesh)[1]])
     front = replace(half, faces=half.faces[half.vertices[half.faces].mean(1)[:, 1] < 0], uvs=None, face_uvs=None)
-    height = scan.displacement(head, front, 128, lambda done: None)
+    height = scan.displacement(mesh, front, 128, lambda done: None)
     assert np.isclose(np.median(height[40:90, 48:80]), 0.002, atol=1e-4)
     assert (height[:, :20] == 0).all() and height.max() < 0.003
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory) -> Capture:
-    """An egg for a head and for its scan, photographed with its own skin, and its maps solved."""
+    """A head that is its own scan, photographed with its own skin, and its maps solved."""
     texture = skin(256)
     capture = capture_of(tmp_path_factory.mktemp("finished") / "é.wildcap", texture, (-30, 0, 30))
     for frame in json.loads(capture.frames_json.read_text())["frames"]:
         images.write_srgb(
             capture.frames / frame["name"], images.read_srgb((capture.delit / frame["name"]).with_suffix(".png"))
         )
-    meshes.write_ply(capture.scan, surfaces.welded(egg())[0])
+    meshes.write_ply(capture.scan, head())
     images.write_linear(capture.maps / "diffuse_albedo.exr", texture * 1.2)
     for name in stages.MAPS:
         if not (capture.maps / name).is_file():

@@ -40,7 +40,7 @@ class ShadingEstimate:
 
 def even_out(head: LitHead, views: list[View], looks: list[ShadingEstimate]) -> list[ShadingEstimate]:
     """The looks of these views with shadings that agree about the head's albedo."""
-    if head.mesh.uvs is None or len(looks) < 2:
+    if len(looks) < 2:
         return looks
     surface = head.head.unfold(UV_TEXELS)
     texel = np.flatnonzero(surface.covered)

@@ -19,7 +19,6 @@ from ..light.sunlight import Light, fit_light
 from .surface import skin_weights, smooth_normals, vertex_colours
 
 MAX_ALBEDO = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed
-FIT_POINTS = 6000  # points of the skin that the light is fitted to
 FEWEST_POINTS = 200  # points that two views show below which those that one alone shows count as well
 UNKNOWNS = 10  # of the light in each colour: the sky's nine coefficients and the sun
 
@@ -86,47 +85,44 @@ def fit_lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
 
 
 def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.ndarray]:
-    """The light from an even draw of skin vertices, and the figures; the posterior [V] that its sun reaches them, 0 on
-    as even a draw of the other vertices, nan on those that were not drawn."""
+    """The light from the skin's vertices, and the figures; the posterior [V] that its sun reaches them, 0 on the other
+    vertices."""
     skin = np.flatnonzero(weights)
     if len(skin) < UNKNOWNS:
         raise Problem(
             "The selected frames show no bare skin of the face.",
             "Film the face from in front as well, or choose another delighter: Folder or None.",
         )
-    every = max(1, len(skin) // FIT_POINTS)
-    drawn = skin[::every]
-    origins = head.mesh.vertices[drawn] + 1e-3 * normals[drawn]
+    origins = head.mesh.vertices[skin] + 1e-3 * normals[skin]
 
     def reaches(direction: np.ndarray) -> np.ndarray:
-        free = normals[drawn] @ direction > 0
+        free = normals[skin] @ direction > 0
         free[free] = ~head.caster.blocked(origins[free], np.repeat(direction[None], free.sum(), 0))
         return free.astype(float)
 
     light, lit, inlier = fit_light(
-        colours[drawn],
-        normals[drawn],
-        transfer[drawn],
+        colours[skin],
+        normals[skin],
+        transfer[skin],
         reaches,
-        weights[drawn],
+        weights[skin],
         step=lambda done, of: report.progress(3 * of + done, 8 * of, "Fitting the light"),
     )
-    expected = light.ambient(transfer[drawn]) + lit[:, None] * light.direct(normals[drawn])
-    residual = np.abs(np.log(colours[drawn] / np.maximum(expected, 1e-4))).mean(1)
+    expected = light.ambient(transfer[skin]) + lit[:, None] * light.direct(normals[skin])
+    residual = np.abs(np.log(colours[skin] / np.maximum(expected, 1e-4))).mean(1)
     report.figure("inlier_percent", round(100 * float(inlier.mean()), 1))
     report.figure("residual_log", round(float(np.median(residual[inlier > 0.5])), 3))
     report.figure("environment_sh", np.round(light.environment, 4).tolist())
     report.figure("sun_direction", np.round(light.sun, 3).tolist() if light.has_sun else None)
-    report.figure("sun_to_sky", round(float(light.colour[1] / np.median(light.ambient(transfer[drawn])[:, 1])), 2))
-    reached = np.full(len(normals), np.nan)
-    reached[np.flatnonzero(weights == 0)[::every]] = 0
-    reached[drawn] = lit
+    report.figure("sun_to_sky", round(float(light.colour[1] / np.median(light.ambient(transfer[skin])[:, 1])), 2))
+    reached = np.zeros(len(normals))
+    reached[skin] = lit
     return light, reached
 
 
 def _best_lit(light, normals, transfer, reached, count) -> np.ndarray:
     """[3]: the colour of the best lit tenth of the skin, taken for the colour of the skin itself."""
-    seen = (count > 0) & np.isfinite(reached)  # without their sun, most vertices of a fine mesh would pass for shaded
+    seen = count > 0
     lit = (light.ambient(transfer) + reached[:, None] * light.direct(normals))[seen]
     tone = lit[lit.mean(1) >= np.quantile(lit.mean(1), 0.9)].mean(0)
     return tone * min(1.0, MAX_ALBEDO / tone.max())

@@ -135,7 +135,7 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
 
 def ask_of_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEstimate, np.ndarray]:
     """What the network says of a frame, and the log-shading of the fitted light at the same size."""
-    pixels, _ = view.project(_landmarks(head))
+    pixels, _ = view.project(template.landmark_points(head.mesh))
     box = square_around(pixels[np.isfinite(pixels).all(1)])
     face, bary = _hits(view, head, box, SIDE_PX)
     ambient, direct, free, normal = head.at(face, bary)
@@ -213,9 +213,3 @@ def divide(
     return images.linear_to_srgb(albedo * min(1.0, MAX_ALBEDO / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(
         np.float32
     )
-
-
-def _landmarks(head: LitHead) -> np.ndarray:
-    """Points [N, 3] that frame the face: MediaPipe's landmarks on the built-in topology, else all vertices."""
-    same = np.array_equal(head.mesh.faces, template.load().faces)  # as many triangles may be others
-    return template.landmark_points(head.mesh) if same else head.mesh.vertices

@@ -76,8 +76,7 @@ def vertex_colours(
         unburnt = srgb.max(1) < 0.99  # what is burnt out has lost its colour
         seen_colours[i, candidates[unburnt]] = images.srgb_to_linear(srgb[unburnt])
         shares[i, candidates] = _shares(head, view, picture, pixels[candidates])
-    mirror = template.mirrored_vertices() if head.built_in else np.arange(len(mesh.vertices))
-    hidden, share = _without_doubts(shares, mirror)
+    hidden, share = _without_doubts(shares, template.mirrored_vertices())
     seen_colours[hidden] = np.nan
     count = np.isfinite(seen_colours[..., 0]).sum(0)
     if (count > 0).sum() < 100:
@@ -91,14 +90,13 @@ def vertex_colours(
 
 
 def _shares(head: Head, view: View, picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """The shares of ASKED at pixels [N, 2] of a frame, [N, len(ASKED)]; none where nobody can tell: a head of another
-    topology has no landmarks."""
-    if head.built_in:
-        marks, _ = view.project(template.landmark_points(head.mesh))
-        if np.isfinite(marks).all():
-            parts = parser.parse(picture, marks)
-            return np.stack([sample(parts.of(name), pixels) for name in ASKED], -1)
-    return np.zeros((len(pixels), len(ASKED)), np.float32)
+    """The shares of ASKED at pixels [N, 2] of a frame, [N, len(ASKED)]; none where a landmark
+    lies behind the camera."""
+    marks, _ = view.project(template.landmark_points(head.mesh))
+    if not np.isfinite(marks).all():
+        return np.zeros((len(pixels), len(ASKED)), np.float32)
+    parts = parser.parse(picture, marks)
+    return np.stack([sample(parts.of(name), pixels) for name in ASKED], -1)
 
 
 def _without_doubts(shares: np.ndarray, mirror: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -115,9 +113,7 @@ def _without_doubts(shares: np.ndarray, mirror: np.ndarray) -> tuple[np.ndarray,
 
 def skin_weights(head: Head) -> tuple[np.ndarray, np.ndarray]:
     """([V], [V]): 1 on plain facial skin, 0 on lips, brows, eyes and off the face; and 1 on brows and lips, 0
-    elsewhere. On a mesh of another topology, or with other UVs, all is skin."""
-    if not head.built_in:
-        return np.ones(len(head.mesh.vertices)), np.zeros(len(head.mesh.vertices))
+    elsewhere."""
     skin = template.mask("skin", 512)
     for name in NOT_SKIN:
         skin = skin * (1 - template.mask(name, 512))

@@ -44,10 +44,12 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         )
     tiles = _tiles(capture, plan, settings)
     several = len(tiles) > 1
-    built_in = read_head(capture).built_in
-    if mesh != capture.head:
-        meshes.read_obj(mesh)  # what is shipped as it lies there is read once, to know that it is whole
-    mean, regions = _mean_specular(capture, built_in), built_in and plan.what == "head"
+    # what is shipped as it lies there is read once, to know that it is whole
+    if mesh == capture.head:
+        read_head(capture)
+    else:
+        meshes.read_obj(mesh)
+    mean, regions = _mean_specular(capture), plan.what == "head"
     pictures = _pictures(plan, settings)
     delivery_plan.discard(plan)
     with replacing_folder(plan.staged) as folder:
@@ -136,16 +138,13 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
     return files
 
 
-def _mean_specular(capture: Capture, built_in: bool) -> float:
+def _mean_specular(capture: Capture) -> float:
     """The specular map's mean on cheeks and forehead, by which its values are told against skin's reflectance: as the
-    stage upscale found it, else the mean over the face, or, without our UVs, where the maps are sure."""
+    stage upscale found it, else the mean over the face."""
     told = capture.read()["stages"].get("upscale", {}).get("figures", {}).get("specular_mean")
     if told:
         return float(told)
     specular = images.read_mask(capture.maps / "specular_albedo.png")
     size = len(specular)
-    if built_in:
-        weight = template.mask("skin", size) * template.mask("face", size)
-    else:
-        weight = images.resize(images.read_mask(capture.maps / "confidence.png"), size, size)
-    return float((specular * weight).sum() / weight.sum()) if weight.sum() > 0 else 0.5
+    weight = template.mask("skin", size) * template.mask("face", size)
+    return float((specular * weight).sum() / weight.sum())

@@ -15,6 +15,8 @@ import numpy as np
 
 from ..contract.capture import Capture
 from ..contract.eyes_record import read_eyes
+from ..contract.messages import Problem
+from ..contract.stages import advise_again
 from ..geometry import meshes, raster
 from ..geometry.meshes import Mesh
 from . import lids, template
@@ -24,7 +26,7 @@ SHORTEST = 1e-9
 
 
 class Head:
-    """A head in the world (metres), whatever its topology; what needs UVs takes for granted that `mesh` has them."""
+    """The built-in head in the world (metres), with the UVs that its masks lie in."""
 
     eyes_open = False
     """Whether the lids are open as they were filmed: then the vertices are those of lids.OpenHead."""
@@ -45,11 +47,6 @@ class Head:
     def caster(self) -> raster.RayCaster:
         """Its triangles are the mesh's, then those of what lies before it."""
         return raster.RayCaster(self._before)
-
-    @cached_property
-    def built_in(self) -> bool:
-        """Whether it has the built-in head's topology and UVs, so that its masks hold for it."""
-        return template.is_built_in(self.mesh)
 
     def raster(self, size: int) -> tuple[np.ndarray, np.ndarray]:
         """Which triangle covers each texel of a map: face int32 [S, S] (-1: none) and bary float32 [S, S, 3]."""
@@ -109,11 +106,15 @@ class Unfolded:
 
 
 def read_head(capture: Capture) -> Head:
-    """The head of a capture that is registered. Raises Problem where head.obj is missing or holds no faces."""
+    """The head of a capture that is registered. Raises Problem where head.obj is missing, damaged or another mesh: what
+    works on a head knows its vertices, triangles and UVs."""
     mesh = meshes.read_obj(capture.head)
+    if not template.is_built_in(mesh):
+        raise Problem(
+            f"{capture.head} is not WildCap's head: its triangles or UVs are others.", advise_again("registration")
+        )
     for array in (mesh.vertices, mesh.faces, mesh.uvs, mesh.face_uvs):
-        if array is not None:
-            _shared(array)
+        _shared(array)
     return Head(mesh)
 
 
@@ -122,7 +123,7 @@ def read_filmed_head(capture: Capture) -> Head:
     and eyeballs lie between them, so that no iris is seen on a lid. Raises Problem as `read_head` does, and where
     head_open.obj or eyes.json is damaged."""
     head = read_head(capture)
-    if not (head.built_in and capture.head_open.is_file() and capture.eyes.is_file()):
+    if not (capture.head_open.is_file() and capture.eyes.is_file()):
         return head
     opened = meshes.read_obj(capture.head_open)
     if not lids.belongs_to(opened, head.mesh):  # another head.obj was put beside it
@@ -138,9 +139,9 @@ def read_filmed_head(capture: Capture) -> Head:
 
 
 class FilmedHead(Head):
-    """The built-in head, its triangles parted between the lids."""
+    """The head, its triangles parted between the lids."""
 
-    built_in = eyes_open = True
+    eyes_open = True
 
     def __init__(self, closed: Mesh, opened: Mesh, balls: list[Mesh]):
         """closed: the head; opened: the same with its lids open, and its sockets; balls: the eyeballs."""

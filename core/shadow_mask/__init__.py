@@ -167,14 +167,8 @@ def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> ShadowEv
         else texture
     )
     confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size)
-    # on a head of another topology, or with other UVs, everything is face and skin
-    built_in = head.head.built_in
-    face, skin = (
-        template.mask(name, size) if built_in else np.ones((size, size), np.float32) for name in ("face", "skin")
-    )
-    brows = template.mask("brows", size) if built_in else np.zeros_like(skin)
-    scalp = template.mask("scalp", size) if built_in else np.zeros_like(skin)
-    for name in UNLIKE_SKIN if built_in else ():
+    face, skin, brows, scalp = (template.mask(name, size) for name in ("face", "skin", "brows", "scalp"))
+    for name in UNLIKE_SKIN:
         skin = skin * (1 - template.mask(name, size))
     visible = interpolate(visible[:, None], head.mesh.faces, head.face, head.bary)[..., 0]
     # the texture has no confidence where it shows a cloth

@@ -54,9 +54,8 @@ class Evidence:
     without lips, brows, eyes and hair; bare [S, S]: that of neck and ears as well; trust [S, S]: 1, less where a
     texel's colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's
     border lies on a shadow's edge that is seen; shadow_colour [3]: the colour of what shadows take of the light, over
-    its mean, zeros where that is not known; added [S, S]: how far the artist added to the proposal for M, None where
-    the maps are in other UVs; missing [S, S]: the share of the light that M's border says is missing, None where nobody
-    asked it."""
+    its mean, zeros where that is not known; added [S, S]: how far the artist added to the proposal for M; missing [S,
+    S]: the share of the light that M's border says is missing, None where nobody asked it."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -69,9 +68,9 @@ class Evidence:
     protected: torch.Tensor
     edge: torch.Tensor
     filmed: torch.Tensor
+    added: torch.Tensor
     shadow_colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
     extent: Extent = Extent()
-    added: torch.Tensor | None = None
     missing: torch.Tensor | None = None
 
     @property
@@ -111,11 +110,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     seen, bearded = _sized(confidence, size), np.maximum(_sized(beard.seen_in(texture, confidence), size), hidden)
     # what nobody saw must not darken its neighbours
     texture = _sized(texture * confidence[..., None], size) / np.maximum(seen, 1e-4)[..., None]
-    if head.mesh.uvs is None:
-        raise Problem("The head has no UV coordinates.", advise_again("registration"))
     covered = head.raster(size)[0] >= 0
-    if not covered.any():
-        raise Problem("The head's UV coordinates cover no texel.", advise_again("registration"))
     normal = raster.bleed(head.interpolate(head.normals, size), covered)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     mask, added = _shadow_mask(capture, size)
@@ -144,9 +139,10 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
             protected,
             np.zeros_like(alpha),
             _brightness(capture, texture, skin * weight > 0.5),
+            added,
         )
     ]
-    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, added=torch.from_numpy(added))
+    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts)
 
 
 def _brightness(capture: Capture, texture: np.ndarray, skin: np.ndarray) -> np.ndarray:
@@ -213,7 +209,7 @@ def make_observations(
         top, left = (start * whole // REFERENCE_TEXELS for start in (extent.top, extent.left))
         coords = make_coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
-        restraint = 1.0 if evidence.added is None else 1 - torch.from_numpy(_sized(evidence.added.numpy(), size))
+        restraint = 1 - torch.from_numpy(_sized(evidence.added.numpy(), size))
         missing = 0.0 if evidence.missing is None else torch.from_numpy(_sized(evidence.missing.numpy(), size))
         levels[factor] = Observation(
             texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, restraint, missing

@@ -62,7 +62,7 @@ def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Rep
         For damaged records.
     """
     remove_file(capture.irises)
-    if not (head.built_in and capture.eyes.is_file() and capture.frames_json.is_file() and capture.cameras.is_dir()):
+    if not (capture.eyes.is_file() and capture.frames_json.is_file() and capture.cameras.is_dir()):
         return
     views = [view for view in read_views(capture) if view.path.is_file()]
     colours = measure_both_irises(views, head, read_eyes(capture), albedo, report)

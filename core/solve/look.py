@@ -85,7 +85,7 @@ def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter
     if not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return None
     views = [view for view in read_views(capture, selected_only=True) if view.path.is_file()]
-    if not views or not head.built_in:
+    if not views:
         return None
     mesh, normals = head.mesh, head.normals
     weight = raster.sample_uv(weigh_skin(512, shadow), vertex_uvs(mesh))

@@ -18,8 +18,8 @@ SIDE_TEXELS = 512
 def read_others(capture: Capture, settings: Settings, report: Reporter) -> list[Evidence]:
     """What is known of the captures that settings.solve.together names; none without it.
 
-    A folder of several may hold this capture, too. Raises Problem where there is no other, for one that has no texture
-    yet, and for a head in other UVs.
+    A folder of several may hold this capture, too. Raises Problem where there is no other, and for one that has no
+    texture yet or whose head is damaged.
     """
     named = captures_in(settings.solve.together)
     roots = [root for root in named if root.resolve() != capture.root.resolve()]
@@ -36,10 +36,5 @@ def read_others(capture: Capture, settings: Settings, report: Reporter) -> list[
                 f"{root.name} has no texture and shadow mask yet.",
                 "Reconstruct it up to the shadow mask first, or leave it out.",
             )
-        head = read_filmed_head(other)
-        if not head.built_in:
-            raise Problem(
-                f"{root.name} has a head in other UVs.", "Solve together only captures whose head is the built-in one."
-            )
-        others.append(read_evidence(other, head, SIDE_TEXELS))
+        others.append(read_evidence(other, read_filmed_head(other), SIDE_TEXELS))
     return others

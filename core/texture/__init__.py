@@ -19,7 +19,6 @@ from ..contract.files import remove_file
 from ..contract.frame_records import read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
-from ..contract.stages import advise_again
 from ..face import template
 from ..face.head import Head, Unfolded, read_filmed_head
 from ..geometry.frame_pictures import check_shape, delit_views
@@ -50,8 +49,6 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     Raises Problem where no view was delit or none of them sees the head.
     """
     head = read_filmed_head(capture)
-    if head.mesh.uvs is None:
-        raise Problem("The registered head has no UVs.", advise_again("registration"))
     size = settings.texture.size
     observations, surface, shown = observe_all(capture, head, min(size, OBSERVED_TEXELS), report)
     covered = surface.covered_at(size)
@@ -166,9 +163,7 @@ def build(
     size : of the map, in texels along a side; None: the observations' own
     aligned : off for measurements only
     """
-    built_in = surface.head.built_in
-    if built_in:
-        leave_out_background(observations, report)
+    leave_out_background(observations, report)
     gains = equalise(observations)
     report.log("Exposure gains of the views: " + ", ".join(f"{gain:.2f}" for gain in np.exp(gains.mean(1))))
     shift = align(observations, surface, report) if aligned else 0.0
@@ -177,8 +172,7 @@ def build(
     log_texture = blend(observations, surface.covered, own, report)
     seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
     confidence = np.where(surface.covered, seen, 0).astype(np.float32)
-    if built_in:
-        confidence = confidence * (1 - clothes(log_texture, confidence, surface))
+    confidence = confidence * (1 - clothes(log_texture, confidence, surface))
     if size and size > own:
         log_texture = blend(observations, surface.covered, size, report)
         # as the weights: zero with them
@@ -188,7 +182,7 @@ def build(
         from .perceptual import refine
 
         features = load_features(settings.texture.perceptual_network, settings.compute_device)
-        wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5 if built_in else True)
+        wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5)
         log_texture, losses = refine(
             log_texture, observations, surface, wanted, features, settings.texture.perceptual, report
         )

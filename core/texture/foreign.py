@@ -4,8 +4,7 @@
 the neck, hair.
 
 None is taken for skin: such texels lose their weight or their confidence, and are completed from the skin around them.
-Background and clothes need the built-in head's masks, and the face itself is never doubted. Brows and beards stay: they
-belong to a face.
+The face itself is never doubted. Brows and beards stay: they belong to a face.
 """
 
 from __future__ import annotations
@@ -47,12 +46,12 @@ def leave_out_hair(observations: list[UnwrappedView], parts_shown: PartsShown, s
     What most views show so counts in all of them; what one view shows so (a strand before a cheek) counts in that one.
     """
     usual = parts_shown.shares[..., [ASKED.index("hair"), ASKED.index("clothes")]].sum(-1)
-    if surface.head.built_in:  # of the scalp behind what any crop shows, what is next to it tells
-        usual = np.where(
-            ~parts_shown.judged & (template.mask("scalp", len(usual)) > 0.5),
-            raster.bleed(usual, parts_shown.judged),
-            usual,
-        )
+    # of the scalp behind what any crop shows, what is next to it tells
+    usual = np.where(
+        ~parts_shown.judged & (template.mask("scalp", len(usual)) > 0.5),
+        raster.bleed(usual, parts_shown.judged),
+        usual,
+    )
     if (usual[surface.covered] > HIDDEN_SHARES[1]).mean() < LEAST_HAIR_SHARE:
         return np.zeros_like(usual)
     low, high = HIDDEN_SHARES

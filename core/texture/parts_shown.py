@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from ..contract.messages import Reporter
-from ..face import faces, parser, template
+from ..face import parser, template
 from ..face.head import Head, Unfolded
 from ..face.parts import GROWTHS
 from ..geometry.views import View
@@ -70,10 +70,7 @@ def _look(observation: UnwrappedView, surface: Unfolded) -> tuple[np.ndarray, np
 
 
 def _landmarks(srgb: np.ndarray, view: View, head: Head) -> np.ndarray | None:
-    """The face's landmarks [468, 2] in a view's frame: where the built-in head has them, from any side, or as they are
-    found."""
-    if not head.built_in:
-        face = faces.detect(srgb)
-        return None if face is None else face.landmarks
+    """Where a view's frame shows the head's landmarks [468, 2], from any side; None where one lies behind the
+    camera."""
     pixels, _ = view.project(template.landmark_points(head.mesh))
     return pixels * [srgb.shape[1] / view.width, srgb.shape[0] / view.height] if np.isfinite(pixels).all() else None

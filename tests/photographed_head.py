@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An egg for a head, painted with a known texture and seen by known cameras: the texture stage's known answer.
-
-U runs around the egg, 0.5 at the face (-Y), larger towards the person's left (+X); V from the bottom to the top.
-"""
+"""The built-in head, painted with a known texture and seen by known cameras: the texture stage's known answer."""
 
 import json
 
@@ -11,23 +8,19 @@ import numpy as np
 import pycolmap
 
 from core.contract.capture import Capture
+from core.face import template
 from core.geometry import meshes, raster
 from core.geometry.meshes import Mesh
 from core.geometry.views import read_views
 from core.imaging import images
 
-RADII = np.array([0.075, 0.095, 0.120])
 WIDTH, HEIGHT, FOCAL = 300, 400, 520.0
 
 
-def egg(columns: int = 96, rows: int = 64) -> Mesh:
-    u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0.02, 0.98, rows + 1))
-    azimuth, height = (u - 0.5) * 2 * np.pi, (v - 0.5) * np.pi
-    directions = np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
-    index = np.arange(u.size).reshape(u.shape)
-    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
-    faces = np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
-    return Mesh((directions * RADII).reshape(-1, 3), faces, np.stack([u, v], -1).reshape(-1, 2), faces)
+def head() -> Mesh:
+    """The built-in head, its middle at the origin."""
+    mesh = template.load()
+    return mesh.moved(mesh.vertices - (mesh.vertices.min(0) + mesh.vertices.max(0)) / 2)
 
 
 def skin(size: int, seed: int = 0) -> np.ndarray:
@@ -41,21 +34,23 @@ def skin(size: int, seed: int = 0) -> np.ndarray:
     return np.clip(tone * np.exp(0.15 * noise(6) + 0.08 * noise(size // 4)), 0.02, 0.9).astype(np.float32)
 
 
-def capture_of(root, texture: np.ndarray, azimuths_deg, distort=lambda i, picture: picture, light=None) -> Capture:
+def capture_of(
+    root, texture: np.ndarray, azimuths_deg, distort=lambda i, picture: picture, light=None, distance: float = 0.5
+) -> Capture:
     """A capture up to the delit frames: one camera per azimuth (0 in front, positive on the person's left), at eye
     height.
 
     `distort(i, picture)` changes the linear picture of camera i before it is stored. With `light` (texture-like,
     linear), which falls on the paint, the frames that were filmed are there too.
     """
-    capture, mesh = Capture(root), egg()
+    capture, mesh = Capture(root), head()
     names = [f"{i:05d}.jpg" for i in range(len(azimuths_deg))]
     capture.frames.mkdir(parents=True)
     frames = [
         {"name": n, "video_frame": i, "time_s": i / 24, "sharpness": 1.0, "selected": True} for i, n in enumerate(names)
     ]
     capture.frames_json.write_text(json.dumps({"frames": frames}))
-    write_cameras(capture.cameras, names, azimuths_deg)
+    write_cameras(capture.cameras, names, azimuths_deg, distance)
     meshes.write_obj(capture.head, mesh)
     caster = raster.RayCaster(mesh)
     for i, view in enumerate(read_views(capture)):
