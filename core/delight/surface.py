@@ -90,8 +90,8 @@ def vertex_colours(
 
 
 def _shares(head: Head, view: View, picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """The shares of ASKED at pixels [N, 2] of a frame, [N, len(ASKED)]; none where a landmark
-    lies behind the camera."""
+    """The shares of ASKED at pixels [N, 2] of a frame, [N, len(ASKED)]; none where a landmark lies
+    behind the camera."""
     marks, _ = view.project(template.landmark_points(head.mesh))
     if not np.isfinite(marks).all():
         return np.zeros((len(pixels), len(ASKED)), np.float32)
