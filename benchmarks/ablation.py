@@ -39,7 +39,7 @@ from core.contract.capture import Capture
 from core.face.head import read_head
 from core.imaging import images
 from core.solve import initial, maps
-from core.solve.evidence import read_evidence
+from core.solve.capture_evidence import read_evidence
 from core.solve.light_fit import total_variation, update_lights
 from core.solve.prior import WEIGHTS, load
 from core.solve.problem import State, albedo, photometric_loss

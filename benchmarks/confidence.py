@@ -27,7 +27,7 @@ from scipy.stats import spearmanr
 from core.face.head import read_filmed_head
 from core.imaging import images
 from core.solve import confidence
-from core.solve.evidence import read_evidence
+from core.solve.capture_evidence import read_evidence
 
 from . import figures
 from .measures.calibration import calibrate

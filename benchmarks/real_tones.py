@@ -27,7 +27,7 @@ from core.contract.settings import Settings
 from core.face import faces
 from core.face.head import read_filmed_head
 from core.imaging import images
-from core.solve.evidence import read_evidence
+from core.solve.capture_evidence import read_evidence
 from core.solve.population import to_lab
 from core.solve.tone import TONE_SIDE_TEXELS, estimate_skin_tone
 

@@ -24,7 +24,8 @@ from core.contract.settings import Settings
 from core.face.head import read_filmed_head
 from core.imaging import images
 from core.solve import border, initial
-from core.solve.evidence import REFERENCE_TEXELS, read_evidence
+from core.solve.capture_evidence import read_evidence
+from core.solve.evidence import REFERENCE_TEXELS
 from core.solve.prior import load
 from core.solve.recipes import OURS
 from core.solve.skin_tone import read_given_tone

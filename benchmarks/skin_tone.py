@@ -24,7 +24,7 @@ from core.contract.messages import Reporter
 from core.contract.settings import Settings
 from core.face.head import read_head
 from core.imaging import images
-from core.solve.evidence import read_evidence
+from core.solve.capture_evidence import read_evidence
 from core.solve.population import TYPOLOGY_GROUPS, estimate_from_scene, estimate_from_white, name_group, to_lab
 from core.solve.skin_tone import SCENE, SkinTone
 from core.solve.tone import TONE_SIDE_TEXELS, estimate_skin_tone

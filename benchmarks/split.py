@@ -29,7 +29,7 @@ from core.contract.messages import Problem
 from core.face.head import read_filmed_head
 from core.imaging import images
 from core.solve import confidence, initial, split
-from core.solve.evidence import read_evidence
+from core.solve.capture_evidence import read_evidence
 from core.solve.prior import load
 from core.solve.problem import albedo
 from core.solve.skin_tone import read_given_tone

@@ -11,7 +11,7 @@ from core.face import beard, template
 from core.face.head import read_head
 from core.imaging import images
 from core.solve import border
-from core.solve.evidence import BEARD_TRUST, read_evidence
+from core.solve.capture_evidence import BEARD_TRUST, read_evidence
 
 from .painted_skin import make
 

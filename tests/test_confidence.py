@@ -55,7 +55,7 @@ def test_how_bright_the_frames_were_is_over_the_skin_that_they_showed(tmp_path):
     from benchmarks.uv_problems import make_plain_problem
     from core.contract.capture import Capture
     from core.face.head import read_filmed_head
-    from core.solve.evidence import read_evidence
+    from core.solve.capture_evidence import read_evidence
 
     capture = Capture(tmp_path)
     make_plain_problem(9000, "self", SIZE).write(capture)

@@ -19,7 +19,7 @@ from core.geometry.views import View
 from core.imaging import images
 from core.light.shadow_edges import penumbra
 from core.solve import initial, maps, witnesses
-from core.solve.evidence import read_evidence
+from core.solve.capture_evidence import read_evidence
 from core.solve.marks import Mark, find_marks, is_unlike_shadow
 from core.solve.prior import load
 from core.solve.recipes import OURS

@@ -18,7 +18,8 @@ from core.face import template
 from core.face.head import read_head
 from core.imaging import images
 from core.solve import initial, tone
-from core.solve.evidence import read_evidence, soften_mask
+from core.solve.capture_evidence import read_evidence
+from core.solve.evidence import soften_mask
 from core.solve.prior import WEIGHTS, load
 from core.solve.problem import albedo
 from core.solve.recipes import RECIPES

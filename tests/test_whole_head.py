@@ -11,8 +11,8 @@ import torch
 
 from core.contract.messages import Reporter
 from core.face import beard, template
+from core.solve.capture_evidence import BEARD_TRUST, FULL_CONFIDENCE
 from core.solve.confidence import estimate_confidence
-from core.solve.evidence import BEARD_TRUST, FULL_CONFIDENCE
 from core.upscale import grain
 from core.upscale.maps import HeadMaps
 from core.upscale.whole_head import complete, seen_well

@@ -35,7 +35,7 @@ from core.contract.settings import from_json
 from core.face.head import read_head
 from core.solve import initial, network, network_blocks
 from core.solve import prior as priors
-from core.solve.evidence import read_evidence
+from core.solve.capture_evidence import read_evidence
 from core.solve.memory import sample_within_memory, spare_memory
 from core.solve.recipes import OURS
 from core.solve.sampler import Sampler, seed_noise

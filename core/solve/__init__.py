@@ -26,10 +26,11 @@ from ..contract.settings import Settings, result_settings
 from ..face.head import read_filmed_head
 from ..imaging import images
 from . import checkpoint, comparison, drawing, initial, iris, layout, maps
+from .capture_evidence import read_evidence
 from .checkpoint import Solution
 from .draft import restore_maps
 from .edited import solve_edited
-from .evidence import REFERENCE_TEXELS, Evidence, read_evidence
+from .evidence import REFERENCE_TEXELS, Evidence
 from .memory import sample_within_memory, spare_memory
 from .prior import ConditionedPrior, Prior, load_chosen
 from .problem import State, rms_residual

@@ -15,7 +15,7 @@ from ..contract.settings import Settings
 from ..face.head import read_filmed_head
 from ..imaging import images
 from . import initial
-from .evidence import read_evidence
+from .capture_evidence import read_evidence
 from .prior import load_chosen
 from .recipes import RECIPES
 from .skin_tone import read_given_tone

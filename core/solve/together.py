@@ -9,7 +9,8 @@ from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..contract.together import captures_in
 from ..face.head import read_filmed_head
-from .evidence import Evidence, read_evidence
+from .capture_evidence import read_evidence
+from .evidence import Evidence
 
 SIDE_TEXELS = 512
 """Side at which they are read: what they tell is larger than a cell of split.py."""

@@ -13,7 +13,8 @@ from ..contract.colour_values import TONE_DECIMALS, describe_estimate, parse_whi
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..face.head import Head, read_filmed_head
-from .evidence import Evidence, read_evidence
+from .capture_evidence import read_evidence
+from .evidence import Evidence
 from .initial import weigh_lit_skin
 from .look import mean_best_lit, read_look
 from .population import estimate_from_scene, estimate_from_white
