@@ -41,7 +41,7 @@ from core.imaging import images
 from core.solve import initial, maps
 from core.solve.capture_evidence import read_evidence
 from core.solve.light_fit import total_variation, update_lights
-from core.solve.prior import WEIGHTS, load
+from core.solve.prior_files import WEIGHTS, load
 from core.solve.problem import State, albedo, photometric_loss
 from core.solve.recipes import OURS, RECIPES, Recipe
 from core.solve.sampler import Sampler, seed_noise

@@ -23,7 +23,7 @@ from core.face.head import read_head
 from core.imaging import images
 from core.solve import initial, maps, recipe_of
 from core.solve.capture_evidence import read_evidence
-from core.solve.prior import load
+from core.solve.prior_files import load
 from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import read_given_tone
 

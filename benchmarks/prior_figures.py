@@ -29,7 +29,8 @@ from core.imaging import images
 from core.solve.draft import restore_maps
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.network import denoise
-from core.solve.prior import WEIGHTS, ConditionedPrior, Prior, load, make_condition, make_coordinates, mean_at
+from core.solve.prior import ConditionedPrior, Prior, make_condition, make_coordinates, mean_at
+from core.solve.prior_files import WEIGHTS, load
 from core.solve.problem import Observation, State
 from core.solve.recipes import OURS
 from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas, seed_noise

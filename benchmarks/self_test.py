@@ -20,7 +20,7 @@ import torch
 
 from core.contract.files import write_json
 from core.contract.messages import Reporter
-from core.solve import prior
+from core.solve import prior_files
 from core.solve.self_test import EXPECTED_FILE, measure
 from core.worker import self_test
 from core.worker.job import read_job
@@ -47,7 +47,7 @@ def main() -> None:
 
 def score(seed: int, dtype: torch.dtype) -> float:
     """PSNR in dB of the sample head solved with this seed in this precision."""
-    with tempfile.TemporaryDirectory() as folder, mock.patch.object(prior, "fast_dtype", lambda device: dtype):
+    with tempfile.TemporaryDirectory() as folder, mock.patch.object(prior_files, "fast_dtype", lambda device: dtype):
         capture = self_test.prepare(Path(folder), seed, "cpu")
         found, seconds = measure(capture, read_job(capture.job).settings, Reporter("self_test", lambda message: None))
     print(f"{dtype} seed {seed}: {found:.3f} dB in {seconds:.0f} s", flush=True)

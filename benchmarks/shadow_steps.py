@@ -26,7 +26,7 @@ from core.imaging import images
 from core.solve import border, initial
 from core.solve.capture_evidence import read_evidence
 from core.solve.evidence import REFERENCE_TEXELS
-from core.solve.prior import load
+from core.solve.prior_files import load
 from core.solve.recipes import OURS
 from core.solve.skin_tone import read_given_tone
 

@@ -30,7 +30,7 @@ from core.face.head import read_filmed_head
 from core.imaging import images
 from core.solve import confidence, initial, split
 from core.solve.capture_evidence import read_evidence
-from core.solve.prior import load
+from core.solve.prior_files import load
 from core.solve.problem import albedo
 from core.solve.skin_tone import read_given_tone
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from core.face import template
 from core.solve import split
-from core.solve.prior import load
+from core.solve.prior_files import load
 from core.training.skins import unshaded
 from core.training.traits import LargeShapes, deviations_at, read_shapes
 

@@ -36,7 +36,7 @@ from core.face import template
 from core.face.head import read_head
 from core.imaging import images
 from core.solve.initial import tint_face
-from core.solve.prior import load
+from core.solve.prior_files import load
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.upscale import grain, hair

@@ -17,7 +17,7 @@ from core.face import template
 from core.geometry import meshes
 from core.imaging import images
 from core.solve import initial
-from core.solve.prior import load
+from core.solve.prior_files import load
 from core.solve.recipes import RECIPES
 from core.solve.skin_tone import GIVEN, SkinTone
 

@@ -9,7 +9,8 @@ import torch
 from benchmarks.prior_figures import errors, of_subject, reflectance, sample_given_diffuse
 from core.face import template
 from core.solve.draft import restore_maps
-from core.solve.prior import load, make_coordinates
+from core.solve.prior import make_coordinates
+from core.solve.prior_files import load
 from core.solve.recipes import Recipe
 from core.solve.sampler import Sampler, seed_noise
 

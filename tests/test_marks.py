@@ -21,7 +21,7 @@ from core.light.shadow_edges import penumbra
 from core.solve import initial, maps, witnesses
 from core.solve.capture_evidence import read_evidence
 from core.solve.marks import Mark, find_marks, is_unlike_shadow
-from core.solve.prior import load
+from core.solve.prior_files import load
 from core.solve.recipes import OURS
 from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import GIVEN, SkinTone

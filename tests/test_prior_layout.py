@@ -25,7 +25,7 @@ from core.imaging import images
 from core.solve import layout
 from core.solve.lighting import Lights
 from core.solve.maps import Maps
-from core.solve.prior import WEIGHTS, load
+from core.solve.prior_files import WEIGHTS, load
 from core.solve.skin_tone import GIVEN, SkinTone
 
 from .painted_skin import SIZE, TONE, as_setting, make

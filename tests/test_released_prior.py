@@ -14,8 +14,9 @@ import torch
 from torch.nn import functional
 
 from core.contract.messages import Problem
-from core.solve import prior, released
+from core.solve import prior_files, released
 from core.solve.network import Condition, denoise
+from core.solve.prior import make_coordinates
 
 CONFIGS = {
     "posenc, patches of 2, attention, variance": (
@@ -196,7 +197,7 @@ def test_a_checkpoint_of_another_kind_gives_what_its_formulas_give(tmp_path, nam
     channels = COND_CHANNELS[cond["type"]]
     state = weights_of(model, channels, wrapped)
     write(tmp_path, model, cond, state, epoch=3, loss=np.float64(0.5))
-    network = prior.load(tmp_path, dtype=torch.float32).network
+    network = prior_files.load(tmp_path, dtype=torch.float32).network
     rng = torch.Generator().manual_seed(1)
     x, condition = torch.randn(2, 7, 16, 32, generator=rng), torch.randn(2, channels, 16, 32, generator=rng)
     sigma, extra = (
@@ -214,12 +215,12 @@ def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_p
     model, cond = CONFIGS["noise, patches of 4, no wrapper, own mapping"]
     write(tmp_path, model, cond, weights_of(model, 3, False))
     x = torch.zeros(1, 7, 16, 16)
-    coords = prior.make_coordinates(64, slice(8, 24), slice(32, 48), centred=False)
+    coords = make_coordinates(64, slice(8, 24), slice(32, 48), centred=False)
     with pytest.raises(Problem, match="fixed random map"):
-        prior.load(tmp_path, dtype=torch.float32).of_tone()(x, 1.0, coords)
+        prior_files.load(tmp_path, dtype=torch.float32).of_tone()(x, 1.0, coords)
     noise = np.random.default_rng(0).normal(size=(3, 64, 64)).astype(np.float32)
     np.save(tmp_path / released.NOISE_FILE, noise)
-    loaded = prior.load(tmp_path, dtype=torch.float32)
+    loaded = prior_files.load(tmp_path, dtype=torch.float32)
     window = torch.from_numpy(noise[None, :, 8:24, 32:48])
     assert (
         loaded.of_tone()(x, 1.0, coords) - denoise(loaded.network, x, torch.tensor([1.0]), Condition(window))
@@ -227,7 +228,7 @@ def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_p
     for wrong in (noise[:2], noise[:, :8], noise.astype(np.int32), np.where(noise > 2, np.nan, noise)):
         np.save(tmp_path / released.NOISE_FILE, wrong)
         with pytest.raises(Problem, match="of shape"):
-            prior.load(tmp_path)
+            prior_files.load(tmp_path)
 
 
 @pytest.mark.parametrize("begins", [b"", b"PK\x03\x04", b"\x93NUMPY\x01\x00"])
@@ -248,7 +249,7 @@ def test_a_noise_map_that_is_damaged_or_promises_more_than_it_holds_is_refused(t
 def test_what_the_config_says_of_noise_levels_is_kept(tmp_path):
     model, cond = CONFIGS["four levels, the first left out, defaults"]
     write(tmp_path, {**model, "sigma_min": 0.02, "sigma_max": 40}, cond, weights_of(model, 2, True))
-    loaded = prior.load(tmp_path)
+    loaded = prior_files.load(tmp_path)
     assert loaded.sigmas == (0.02, 40.0) and not loaded.centred and loaded.one_scale and loaded.multiple == 4
 
 
@@ -276,7 +277,7 @@ def test_other_models_are_told_apart(good, entry, value, match):
     config["model"] |= {entry: value, "cross_attn_depths": [True] * 4}
     (good / "config.json").write_text(json.dumps(config))
     with pytest.raises(Problem, match=match):
-        prior.load(good)
+        prior_files.load(good)
 
 
 def test_damaged_files_are_problems(good):
@@ -284,19 +285,19 @@ def test_damaged_files_are_problems(good):
     for content in (whole[: len(whole) // 2], b"", b"no checkpoint", pickle.dumps({"model_ema": print}, 2)):
         (good / "ckpt.pth").write_bytes(content)
         with pytest.raises(Problem, match="cannot be read as weights"):
-            prior.load(good)
+            prior_files.load(good)
     torch.save({"model_ema": 3}, good / "ckpt.pth")
     with pytest.raises(Problem, match="no state dict"):
-        prior.load(good)
+        prior_files.load(good)
     (good / "ckpt.pth").unlink()
     with pytest.raises(Problem, match="holds no ckpt"):
-        prior.load(good)
+        prior_files.load(good)
     for text in ("{", "[]", "{}", '{"model": {"input_channels": 7}}'):
         (good / "config.json").write_text(text)
         with pytest.raises(Problem, match="does not describe a prior"):
-            prior.load(good)
+            prior_files.load(good)
     with pytest.raises(Problem, match="does not describe a prior"):
-        prior.load(good / "nowhere")
+        prior_files.load(good / "nowhere")
 
 
 class Calls:
@@ -312,5 +313,5 @@ class Calls:
 def test_code_in_a_checkpoint_is_never_run(good, tmp_path):
     torch.save({"model_ema": Calls(tmp_path / "made")}, good / "ckpt.pth")
     with pytest.raises(Problem, match="Nothing in it was run"):
-        prior.load(good)
+        prior_files.load(good)
     assert not (tmp_path / "made").exists()

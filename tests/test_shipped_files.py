@@ -13,7 +13,7 @@ from core.__main__ import main
 from core.contract import shipped_files, unforeseen
 from core.contract.messages import Problem
 from core.face import faces, template
-from core.solve import prior
+from core.solve import prior_files
 from core.training import manifest
 from core.upscale import enlarge, whole_head
 
@@ -65,7 +65,7 @@ def test_line_ends_of_a_checkout_are_no_damage(core):
     [
         (network, "delighter", lambda path: network.load_network("cpu")),
         (enlarge, "upscaler", enlarge.load_network),
-        (prior, "prior", prior._load_ours),
+        (prior_files, "prior", prior_files._load_ours),
         (whole_head, "prior", lambda path: whole_head.usual_skin(8)),
     ],
 )

@@ -13,7 +13,7 @@ from core.contract.colour_values import format_skin_tone, parse_skin_tone
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.face.head import read_head
-from core.solve import look, population, prior, tone
+from core.solve import look, population, prior, prior_files, tone
 from core.solve.skin_tone import EARLIER, GIVEN, SCENE, TEXTURE, WHITE_POINT, SkinTone, read_given_tone
 from core.training import tones
 
@@ -173,7 +173,7 @@ def test_a_tone_that_only_the_pictures_tell_is_said_to_be_a_guess():
 
 
 def test_a_prior_is_told_a_tone_and_stays_as_it_is():
-    ours, coords = prior.load(dtype=torch.float32), prior.make_coordinates(1024, slice(480, 512), slice(480, 512))
+    ours, coords = prior_files.load(dtype=torch.float32), prior.make_coordinates(1024, slice(480, 512), slice(480, 512))
     x = torch.randn(1, 7, 32, 32, generator=torch.Generator().manual_seed(0))
     before = dict(vars(ours))
     light, dark = (ours.of_tone(SkinTone((tone, 0.7 * tone, 0.5 * tone), GIVEN)) for tone in (0.6, 0.1))

@@ -20,7 +20,7 @@ from core.imaging import images
 from core.solve import initial, tone
 from core.solve.capture_evidence import read_evidence
 from core.solve.evidence import soften_mask
-from core.solve.prior import WEIGHTS, load
+from core.solve.prior_files import WEIGHTS, load
 from core.solve.problem import albedo
 from core.solve.recipes import RECIPES
 from core.solve.skin_tone import GIVEN, SkinTone

@@ -12,7 +12,8 @@ import torch
 from core.contract.messages import Problem, Reporter
 from core.face import template
 from core.imaging import images
-from core.solve.prior import build_network, load
+from core.solve.prior import build_network
+from core.solve.prior_files import load
 from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic import pigment
 from core.training import prior, skins

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.solve import maps, prior
+from core.solve import maps, prior, prior_files
 from core.solve.initial import mean_tone
 from core.solve.light_fit import light_loss
 from core.solve.lighting import Lights, Shader, interpolation_matrix, shading_basis
@@ -107,7 +107,7 @@ def test_vectors_losses():
 def test_vectors_released_prior(folder):
     """The authors' layout of config.json and ckpt.pth loads, and gives their values and gradients."""
     v = arrays(f"{folder}/io.npz")
-    network = prior.load(VECTORS / folder, dtype=torch.float32).network
+    network = prior_files.load(VECTORS / folder, dtype=torch.float32).network
     mapping = v.get("mapping_cond")
     # the augmentation's nine numbers are zero, and come first
     if mapping is not None and mapping.shape[1] < network.mapping_cond.in_features:
@@ -128,7 +128,7 @@ def test_vectors_miniloop(run):
     rows, columns = slice(2, 34), slice(4, 36)
     if "prior_v1_coord" not in PRIORS:
         pytest.skip(f"the loop's prior, {VECTORS / 'prior_v1_coord'}, is missing")
-    denoiser = prior.load(VECTORS / "prior_v1_coord", dtype=torch.float32).of_tone()
+    denoiser = prior_files.load(VECTORS / "prior_v1_coord", dtype=torch.float32).of_tone()
 
     def crop(name):
         return v[name][0][:, rows, columns]

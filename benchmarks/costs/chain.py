@@ -32,7 +32,7 @@ from core.contract.capture import Capture
 from core.contract.files import replacing_folder
 from core.contract.frame_records import read_frames, write_frames
 from core.contract.messages import Problem
-from core.solve.prior import fast_dtype
+from core.solve.prior_files import fast_dtype
 
 from .. import figures
 from ..films import read_film

@@ -33,10 +33,10 @@ from core.contract.capture import Capture
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
 from core.face.head import read_head
-from core.solve import initial, network, network_blocks
-from core.solve import prior as priors
+from core.solve import initial, network, network_blocks, prior_files
 from core.solve.capture_evidence import read_evidence
 from core.solve.memory import sample_within_memory, spare_memory
+from core.solve.prior import Prior, ReleasedPrior, build_network
 from core.solve.recipes import OURS
 from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import read_given_tone
@@ -218,8 +218,8 @@ def single_steps(row: SolverVariant, capture: Capture, options: argparse.Namespa
 
 def whole_stage(row: SolverVariant, capture: Capture, options: argparse.Namespace) -> dict:
     """The stage solve, the mask's proposal before it where the capture has frames; loading the prior counts."""
-    dtype = torch.float32 if row.float32 else priors.fast_dtype(options.device)
-    priors.fast_dtype = lambda device: dtype
+    dtype = torch.float32 if row.float32 else prior_files.fast_dtype(options.device)
+    prior_files.fast_dtype = lambda device: dtype
     settings = from_json({"device": options.device, "solve": row.stage})
     report = Reporter("solve", emit=lambda message: None)
     with spending() as spent:
@@ -233,19 +233,19 @@ def whole_stage(row: SolverVariant, capture: Capture, options: argparse.Namespac
     }
 
 
-def prior_of(row: SolverVariant, options: argparse.Namespace) -> priors.Prior:
+def prior_of(row: SolverVariant, options: argparse.Namespace) -> Prior:
     """The shipped prior, or one of the authors' size, as the row has it."""
-    dtype = torch.float32 if row.float32 else priors.fast_dtype(options.device)
+    dtype = torch.float32 if row.float32 else prior_files.fast_dtype(options.device)
     if row.channels_first:
         network.MEMORY_FORMAT = network_blocks.MEMORY_FORMAT = torch.contiguous_format
     if options.network == "ours":
-        prior = priors.load(device=options.device, dtype=dtype)
+        prior = prior_files.load(device=options.device, dtype=dtype)
     else:
         torch.manual_seed(0)
-        made = priors.build_network(AUTHORS)
+        made = build_network(AUTHORS)
         for parameter in made.parameters():  # those that begin at zero as well: their products are to be worked out
             torch.nn.init.normal_(parameter, std=0.02)
-        prior = priors.ReleasedPrior(made, "coord", 0, (0.01, 80.0), None)
+        prior = ReleasedPrior(made, "coord", 0, (0.01, 80.0), None)
         made.to(options.device).lower(dtype)
     if row.low_memory:
         spare_memory(prior)

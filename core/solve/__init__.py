@@ -32,7 +32,8 @@ from .draft import restore_maps
 from .edited import solve_edited
 from .evidence import REFERENCE_TEXELS, Evidence
 from .memory import sample_within_memory, spare_memory
-from .prior import ConditionedPrior, Prior, load_chosen
+from .prior import ConditionedPrior, Prior
+from .prior_files import load_chosen
 from .problem import State, rms_residual
 from .recipes import RECIPES, Recipe, free_recipe
 from .sampler import Sampler, seed_noise

@@ -15,7 +15,8 @@ from functools import cache
 
 import torch
 
-from .prior import WEIGHTS, load, make_coordinates
+from .prior import make_coordinates
+from .prior_files import WEIGHTS, load
 from .skin_tone import GIVEN, SkinTone
 
 TRIAL_TEXELS = 128

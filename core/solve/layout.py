@@ -25,7 +25,8 @@ from ..geometry import atlas, baking, meshes
 from .evidence import REFERENCE_TEXELS, Evidence, Extent
 from .lighting import Lights, shading_basis
 from .maps import MIN_ALBEDO, Maps, to_picture
-from .prior import Prior, load, mean_at
+from .prior import Prior, mean_at
+from .prior_files import load
 from .skin_tone import SkinTone
 
 WINDOW = Extent(64, 128, 768, centred=False, factors=(1,))

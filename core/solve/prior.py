@@ -3,31 +3,23 @@
 """The slot for a diffusion prior of facial reflectance: `denoised = prior.of_tone(tone)(x, sigma, coords)`.
 
 x is [N, 7, H, W]: 2 * diffuse_linear - 1 (3), tangent-space normal xyz (3), 2 * specular - 1 (1), plus noise of
-standard deviation sigma. Two priors fit: ours (NAME.safetensors with its card NAME.json) and a folder with the authors'
-config.json and ckpt.pth.
+standard deviation sigma. Two priors fit: ours, and those that the method's authors release (`ReleasedPrior`).
 """
 
 from __future__ import annotations
 
 import copy
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import torch
-from safetensors import safe_open
 
-from ..contract import shipped_files
 from ..contract.messages import Problem
-from ..contract.settings import Settings
 from . import released
-from .network import Condition, UNet, UNetLayout, denoise, from_state
+from .network import Condition, UNet, UNetLayout, denoise
 from .skin_tone import SkinTone
 
 BLIND_SIGMA = 80.0  # noise level of a channel of which nothing is seen
 CLEAR_SIGMA = 0.01  # ... and of one that is known
-DATA_FILES = ("weights/prior.safetensors", "weights/prior.json")
-WEIGHTS = Path(__file__).parent.parent / DATA_FILES[0]
 
 
 class Prior:
@@ -222,39 +214,6 @@ def mean_at(mean_face: torch.Tensor, coords: torch.Tensor, tone: torch.Tensor) -
     return torch.cat([2 * mean[:, :3] * tone[:, :, None, None] - 1, mean[:, 3:]], 1)
 
 
-def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = None) -> Prior:
-    """Our prior, or the authors' when `path` is a folder with config.json and ckpt.pth.
-
-    Map-sized work runs in `dtype`, by default bfloat16 where the processor has it. Raises Problem for files that are
-    missing or of another kind.
-    """
-    path = Path(path)
-    if path.suffix != WEIGHTS.suffix:
-        prior = _load_released(path)
-    else:
-        try:
-            prior = _load_ours(path)
-        except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
-            raise Problem(
-                f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).", "Install the extension again."
-            ) from error
-    prior.network.lower(dtype or fast_dtype(device))
-    return prior.to(device)
-
-
-def load_chosen(settings: Settings) -> Prior:
-    """The authors' prior where the settings name one, else ours, on the device of the settings."""
-    chosen = settings.solve.prior
-    return load(Path(chosen).expanduser() if chosen else WEIGHTS, settings.compute_device)
-
-
-def fast_dtype(device: str) -> torch.dtype:
-    """bfloat16 on a GPU or a processor that multiplies it, else float32."""
-    if str(device).startswith("cuda"):
-        return torch.bfloat16
-    return torch.bfloat16 if str(device) == "cpu" and torch.cpu._is_avx512_bf16_supported() else torch.float32
-
-
 def build_network(config: dict) -> UNet:
     """The network of a card's or config.json's `model` and `cond` entries."""
     model, cond = config["model"], config.get("cond", {})
@@ -296,41 +255,3 @@ def positional_encoding(coords: torch.Tensor, octaves: int) -> torch.Tensor:
     """[N, 2, H, W] -> [N, 2 + 4 octaves, H, W]: the coordinates, then sines and cosines of 1, 2, 4 ... times them."""
     waves = [wave for k in range(octaves) for wave in (torch.sin(coords * 2**k), torch.cos(coords * 2**k))]
     return torch.cat([coords, *waves], 1)
-
-
-def _load_ours(path: Path) -> Prior:
-    shipped_files.require_whole(path)
-    card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-    with safe_open(path, "pt") as file:
-        tensors = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    mean_face, spread, references = (
-        tensors.pop("mean_face"),
-        tensors.pop("spread"),
-        unpack_maps(tensors.pop("references"), tensors.pop("references_range")),
-    )
-    network = build_network(card)
-    network.load_state_dict(tensors)
-    return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, references)
-
-
-def _load_released(folder: Path) -> ReleasedPrior:
-    config = released.read_config(folder)
-    network, state = build_network(config), from_state(released.read_weights(folder))
-    try:
-        network.load_state_dict(state)
-    except RuntimeError as error:
-        first = str(error).strip().splitlines()[1:2] or [str(error)]
-        raise Problem(
-            f"{folder / 'ckpt.pth'} does not fit the config.json beside it ({first[0].strip()}).", released.CHOOSE
-        ) from error
-    model, cond = config["model"], config["cond"]
-    sigmas = (
-        (float(model["sigma_min"]), float(model["sigma_max"])) if {"sigma_min", "sigma_max"} <= set(model) else None
-    )
-    return ReleasedPrior(
-        network,
-        cond["type"],
-        cond.get("pos_enc_freq", 0) if cond["type"] == "posenc" else 0,
-        sigmas,
-        released.read_noise(folder),
-    )

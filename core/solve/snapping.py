@@ -16,7 +16,7 @@ from ..face.head import read_filmed_head
 from ..imaging import images
 from . import initial
 from .capture_evidence import read_evidence
-from .prior import load_chosen
+from .prior_files import load_chosen
 from .recipes import RECIPES
 from .skin_tone import read_given_tone
 from .tone import estimate_from_texture

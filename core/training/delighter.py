@@ -25,7 +25,7 @@ from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
 from ..delight.unet import DelightNet
-from ..solve.prior import fast_dtype
+from ..solve.prior_files import fast_dtype
 from . import command_line, descent
 from .people import People, is_prepared, prepare_people
 from .portraits import PortraitBatch, Portraits, mirrored, prepare, repainted

@@ -25,7 +25,7 @@ from ..contract.messages import Reporter
 from ..delight.unet import FARTHEST_LOG, SIDE_PX, network_input
 from ..geometry.meshes import vertex_normals
 from ..imaging import images
-from ..solve.prior import WEIGHTS
+from ..solve.prior_files import WEIGHTS
 from ..synthetic import sight
 from ..synthetic.environments import read_panoramas
 from ..synthetic.identities import subject_mesh

@@ -23,7 +23,8 @@ from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
 from ..solve.network import UNet, denoise
-from ..solve.prior import BLIND_SIGMA, WEIGHTS, build_network, fast_dtype, make_condition, pack_maps
+from ..solve.prior import BLIND_SIGMA, build_network, make_condition, pack_maps
+from ..solve.prior_files import WEIGHTS, fast_dtype
 from . import command_line, descent
 from .patches import PatchBatch, Windows, mean_map, reference_skins, spread_about
 from .release import TrainingCard, again, release

@@ -18,7 +18,7 @@ import torch
 from torch.utils.data import Dataset
 
 from ..contract.messages import Reporter
-from ..solve.prior import fast_dtype
+from ..solve.prior_files import fast_dtype
 from ..upscale.enlarge import WEIGHTS
 from ..upscale.network import BICUBIC_ERRORS, Rcan, bicubic
 from . import command_line, descent
