@@ -239,7 +239,7 @@ def solve_problem(
             mask={"painted": uv_problem.mask, "empty": 0 * uv_problem.mask, "full": 0 * uv_problem.mask + 1}[mask],
         ).write(capture)
         evidence = read_evidence(capture, read_head(capture), size)
-    start = initial.start_solve(prior, evidence, tone, FACE_CROP / cells, recipe)
+    start = initial.start_solve(prior, evidence, tone.tensor, FACE_CROP / cells, recipe)
     if with_prior:
         sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(seed))
         state = sampler.sample(start.observations, start.state)

@@ -183,7 +183,7 @@ def solve_by_method(
     start = initial.start_solve(
         prior,
         evidence,
-        tone,
+        tone.tensor,
         cell,
         recipe_of(settings, prior),
         callbacks=initial.Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size)),

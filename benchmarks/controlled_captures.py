@@ -54,7 +54,7 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     start = initial.start_solve(
         prior,
         evidence,
-        read_given_tone(settings.solve.skin_tone),
+        read_given_tone(settings.solve.skin_tone).tensor,
         evidence.cell_side(settings.solve.grid_cells),
         recipe,
     )

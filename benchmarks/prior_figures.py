@@ -220,7 +220,7 @@ def reflectance(seed: int, size: int) -> torch.Tensor:
 def of_subject(prior: Prior, truth: torch.Tensor) -> ConditionedPrior:
     """The prior told the mean albedo of the skin of a map [7, S, S]."""
     skin = torch.from_numpy(template.mask("skin", truth.shape[-1]) * (1 - template.mask("eyes", truth.shape[-1])))
-    return prior.of_tone(SkinTone.from_linear(((truth[:3] + 1) / 2 * skin).sum((1, 2)) / skin.sum(), GIVEN))
+    return prior.of_tone(SkinTone.from_linear(((truth[:3] + 1) / 2 * skin).sum((1, 2)) / skin.sum(), GIVEN).tensor)
 
 
 def sample_given_diffuse(

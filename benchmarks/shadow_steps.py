@@ -63,7 +63,8 @@ def measure(filmed: Filmed) -> dict:
     capture = filmed.capture
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
     tone = read_given_tone(people.skin_tone(filmed.truth))
-    begun = initial.start_solve(load(), evidence, tone, evidence.cell_side(Settings().solve.grid_cells), OURS)
+    cell = evidence.cell_side(Settings().solve.grid_cells)
+    begun = initial.start_solve(load(), evidence, tone.tensor, cell, OURS)
     luminance = {
         name: np.log(
             np.maximum(

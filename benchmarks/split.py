@@ -168,7 +168,7 @@ def shapes_of(filmed: Filmed) -> split.Shapes:
     tone = read_given_tone(people.skin_tone(filmed.truth))
     if tone is None:
         raise Problem(f"{filmed.truth} has no skin tone.", "Give it a skin_tone.txt with sRGB R,G,B.")
-    return initial.make_shapes(evidence, albedo(initial.make_reference(prior(), tone, evidence, "mean")))
+    return initial.make_shapes(evidence, albedo(initial.make_reference(prior(), tone.tensor, evidence, "mean")))
 
 
 def divided(shapes: split.Shapes, fitted: split.Split, local: bool) -> np.ndarray:

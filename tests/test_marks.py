@@ -24,7 +24,6 @@ from core.solve.marks import Mark, find_marks, is_unlike_shadow
 from core.solve.prior_files import load
 from core.solve.recipes import OURS
 from core.solve.sampler import Sampler, seed_noise
-from core.solve.skin_tone import GIVEN, SkinTone
 
 SIZE = 512
 TEXEL = 1024 / SIZE
@@ -131,7 +130,7 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     images.write_data(capture.shadow_mask, (distance_to(row - 1.5, column + 1.5) < 98).astype(np.float32))
     meshes.write_obj(capture.head, template.load())
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
-    start = initial.start_solve(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
+    start = initial.start_solve(prior, evidence, torch.from_numpy(TONE), 8.0, recipe)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
     sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(0))
     result = maps.finish_maps(sampler.sample(start.observations, start.state), evidence, start)

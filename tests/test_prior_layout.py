@@ -26,7 +26,6 @@ from core.solve import layout
 from core.solve.lighting import Lights
 from core.solve.maps import Maps
 from core.solve.prior_files import WEIGHTS, load
-from core.solve.skin_tone import GIVEN, SkinTone
 
 from .painted_skin import SIZE, TONE, as_setting, make
 from .recorded import changed, record
@@ -156,7 +155,7 @@ def round_trip(there: layout.Layout, albedo: np.ndarray, normal: np.ndarray) -> 
         e,
         Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)),
         1.0,
-        SkinTone.from_linear(TONE, GIVEN),
+        torch.from_numpy(TONE),
     )
 
 

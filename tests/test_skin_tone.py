@@ -176,7 +176,7 @@ def test_a_prior_is_told_a_tone_and_stays_as_it_is():
     ours, coords = prior_files.load(dtype=torch.float32), prior.make_coordinates(1024, slice(480, 512), slice(480, 512))
     x = torch.randn(1, 7, 32, 32, generator=torch.Generator().manual_seed(0))
     before = dict(vars(ours))
-    light, dark = (ours.of_tone(SkinTone((tone, 0.7 * tone, 0.5 * tone), GIVEN)) for tone in (0.6, 0.1))
+    light, dark = (ours.of_tone(tone * torch.tensor([1.0, 0.7, 0.5])) for tone in (0.6, 0.1))
     first = light(x, 1.0, coords)
     assert not torch.equal(dark(x, 1.0, coords), first) and torch.equal(light(x, 1.0, coords), first)
     assert all(vars(ours)[name] is value for name, value in before.items()) and len(before) == len(vars(ours))

@@ -23,7 +23,6 @@ from core.solve.evidence import soften_mask
 from core.solve.prior_files import WEIGHTS, load
 from core.solve.problem import albedo
 from core.solve.recipes import RECIPES
-from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic.identities import reserved_seeds
 
 from .painted_skin import SIZE, TONE, as_setting, brief_light, make, settings  # noqa: F401
@@ -180,7 +179,7 @@ def test_the_border_of_a_shadow_on_the_neck_tells_what_is_missing_there(capture)
     images.write_data(capture.shadow_mask_auto, (distance < 0.06).astype(np.float32))
     evidence, prior = read_evidence(capture, read_head(capture), SIZE), load()
     recipe = replace(RECIPES["wildcap"], faint=1.0, reference="uniform", protect_marks=False)
-    start = initial.start_solve(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
+    start = initial.start_solve(prior, evidence, torch.from_numpy(TONE), 8.0, recipe)
     neck = (shadow > 0.9) & (template.mask("neck", SIZE) > 0.9) & evidence.covered.numpy()
     assert neck.sum() > 50 and start.observations[1].missing.numpy()[neck].mean() > 0.12
 
@@ -204,7 +203,7 @@ def test_a_cancel_is_heard_and_something_is_said_before_the_first_step(capture):
 
 def test_under_the_light_that_the_split_tells_the_skin_has_its_tone(capture):
     """Even light, and a face redder on one side: no part of its mean is light's level."""
-    evidence, prior, told = read_evidence(capture, read_head(capture), SIZE), load(), SkinTone.from_linear(TONE, GIVEN)
+    evidence, prior, told = read_evidence(capture, read_head(capture), SIZE), load(), torch.from_numpy(TONE)
     side, redder = torch.sigmoid((torch.linspace(0, 1, SIZE) - 0.6) / 0.02), torch.tensor([0.1, 0.4, 0.5])
     face = initial.make_reference(prior, told, evidence, "mean")
     evidence = replace(evidence, texture=albedo(face) * (1 - redder[:, None, None] * side), alpha=0 * evidence.alpha)
@@ -249,13 +248,13 @@ def test_the_card_names_its_seeds_and_they_are_not_the_sample_subjects():
 
 def test_the_nearest_skin_is_the_one_that_was_filmed(capture):
     """Under another light, another tone and a shadow that M covers."""
-    prior, told = load(), SkinTone.from_linear(TONE, GIVEN)
+    prior, told = load(), torch.from_numpy(TONE)
     evidence = read_evidence(capture, read_head(capture), SIZE)
     light = images.read_linear(capture.texture) / np.maximum(filmed(prior.mean_face, evidence), 1e-3)
     for skin in prior.references[[3, 7]]:
         evidence = replace(evidence, texture=torch.from_numpy((filmed(skin, evidence) * light).transpose(2, 0, 1)))
         found = initial.make_reference(prior, told, evidence, "nearest")
-        assert torch.equal(found, initial.tint_face(skin, told.tensor, evidence.skin))
+        assert torch.equal(found, initial.tint_face(skin, told, evidence.skin))
 
 
 def test_a_confidence_of_another_size_is_named(capture):

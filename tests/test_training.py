@@ -14,7 +14,6 @@ from core.face import template
 from core.imaging import images
 from core.solve.prior import build_network
 from core.solve.prior_files import load
-from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic import pigment
 from core.training import prior, skins
 from core.training.descent import TrainingRun
@@ -165,7 +164,7 @@ def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypat
     assert second["skins"] == ["a"] and second["held_out_skins"] == ["b"] and second["notices"] == ["Theirs."]
     assert set(second["held_out"]["loss"]) == {"synthetic", "carried"}
     assert not set(second["seeds"]) & set(second["held_out_seeds"])
-    conditioned = load(out).of_tone(SkinTone((0.4, 0.3, 0.2), GIVEN))
+    conditioned = load(out).of_tone(torch.tensor([0.4, 0.3, 0.2]))
     assert (
         conditioned(torch.zeros(1, 7, 32, 32), 1.0, torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32))
         .isfinite()

@@ -17,7 +17,6 @@ from core.solve.prior import ConditionedPrior, Prior, ReleasedPrior, make_coordi
 from core.solve.problem import Observation, State
 from core.solve.recipes import RECIPES
 from core.solve.sampler import Sampler, seed_noise
-from core.solve.skin_tone import GIVEN, SkinTone
 
 SIZE = 32
 CARD = "meta"
@@ -81,7 +80,7 @@ def begun(size: int, cells: tuple[int, int] = (4, 4)) -> State:
 
 def our_prior() -> ConditionedPrior:
     network = UNet(UNetLayout(7, 2 + 4 * 2, 16, [1, 1], [16, 16], mapping_cond_dim=5, norm="pixel"))
-    return Prior(network, 2, torch.zeros(7, 8, 8), torch.ones(7)).of_tone(SkinTone((0.4, 0.3, 0.2), GIVEN))
+    return Prior(network, 2, torch.zeros(7, 8, 8), torch.ones(7)).of_tone(torch.tensor([0.4, 0.3, 0.2]))
 
 
 def released_prior() -> ConditionedPrior:

@@ -192,7 +192,8 @@ def single_steps(row: SolverVariant, capture: Capture, options: argparse.Namespa
     coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
     evidence = read_evidence(capture, read_head(capture), options.size)
-    begun = initial.start_solve(prior, evidence, read_given_tone(TONE), evidence.cell_side(96), recipe)
+    tone = read_given_tone(TONE).tensor
+    begun = initial.start_solve(prior, evidence, tone, evidence.cell_side(96), recipe)
     short = replace(begun.recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
     if options.compile:
         prior.network = torch.compile(prior.network)

@@ -27,7 +27,6 @@ from ..face.head import read_filmed_head
 from ..imaging import images
 from . import checkpoint, comparison, drawing, initial, iris, layout, maps
 from .capture_evidence import read_evidence
-from .checkpoint import Solution
 from .draft import restore_maps
 from .edited import solve_edited
 from .evidence import REFERENCE_TEXELS, Evidence
@@ -37,6 +36,7 @@ from .prior_files import load_chosen
 from .problem import State, rms_residual
 from .recipes import RECIPES, Recipe, free_recipe
 from .sampler import Sampler, seed_noise
+from .solution import Solution
 from .together import read_others
 from .tone import resolve_skin_tone, tell_skin_tone
 from .witnesses import confirm_marks
@@ -89,7 +89,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     start = initial.start_solve(
         prior,
         evidence,
-        tone,
+        tone.tensor,
         evidence.cell_side(options.grid_cells),
         recipe,
         others,
@@ -199,7 +199,7 @@ def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
         evidence.weight,
         evidence.alpha,
         evidence.normal,
-        start.tone.tensor,
+        start.tone,
         start.state.lights.glob,
         start.local,
         start.reference,

@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import os
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -23,31 +22,14 @@ from ..contract.files import replacing
 from ..contract.mask_edit import FIELD
 from .lighting import Lights
 from .problem import State
-from .skin_tone import EARLIER, SkinTone
-
-
-@dataclass(frozen=True)
-class Solution:
-    """What a solve ended with, all of the whole map: denoised x_0 [1, 7, S, S] before the maps' own gain, lights, the
-    mask as `painted` [S, S] and as it was used (`alpha`), the skin tone, gain [3] of the albedo, exposure of the
-    texture; local [3, C, C]: initial.Start's; settled: whether the split told the global light."""
-
-    denoised: torch.Tensor
-    lights: Lights
-    painted: torch.Tensor
-    alpha: torch.Tensor
-    tone: SkinTone
-    gain: torch.Tensor
-    exposure: float
-    local: torch.Tensor
-    settled: bool
+from .solution import Solution
 
 
 def write_solution(path: Path, solution: Solution, conditions: dict[str, str]) -> None:
     """`conditions` are mask_edit's: under others this state is of no use."""
     lights = {"glob": solution.lights.glob, "grid": solution.lights.grid, "chroma": solution.lights.chroma}
-    tensors = {name: getattr(solution, name) for name in ("denoised", "painted", "alpha", "gain", "local")} | lights
-    tensors["tone"] = solution.tone.tensor
+    names = "denoised", "painted", "alpha", "gain", "local", "tone"
+    tensors = {name: getattr(solution, name) for name in names} | lights
     tensors["settled"] = torch.tensor(solution.settled)
     tensors["exposure"] = torch.tensor(solution.exposure, dtype=torch.float64)
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
@@ -63,10 +45,8 @@ def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
                 return None
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
         lights = Lights(*(tensors.pop(name) for name in ("glob", "grid", "chroma")))
-        tone = SkinTone.from_linear(tensors.pop("tone"), EARLIER)
         return Solution(
             lights=lights,
-            tone=tone,
             exposure=tensors.pop("exposure").item(),
             settled=bool(tensors.pop("settled")),
             **tensors,

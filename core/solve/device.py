@@ -17,7 +17,6 @@ import torch
 
 from .prior import make_coordinates
 from .prior_files import WEIGHTS, load
-from .skin_tone import GIVEN, SkinTone
 
 TRIAL_TEXELS = 128
 """Side of the map that is tried, in texels: small enough for any card, and large enough that a card shows what it can
@@ -76,7 +75,7 @@ def run_pass(device: str) -> tuple[torch.Tensor, float]:
     """A pass of the shipped prior over a fixed map [1, 7, TRIAL_TEXELS, TRIAL_TEXELS] and back to its input, twice: the
     gradient, on the CPU, and the second one's seconds."""
     generator = torch.Generator().manual_seed(0)
-    prior = load(WEIGHTS, device).of_tone(SkinTone((0.45, 0.3, 0.22), GIVEN))
+    prior = load(WEIGHTS, device).of_tone(torch.tensor([0.45, 0.3, 0.22]))
     noisy, weights = (torch.randn(1, 7, TRIAL_TEXELS, TRIAL_TEXELS, generator=generator).to(device) for _ in range(2))
     weights = weights / (7 * TRIAL_TEXELS * TRIAL_TEXELS) ** 0.5
     middle = slice(512 - TRIAL_TEXELS // 2, 512 + TRIAL_TEXELS // 2)

@@ -16,12 +16,12 @@ from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..face.head import Head
 from . import checkpoint, initial, maps
-from .checkpoint import Solution
 from .evidence import REFERENCE_TEXELS, Evidence, grid_cells
 from .prior import ConditionedPrior, Prior
 from .problem import State
 from .recipes import Recipe
-from .skin_tone import SkinTone
+from .skin_tone import EARLIER, SkinTone
+from .solution import Solution
 from .window import Window, find_window, solve_inside
 from .witnesses import confirm_marks
 
@@ -81,7 +81,7 @@ def solve_edited(
         maps.write_preview(capture, state, start.observations, report)
         height, width = (s.stop - s.start for s in window.inside)
         report.log(f"{width} x {height} texels were solved again in {time.monotonic() - began:.1f} s.")
-    return result, earlier.tone
+    return result, SkinTone.from_linear(earlier.tone, EARLIER)
 
 
 def _sampled(

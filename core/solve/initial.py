@@ -12,7 +12,6 @@ import torch
 
 from ..contract.messages import Problem
 from .border import measure_missing_light
-from .checkpoint import Solution
 from .edges import snap_to_edges
 from .evidence import Evidence, grid_cells, make_observations
 from .lighting import Lights, constant_light, fit_around_constant, fit_global, shading_basis
@@ -21,19 +20,19 @@ from .prior import Prior, make_coordinates, mean_at
 from .problem import Observation, State
 from .problem import albedo as albedo_of
 from .recipes import OURS, Recipe, free_recipe, settle_recipe
-from .skin_tone import SkinTone
+from .solution import Solution
 from .split import Shapes, enlarge_field, split_captures
 
 
 @dataclass(frozen=True)
 class Start:
-    """tone: the skin's; recipe: the one that was asked for, as this capture's light lets it be used; reference x_0^ref
-    [1, 7, S, S]; exposure: what the texture is multiplied by in `observations` (by coarsening factor), so that its
-    shading is about one; alpha [S, S]: M as it is used; state: before the first step; marks: what of the skin's own is
-    kept from the light; local [3, C, C], natural log: what other captures of the person tell of the light beside theta,
-    zeros without any."""
+    """tone: the skin's, linear RGB [3]; recipe: the one that was asked for, as this capture's light lets it be used;
+    reference x_0^ref [1, 7, S, S]; exposure: what the texture is multiplied by in `observations` (by coarsening
+    factor), so that its shading is about one; alpha [S, S]: M as it is used; state: before the first step; marks: what
+    of the skin's own is kept from the light; local [3, C, C], natural log: what other captures of the person tell of
+    the light beside theta, zeros without any."""
 
-    tone: SkinTone
+    tone: torch.Tensor
     recipe: Recipe
     reference: torch.Tensor
     exposure: float
@@ -58,7 +57,7 @@ NOBODY = Callbacks()
 def start_solve(
     prior: Prior,
     evidence: Evidence,
-    tone: SkinTone,
+    tone: torch.Tensor,
     cell: float,
     recipe: Recipe,
     other_captures: Sequence[Evidence] = (),
@@ -70,7 +69,7 @@ def start_solve(
     ----------
     prior : of albedo, normals and specular
     evidence : of the capture
-    tone : of the skin
+    tone : of the skin, linear RGB [3]
     cell : side of a cell of V in texels of a 1024 map
     recipe : of the solve
     other_captures : what is known of other captures of the same person
@@ -232,13 +231,13 @@ def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     return (albedo * weight).sum((1, 2)) / weight.sum().clamp_min(1e-6)
 
 
-def make_reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) -> torch.Tensor:
+def make_reference(prior: Prior, tone: torch.Tensor, evidence: Evidence, kind: str) -> torch.Tensor:
     """x_0^ref of a tone.
 
     Parameters
     ----------
     prior : with its mean face and reference skins
-    tone : of the skin
+    tone : of the skin, linear RGB [3]
     evidence : of the capture
     kind : "mean", the prior's mean face; "nearest", the one of its reference skins that explains the texture best;
         "uniform", the tone everywhere, as where the prior has neither
@@ -248,9 +247,9 @@ def make_reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) 
     [1, 7, S, S] in the network's range.
     """
     if prior.mean_face is None or kind == "uniform":
-        return make_uniform_skin(tone.tensor, evidence.size)
+        return make_uniform_skin(tone, evidence.size)
     if kind == "mean" or prior.references is None:
-        return tint_face(prior.mean_face, tone.tensor, evidence.skin)
+        return tint_face(prior.mean_face, tone, evidence.skin)
     basis, weight = shading_basis(evidence.normal), evidence.weight * (1 - evidence.alpha)
 
     def unexplained(face: torch.Tensor) -> float:
@@ -259,7 +258,7 @@ def make_reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) 
             (((evidence.texture - albedo_of(face) * torch.einsum("ck,khw->chw", light, basis)) * weight) ** 2).sum()
         )
 
-    return min((tint_face(skin, tone.tensor, evidence.skin) for skin in prior.references), key=unexplained)
+    return min((tint_face(skin, tone, evidence.skin) for skin in prior.references), key=unexplained)
 
 
 def tint_face(face: torch.Tensor, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:

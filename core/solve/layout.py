@@ -27,7 +27,6 @@ from .lighting import Lights, shading_basis
 from .maps import MIN_ALBEDO, Maps, to_picture
 from .prior import Prior, mean_at
 from .prior_files import load
-from .skin_tone import SkinTone
 
 WINDOW = Extent(64, 128, 768, centred=False, factors=(1,))
 Box = tuple[int, int, int, int]
@@ -80,7 +79,7 @@ class Layout:
             changes |= {"skin": tone, "weight": weight * face, "alpha": changes["alpha"] * shadow}
         return replace(e, **changes)
 
-    def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: float, tone: SkinTone) -> Maps:
+    def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: float, tone: torch.Tensor) -> Maps:
         """The window's maps in the built-in UVs. Beyond the window the albedo is the texture under the solved global
         light, or our mean face of that tone where nobody looked, without confidence.
 
@@ -90,11 +89,11 @@ class Layout:
         e : the evidence in the built-in UVs
         lights : that were solved
         exposure : factor that the texture was multiplied by
-        tone : of the skin
+        tone : of the skin, linear RGB [3]
         """
         inside = self._inside()
         side = 2 * (torch.arange(e.size) + 0.5) / e.size - 1
-        mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone.tensor[None])[0]
+        mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone[None])[0]
         light = torch.einsum("ck,khw->chw", lights.glob, shading_basis(e.normal)).clamp_min(1e-2)
         light = light / exposure / solved.gain[:, None, None]
         seen = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(MIN_ALBEDO, 1)

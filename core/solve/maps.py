@@ -14,12 +14,13 @@ from ..contract.capture import Capture
 from ..contract.files import replacing_folder
 from ..contract.messages import Reporter
 from ..imaging import images
-from .checkpoint import Solution, write_solution
+from .checkpoint import write_solution
 from .confidence import estimate_confidence
 from .evidence import Evidence
 from .initial import Start, mean_tone
 from .marks import draw_cover
 from .problem import Observation, State, albedo
+from .solution import Solution
 from .split import enlarge_field
 
 MIN_ALBEDO = 0.004  # linear albedo below which no skin or hair lies
@@ -66,7 +67,7 @@ def finish_maps(state: State, evidence: Evidence, start: Start, gain: torch.Tens
         diffuse = torch.lerp(diffuse, evidence.texture / shading, kept)
     diffuse = diffuse.clamp_min(MIN_ALBEDO)
     if gain is None:
-        gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone.tensor, start.recipe.rescale)
+        gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, start.recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
     each = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], seen)  # the mean face is of the tone already

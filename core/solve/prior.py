@@ -16,7 +16,6 @@ import torch
 from ..contract.messages import Problem
 from . import released
 from .network import Condition, UNet, UNetLayout, denoise
-from .skin_tone import SkinTone
 
 BLIND_SIGMA = 80.0  # noise level of a channel of which nothing is seen
 CLEAR_SIGMA = 0.01  # ... and of one that is known
@@ -60,9 +59,9 @@ class Prior:
         )
         return self
 
-    def of_tone(self, tone: SkinTone) -> ConditionedPrior:
-        """The prior of a person with this skin tone."""
-        return ConditionedPrior(self, tone.tensor[None].to(self.device))
+    def of_tone(self, tone: torch.Tensor) -> ConditionedPrior:
+        """The prior of a person with this skin tone, linear RGB [3]."""
+        return ConditionedPrior(self, tone[None].to(self.device))
 
     def with_face(self, mean_face: torch.Tensor) -> Prior:
         """The prior with a mean face to start from."""
@@ -119,7 +118,7 @@ class ConditionedPrior:
 
 
 class ReleasedPrior(Prior):
-    """One of the authors' own, in the UV layout it was trained in (layout.py). `kind` is what it is conditioned on:
+    """One of the authors' own, in the UV layout it was trained in. `kind` is what it is conditioned on:
     coord, posenc or noise; the fixed random map `noise` [1, 3, S, S] of the last is not in their checkpoint."""
 
     centred, one_scale = False, True
@@ -144,7 +143,7 @@ class ReleasedPrior(Prior):
                 f"Save the map it was trained with beside ckpt.pth as {released.NOISE_FILE}, float32 of shape 3, S, S.",
             )
 
-    def of_tone(self, tone: SkinTone | None = None) -> ConditionedPrior:
+    def of_tone(self, tone: torch.Tensor | None = None) -> ConditionedPrior:
         """It takes no tone: the same for everybody."""
         return ConditionedPrior(self, None)
 
@@ -215,7 +214,7 @@ def mean_at(mean_face: torch.Tensor, coords: torch.Tensor, tone: torch.Tensor) -
 
 
 def build_network(config: dict) -> UNet:
-    """The network of a card's or config.json's `model` and `cond` entries."""
+    """The network that the entries `model` and `cond` of a prior's description tell of, ours or the authors'."""
     model, cond = config["model"], config.get("cond", {})
     channels = {"coord": 2, "posenc": 2 + 4 * int(cond.get("pos_enc_freq", 0)), "noise": 3}[cond.get("type", "coord")]
     augmented = 9 if model.get("augment_wrapper", True) else 0

@@ -35,7 +35,12 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
     tone = read_given_tone(settings.solve.skin_tone) or estimate_from_texture(evidence)
     start = initial.start_solve(
-        prior, evidence, tone, CELL_TEXELS, recipe, callbacks=initial.Callbacks(check=report.check)
+        prior,
+        evidence,
+        tone.tensor,
+        CELL_TEXELS,
+        recipe,
+        callbacks=initial.Callbacks(check=report.check),
     )
     snapped = np.clip(images.resize(start.alpha.numpy(), width, height), 0, 1)
     images.write_data(capture.shadow_mask_edges, snapped)

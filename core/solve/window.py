@@ -17,7 +17,6 @@ import torch
 from torch.nn import functional
 
 from ..contract.messages import Reporter
-from .checkpoint import Solution
 from .draft import restore_maps
 from .lighting import Lights
 from .memory import sample_within_memory
@@ -25,6 +24,7 @@ from .prior import ConditionedPrior
 from .problem import Observation, State
 from .recipes import Recipe
 from .sampler import Sampler, seed_noise
+from .solution import Solution
 
 MARGIN_TEXELS = 64
 """Texels of a 1024 map around the touched box that are sampled again."""
