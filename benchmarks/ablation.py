@@ -40,6 +40,7 @@ from core.face.head import read_head
 from core.imaging import images
 from core.solve import initial, maps
 from core.solve.capture_evidence import read_evidence
+from core.solve.head_cells import make_head_cells
 from core.solve.light_fit import total_variation, update_lights
 from core.solve.prior_files import WEIGHTS, load
 from core.solve.problem import State, albedo, photometric_loss
@@ -239,7 +240,7 @@ def solve_problem(
             mask={"painted": uv_problem.mask, "empty": 0 * uv_problem.mask, "full": 0 * uv_problem.mask + 1}[mask],
         ).write(capture)
         evidence = read_evidence(capture, read_head(capture), size)
-    start = initial.start_solve(prior, evidence, tone.tensor, FACE_CROP / cells, recipe)
+    start = initial.start_solve(prior, evidence, tone.tensor, FACE_CROP / cells, recipe, make_head_cells)
     if with_prior:
         sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(seed))
         state = sampler.sample(start.observations, start.state)

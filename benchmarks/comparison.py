@@ -45,6 +45,7 @@ from core.imaging import images
 from core.solve import initial, maps, recipe_of
 from core.solve.capture_evidence import read_evidence
 from core.solve.evidence import Evidence
+from core.solve.head_cells import make_head_cells
 from core.solve.prior_files import load
 from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import read_given_tone
@@ -186,6 +187,7 @@ def solve_by_method(
         tone.tensor,
         cell,
         recipe_of(settings, prior),
+        make_head_cells,
         callbacks=initial.Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size)),
     )
     fit, recipe = {}, start.recipe

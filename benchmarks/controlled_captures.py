@@ -23,6 +23,7 @@ from core.face.head import read_head
 from core.imaging import images
 from core.solve import initial, maps, recipe_of
 from core.solve.capture_evidence import read_evidence
+from core.solve.head_cells import make_head_cells
 from core.solve.prior_files import load
 from core.solve.sampler import Sampler, seed_noise
 from core.solve.skin_tone import read_given_tone
@@ -57,6 +58,7 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
         read_given_tone(settings.solve.skin_tone).tensor,
         evidence.cell_side(settings.solve.grid_cells),
         recipe,
+        make_head_cells,
     )
     sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(settings.seed))
     state = sampler.sample(start.observations, start.state)

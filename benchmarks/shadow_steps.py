@@ -26,6 +26,7 @@ from core.imaging import images
 from core.solve import border, initial
 from core.solve.capture_evidence import read_evidence
 from core.solve.evidence import REFERENCE_TEXELS
+from core.solve.head_cells import make_head_cells
 from core.solve.prior_files import load
 from core.solve.recipes import OURS
 from core.solve.skin_tone import read_given_tone
@@ -64,7 +65,7 @@ def measure(filmed: Filmed) -> dict:
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
     tone = read_given_tone(people.skin_tone(filmed.truth))
     cell = evidence.cell_side(Settings().solve.grid_cells)
-    begun = initial.start_solve(load(), evidence, tone.tensor, cell, OURS)
+    begun = initial.start_solve(load(), evidence, tone.tensor, cell, OURS, make_head_cells)
     luminance = {
         name: np.log(
             np.maximum(

@@ -30,6 +30,7 @@ from core.face.head import read_filmed_head
 from core.imaging import images
 from core.solve import confidence, initial, split
 from core.solve.capture_evidence import read_evidence
+from core.solve.head_cells import make_head_cells
 from core.solve.prior_files import load
 from core.solve.problem import albedo
 from core.solve.skin_tone import read_given_tone
@@ -136,15 +137,15 @@ def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, di
             others = [shapes[other.name] for other in own if other is not filmed]
             answers = {method: filmed.answer(method) for method in (NOTHING, TRUE, DELIT, SOLVED)}
             answers |= {name: solved_map(path / f"{filmed.name}.wildcap") for name, path in beside.items()}
-            alone = split.split_captures([shapes[filmed.name]])
+            alone = split.split_captures([shapes[filmed.name]], make_head_cells)
             scales[filmed.name] = {name: round(value, 4) for name, value in asdict(alone.scales).items()}
             answers |= {ALONE: divided(shapes[filmed.name], alone, False)}
             if others:
-                together = split.split_captures([shapes[filmed.name], *others])
+                together = split.split_captures([shapes[filmed.name], *others], make_head_cells)
                 answers |= {TOGETHER: divided(shapes[filmed.name], together, True)}
             for name, factor in ((LESS, 0.5), (MORE, 2.0)):
                 typical = split.Scales(*(factor * value for value in split.TYPICAL_SCALES))
-                alone = split.split_captures([shapes[filmed.name]], typical)
+                alone = split.split_captures([shapes[filmed.name]], make_head_cells, typical)
                 answers |= {name: divided(shapes[filmed.name], alone, False)}
             maps.append(small({method: answer for method, answer in answers.items() if answer is not None}))
             print(f"{filmed.name}: split", file=sys.stderr, flush=True)
@@ -184,7 +185,7 @@ def parts_side_by_side(filmed: Filmed) -> np.ndarray:
     the global light, solved, true, and the deviation of the error that is expected, black to DOUBTFUL: sRGB, at the
     truth's tone."""
     shapes = shapes_of(filmed)
-    found = split.split_captures([shapes])
+    found = split.split_captures([shapes], make_head_cells)
     maps = small(
         {method: answer for method in (NOTHING, DELIT, SOLVED, TRUE) if (answer := filmed.answer(method)) is not None}
     )

@@ -20,6 +20,7 @@ from core.imaging import images
 from core.light.shadow_edges import penumbra
 from core.solve import initial, maps, witnesses
 from core.solve.capture_evidence import read_evidence
+from core.solve.head_cells import make_head_cells
 from core.solve.marks import Mark, find_marks, is_unlike_shadow
 from core.solve.prior_files import load
 from core.solve.recipes import OURS
@@ -130,7 +131,7 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     images.write_data(capture.shadow_mask, (distance_to(row - 1.5, column + 1.5) < 98).astype(np.float32))
     meshes.write_obj(capture.head, template.load())
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
-    start = initial.start_solve(prior, evidence, torch.from_numpy(TONE), 8.0, recipe)
+    start = initial.start_solve(prior, evidence, torch.from_numpy(TONE), 8.0, recipe, make_head_cells)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
     sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(0))
     result = maps.finish_maps(sampler.sample(start.observations, start.state), evidence, start)

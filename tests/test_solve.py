@@ -20,6 +20,7 @@ from core.imaging import images
 from core.solve import initial, tone
 from core.solve.capture_evidence import read_evidence
 from core.solve.evidence import soften_mask
+from core.solve.head_cells import make_head_cells
 from core.solve.prior_files import WEIGHTS, load
 from core.solve.problem import albedo
 from core.solve.recipes import RECIPES
@@ -179,7 +180,7 @@ def test_the_border_of_a_shadow_on_the_neck_tells_what_is_missing_there(capture)
     images.write_data(capture.shadow_mask_auto, (distance < 0.06).astype(np.float32))
     evidence, prior = read_evidence(capture, read_head(capture), SIZE), load()
     recipe = replace(RECIPES["wildcap"], faint=1.0, reference="uniform", protect_marks=False)
-    start = initial.start_solve(prior, evidence, torch.from_numpy(TONE), 8.0, recipe)
+    start = initial.start_solve(prior, evidence, torch.from_numpy(TONE), 8.0, recipe, make_head_cells)
     neck = (shadow > 0.9) & (template.mask("neck", SIZE) > 0.9) & evidence.covered.numpy()
     assert neck.sum() > 50 and start.observations[1].missing.numpy()[neck].mean() > 0.12
 
@@ -207,7 +208,7 @@ def test_under_the_light_that_the_split_tells_the_skin_has_its_tone(capture):
     side, redder = torch.sigmoid((torch.linspace(0, 1, SIZE) - 0.6) / 0.02), torch.tensor([0.1, 0.4, 0.5])
     face = initial.make_reference(prior, told, evidence, "mean")
     evidence = replace(evidence, texture=albedo(face) * (1 - redder[:, None, None] * side), alpha=0 * evidence.alpha)
-    start = initial.start_solve(prior, evidence, told, 8.0, RECIPES["wildcap"])
+    start = initial.start_solve(prior, evidence, told, 8.0, RECIPES["wildcap"], make_head_cells)
     assert "grid" in {phase for phase, _, _ in start.recipe.phases}, "the split's light is taken"
     o, skin = start.observations[1], evidence.skin
     found = initial.mean_tone(o.texture / o.shader.main(start.state.lights), skin)

@@ -14,6 +14,7 @@ from core.geometry import raster
 from core.geometry.meshes import vertex_normals
 from core.light.spherical_harmonics import sh_basis
 from core.solve import split as skin_or_light
+from core.solve.head_cells import make_head_cells
 from core.solve.split import (
     COLOUR_AXES,
     Scales,
@@ -57,15 +58,18 @@ def lamp(seed, amount):
 def drawn(seed, scales, parts=("traits",)):
     """Log fields [3, S, S] drawn from the model's own Gaussians, at its cells."""
     normal, skin = face()
-    cells = average_cells(Shapes(TONE.expand(3, SIZE, SIZE), TONE.expand(3, SIZE, SIZE), normal, skin), 24)
-    everywhere = skin_or_light.Places(cells.places, cells.normal, cells.varied, np.zeros(len(cells.places), int))
+    cells = average_cells(
+        Shapes(TONE.expand(3, SIZE, SIZE), TONE.expand(3, SIZE, SIZE), normal, skin), make_head_cells(24)
+    )
+    on_head, count = cells.on_head, len(cells.normal)
+    everywhere = skin_or_light.Places(on_head.places, cells.normal, on_head.varied, np.zeros(count, int))
     model = skin_or_light.model_covariances(everywhere, everywhere)
-    rng, values = np.random.default_rng(seed), np.zeros((3, len(cells.places)))
+    rng, values = np.random.default_rng(seed), np.zeros((3, count))
     for part in parts:
-        lower = np.linalg.cholesky(getattr(model, part) + 1e-6 * np.eye(len(cells.places)))
-        drawn = (lower @ rng.standard_normal((len(cells.places), 3))).T
+        lower = np.linalg.cholesky(getattr(model, part) + 1e-6 * np.eye(count))
+        drawn = (lower @ rng.standard_normal((count, 3))).T
         values += getattr(scales, part) * skin_or_light.AXIS_DEVIATIONS[:, None] * drawn
-    return enlarge_field(torch.from_numpy(skin_or_light._spread(COLOUR_AXES.T @ values, cells.covered)), SIZE)
+    return enlarge_field(torch.from_numpy(skin_or_light._spread(COLOUR_AXES.T @ values, on_head)), SIZE)
 
 
 def shapes(log, weight=1.0):
@@ -81,7 +85,7 @@ def deviation(log):
 def test_a_lamp_on_even_skin_is_light_in_strength_and_shape():
     for seed in range(2):
         light = lamp(seed, 0.2)
-        found = split_captures([shapes(light)])
+        found = split_captures([shapes(light)], make_head_cells)
         assert deviation(found.light(face()[0]).log() - light) < 0.02
         assert found.scales.light > found.scales.traits
 
@@ -89,7 +93,7 @@ def test_a_lamp_on_even_skin_is_light_in_strength_and_shape():
 def test_traits_alone_are_mostly_left_to_the_skin():
     scales = Scales(0.2, 0.08, 0.08, 0.07)
     taken = [
-        deviation(split_captures([shapes(traits)]).light(face()[0]).log()) / deviation(traits)
+        deviation(split_captures([shapes(traits)], make_head_cells).light(face()[0]).log()) / deviation(traits)
         for traits in (drawn(seed, scales) for seed in range(3))
     ]
     assert np.mean(taken) < 0.4, taken
@@ -102,7 +106,7 @@ def test_a_lamp_on_a_face_with_traits_is_told_from_them_better_than_by_least_squ
     for seed in range(3):
         light = lamp(seed, 0.08)
         mixed = light + drawn(10 + seed, Scales(0.25, 0.08, 0.08, 0.07))
-        ours.append(deviation(split_captures([shapes(mixed)]).light(normal).log() - light))
+        ours.append(deviation(split_captures([shapes(mixed)], make_head_cells).light(normal).log() - light))
         inside, true = mixed[:, skin > 0].numpy(), light[:, skin > 0].numpy()
         fitted = inside @ np.linalg.pinv(basis) @ basis
         squares.append(float((fitted - true - (fitted - true).mean(1, keepdims=True)).std()))
@@ -111,17 +115,17 @@ def test_a_lamp_on_a_face_with_traits_is_told_from_them_better_than_by_least_squ
 
 def test_exposure_and_the_axes_of_the_world_change_nothing():
     mixed, normal = lamp(0, 0.1) + drawn(5, Scales(0.2, 0.08, 0.08, 0.07)), face()[0]
-    before = split_captures([shapes(mixed)])
-    brighter = split_captures([shapes(mixed + 0.3)])
+    before = split_captures([shapes(mixed)], make_head_cells)
+    brighter = split_captures([shapes(mixed + 0.3)], make_head_cells)
     assert deviation(before.light(normal).log() - brighter.light(normal).log()) < 0.005
     rotation = torch.from_numpy(np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]).float()
     turned = torch.einsum("ij,jhw->ihw", rotation * torch.linalg.det(rotation), normal)
-    there = split_captures([Shapes(TONE * mixed.exp(), TONE.expand(3, SIZE, SIZE), turned, face()[1])])
+    there = split_captures([Shapes(TONE * mixed.exp(), TONE.expand(3, SIZE, SIZE), turned, face()[1])], make_head_cells)
     assert deviation(before.light(normal).log() - there.light(turned).log()) < 0.01
 
 
 def test_the_probability_is_the_gaussians():
-    cells = average_cells(shapes(lamp(1, 0.1)), 12)
+    cells = average_cells(shapes(lamp(1, 0.1)), make_head_cells(12))
     seen, values = join_seen([cells])
     together = skin_or_light.model_covariances(seen, seen)
     scales = skin_or_light.TYPICAL_SCALES
@@ -138,7 +142,7 @@ def test_of_two_captures_what_differs_is_light_and_what_agrees_is_skin():
     traits, local = drawn(3, scales), drawn(4, scales, ("local",))
     lights = lamp(1, 0.15), lamp(2, 0.15)
     first, second = shapes(traits + lights[0] + local), shapes(traits + lights[1])
-    alone, both = split_captures([first]), split_captures([first, second])
+    alone, both = split_captures([first], make_head_cells), split_captures([first, second], make_head_cells)
     alone_left = deviation(lights[0] + local - alone.light(normal).log())
     assert (
         deviation(lights[0] + local - both.light(normal).log() - enlarge_field(torch.from_numpy(both.local), SIZE))
@@ -150,9 +154,11 @@ def test_of_two_captures_what_differs_is_light_and_what_agrees_is_skin():
 
 def test_little_seen_tells_little_of_the_light():
     normal, skin = face()
-    nothing = split_captures([Shapes(TONE.expand(3, SIZE, SIZE), TONE.expand(3, SIZE, SIZE), normal, 0 * skin)])
+    nothing = split_captures(
+        [Shapes(TONE.expand(3, SIZE, SIZE), TONE.expand(3, SIZE, SIZE), normal, 0 * skin)], make_head_cells
+    )
     assert deviation(nothing.light(normal).log()) < 1e-6
     corner = torch.zeros_like(skin)
     corner[160:180, 180:200] = 1
-    cells = average_cells(shapes(lamp(0, 0.2), corner), 48)
+    cells = average_cells(shapes(lamp(0, 0.2), corner), make_head_cells(48))
     assert deviation(infer_split([cells], skin_or_light.TYPICAL_SCALES).light(normal).log()) < 0.2

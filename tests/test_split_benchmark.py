@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks import figures, split, traits
 from benchmarks.measures.table import summarise, to_record
-from core.solve.split import place_cells
+from core.solve.head_cells import place_cells
 from core.training.traits import LargeShapes, deviations_at
 
 

@@ -35,6 +35,7 @@ from core.contract.settings import from_json
 from core.face.head import read_head
 from core.solve import initial, network, network_blocks, prior_files
 from core.solve.capture_evidence import read_evidence
+from core.solve.head_cells import make_head_cells
 from core.solve.memory import sample_within_memory, spare_memory
 from core.solve.prior import Prior, ReleasedPrior, build_network
 from core.solve.recipes import OURS
@@ -193,7 +194,7 @@ def single_steps(row: SolverVariant, capture: Capture, options: argparse.Namespa
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
     evidence = read_evidence(capture, read_head(capture), options.size)
     tone = read_given_tone(TONE).tensor
-    begun = initial.start_solve(prior, evidence, tone, evidence.cell_side(96), recipe)
+    begun = initial.start_solve(prior, evidence, tone, evidence.cell_side(96), recipe, make_head_cells)
     short = replace(begun.recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
     if options.compile:
         prior.network = torch.compile(prior.network)

@@ -30,6 +30,7 @@ from .capture_evidence import read_evidence
 from .draft import restore_maps
 from .edited import solve_edited
 from .evidence import REFERENCE_TEXELS, Evidence
+from .head_cells import make_head_cells
 from .memory import sample_within_memory, spare_memory
 from .prior import ConditionedPrior, Prior
 from .prior_files import load_chosen
@@ -92,6 +93,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         tone.tensor,
         evidence.cell_side(options.grid_cells),
         recipe,
+        make_head_cells,
         others,
         initial.Callbacks(witness, report.check),
     )

@@ -21,7 +21,7 @@ from .problem import Observation, State
 from .problem import albedo as albedo_of
 from .recipes import OURS, Recipe, free_recipe, settle_recipe
 from .solution import Solution
-from .split import Shapes, enlarge_field, split_captures
+from .split import HeadCells, Shapes, enlarge_field, split_captures
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ def start_solve(
     tone: torch.Tensor,
     cell: float,
     recipe: Recipe,
+    head_cells: Callable[[int], HeadCells],
     other_captures: Sequence[Evidence] = (),
     callbacks: Callbacks = NOBODY,
 ) -> Start:
@@ -72,6 +73,7 @@ def start_solve(
     tone : of the skin, linear RGB [3]
     cell : side of a cell of V in texels of a 1024 map
     recipe : of the solve
+    head_cells : C -> the C x C cells of the head whose UVs the evidence is in (`split_captures`)
     other_captures : what is known of other captures of the same person
     callbacks : asked on the way
 
@@ -100,6 +102,7 @@ def start_solve(
                 make_shapes(each, albedo_of(make_reference(prior, tone, each, recipe.reference)))
                 for each in (evidence, *other_captures)
             ],
+            head_cells,
             check=callbacks.check,
         )
         light = told.light(evidence.normal)

@@ -17,7 +17,6 @@ import cv2
 import numpy as np
 import torch
 
-from ..geometry import raster
 from .evidence import Evidence
 
 RADII_TEXELS = tuple(np.geomspace(2.0, 8.0, 6))  # of the blobs that are looked for
@@ -86,7 +85,7 @@ def find_marks(texture: np.ndarray, skin: np.ndarray, texel: float) -> list[Mark
     if not skin.any():
         return []
     log = np.log(np.maximum(texture, 1e-3)).astype(np.float32)
-    log = raster.bleed(log, skin)  # so that the border of what is not skin is no blob
+    log = _bled(log, skin)  # so that the border of what is not skin is no blob
     candidates = _blobs(log.mean(-1), skin, texel)
     measured = [
         mark
@@ -121,6 +120,14 @@ def draw_cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
         reach = 1.3 * mark.radius + 1.5 / texel
         np.maximum(out, np.clip(1.5 + reach - distance, 0, 1), out=out)
     return out
+
+
+def _bled(image: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """[S, S, C] with every texel that is not `known` bool [S, S] given the value of the nearest that is; one is."""
+    _, labels = cv2.distanceTransformWithLabels(
+        (~known).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    return image[known][labels - 1]  # known texels are numbered from 1, row by row
 
 
 def _blobs(log_luminance: np.ndarray, skin: np.ndarray, texel: float) -> list[_Blob]:

@@ -16,6 +16,7 @@ from ..face.head import read_filmed_head
 from ..imaging import images
 from . import initial
 from .capture_evidence import read_evidence
+from .head_cells import make_head_cells
 from .prior_files import load_chosen
 from .recipes import RECIPES
 from .skin_tone import read_given_tone
@@ -40,6 +41,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         tone.tensor,
         CELL_TEXELS,
         recipe,
+        make_head_cells,
         callbacks=initial.Callbacks(check=report.check),
     )
     snapped = np.clip(images.resize(start.alpha.numpy(), width, height), 0, 1)

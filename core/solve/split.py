@@ -6,7 +6,7 @@ In the logarithm a texture is the mean face of the tone, plus this person's trai
 these is taken for a Gaussian:
 
     traits: broad (TRAIT_REACH_M) and mostly alike on the face's two sides (MIRROR_CORRELATION), whichever way the skin
-      faces; larger where skins differ more (weights/traits.json)
+      faces; larger where skins differ more (HeadCells.varied)
     global light: second-order spherical harmonics of the normal, their level free
     local light: what a light leaves that the normal does not tell (a soft shadow, a delighter's mistake), about as
       broad as traits, but of one side
@@ -22,19 +22,14 @@ outcome.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
 import torch
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 
-from ..face import template
-from ..geometry import raster
 from ..light.spherical_harmonics import sh_basis
 
 CELLS, FIRST_CELLS = 48, 24
@@ -46,8 +41,6 @@ TRAIT_REACH_M, MIRROR_CORRELATION = 0.016, 0.72
 """Distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of
 painted skins, midway between taking what light is painted into them for traits and taking it out
 (benchmarks/traits.py)."""
-DATA_FILES = ("weights/traits.json",)
-TRAITS_FILE = Path(__file__).parents[1] / DATA_FILES[0]
 LOCAL_REACH_M, NOISE_REACH_M = 0.020, 0.005
 COLOUR_AXES = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
 """Axes of a log colour along which the parts are taken for independent: brightness, red against blue, green against
@@ -85,8 +78,8 @@ TYPICAL_SCALES, SCALES_DEVIATION = Scales(0.20, 0.08, 0.08, 0.07), 0.6
 
 @dataclass(frozen=True)
 class Shapes:
-    """What is split of a capture. texture and reference albedo [3, S, S] linear, in the built-in head's UVs; normal [3,
-    S, S], unit, in any axes; weight [S, S] in [0, 1]: how far a texel tells of skin, 0 in M."""
+    """What is split of a capture. texture and reference albedo [3, S, S] linear, in the head's UVs; normal [3, S, S],
+    unit, in any axes; weight [S, S] in [0, 1]: how far a texel tells of skin, 0 in M."""
 
     texture: torch.Tensor
     reference: torch.Tensor
@@ -111,22 +104,31 @@ class Split:
 
 
 @dataclass(frozen=True)
-class Cells:
-    """places [N, 3] in metres on the built-in head and normal [N, 3] of all cells of a head; varied [N]: the traits'
-    deviation there over that of the whole face; observed [K]: which of them tell of the skin; log_ratio [K, 3] there:
-    log(texture / reference) along COLOUR_AXES; covered [C, C]: where the N lie."""
+class HeadCells:
+    """The map's C x C cells on a head, alike for all captures. covered bool [C, C]: the N of them that lie on it;
+    places [N, 3], in metres, x towards one side of the face and 0 in its middle; varied [N]: how far skins differ from
+    their mean there, over the face's own mean; nearest int [C, C]: which of the N is nearest to a cell."""
 
+    covered: np.ndarray
     places: np.ndarray
-    normal: np.ndarray
     varied: np.ndarray
+    nearest: np.ndarray
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A capture on the cells of a head: normal [N, 3]; observed [K]: which of them tell of the skin; log_ratio [K, 3]
+    there: log(texture / reference) along COLOUR_AXES."""
+
+    on_head: HeadCells
+    normal: np.ndarray
     observed: np.ndarray
     log_ratio: np.ndarray
-    covered: np.ndarray
 
 
 @dataclass(frozen=True)
 class Places:
-    """at [N, 3] in metres on the built-in head, normal [N, 3], varied [N] as of Cells, and own [N]: the number of the
+    """at [N, 3] in metres on the head, normal [N, 3], varied [N] as of HeadCells, and own [N]: the number of the
     capture."""
 
     at: np.ndarray
@@ -156,56 +158,53 @@ class Covariances:
 
 
 def split_captures(
-    captures: list[Shapes], typical: Scales = TYPICAL_SCALES, check: Callable[[], None] = lambda: None
+    captures: list[Shapes],
+    head_cells: Callable[[int], HeadCells],
+    typical: Scales = TYPICAL_SCALES,
+    check: Callable[[], None] = lambda: None,
 ) -> Split:
-    """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the
-    scales' prior. `check` may raise to cancel."""
+    """Splits the first capture, beside others of the same person where there are any.
+
+    Parameters
+    ----------
+    captures : in the UVs of one head
+    head_cells : C -> the C x C cells of that head
+    typical : the middle of the scales' prior
+    check : may raise to cancel
+    """
     fewer = len(captures) ** -0.5
     most = captures[0].weight.shape[0] // MIN_CELL_TEXELS
-    seen, ratios = join_seen([average_cells(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures])
+    on_head = head_cells(round(min(FIRST_CELLS, most) * fewer))
+    seen, ratios = join_seen([average_cells(shapes, on_head) for shapes in captures])
     scales = find_scales(model_covariances(seen, seen), ratios, typical, check)
-    return infer_split([average_cells(shapes, round(min(CELLS, most) * fewer)) for shapes in captures], scales)
+    on_head = head_cells(round(min(CELLS, most) * fewer))
+    return infer_split([average_cells(shapes, on_head) for shapes in captures], scales)
 
 
-def average_cells(shapes: Shapes, count: int) -> Cells:
-    """A capture as count x count cells."""
+def average_cells(shapes: Shapes, on_head: HeadCells) -> Cells:
+    """A capture on the cells of a head."""
+    covered, count = on_head.covered, len(on_head.covered)
     weight = shapes.weight.numpy().astype(np.float32)
     texture, reference = (np.log(np.maximum(image.numpy(), MIN_LINEAR)) for image in (shapes.texture, shapes.reference))
     ratio = texture - reference
     share = _shrunk(weight, count)
     mean = _shrunk(ratio.transpose(1, 2, 0) * weight[..., None], count) / np.maximum(share, 1e-4)[..., None]
-    places, covered = place_cells(count)
     normal = _shrunk(shapes.normal.numpy().transpose(1, 2, 0), count)[covered].astype(np.float64)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
     seen = np.flatnonzero(share[covered] > MIN_SEEN_SHARE)
-    varied = _shrunk(read_variation(), count)[covered].astype(np.float64)
-    return Cells(places, normal, varied, seen, mean[covered][seen].astype(np.float64) @ COLOUR_AXES.T, covered)
-
-
-@cache
-def read_variation() -> np.ndarray:
-    """[C, C]: how far skins differ from their mean at places of the built-in map, over the face's own mean."""
-    return np.array(json.loads(TRAITS_FILE.read_text(encoding="utf-8"))["deviation"])
-
-
-@cache
-def place_cells(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of count x count cells: where on the built-in head they lie [N, 3], and which of them do [count, count]."""
-    mesh = template.load()
-    face, bary = raster.rasterize_uv(mesh, count)
-    return raster.interpolate(mesh.vertices, mesh.faces, face, bary)[face >= 0], face >= 0
+    return Cells(on_head, normal, seen, mean[covered][seen].astype(np.float64) @ COLOUR_AXES.T)
 
 
 def join_seen(captures: list[Cells]) -> tuple[Places, np.ndarray]:
     """All cells that were observed, and their values [K, 3]."""
     own = np.repeat(np.arange(len(captures)), [len(cells.observed) for cells in captures])
-    return Places(
-        *(
-            np.concatenate([getattr(cells, name)[cells.observed] for cells in captures])
-            for name in ("places", "normal", "varied")
-        ),
-        own,
-    ), np.concatenate([cells.log_ratio for cells in captures])
+    seen = [
+        (cells.on_head.places[cells.observed], cells.normal[cells.observed], cells.on_head.varied[cells.observed])
+        for cells in captures
+    ]
+    return Places(*map(np.concatenate, zip(*seen, strict=True)), own), np.concatenate(
+        [cells.log_ratio for cells in captures]
+    )
 
 
 def model_covariances(rows: Places, columns: Places) -> Covariances:
@@ -279,16 +278,17 @@ def infer_split(captures: list[Cells], scales: Scales) -> Split:
     """The posterior mean of each part of the first capture, under the scales."""
     first, (seen, ratios) = captures[0], join_seen(captures)
     among = model_covariances(seen, seen)
-    beyond = model_covariances(Places(first.places, first.normal, first.varied, np.zeros(len(first.places), int)), seen)
+    on_head, count = first.on_head, len(first.normal)
+    beyond = model_covariances(Places(on_head.places, first.normal, on_head.varied, np.zeros(count, int)), seen)
     basis = SH_SCALE * sh_basis(first.normal[first.observed])
-    traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
+    traits, local, coefficients = np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, 9))
     for axis, size in enumerate(AXIS_DEVIATIONS):
         told = cho_solve(cho_factor(among.covariance(scales, axis)), ratios[:, axis])
         traits[axis] = (scales.traits * size) ** 2 * beyond.traits @ told
         local[axis] = (scales.local * size) ** 2 * beyond.local @ told
         prior = (scales.light * size * ORDER_DEVIATIONS) ** 2 + LEVEL_DEVIATION**2 * (ORDER_DEVIATIONS == 0)
         coefficients[axis] = SH_SCALE * prior * (basis.T @ told[seen.own == 0])
-    maps = (_spread(COLOUR_AXES.T @ field, first.covered) for field in (traits, local))
+    maps = (_spread(COLOUR_AXES.T @ field, on_head) for field in (traits, local))
     return Split(COLOUR_AXES.T @ coefficients, *maps, scales)
 
 
@@ -297,11 +297,9 @@ def enlarge_field(field: torch.Tensor, size: int) -> torch.Tensor:
     return torch.nn.functional.interpolate(field[None], (size, size), mode="bicubic", align_corners=False)[0]
 
 
-def _spread(field: np.ndarray, covered: np.ndarray) -> np.ndarray:
+def _spread(field: np.ndarray, on_head: HeadCells) -> np.ndarray:
     """[3, N] of the covered cells as maps [3, C, C]; what is off the head takes its neighbours' values."""
-    maps = np.zeros((*covered.shape, 3), np.float32)
-    maps[covered] = field.T
-    return raster.bleed(maps, covered).transpose(2, 0, 1)
+    return np.ascontiguousarray(field.T, np.float32)[on_head.nearest].transpose(2, 0, 1)
 
 
 def _shrunk(image: np.ndarray, count: int) -> np.ndarray:

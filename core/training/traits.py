@@ -24,7 +24,8 @@ from ..contract.files import write_json
 from ..face import template
 from ..geometry import raster
 from ..imaging import images
-from ..solve.split import CELLS, TRAITS_FILE, place_cells
+from ..solve.head_cells import TRAITS_FILE, place_cells
+from ..solve.split import CELLS
 from .skins import carried_names, clusters
 
 SIZE, COUNT = 512, 64
