@@ -17,6 +17,7 @@ from core.contract.messages import Problem
 from core.solve import prior_files, released
 from core.solve.network import Condition, denoise
 from core.solve.prior import make_coordinates
+from core.solve.refusals import tell_refusals
 
 CONFIGS = {
     "posenc, patches of 2, attention, variance": (
@@ -216,7 +217,7 @@ def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_p
     write(tmp_path, model, cond, weights_of(model, 3, False))
     x = torch.zeros(1, 7, 16, 16)
     coords = make_coordinates(64, slice(8, 24), slice(32, 48), centred=False)
-    with pytest.raises(Problem, match="fixed random map"):
+    with pytest.raises(Problem, match="fixed random map"), tell_refusals():
         prior_files.load(tmp_path, dtype=torch.float32).of_tone()(x, 1.0, coords)
     noise = np.random.default_rng(0).normal(size=(3, 64, 64)).astype(np.float32)
     np.save(tmp_path / released.NOISE_FILE, noise)

@@ -16,6 +16,7 @@ from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.prior import make_coordinates
 from core.solve.problem import Observation, State
 from core.solve.recipes import RECIPES, Recipe
+from core.solve.refusals import tell_refusals
 from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas, noise_schedule, seed_noise
 
 SIZE = 32
@@ -243,5 +244,5 @@ def test_any_mask_gives_finite_maps(kind, guidance):
 
 def test_divergence_is_a_problem_with_a_remedy():
     o = {1: observation(torch.full((3, SIZE, SIZE), float("nan")))}
-    with pytest.raises(Problem, match="diverged at step 1"):
+    with pytest.raises(Problem, match="diverged at step 1"), tell_refusals():
         Sampler(gaussian_prior, EVEN, seed_noise(0)).sample(o, start())

@@ -36,6 +36,7 @@ from .prior import ConditionedPrior, Prior
 from .prior_files import load_chosen
 from .problem import State, rms_residual
 from .recipes import RECIPES, Recipe, free_recipe
+from .refusals import tell_refusals
 from .sampler import Sampler, seed_noise
 from .solution import Solution
 from .together import read_others
@@ -47,6 +48,7 @@ FAINT_WEIGHT = 1.4
 by local light (Recipe.faint)."""
 
 
+@tell_refusals()
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """texture, confidence, head and masks -> maps/ (see maps.py for their colour spaces), comparison/, preview/, and
     two pictures for the report.

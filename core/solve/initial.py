@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 
 import torch
 
-from ..contract.messages import Problem
 from .border import measure_missing_light
 from .edges import snap_to_edges
 from .evidence import Evidence, grid_cells, make_observations
@@ -22,6 +21,10 @@ from .problem import albedo as albedo_of
 from .recipes import OURS, Recipe, free_recipe, settle_recipe
 from .solution import Solution
 from .split import HeadCells, Shapes, enlarge_field, split_captures
+
+
+class NoSkinError(ValueError):
+    """Nothing was seen of the facial skin."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,7 @@ class Callbacks:
     check: Callable[[], None] = lambda: None
 
 
-NOBODY = Callbacks()
+NO_CALLBACKS = Callbacks()
 
 
 def start_solve(
@@ -62,7 +65,7 @@ def start_solve(
     recipe: Recipe,
     head_cells: Callable[[int], HeadCells],
     other_captures: Sequence[Evidence] = (),
-    callbacks: Callbacks = NOBODY,
+    callbacks: Callbacks = NO_CALLBACKS,
 ) -> Start:
     """All that a run begins with.
 
@@ -79,7 +82,7 @@ def start_solve(
 
     Raises
     ------
-    Problem
+    NoSkinError
         Where no facial skin was seen.
     """
     lit = weigh_lit_skin(evidence)
@@ -129,7 +132,7 @@ def start_again(
     cell: float,
     recipe: Recipe,
     near: torch.Tensor,
-    callbacks: Callbacks = NOBODY,
+    callbacks: Callbacks = NO_CALLBACKS,
 ) -> Start:
     """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and its mask but for the
     edit's surroundings.
@@ -198,16 +201,13 @@ def find_remaining_light(evidence: Evidence, begun: Start) -> torch.Tensor:
 
 
 def weigh_lit_skin(evidence: Evidence) -> torch.Tensor:
-    """[S, S]: how far a texel tells of the skin in the light, 0 in shadows. Raises Problem where no facial skin was
-    seen."""
+    """[S, S]: how far a texel tells of the skin in the light, 0 in shadows. Raises NoSkinError where no facial skin
+    was seen."""
     lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
     if lit.sum() < 1:  # everything on the face is masked: the least evil is to trust it all
         lit = evidence.skin * evidence.weight
     if lit.sum() < 1:
-        raise Problem(
-            "No facial skin was seen in the texture.",
-            "Look at the texture in the report; film the face from the front and from both sides.",
-        )
+        raise NoSkinError("No facial skin was seen in the texture.")
     return lit
 
 

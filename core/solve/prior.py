@@ -13,12 +13,14 @@ from dataclasses import replace
 
 import torch
 
-from ..contract.messages import Problem
-from . import released
 from .network import Condition, UNet, UNetLayout, denoise
 
 BLIND_SIGMA = 80.0  # noise level of a channel of which nothing is seen
 CLEAR_SIGMA = 0.01  # ... and of one that is known
+
+
+class MissingMapError(ValueError):
+    """A prior is to sample without the fixed random map that it is conditioned on."""
 
 
 class Prior:
@@ -136,12 +138,9 @@ class ReleasedPrior(Prior):
         return self
 
     def check(self) -> None:
-        """Raises Problem where it loads but cannot sample."""
+        """Raises MissingMapError where it loads but cannot sample."""
         if self.kind == "noise" and self.noise is None:
-            raise Problem(
-                "This prior is conditioned on a fixed random map, which is not in its folder.",
-                f"Save the map it was trained with beside ckpt.pth as {released.NOISE_FILE}, float32 of shape 3, S, S.",
-            )
+            raise MissingMapError("This prior is conditioned on a fixed random map, which is not in its folder.")
 
     def of_tone(self, tone: torch.Tensor | None = None) -> ConditionedPrior:
         """It takes no tone: the same for everybody."""
@@ -154,7 +153,7 @@ class ReleasedPrior(Prior):
         return maps
 
     def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> Condition:
-        """The encoded coordinates, or the fixed random map there. Raises Problem where that is missing."""
+        """The encoded coordinates, or the fixed random map there. Raises MissingMapError without that."""
         self.check()
         if self.kind != "noise":
             return Condition(positional_encoding(coords, self.octaves))

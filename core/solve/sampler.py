@@ -17,11 +17,14 @@ from dataclasses import dataclass
 
 import torch
 
-from ..contract.messages import Problem
 from .light_fit import update_lights
 from .lighting import Lights, interpolation_matrix
 from .problem import Observation, State, albedo, blur_maps, photometric_loss
 from .recipes import Recipe
+
+
+class DivergedError(ArithmeticError):
+    """The numbers of a walk left all bounds, or are none."""
 
 
 def seed_noise(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Callable]:
@@ -58,8 +61,8 @@ class Sampler:
     ) -> State:
         """Samples from `state` to the end and returns the final state; `denoised` is the solved map, `lights` theta.
 
-        `observations` maps a coarsening factor to what is known at that size. Raises Problem when the numbers leave all
-        bounds.
+        `observations` maps a coarsening factor to what is known at that size. Raises DivergedError when the numbers
+        leave all bounds.
         """
         sigmas = noise_schedule(self.recipe)
         steps = len(sigmas) - 1
@@ -75,10 +78,7 @@ class Sampler:
                 state.moments = [moment * grown ** (1 + k % 2) for k, moment in enumerate(state.moments)]
             self.step(o, state, (s, sigmas[i + 1]), steps, draw)
             if not state.x.abs().max() <= 1e3 * (1 + s):  # nor where it is no number
-                raise Problem(
-                    f"The solver diverged at step {i + 1} of {steps}.",
-                    "Check that the texture and the mask are those of this head, or choose the proximal guidance.",
-                )
+                raise DivergedError(f"The solver diverged at step {i + 1} of {steps}.")
             on_step(state, steps)
         return state
 

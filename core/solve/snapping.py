@@ -19,6 +19,7 @@ from .capture_evidence import read_evidence
 from .head_cells import make_head_cells
 from .prior_files import load_chosen
 from .recipes import RECIPES
+from .refusals import tell_refusals
 from .skin_tone import read_given_tone
 from .tone import estimate_from_texture
 
@@ -26,6 +27,7 @@ CELL_TEXELS = 8.0
 """Texels of a 1024 map per light of the grid: none is fitted here, but a start lays them out."""
 
 
+@tell_refusals()
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """The artist's mask, or the proposal -> shadow_mask_edges.png, 8 bit grey, of the texture's size."""
     report.progress(0, 2, "reading the texture, the head and the masks")

@@ -18,12 +18,14 @@ from .evidence import Evidence
 from .initial import weigh_lit_skin
 from .look import mean_best_lit, read_look
 from .population import estimate_from_scene, estimate_from_white
+from .refusals import tell_refusals
 from .skin_tone import EARLIER, SCENE, TEXTURE, SkinTone, read_given_tone
 
 TONE_SIDE_TEXELS = 256
 """Side at which the mean is taken: it needs no detail."""
 
 
+@tell_refusals()
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Leaves the figures of `tell_skin_tone`. Raises Problem where no facial skin was seen."""
     report.progress(0, 1, "reading the texture, the head and the masks")
@@ -48,7 +50,9 @@ def resolve_skin_tone(
     Raises
     ------
     Problem
-        For a setting that is no colour, and where no facial skin was seen.
+        For a setting that is no colour.
+    NoSkinError
+        Where no facial skin was seen.
     """
     return read_given_tone(settings.solve.skin_tone) or estimate_skin_tone(capture, head, settings, evidence, report)
 
@@ -66,7 +70,7 @@ def estimate_skin_tone(
 
 
 def estimate_from_texture(evidence: Evidence) -> SkinTone:
-    """The tone that the texture tells. Raises Problem where no facial skin was seen."""
+    """The tone that the texture tells. Raises NoSkinError where no facial skin was seen."""
     lit = weigh_lit_skin(evidence).numpy()
     colours = evidence.texture.numpy().transpose(1, 2, 0)
     return estimate_from_scene(mean_best_lit(colours[lit > 0], lit[lit > 0]), TEXTURE)
