@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who may import whom, read from the sources: where a file lies says it, and no module is named here."""
+"""Who may import whom, read from the sources: where a file lies says it. Named here are the solver's modules alone,
+which lie among those of their stage."""
 
 import ast
 import sys
@@ -21,6 +22,17 @@ FLOORS = (("contract",), ("imaging",), ("geometry",), ("face", "light"))
 """Rooms that the stages share, from the bottom up: each imports the floors below its own, and itself."""
 SHARED = tuple(room for floor in FLOORS for room in floor)
 STAGES = {step.module.split(".")[1] for step in (*stages.STAGES, *stages.TOOLS)}
+SOLVER = [
+    f"core.solve.{name}"
+    for name in (
+        *("lighting", "problem", "sampler", "light_fit", "recipes", "initial", "prior", "network", "network_blocks"),
+        *("draft", "border", "edges", "marks", "split", "evidence", "solution"),
+    )
+]
+"""The paper as functions of tensors: no file, no capture, no mesh."""
+SOLVER_LIBRARIES = {"torch", "numpy", "scipy", "cv2"}
+SOLVER_FILES = {"json", "pathlib", "os", "io", "shutil", "tempfile", "pickle"}
+"""Of the standard library, what reads and writes files."""
 BPY = {"core/synthetic/render.py", "core/synthetic/people/render.py"}
 
 
@@ -149,6 +161,31 @@ def test_a_stage_imports_shared_rooms_and_itself():
     inside = [i for i in INSIDE if own_room(i.file) in STAGES]
     assert len({own_room(i.file) for i in inside}) == len(STAGES)
     _none(i for i in inside if room(i.target) not in (*SHARED, own_room(i.file)))
+
+
+def foreign_to_the_solver(found: list[Import]) -> list[Import]:
+    """What is neither the solver's own, nor of light/, nor a library that computes."""
+    return [
+        i
+        for i in found
+        if (
+            i.target not in SOLVER and room(i.target) != "light"
+            if i.level
+            else i.target.split(".")[0] not in (sys.stdlib_module_names | SOLVER_LIBRARIES) - SOLVER_FILES
+        )
+    ]
+
+
+def test_the_solver_knows_tensors_alone():
+    found = imports(*(name.replace(".", "/") + ".py" for name in SOLVER))
+    assert {i.file for i in found} == {name.replace(".", "/") + ".py" for name in SOLVER}
+    assert not [str(i) for i in foreign_to_the_solver(found)]
+    planted = [
+        Import("core/solve/prior.py", 1, level, target, True)
+        for level, target in ((2, "core.contract.messages"), (1, "core.solve.maps"), (1, "core.solve"))
+        + ((0, "json"), (0, "safetensors.torch"))
+    ]
+    assert foreign_to_the_solver(planted) == planted
 
 
 def test_other_rooms_import_no_stage():
