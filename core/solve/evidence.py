@@ -18,7 +18,7 @@ from .recipes import Recipe
 
 REFERENCE_TEXELS = 1024  # lengths in texels are given for maps of this size
 MASK_FADE_TEXELS = 2.0  # deviation in texels over which a hard mask's border fades
-# texels of REFERENCE_TEXELS over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels
+# texels of REFERENCE_TEXELS over which the cells of V are counted, as in the paper: 96 of them are of 8 texels
 FACE_CROP_TEXELS = 768
 
 
@@ -71,8 +71,8 @@ class Evidence:
         return self.extent.side / self.size
 
     def cell_side(self, grid_cells: int) -> float:
-        """The side of a cell of V, in texels where the whole map has REFERENCE_TEXELS, when settings.solve.grid_cells
-        of them are asked for."""
+        """The side of a cell of V, in texels where the whole map has REFERENCE_TEXELS, when `grid_cells` of them are
+        asked for across the face."""
         return FACE_CROP_TEXELS / grid_cells * REFERENCE_TEXELS / self.extent.side
 
 
