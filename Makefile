@@ -27,18 +27,18 @@ IN_BLENDER = addon artists_work captures setup evidence choices eyedropper white
 .PHONY: demo test test-failed results test-blenders test-gui test-gui-newest zip site clean
 
 demo: $(VENV)/installed
-	$(BIN)/python -m benchmarks.demo $(DEMO)
+	$(BIN)/python -m research.benchmarks.demo $(DEMO)
 
 test: $(VENV)/installed
-	$(BIN)/ruff check core wildcap_addon tests benchmarks
+	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
 	rm -rf .reached
 	$(BIN)/python -m pytest tests --ignore=tests/gui --ignore=tests/test_messages_reached.py --numprocesses auto --maxprocesses 4 --dist loadfile --reached .reached
 	$(BIN)/python -m pytest tests/test_messages_reached.py --messages --reached .reached
 
-# The pages of docs/results, out of the records that the benchmarks left in docs/figures.
+# The pages of docs/results, out of the records that the benchmarks left in research/records.
 results: $(VENV)/installed
-	$(BIN)/python -m benchmarks.results
+	$(BIN)/python -m research.benchmarks.results
 
 # What failed in `make test`, once more by itself: a shared machine may stand still for as long as a test waits.
 test-failed: $(VENV)/installed

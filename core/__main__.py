@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """python -m core: run, batch, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks, doctor,
-self-test, install, wheels, report-problem, train.
+self-test, install, wheels, report-problem.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import importlib.util
 import signal
 import sys
 import tempfile
@@ -19,17 +18,10 @@ from pathlib import Path
 
 from . import __version__
 from .batch import command_line as batch_commands
-from .contract import (
-    consent,
-    delighter_cards,
-    delivery_plan,
-    delivery_presets,
-    settings,
-    stages,
-    unforeseen,
-)
-from .contract.capture import Capture
-from .contract.messages import Problem
+from .capture import consent, delivery_plan, stages, unforeseen
+from .capture.capture import Capture
+from .capture.messages import Problem
+from .settings import delighter_cards, delivery_presets, settings
 from .worker import capture_commands, command_settings, read_only, self_test, setup_commands, terminal
 from .worker.commands import add_command
 from .worker.job import last_settings, wait_until_free, write_job
@@ -44,8 +36,6 @@ def main(arguments: list[str] | None = None) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
-        if arguments[:1] == ["train"]:  # its options are its own
-            return _train(arguments[1:])
         options = _parser().parse_args(arguments)
         return options.command(options)
     except Problem as problem:
@@ -85,10 +75,6 @@ def _parser() -> argparse.ArgumentParser:
     test.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto")
     batch_commands.add_commands(commands)
     setup_commands.add_commands(commands)
-    commands.add_parser(
-        "train",
-        help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help",
-    )
     return parser
 
 
@@ -225,9 +211,9 @@ def _delighters(options: argparse.Namespace) -> int:
 
 
 def _white(options: argparse.Namespace) -> int:
-    from .contract.messages import Reporter
+    from .capture.messages import Reporter
     from .imaging.images import read_srgb  # these need OpenImageIO, OpenCV and torch
-    from .solve import white_point
+    from .stages.solve import white_point
 
     capture = Capture(options.capture)
     if bool(options.frame) != bool(options.at):
@@ -262,17 +248,6 @@ def _self_test(options: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory(prefix="wildcap_self_test_") as folder:
         capture = self_test.prepare(Path(folder), device=options.device)
         return terminal.follow(ROOT, capture, capture.job, {})
-
-
-def _train(arguments: list[str]) -> int:
-    """Hands over to core/training, which is not part of the installed extension."""
-    name = arguments[0] if arguments else ""
-    if not name.isidentifier() or importlib.util.find_spec(f"{__package__}.training.{name}") is None:
-        raise Problem(
-            f"There is nothing to train named {name!r}." if name else "The name of what to train is missing.",
-            "Try `python -m core train prior --help` in a source checkout.",
-        )
-    return importlib.import_module(f".training.{name}", __package__).main(arguments[1:]) or 0
 
 
 if __name__ == "__main__":

@@ -8,11 +8,10 @@ import time
 from pathlib import Path
 
 from core.batch import record
-from core.contract import processes, stages
-from core.contract.capture import Capture
-from core.contract.settings import Settings
-
-from . import standin
+from core.capture import processes, stages
+from core.capture.capture import Capture
+from core.settings.settings import Settings
+from tests import standin
 
 BEFORE_MASK = stages.STAGES[: stages.NAMES.index(stages.MASK_STAGE) + 1]
 

@@ -16,10 +16,9 @@ from pathlib import Path
 
 import pytest
 
-import core.contract.messages
+import core.capture.messages
 from core.worker.client import SPINS, THREAD_VARIABLES
-
-from . import deprecations, message_sites
+from tests import deprecations, message_sites
 
 ROOT = Path(__file__).resolve().parent.parent
 MODULE = "bl_ext.user_default.wildcap"
@@ -64,7 +63,7 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     config.pluginmanager.register(deprecations.Watch(ROOT))
-    message_sites.watch_problems(core.contract.messages.Problem)
+    message_sites.watch_problems(core.capture.messages.Problem)
     if config.option.reached:
         message_sites.take_in(config.option.reached)
 
@@ -115,7 +114,7 @@ def enabled_extension():
     repository.mkdir(parents=True, exist_ok=True)
     (repository / "wildcap").symlink_to(ROOT, target_is_directory=True)
     assert addon_utils.enable(MODULE, default_set=True) is not None, "Blender could not enable the extension"
-    message_sites.watch_problems(import_module(f"{MODULE}.core.contract.messages").Problem)
+    message_sites.watch_problems(import_module(f"{MODULE}.core.capture.messages").Problem)
     message_sites.watch_reasons(import_module(f"{MODULE}.wildcap_addon.base_operator").BaseOperator)
     yield MODULE
     addon_utils.disable(MODULE, default_set=True)
@@ -143,7 +142,7 @@ def capture(tmp_path, wildcap):
     """An open, solved capture in a folder with a space and an accent."""
     import bpy
 
-    from . import standin
+    from tests import standin
 
     root = standin.make(tmp_path / "Zoë et moi" / "head.wildcap")
     bpy.ops.wildcap.open_capture(directory=str(root))
@@ -154,7 +153,7 @@ def capture(tmp_path, wildcap):
 def batches(addon, monkeypatch, tmp_path):
     """The add-on's view of batches, over a chain of tiny rooms; no batch of a test is left running, or known to the
     next one."""
-    from . import batch_faces, tiny_chain
+    from tests import batch_faces, tiny_chain
 
     module, running = addon("batches"), addon("batch.running")
     monkeypatch.setattr(addon("jobs"), "ROOT", tiny_chain.build(tmp_path / "code"))

@@ -9,17 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import Message
-from core.contract.settings import Settings
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Message
 from core.geometry import meshes
 from core.imaging import images
+from core.settings.settings import Settings
 from core.worker.job import write_job
 from core.worker.runner import run_job
-
-from . import standin
-from .recorded import make_entry
+from tests import standin
+from tests.recorded import make_entry
 
 SIDE = 16
 NORMALS = (

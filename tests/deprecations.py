@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-OURS = {"core", "wildcap_addon", "benchmarks", "tests"}
+OURS = {"core", "wildcap_addon", "research", "tests"}
 DEPRECATIONS = DeprecationWarning, PendingDeprecationWarning, FutureWarning
 FORKED = "use of fork() may lead to deadlocks"
 """Of Python 3.12 and newer beside other threads, as pytest-xdist has them. Nothing is to be removed, and those who fork

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from . import standin
-from .recorded import make_entry
+from tests import standin
+from tests.recorded import make_entry
 
 
 def make(root):

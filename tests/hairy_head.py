@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 
 from core.face import template
-from core.synthetic.parameters import sample_parameters
-from core.synthetic.skin import make_skin
-from core.upscale.maps import HeadMaps
-from core.upscale.surface import HeadSurface, lay_out
+from core.stages.upscale.maps import HeadMaps
+from core.stages.upscale.surface import HeadSurface, lay_out
+from research.people.parameters import sample_parameters
+from research.people.skin import make_skin
 
 SIZE = 256
 

@@ -5,9 +5,9 @@ is tested with."""
 
 from pathlib import Path
 
-from core.contract import ownership
-from core.contract.capture import Capture
-from core.contract.files import replacing_folder
+from core.capture import ownership
+from core.capture.capture import Capture
+from core.capture.files import replacing_folder
 
 
 def make(root: Path) -> Capture:

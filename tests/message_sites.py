@@ -18,9 +18,9 @@ ROOT = Path(__file__).resolve().parent.parent
 PLACES = (
     "wildcap_addon",
     "core/worker",
-    "core/contract/capture.py",
-    "core/contract/settings.py",
-    "core/contract/setting_values.py",
+    "core/capture/capture.py",
+    "core/settings/settings.py",
+    "core/settings/setting_values.py",
 )
 REASONS = "wildcap_addon/base_operator.py"  # the one file that hands a reason to Blender
 _reached: set[tuple[str, int]] = set()  # (file relative to the root, line that is being carried out)

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core import registration
-from core.contract.capture import Capture
-from core.contract.messages import Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.messages import Reporter
 from core.face import template as built_in
 from core.geometry import meshes
 from core.geometry.meshes import Mesh
-from core.registration import own_mesh, own_template, render_landmarks
+from core.settings.settings import from_json
+from core.stages import registration
+from core.stages.registration import own_mesh, own_template, render_landmarks
 
 
 @cache

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 import torch
 
-from core.contract.capture import Capture
-from core.contract.colour_values import format_skin_tone
-from core.contract.settings import Settings, from_json
+from core.capture.capture import Capture
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-from core.solve import initial
-from core.solve.prior_files import load
-from core.solve.recipes import RECIPES
-from core.solve.skin_tone import GIVEN, SkinTone
+from core.settings.colour_values import format_skin_tone
+from core.settings.settings import Settings, from_json
+from core.solver import start as initial
+from core.solver.recipes import RECIPES
+from core.stages.solve.prior_files import load
+from core.stages.solve.skin_tone import GIVEN, SkinTone
 
 SIZE = 128
 TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pycolmap
 
-from core.contract.capture import Capture
+from core.capture.capture import Capture
 from core.face import template
 from core.geometry import meshes, raster
 from core.geometry.meshes import Mesh

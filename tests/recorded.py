@@ -4,10 +4,10 @@
 
 from pathlib import Path
 
-from core.contract import freshness, stages
-from core.contract.capture import Capture
-from core.contract.settings import Settings
-from core.contract.stages import Stage
+from core.capture import freshness, stages
+from core.capture.capture import Capture
+from core.capture.stages import Stage
+from core.settings.settings import Settings
 
 FRAMES, CAMERAS = stages.by_name("frames"), stages.by_name("cameras")
 

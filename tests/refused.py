@@ -4,7 +4,7 @@
 
 import pytest
 
-from core.contract.messages import Problem
+from core.capture.messages import Problem
 
 
 def refused(call, *words: str) -> Problem:

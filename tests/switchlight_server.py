@@ -11,7 +11,7 @@ from email import message_from_bytes, policy
 from hashlib import sha256
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
-from . import standin
+from tests import standin
 
 KEY = "sk-Zoe-4711-do-not-tell"
 

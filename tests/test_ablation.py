@@ -5,11 +5,11 @@
 import numpy as np
 import pytest
 
-from benchmarks import ablation, uv_problems
-from benchmarks.ablation_measures import measure_regions, summary, table
 from core.face import template
 from core.imaging import images
-from core.synthetic.light import SkyAndSun, bake
+from research.benchmarks import ablation, uv_problems
+from research.benchmarks.ablation_measures import measure_regions, summary, table
+from research.people.light import SkyAndSun, bake
 
 
 @pytest.fixture(autouse=True)

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.capture import Capture
-
-from . import standin
-from .recorded import make_entry
+from core.capture.capture import Capture
+from tests import standin
+from tests.recorded import make_entry
 
 bpy = pytest.importorskip("bpy")
 
@@ -208,8 +207,8 @@ def drawn(panel) -> list[tuple]:
 
 
 def test_what_is_wrong_with_a_video_stands_in_the_tab(addon, capture):
-    from core.contract.capture import Capture
-    from core.contract.messages import Problem
+    from core.capture.capture import Capture
+    from core.capture.messages import Problem
 
     doctor, status = addon("panel").WILDCAP_PT_doctor, addon("status")
     status.refresh(bpy.context)

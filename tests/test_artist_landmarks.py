@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from core import __main__ as cli
-from core import registration
-from core.contract import artist_landmarks, stages
-from core.contract.capture import Capture
-from core.contract.files import write_json
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import Settings, from_json
+from core.capture import artist_landmarks, stages
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from core.capture.messages import Problem, Reporter
 from core.geometry import meshes
-
-from .recorded import changed, record
-from .test_registration import _capture, known  # noqa: F401
+from core.settings.settings import Settings, from_json
+from core.stages import registration
+from tests.recorded import changed, record
+from tests.test_registration import _capture, known  # noqa: F401
 
 MOUTH_CORNER = 61
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from . import standin
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 

@@ -10,8 +10,7 @@ import pytest
 
 from core.geometry import atlas, meshes, surfaces
 from core.geometry.meshes import Mesh
-
-from .egg import egg
+from tests.egg import egg
 
 
 @pytest.fixture(scope="module")

@@ -10,13 +10,12 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.contract import sample_head
-from core.contract.capture import Capture
-from core.contract.files import AWAY, replacing, replacing_folder, storage_problem
-from core.contract.messages import Problem
+from core.capture import sample_head
+from core.capture.capture import Capture
+from core.capture.files import AWAY, replacing, replacing_folder, storage_problem
+from core.capture.messages import Problem
 from core.worker import read_only
-
-from . import delivered
+from tests import delivered
 
 
 def contents(folder: Path) -> dict:

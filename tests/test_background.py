@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from core.contract.messages import Cancelled, CancelledError, Done, Problem
+from core.capture.messages import Cancelled, CancelledError, Done, Problem
 from core.worker.background import BackgroundTask
 
 

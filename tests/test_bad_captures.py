@@ -8,20 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core import cameras, frames, registration, scan
-from core.cameras import coverage, solving
-from core.cameras.mirrored import find_mirrored
-from core.cameras.motion import expression_changes
-from core.contract.capture import Capture
-from core.contract.frame_records import VIDEO, FrameRecord, Frames
-from core.contract.messages import Reporter
-from core.contract.settings import Settings, from_json
+from core.capture.capture import Capture
+from core.capture.frame_records import VIDEO, FrameRecord, Frames
+from core.capture.messages import Reporter
 from core.face import faces, template
 from core.face.head import read_head
 from core.geometry.views import read_views
 from core.imaging import images
-from core.synthetic import painted_head
-from core.synthetic.painted_head import place_camera
+from core.settings.settings import Settings, from_json
+from core.stages import cameras, frames, registration, scan
+from core.stages.cameras import coverage, solving
+from core.stages.cameras.mirrored import find_mirrored
+from core.stages.cameras.motion import expression_changes
+from research.people import painted_head
+from research.people.painted_head import place_camera
 
 
 def place(azimuth_deg, elevation_deg=0.0) -> np.ndarray:

@@ -21,12 +21,11 @@ import numpy as np
 import pytest
 from skimage.data import astronaut
 
-from core.contract.capture import Capture
-from core.contract.messages import Cancelled, Failed, Progress, StageDone
+from core.capture.capture import Capture
+from core.capture.messages import Cancelled, Failed, Progress, StageDone
 from core.worker.client import Worker
 from core.worker.job import write_job
-
-from .tiny_chain import follow
+from tests.tiny_chain import follow
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE = ROOT / "core" / "synthetic" / "sample" / "capture.mp4"
@@ -130,7 +129,7 @@ def test_accents_and_spaces_in_every_path(face, tmp_path):
     shutil.copytree(
         ROOT / "core",
         root / "core",
-        ignore=shutil.ignore_patterns("__pycache__", "sample_head", "training", "synthetic"),
+        ignore=shutil.ignore_patterns("__pycache__", "sample_head"),
     )
     capture = Capture(tmp_path / "mes visages" / "été 🙂.wildcap")
     command = [sys.executable, "-B", "-m", "core", "run", str(face), str(capture.root), "--until", "frames"]

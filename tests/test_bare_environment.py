@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.messages import Problem
+from core.capture.messages import Problem
 from core.worker import bare_environment, environment, pip_source
 
 PIP = "pip-0.1-py3-none-any.whl"

@@ -20,11 +20,10 @@ from core.batch import gate, lines, local
 from core.batch.known_hashes import known_hashes
 from core.batch.record import read_batch
 from core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, derive_state
-from core.contract import hashes, lease
-from core.contract.messages import Problem, Progress
-
-from . import tiny_batch
-from .tiny_batch import core, finished, make, states
+from core.capture import hashes, lease
+from core.capture.messages import Problem, Progress
+from tests import tiny_batch
+from tests.tiny_batch import core, finished, make, states
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,10 @@ from pathlib import Path
 import pytest
 
 from core.batch import gate, record, state
-from core.contract.capture import Capture
-
-from . import batch_faces, standin
-from .drawn import drawn
-from .test_refusals import refuses
+from core.capture.capture import Capture
+from tests import batch_faces, standin
+from tests.drawn import drawn
+from tests.test_refusals import refuses
 
 bpy = pytest.importorskip("bpy")
 

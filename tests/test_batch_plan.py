@@ -12,8 +12,8 @@ import pytest
 from core.__main__ import main
 from core.batch.record import read_batch
 from core.batch.shots import read_faces
-from core.contract import lease
-from core.contract.messages import Problem
+from core.capture import lease
+from core.capture.messages import Problem
 
 
 @pytest.fixture

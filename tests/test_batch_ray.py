@@ -3,7 +3,7 @@
 """Batches on Ray, over rooms of a few lines: what dies is done again, what was done is not, and whatever is lacking is
 told in one line.
 
-Two nodes in namespaces of their own, real stages, and a node that dies, are `python -m benchmarks.farm`."""
+Two nodes in namespaces of their own, real stages, and a node that dies, are `python -m research.benchmarks.farm`."""
 
 import collections
 import json
@@ -19,20 +19,19 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import same_maps
 from core import __version__
 from core.__main__ import main
 from core.batch import local, ray_cluster, ray_connection, ray_task
 from core.batch.groups import group_named
 from core.batch.record import NAME, read_batch
 from core.batch.state import DONE, STOPPED, TO_DO, WAITING, FaceState
-from core.contract import lease, stages
-from core.contract.hashes import hash_file
-from core.contract.messages import Problem
+from core.capture import lease, stages
+from core.capture.hashes import hash_file
+from core.capture.messages import Problem
 from core.worker.client import THREAD_VARIABLES
-
-from . import tiny_batch, tiny_chain
-from .tiny_batch import core, finished, make, states
+from research.benchmarks import same_maps
+from tests import tiny_batch, tiny_chain
+from tests.tiny_batch import core, finished, make, states
 
 ROOT = Path(__file__).resolve().parent.parent
 WAIT_S = 90  # for what takes seconds where nothing else is computed
@@ -195,7 +194,7 @@ def test_a_task_of_ours_that_died_is_waited_for(code, tmp_path, monkeypatch):
     monkeypatch.setattr("core.batch.task.ROOT", code)
     words = str(batch.root), "a", "head", 1
     hold = (
-        "import sys; from core.contract.capture import Capture\nwith Capture(sys.argv[1]).locked(): "
+        "import sys; from core.capture.capture import Capture\nwith Capture(sys.argv[1]).locked(): "
         "print(flush=True); input()"
     )
     holding = [sys.executable, "-c", hold, capture.root]
@@ -243,8 +242,8 @@ def test_an_address_that_cannot_be_reached_is_told_in_seconds(code, tmp_path, ca
 
 @pytest.mark.skipif(os.name == "nt", reason="links to folders take rights there")
 def test_real_stages_on_ray_give_the_bytes_of_a_local_run(tmp_path, monkeypatch):
-    """One head, from twelve frames of the sample; the whole chain is `python -m benchmarks.farm`, for it takes 40 s of
-    a core a capture."""
+    """One head, from twelve frames of the sample; the whole chain is `python -m research.benchmarks.farm`, for it takes
+    40 s of a core a capture."""
     for name in THREAD_VARIABLES:
         monkeypatch.setenv(name, "1")
     code = tmp_path / "code"
@@ -260,7 +259,7 @@ def test_real_stages_on_ray_give_the_bytes_of_a_local_run(tmp_path, monkeypatch)
     }
     (tmp_path / "small.json").write_text(json.dumps(settings))
     shots = tmp_path / "shots.csv"
-    shots.write_text(f"video,name\n{ROOT / 'core/synthetic/sample/capture.mp4'},one\n")
+    shots.write_text(f"video,name\n{ROOT / 'research/people/sample/capture.mp4'},one\n")
     running = []
     for name, words in (("local", ("--on", "local")), ("ray", ("--on", "ray", "--cores", 1))):
         assert (

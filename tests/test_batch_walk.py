@@ -10,11 +10,10 @@ import time
 import pytest
 
 from core.batch import gate, state
-from core.contract.settings import from_json, preset
-
-from . import batch_faces
-from .drawn import buttons, drawn
-from .test_refusals import refuses
+from core.settings.settings import from_json, preset
+from tests import batch_faces
+from tests.drawn import buttons, drawn
+from tests.test_refusals import refuses
 
 bpy = pytest.importorskip("bpy")
 

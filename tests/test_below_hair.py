@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.delight.below_hair import complete_shading, fill_features, fill_hair
-from core.delight.evening import ShadingEstimate
+from core.stages.delight.below_hair import complete_shading, fill_features, fill_hair
+from core.stages.delight.evening import ShadingEstimate
 
 
 def slope(side: int = 40) -> np.ndarray:

@@ -1,15 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What benchmarks put into their records has the keys by which benchmarks/results asks for it."""
+"""What benchmarks put into their records has the keys by which research/benchmarks/results asks for it."""
 
 import json
 
 import pytest
 
-from benchmarks import figures, shadow_mask, skin_tone, whole_chain
-from core.contract.capture import Capture
-
-from .recorded import make_entry
+from core.capture.capture import Capture
+from research.benchmarks import figures, shadow_mask, skin_tone, whole_chain
+from tests.recorded import make_entry
 
 
 def test_tones_are_summed_up_by_group():

@@ -8,12 +8,11 @@ import sys
 
 import pytest
 
-from core.synthetic.blender_module import without_numpy_1
-
-from .conftest import ROOT
+from research.people.blender_module import without_numpy_1
+from tests.conftest import ROOT
 
 ENABLED = """import os
-from benchmarks.render_capture import extension
+from research.benchmarks.render_capture import extension
 with extension():
     import bpy
     print("in", bpy.app.version_string, flush=True)
@@ -29,7 +28,7 @@ def test_the_extension_is_enabled_without_a_word_of_numpys():
 
 
 @pytest.mark.parametrize(
-    "renderer", ["core.synthetic.render", "core.synthetic.people.render", "benchmarks.long_films_render"]
+    "renderer", ["research.people.render", "research.people.lifelike.render", "research.benchmarks.long_films_render"]
 )
 def test_subjects_are_rendered_without_a_word_of_numpys(renderer):
     pytest.importorskip("bpy")

@@ -10,19 +10,19 @@ import pytest
 
 pytest.importorskip("OpenImageIO")
 
-from core.contract.capture import Capture  # noqa: E402
-from core.contract.eyes_record import write_eyes  # noqa: E402
-from core.contract.messages import Reporter  # noqa: E402
+from core.capture.capture import Capture  # noqa: E402
+from core.capture.eyes_record import write_eyes  # noqa: E402
+from core.capture.messages import Reporter  # noqa: E402
 from core.face import faces, lids  # noqa: E402
 from core.face.head import read_filmed_head, read_head  # noqa: E402
 from core.geometry import meshes  # noqa: E402
 from core.imaging import images  # noqa: E402
-from core.registration import eyeballs  # noqa: E402
-from core.synthetic.painted_head import place_camera  # noqa: E402
-from core.synthetic.people import shape  # noqa: E402
-from core.texture import blinks  # noqa: E402
-from core.texture.held_picture import hold  # noqa: E402
-from core.texture.projection import observe  # noqa: E402
+from core.stages.registration import eyeballs  # noqa: E402
+from core.stages.texture import blinks  # noqa: E402
+from core.stages.texture.held_picture import hold  # noqa: E402
+from core.stages.texture.projection import observe  # noqa: E402
+from research.people.lifelike import shape  # noqa: E402
+from research.people.painted_head import place_camera  # noqa: E402
 
 SEED, AZIMUTHS, SIZE = 4, (-20, -8, 8, 20, 70), 128
 
@@ -65,7 +65,7 @@ def filmed(tmp_path, monkeypatch):
 
 
 def around(surface, capture, side):
-    from core.contract.eyes_record import read_eyes
+    from core.capture.eyes_record import read_eyes
 
     ball = read_eyes(capture)[side]
     near = np.linalg.norm(surface.points - ball.centre, axis=1) < 1.4 * ball.radius

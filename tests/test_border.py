@@ -10,10 +10,9 @@ import torch
 from core.face import beard, template
 from core.face.head import read_head
 from core.imaging import images
-from core.solve import border
-from core.solve.capture_evidence import BEARD_TRUST, read_evidence
-
-from .painted_skin import make
+from core.solver.extensions import border
+from core.stages.solve.capture_evidence import BEARD_TRUST, read_evidence
+from tests.painted_skin import make
 
 SIZE = 256
 TEXEL = 1024 / SIZE

@@ -7,8 +7,8 @@ import pytest
 
 from core.face import template
 from core.geometry.meshes import face_normals
-from core.registration.bust import level_edge, open_edge
-from core.registration.intersections import flipped, intersecting
+from core.stages.registration.bust import level_edge, open_edge
+from core.stages.registration.intersections import flipped, intersecting
 
 
 def off_plane(points: np.ndarray) -> float:

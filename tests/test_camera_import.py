@@ -10,12 +10,12 @@ import numpy as np
 import pycolmap
 import pytest
 
-from core.cameras.calibration import import_cameras, read_cameras
-from core.cameras.importers.realityscan import turned
-from core.contract.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
-from core.contract.messages import Problem, Reporter
+from core.capture.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
+from core.capture.messages import Problem, Reporter
 from core.imaging import images
-from core.synthetic import painted_head
+from core.stages.cameras.calibration import import_cameras, read_cameras
+from core.stages.cameras.importers.realityscan import turned
+from research.people import painted_head
 
 WIDTH, HEIGHT = 1200, 1600  # of the pictures the cameras were solved from; the frames are smaller
 FRAME_WIDTH, FRAME_HEIGHT = 360, 480

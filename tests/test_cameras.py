@@ -13,18 +13,18 @@ import pycolmap
 import pytest
 from skimage.data import astronaut
 
-from benchmarks.cameras_against_truth import similarity
-from core import cameras, frames
-from core.cameras.landmarks import find_landmarks
-from core.cameras.world import find_head, intersect_rays
-from core.contract.capture import Capture
-from core.contract.frame_records import read_frames
-from core.contract.messages import CancelledError, Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.frame_records import read_frames
+from core.capture.messages import CancelledError, Problem, Reporter
 from core.face import faces
 from core.geometry.views import read_views
 from core.imaging import images
-from core.synthetic.sample import write_video
+from core.settings.settings import from_json
+from core.stages import cameras, frames
+from core.stages.cameras.landmarks import find_landmarks
+from core.stages.cameras.world import find_head, intersect_rays
+from research.benchmarks.cameras_against_truth import similarity
+from research.people.sample import write_video
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 WIDTH, HEIGHT, FOCAL = 360, 480, 420.0
@@ -208,7 +208,7 @@ def test_sixteen_frames_of_a_real_video_against_its_truth(tmp_path):
     truth = DATA / "lps_sun"
     if not truth.is_dir():
         pytest.skip("lps_sun is not at hand")
-    from benchmarks.cameras_against_truth import compare
+    from research.benchmarks.cameras_against_truth import compare
 
     capture = Capture(tmp_path / "lps.wildcap")
     capture.root.mkdir()

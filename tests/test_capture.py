@@ -7,14 +7,13 @@ import os
 
 import pytest
 
-from core.contract import files, mask_history
-from core.contract.capture import FORMAT, Capture
-from core.contract.files import replacing, replacing_folder, write_json
-from core.contract.messages import Failed, Problem
+from core.capture import files, mask_history
+from core.capture.capture import FORMAT, Capture
+from core.capture.files import replacing, replacing_folder, write_json
+from core.capture.messages import Failed, Problem
 from core.worker.job import write_job
 from core.worker.runner import run_job
-
-from .recorded import make, states
+from tests.recorded import make, states
 
 
 @pytest.fixture

@@ -10,10 +10,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from core.contract import hashes
-from core.contract.capture import Capture
-
-from . import standin
+from core.capture import hashes
+from core.capture.capture import Capture
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 
@@ -79,7 +78,8 @@ def test_what_is_dropped_becomes_captures(addon, tmp_path):
 def test_drops_are_taken_where_the_tab_is_shown(addon):
     source = addon("capture.source")
     # not imported: it needs OpenCV
-    stage = ast.parse((Path(__file__).parents[1] / "core" / "frames" / "photographs.py").read_text(encoding="utf-8"))
+    path = Path(__file__).parents[1] / "core" / "stages" / "frames" / "photographs.py"
+    stage = ast.parse(path.read_text(encoding="utf-8"))
     unread = next(
         ast.literal_eval(node.value)
         for node in stage.body

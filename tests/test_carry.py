@@ -7,12 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from core.contract.messages import Problem, Reporter
+from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.geometry import meshes, raster
 from core.imaging import images
-from core.registration import own_template
-from core.training import carry
+from core.stages.registration import own_template
+from research.training import carry
 
 
 @pytest.fixture

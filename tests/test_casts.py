@@ -5,9 +5,9 @@
 import numpy as np
 import pytest
 
-from core.delight.casts import remove_casts, settle_dim_hues
-from core.delight.evening import ShadingEstimate
 from core.imaging import images
+from core.stages.delight.casts import remove_casts, settle_dim_hues
+from core.stages.delight.evening import ShadingEstimate
 
 
 def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():

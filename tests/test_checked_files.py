@@ -16,13 +16,12 @@ oiio = pytest.importorskip("OpenImageIO")
 pytest.importorskip("pycolmap")
 pytest.importorskip("trimesh")
 
-from core.contract.capture import Capture  # noqa: E402
+from core.capture.capture import Capture  # noqa: E402
 from core.geometry import frame_pictures, meshes  # noqa: E402
 from core.geometry.meshes import Mesh  # noqa: E402
 from core.imaging import checks, images  # noqa: E402
 from core.imaging.mask_import import import_mask  # noqa: E402
-
-from .refused import refused  # noqa: E402
+from tests.refused import refused  # noqa: E402
 
 RNG = np.random.default_rng(0)
 PICTURE = RNG.integers(0, 255, (24, 18, 3), np.uint8)
@@ -329,8 +328,8 @@ def test_a_pipe_under_a_file_s_name_is_refused_and_not_waited_for(tmp_path, name
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes here")
 def test_a_pipe_among_a_capture_s_books_is_not_waited_for(tmp_path):
-    from core.contract.json_files import read_json
-    from core.contract.regular_files import require_regular
+    from core.capture.json_files import read_json
+    from core.capture.regular_files import require_regular
 
     os.mkfifo(tmp_path / "capture.json")
     for read in (read_json, require_regular):

@@ -15,20 +15,19 @@ pytest.importorskip("OpenImageIO")
 pycolmap = pytest.importorskip("pycolmap")
 
 from core.__main__ import main  # noqa: E402
-from core.cameras.calibration import read_cameras  # noqa: E402
-from core.contract import artist_landmarks, own_head  # noqa: E402
-from core.contract.capture import Capture  # noqa: E402
-from core.contract.frame_records import read_frames  # noqa: E402
-from core.contract.messages import Done, Failed, Log, Message  # noqa: E402
+from core.capture import artist_landmarks, own_head  # noqa: E402
+from core.capture.capture import Capture  # noqa: E402
+from core.capture.frame_records import read_frames  # noqa: E402
+from core.capture.messages import Done, Failed, Log, Message  # noqa: E402
 from core.geometry.models import read_model  # noqa: E402
 from core.geometry.views import read_views  # noqa: E402
 from core.imaging import images  # noqa: E402
+from core.stages.cameras.calibration import read_cameras  # noqa: E402
 from core.worker.job import write_job  # noqa: E402
 from core.worker.runner import run_job  # noqa: E402
-
-from . import delivered  # noqa: E402
-from .recorded import make_entry  # noqa: E402
-from .refused import refused  # noqa: E402
+from tests import delivered  # noqa: E402
+from tests.recorded import make_entry  # noqa: E402
+from tests.refused import refused  # noqa: E402
 
 FRAME = {"name": "00000.jpg", "sharpness": 0.5, "selected": True}
 

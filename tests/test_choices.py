@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.capture import Capture
-
-from . import standin
+from core.capture.capture import Capture
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 

@@ -5,12 +5,11 @@ nothing in it is touched."""
 
 import pytest
 
-from core.contract import ownership
-from core.contract.capture import Capture
-from core.contract.messages import Problem
+from core.capture import ownership
+from core.capture.capture import Capture
+from core.capture.messages import Problem
 from core.worker.job import write_job
-
-from .kept_capture import contents, make, make_frames
+from tests.kept_capture import contents, make, make_frames
 
 
 @pytest.fixture

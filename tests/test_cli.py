@@ -15,15 +15,14 @@ import OpenImageIO as oiio
 import pytest
 
 from core import __main__ as command_line
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import Problem
-from core.contract.portable_paths import read_portable
-from core.contract.settings import preset
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Problem
+from core.capture.portable_paths import read_portable
 from core.imaging import images
 from core.imaging.mask_import import import_mask
-
-from . import tiny_chain
+from core.settings.settings import preset
+from tests import tiny_chain
 
 ROOT = Path(__file__).resolve().parent.parent
 

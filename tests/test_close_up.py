@@ -10,8 +10,13 @@ bpy = pytest.importorskip("bpy")
 mathutils = pytest.importorskip("mathutils")
 BVHTree = pytest.importorskip("mathutils.bvhtree").BVHTree
 
-from tests.test_acting import COPIES, HEAD, coordinates, shown, write_head  # noqa: E402
-from tests.test_acting import head as head  # noqa: E402  (a fixture)
+from tests.test_acting import (  # noqa: E402
+    COPIES,
+    HEAD,
+    coordinates,
+    shown,
+    write_head,
+)
 from tests.test_gaze import degrees  # noqa: E402
 
 KINDS = {

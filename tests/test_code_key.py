@@ -13,17 +13,17 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import code_key, stages
-
-from . import test_imports as house
+from core.capture import code_key, stages
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "core"
+SHARED = ("capture", "settings", "imaging", "geometry", "face", "light", "solver")
+"""The rooms that stages share."""
 VERSIONS = ("3.11", "3.12", "3.13", "3.14")
 KEYS = """
 import sys
 sys.path.insert(0, {!r})
-from core.contract import code_key, stages
+from core.capture import code_key, stages
 print(sys.version_info[:2], {{s.name: code_key.code_key(s.module) for s in stages.STAGES}})
 """
 
@@ -78,32 +78,35 @@ def changed(before: dict[str, str], core: Path) -> set[str]:
 
 
 def dependent_stages() -> dict[str, set[str]]:
-    """File of core -> the stages that import it, however far away: by the reading of imports that keeps the house's
-    rules, which is another one."""
-    edges: dict[str, set[str]] = {}
-    for found in house.CORE:
-        if found.level and found.target != "core":
-            name = found.file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-            edges.setdefault(name, set()).add(found.target)
+    """File of core -> the stages that import it, however far away: by another reading than the key's."""
     reached: dict[str, set[str]] = {}
     for stage in stages.STAGES:
-        known, waiting = set(), [stage.module]
+        known, waiting = set(), [CORE.joinpath(*stage.module.split(".")[1:], "__init__.py")]
         while waiting:
-            name = waiting.pop()
-            if name not in known:
-                known.add(name)
-                waiting += edges.get(name, ())
-                waiting += [name.rpartition(".")[0]] if name.count(".") > 1 else []
-        for name in known:
-            path = CORE.joinpath(*name.split(".")[1:])
-            file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-            reached.setdefault(file.relative_to(CORE).as_posix(), set()).add(stage.name)
+            path = waiting.pop()
+            if path not in known and path != CORE / "__init__.py":
+                known.add(path)
+                waiting += imported_files(path)
+                waiting += [folder / "__init__.py" for folder in path.parents if CORE in folder.parents]
+        for path in known:
+            reached.setdefault(path.relative_to(CORE).as_posix(), set()).add(stage.name)
     return reached
+
+
+@cache
+def imported_files(path: Path) -> list[Path]:
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            for place in (*(base / alias.name for alias in node.names), base):
+                found += [file for file in (place / "__init__.py", place.with_suffix(".py")) if file.is_file()]
+    return found
 
 
 def test_a_line_in_a_shared_module_changes_exactly_the_stages_that_depend_on_it(copy):
     before, dependent = keys(copy), dependent_stages()
-    shared = [path for room in house.SHARED for path in sorted((copy / room).glob("*.py"))]
+    shared = [path for room in SHARED for path in sorted((copy / room).glob("*.py"))]
     assert len(shared) > 25
     for path in shared:
         text = path.read_text(encoding="utf-8")
@@ -121,11 +124,10 @@ def test_a_line_in_a_shared_module_changes_exactly_the_stages_that_depend_on_it(
         ("face/beard.py", {"solve", "upscale"}),
         ("geometry/noise.py", {"upscale"}),
         ("imaging/images.py", set(stages.NAMES)),
-        ("cameras/colmap.py", {"cameras"}),
-        ("cameras/importers/metashape.py", {"cameras"}),
-        ("solve/sampler.py", {"solve"}),
+        ("stages/cameras/colmap.py", {"cameras"}),
+        ("stages/cameras/importers/metashape.py", {"cameras"}),
+        ("solver/sampler.py", {"solve"}),
         ("__init__.py", set()),
-        ("synthetic/skin.py", set()),
         ("worker/runner.py", set()),
     ],
 )
@@ -215,14 +217,14 @@ def test_docstrings_comments_and_layout_do_not_count_and_code_does():
 
 
 def test_only_a_plain_name_after_the_package_means_a_module_that_is_run(copy):
-    with open(copy / "scan" / "pairs.py", "a", encoding="utf-8") as source:
+    with open(copy / "stages" / "scan" / "pairs.py", "a", encoding="utf-8") as source:
         source.write(
             '\nname = "x"\nNAMES = (f"{__package__}{name}", f"{__package__}", f"{name}.colmap", '
             'f"{__package__}.pairs")\n'
         )
     forget()
-    of_scan = code_key.modules("core.scan", copy)
-    assert "cameras/colmap.py" not in of_scan and "scan/pairs.py" in of_scan
+    of_scan = code_key.modules("core.stages.scan", copy)
+    assert "stages/cameras/colmap.py" not in of_scan and "stages/scan/pairs.py" in of_scan
 
 
 def test_every_python_gives_the_same_keys():

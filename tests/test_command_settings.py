@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.contract.capture import Capture
-from core.contract.settings import Settings, find_setting, known_settings, preset
+from core.capture.capture import Capture
+from core.settings.settings import Settings, find_setting, known_settings, preset
 from core.worker import terminal
 from core.worker.job import read_job
 

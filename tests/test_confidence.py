@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks import confidence as benchmark
-from benchmarks.confidence import Errors, fit_deviations, judge
 from core.imaging import images
-from core.solve import confidence
-from core.solve.confidence import PLAIN_DEVIATION, estimate_confidence
-from core.solve.evidence import Evidence
+from core.solver.evidence import Evidence
+from core.stages.solve import confidence
+from core.stages.solve.confidence import PLAIN_DEVIATION, estimate_confidence
+from research.benchmarks import confidence as benchmark
+from research.benchmarks.confidence import Errors, fit_deviations, judge
 
 SIZE = 256
 PLANE = torch.ones(SIZE, SIZE)
@@ -52,10 +52,10 @@ def test_variances_add_up():
 
 
 def test_how_bright_the_frames_were_is_over_the_skin_that_they_showed(tmp_path):
-    from benchmarks.uv_problems import make_plain_problem
-    from core.contract.capture import Capture
+    from core.capture.capture import Capture
     from core.face.head import read_filmed_head
-    from core.solve.capture_evidence import read_evidence
+    from core.stages.solve.capture_evidence import read_evidence
+    from research.benchmarks.uv_problems import make_plain_problem
 
     capture = Capture(tmp_path)
     make_plain_problem(9000, "self", SIZE).write(capture)

@@ -10,15 +10,14 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks import controlled, flash_light  # noqa: E402
-from core.contract.capture import Capture  # noqa: E402
+from core.capture.capture import Capture  # noqa: E402
 from core.face.head import Head  # noqa: E402
 from core.geometry import meshes, raster
 from core.geometry.views import read_views  # noqa: E402
 from core.imaging import images  # noqa: E402
-
-from . import photographed_head  # noqa: E402
-from .egg import egg  # noqa: E402
+from research.benchmarks import controlled, flash_light  # noqa: E402
+from tests import photographed_head  # noqa: E402
+from tests.egg import egg  # noqa: E402
 
 ROUGHNESS, F0 = 0.5, 0.04
 

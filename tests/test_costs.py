@@ -11,15 +11,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks import costs, figures
-from benchmarks.costs import __main__ as terminal
-from benchmarks.costs import chain, meter
-from benchmarks.costs.rows import GROWTH, ROWS, WHOLES, StageRun, growth, table, together
-from benchmarks.costs.stage import measure_stage, over, preset
-from benchmarks.results.blender import acting_table
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.files import write_json
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from research.benchmarks import costs, figures
+from research.benchmarks.costs import __main__ as terminal
+from research.benchmarks.costs import chain, meter
+from research.benchmarks.costs.rows import GROWTH, ROWS, WHOLES, StageRun, growth, table, together
+from research.benchmarks.costs.stage import measure_stage, over, preset
+from research.benchmarks.results.blender import acting_table
 
 DONE = {"seconds": 12.4, "processor_s": 20.0, "peak_mb": 1640, "load": 0.1, "others": 0.05}
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -121,11 +121,11 @@ def test_a_process_alone_is_measured_to_its_end_or_its_limit():
 
 @pytest.mark.parametrize("record", ["costs", "solver_speed", "blender_memory"])
 def test_a_record_is_made_by_a_command_that_exists(record, capsys):
-    word = figures.read_record(record)["command"].removeprefix("python -m benchmarks.costs ").split()[0]
-    assert f"benchmarks.costs {word} " in costs.__doc__ and f"docs/figures/{record}.json" in costs.__doc__
+    word = figures.read_record(record)["command"].removeprefix("python -m research.benchmarks.costs ").split()[0]
+    assert f"research.benchmarks.costs {word} " in costs.__doc__ and f"research/records/{record}.json" in costs.__doc__
     with pytest.raises(SystemExit) as ended:
         terminal.main([word, "--help"])
-    assert ended.value.code == 0 and f"usage: python -m benchmarks.costs {word}" in capsys.readouterr().out
+    assert ended.value.code == 0 and f"usage: python -m research.benchmarks.costs {word}" in capsys.readouterr().out
 
 
 def test_settings_may_lie_beyond_their_range_but_must_exist():

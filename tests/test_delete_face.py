@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import ownership
+from core.capture import ownership
 
 bpy = pytest.importorskip("bpy")
 
@@ -57,7 +57,7 @@ def test_the_list_comes_first_and_then_all_of_it_goes(addon, face):
 
 
 def test_a_face_that_is_worked_on_elsewhere_stays_and_stays_on_the_list(addon, face):
-    from core.contract.capture import Capture
+    from core.capture.capture import Capture
 
     with Capture(face).locked():
         bpy.ops.wildcap.delete_face()

@@ -7,13 +7,12 @@ import os
 import pytest
 
 from core.__main__ import main
-from core.contract import deletion, ownership
-from core.contract.capture import Capture
-from core.contract.files import replacing
-from core.contract.messages import Problem
-
-from . import delivered, kept_capture
-from .kept_capture import make_frames
+from core.capture import deletion, ownership
+from core.capture.capture import Capture
+from core.capture.files import replacing
+from core.capture.messages import Problem
+from tests import delivered, kept_capture
+from tests.kept_capture import make_frames
 
 
 @pytest.fixture

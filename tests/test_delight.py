@@ -10,11 +10,9 @@ import numpy as np
 import pycolmap
 import pytest
 
-from core.contract.capture import Capture
-from core.contract.files import write_json
-from core.contract.messages import Problem, Progress, Reporter
-from core.contract.settings import from_json
-from core.delight import run
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from core.capture.messages import Problem, Progress, Reporter
 from core.face import template
 from core.geometry import meshes, raster
 from core.geometry.views import read_views
@@ -22,6 +20,8 @@ from core.imaging import images
 from core.light.skylight import fibonacci_sphere, radiance_transfer
 from core.light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from core.light.sunlight import fit_light
+from core.settings.settings import from_json
+from core.stages.delight import run
 
 SKIN = np.array([0.45, 0.28, 0.20])
 SKY = np.zeros((9, 3))

@@ -5,9 +5,9 @@
 import numpy as np
 import pytest
 
-from benchmarks import delight_answers
-from benchmarks.delight_answers import Judged
-from core.delight.second_opinion import Weighing
+from core.stages.delight.second_opinion import Weighing
+from research.benchmarks import delight_answers
+from research.benchmarks.delight_answers import Judged
 
 
 def judged(person, frames_error, fitted_error, cells=4000):

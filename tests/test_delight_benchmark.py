@@ -11,9 +11,13 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks import delight, delight_portraits  # noqa: E402
-from benchmarks.albedo_score import AlbedoTruth  # noqa: E402
-from benchmarks.delight_measures import (  # noqa: E402
+from core.capture.messages import Problem  # noqa: E402
+from core.face import template  # noqa: E402
+from core.imaging import images  # noqa: E402
+from core.settings.settings import Settings  # noqa: E402
+from research.benchmarks import delight, delight_portraits  # noqa: E402
+from research.benchmarks.albedo_score import AlbedoTruth  # noqa: E402
+from research.benchmarks.delight_measures import (
     FIGURES,
     flat_tone,
     mean_of,
@@ -22,14 +26,10 @@ from benchmarks.delight_measures import (  # noqa: E402
     table,
     tone_group,
 )
-from benchmarks.delight_sets import Photograph, Photographs, light_stage  # noqa: E402
-from benchmarks.measures import pictures  # noqa: E402
-from core.contract.messages import Problem  # noqa: E402
-from core.contract.settings import Settings  # noqa: E402
-from core.face import template  # noqa: E402
-from core.imaging import images  # noqa: E402
-from core.synthetic.parameters import sample_parameters  # noqa: E402
-from core.synthetic.skin import make_skin  # noqa: E402
+from research.benchmarks.delight_sets import Photograph, Photographs, light_stage  # noqa: E402
+from research.benchmarks.measures import pictures  # noqa: E402
+from research.people.parameters import sample_parameters  # noqa: E402
+from research.people.skin import make_skin  # noqa: E402
 
 FACEOLAT = Path(__file__).resolve().parents[2] / "shared" / "data" / "faceolat"
 
@@ -154,7 +154,7 @@ def test_a_folder_without_photographs_is_refused(tmp_path):
 
 
 def test_portraits_are_of_people_that_no_training_sees(monkeypatch):
-    from core.training.seeds import HELD_OUT_SEED
+    from research.training.seeds import HELD_OUT_SEED
 
     assert delight_portraits.FIRST_SEED > HELD_OUT_SEED
     seeds = delight_portraits.subjects_by_tone(1)

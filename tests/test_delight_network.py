@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 import torch
 
-from core.contract.messages import Problem, Reporter
-from core.delight.below_hair import FITTED_SHARE, fill_hair
-from core.delight.evening import ShadingEstimate
-from core.delight.lift import lift_shading, lift_share
-from core.delight.lit_head import MAX_ALBEDO
-from core.delight.network import WEIGHTS, crop, divide, load_network, square_around
-from core.delight.second_opinion import Weighing, continue_beyond, weigh_in
-from core.delight.unet import CHANNELS, DelightNet, network_input
+from core.capture.messages import Problem, Reporter
 from core.geometry.meshes import vertex_normals
 from core.imaging import images
-from core.synthetic.identities import reserved_seeds
-from core.synthetic.sight import random_camera
-from core.training import delighter, people
-from core.training.descent import TrainingRun
+from core.stages.delight.below_hair import FITTED_SHARE, fill_hair
+from core.stages.delight.evening import ShadingEstimate
+from core.stages.delight.lift import lift_shading, lift_share
+from core.stages.delight.lit_head import MAX_ALBEDO
+from core.stages.delight.network import WEIGHTS, crop, divide, load_network, square_around
+from core.stages.delight.second_opinion import Weighing, continue_beyond, weigh_in
+from core.stages.delight.unet import CHANNELS, DelightNet, network_input
+from research.people.identities import reserved_seeds
+from research.people.sight import random_camera
+from research.training import delighter, people
+from research.training.descent import TrainingRun
 
 QUIET = Reporter("train", emit=lambda message: None)
 
@@ -143,7 +143,7 @@ def test_how_bright_a_frame_came_out_is_told_by_its_skin_and_not_by_the_wall_beh
 
 
 def test_missing_weights_are_named(monkeypatch, tmp_path):
-    module = importlib.import_module("core.delight.network")  # the package has a function of that name
+    module = importlib.import_module("core.stages.delight.network")  # the package has a function of that name
     monkeypatch.setattr(module, "WEIGHTS", tmp_path / "delighter.safetensors")
     with pytest.raises(Problem, match="weights of the delighting network are missing"):
         load_network("cpu")
@@ -242,9 +242,9 @@ def _emptied(work):
 
 def _prepared(seeds, work):
     """Sights of subjects with plain skin: what `prepare` makes in seconds, in tenths of one."""
-    from core.delight.unet import SIDE_PX
-    from core.synthetic import olat, sight
-    from core.synthetic.identities import subject_mesh
+    from core.stages.delight.unet import SIDE_PX
+    from research.people import olat, sight
+    from research.people.identities import subject_mesh
 
     for seed in seeds:
         place = work / f"subject_{seed}"

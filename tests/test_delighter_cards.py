@@ -7,11 +7,10 @@ import subprocess
 import sys
 from dataclasses import fields
 
-from core.contract import delighter_cards
-from core.contract import switchlight_api as service
-from core.contract.settings import DelightSettings
-
-from .conftest import ROOT
+from core.capture import switchlight_api as service
+from core.settings import delighter_cards
+from core.settings.settings import DelightSettings
+from tests.conftest import ROOT
 
 CARDS = delighter_cards.CARDS
 
@@ -30,7 +29,7 @@ def test_every_delighter_has_a_card_of_whole_sentences():
 
 
 def test_the_cards_are_those_of_the_delighters_there_are():
-    from core.delight import DELIGHTERS
+    from core.stages.delight import DELIGHTERS
 
     assert set(DELIGHTERS) == set(delighter_cards.choices())
 

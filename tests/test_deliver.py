@@ -18,10 +18,9 @@ bpy = pytest.importorskip("bpy")
 Vector = pytest.importorskip("mathutils").Vector
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
-from core.contract.messages import Done  # noqa: E402
-
-from . import delivered  # noqa: E402
-from .delivered import SIDE  # noqa: E402
+from core.capture.messages import Done  # noqa: E402
+from tests import delivered  # noqa: E402
+from tests.delivered import SIDE  # noqa: E402
 
 KEYS = {"jawOpen": (0.0, -0.01, -0.02), "eyeBlinkLeft": (0.005, 0.0, 0.0)}
 MOVED = slice(100, 140)

@@ -11,8 +11,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
-from . import delivered  # noqa: E402
-from .test_deliver import by_another_reader, capture, deliver, glb  # noqa: E402, F401  (capture is a fixture)
+from tests import delivered  # noqa: E402
+from tests.test_deliver import by_another_reader, capture, deliver, glb  # noqa: E402, F401  (capture is a fixture)
 
 POINTS = np.array(
     [

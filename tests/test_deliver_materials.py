@@ -7,7 +7,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
-from .test_deliver import capture, deliver, glb  # noqa: E402, F401  (capture is a fixture)
+from tests.test_deliver import capture, deliver, glb  # noqa: E402, F401  (capture is a fixture)
 
 
 def test_pictures_of_the_artists_own_materials_take_no_maps_place(capture):  # noqa: F811

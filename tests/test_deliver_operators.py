@@ -11,13 +11,13 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
-from . import delivered  # noqa: E402
-from .drawn import drawn  # noqa: E402
-from .test_deliver import capture, deliver  # noqa: E402, F401  (capture is a fixture)
+from tests import delivered  # noqa: E402
+from tests.drawn import drawn  # noqa: E402
+from tests.test_deliver import capture, deliver  # noqa: E402, F401  (capture is a fixture)
 
 
 def test_what_comes_before_the_files_is_told_in_panel_and_dialog(addon, capture):  # noqa: F811
-    presets = import_module(f"{addon('deliver').__name__.rsplit('.', 2)[0]}.core.contract.delivery_presets")
+    presets = import_module(f"{addon('deliver').__name__.rsplit('.', 2)[0]}.core.settings.delivery_presets")
     said = " ".join(text for text, _ in drawn(bpy.types.WILDCAP_PT_deliver))
     assert "glTF, one file, m, PNG, 16 bit" in said and "no subsurface scattering" in said
     deliver(capture)
@@ -103,7 +103,7 @@ def test_views_selection_and_the_active_object_are_afterwards_as_they_were(captu
 
 def test_a_blender_without_an_exporter_says_so(addon, capture, monkeypatch, tmp_path):  # noqa: F811
     files = addon("deliver.files")
-    problem = import_module(f"{files.__name__.split('.wildcap_addon')[0]}.core.contract.messages").Problem
+    problem = import_module(f"{files.__name__.split('.wildcap_addon')[0]}.core.capture.messages").Problem
     monkeypatch.setitem(files.ADDONS, ".glb", "none of these")
     with pytest.raises(problem, match="switched off"):
         files.check(".glb")

@@ -18,18 +18,18 @@ from scipy.spatial import cKDTree
 
 from core import deliver
 from core.__main__ import main
-from core.contract import delivery_plan, delivery_presets, skin_regions, stages
-from core.contract.capture import Capture
-from core.contract.messages import Cancelled, Done, Failed, Problem
-from core.contract.settings import DeliverSettings, Settings
+from core.capture import delivery_plan, skin_regions, stages
+from core.capture.capture import Capture
+from core.capture.messages import Cancelled, Done, Failed, Problem
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-
-from . import delivered
-from .conftest import ROOT
-from .delivered import NORMALS, OBJ, SIDE, folder
-from .recorded import record
+from core.settings import delivery_presets
+from core.settings.settings import DeliverSettings, Settings
+from tests import delivered
+from tests.conftest import ROOT
+from tests.delivered import NORMALS, OBJ, SIDE, folder
+from tests.recorded import record
 
 
 @pytest.fixture

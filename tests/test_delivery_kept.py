@@ -8,13 +8,12 @@ import shutil
 
 import pytest
 
-from core.contract import delivery_plan
-from core.contract.capture import Capture
-from core.contract.messages import Done, Failed, Problem
-from core.contract.settings import DeliverSettings
-
-from . import delivered
-from .delivered import OBJ, folder
+from core.capture import delivery_plan
+from core.capture.capture import Capture
+from core.capture.messages import Done, Failed, Problem
+from core.settings.settings import DeliverSettings
+from tests import delivered
+from tests.delivered import OBJ, folder
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from .conftest import ROOT
+from tests.conftest import ROOT
 
 RUN = """import sys
 from pathlib import Path
@@ -22,7 +22,7 @@ TEST = "import sys\n\nsys.path.insert(0, {folder!r})\n\nimport old_ways\n\n\ndef
 @pytest.mark.parametrize(
     ("folder", "category", "message", "code"),
     [
-        ("core/scan", "DeprecationWarning", "gone soon", 1),
+        ("core/stages/scan", "DeprecationWarning", "gone soon", 1),
         ("wildcap_addon", "PendingDeprecationWarning", "gone soon", 1),
         ("linked/wildcap_addon", "FutureWarning", "gone soon", 1),
         (".venv/lib", "DeprecationWarning", "gone soon", 0),

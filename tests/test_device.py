@@ -4,14 +4,14 @@
 
 import pytest
 
-from core.contract import freshness, stages
-from core.contract.messages import Reporter
-from core.contract.settings import from_json
+from core.capture import freshness, stages
+from core.capture.messages import Reporter
+from core.settings.settings import from_json
 from core.worker import runner
 
 torch = pytest.importorskip("torch")
 
-from core.solve import device  # noqa: E402
+from core.stages.solve import device  # noqa: E402
 
 MAP = torch.linspace(-1, 1, 14 * 4).reshape(1, 14, 2, 2)
 

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from skimage.data import astronaut
 
-from core import frames
-from core.contract.capture import Capture
-from core.contract.frame_records import FrameRecord
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.frame_records import FrameRecord
+from core.capture.messages import Problem, Reporter
 from core.face import faces
-from core.frames.doctor import blurred, diagnose, examine
-from core.frames.eyes import blinks
-from core.frames.select import sharpness
-from core.frames.source import Picture
 from core.imaging import images
+from core.settings.settings import from_json
+from core.stages import frames
+from core.stages.frames.doctor import blurred, diagnose, examine
+from core.stages.frames.eyes import blinks
+from core.stages.frames.select import sharpness
+from core.stages.frames.source import Picture
 
 FACE = astronaut().astype(np.float32)[:300, 60:400] / 255
 

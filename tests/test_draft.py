@@ -6,15 +6,14 @@ as the shipped one does."""
 import pytest
 import torch
 
-from benchmarks.prior_figures import errors, of_subject, reflectance, sample_given_diffuse
 from core.face import template
-from core.solve.draft import restore_maps
-from core.solve.prior import make_coordinates
-from core.solve.prior_files import load
-from core.solve.recipes import Recipe
-from core.solve.sampler import Sampler, seed_noise
-
-from .test_sampler import observation, start
+from core.solver.extensions.draft import restore_maps
+from core.solver.prior.prior import make_coordinates
+from core.solver.recipes import Recipe
+from core.solver.sampler import Sampler, seed_noise
+from core.stages.solve.prior_files import load
+from research.benchmarks.prior_figures import errors, of_subject, reflectance, sample_given_diffuse
+from tests.test_sampler import observation, start
 
 SIZE = 32
 DRAFT = Recipe(steps=30, coarse=(), guidance="proximal", rate=0.0)

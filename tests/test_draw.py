@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from . import standin
-from .drawn import drawn
+from tests import standin
+from tests.drawn import drawn
 
 bpy = pytest.importorskip("bpy")
 

@@ -9,9 +9,9 @@ import pytest
 from skimage.data import astronaut
 
 from core.face import faces
-from core.frames import drift
-from core.frames.drift import content_of, gains_of
 from core.imaging import images
+from core.stages.frames import drift
+from core.stages.frames.drift import content_of, gains_of
 
 HEIGHT, WIDTH = 300, 400
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.measures.edges import ALONG, LINE, score_edges
 from core.light.shadow_edges import signed_distance
+from research.benchmarks.measures.edges import ALONG, LINE, score_edges
 
 HEIGHT = 500
 SHADOW = np.zeros((600, 500), bool)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core.light.shadow_edges import BAND_TEXELS, INWARD_TEXELS, penumbra, place
-from core.solve.evidence import soften_mask
+from core.solver.evidence import soften_mask
 
 SIZE = 512
 TAKEN = np.array([0.62, 0.55, 0.48])  # the share of the light that the shadow takes

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The table of the two engines, from ratios that are known."""
 
-from benchmarks import engines
+from research.benchmarks import engines
 
 
 def test_each_light_is_a_row_of_three_channels_per_column():

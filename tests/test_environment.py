@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.messages import Cancelled, CancelledError, Done, Failed, Problem, Progress
+from core.capture.messages import Cancelled, CancelledError, Done, Failed, Problem, Progress
 from core.worker import bare_environment, index, installation, locks
 from core.worker.background import BackgroundTask
 from core.worker.environment import COMPUTE_FILE, answer, empty, python_of, removal, remove, verify

@@ -8,8 +8,8 @@ import sys
 import time
 from pathlib import Path
 
-from core.contract import lease, processes
-from core.contract.messages import Cancelled, Done
+from core.capture import lease, processes
+from core.capture.messages import Cancelled, Done
 from core.worker import installation
 from core.worker.environment import COMPUTE_FILE, removal
 from tests.test_background import follow

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.messages import Problem
+from core.capture.messages import Problem
 from core.worker import environment, locks
 from core.worker.environment import judge, required, survey, verify
 from core.worker.installation import find_python

@@ -4,13 +4,13 @@
 
 import numpy as np
 
-from core.delight.evening import ShadingEstimate, estimate_exposures, even_out, robust_mean
-from core.delight.lit_head import LitHead
 from core.face import template
 from core.face.head import Head
 from core.geometry.meshes import vertex_normals
 from core.geometry.raster import render_view
-from core.synthetic.sight import random_camera
+from core.stages.delight.evening import ShadingEstimate, estimate_exposures, even_out, robust_mean
+from core.stages.delight.lit_head import LitHead
+from research.people.sight import random_camera
 
 
 def drawn(rng, count=400, views=5):

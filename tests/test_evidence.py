@@ -4,8 +4,8 @@
 
 import pytest
 
-from . import standin
-from .standin import CENTRE, FOCAL, HEIGHT, WIDTH
+from tests import standin
+from tests.standin import CENTRE, FOCAL, HEIGHT, WIDTH
 
 bpy = pytest.importorskip("bpy")
 from bpy_extras.object_utils import world_to_camera_view  # noqa: E402

@@ -31,8 +31,9 @@ WANTED = (
     r"wildcap_addon/([a-z_]+/){0,2}[a-z_]+\.py",
     r"core/README\.md",
     r"core/[a-z_]+\.py",
-    r"core/(batch|contract|worker|imaging|geometry|face|light)/[a-z0-9_]+\.py",
-    r"core/(frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale|deliver)/(importers/)?[a-z0-9_]+\.py",
+    r"core/(batch|capture|settings|worker|imaging|geometry|face|light|deliver|stages)/[a-z0-9_]+\.py",
+    r"core/solver/((prior|upsampling|extensions)/)?[a-z0-9_]+\.py",
+    r"core/stages/[a-z_]+/(importers/)?[a-z0-9_]+\.py",
     r"core/weights/[a-z0-9_]+\.(safetensors|json)",
     r"core/weights/face_nets/([a-z_]+\.tflite|NOTICE\.md|LICENSE\.txt)",
     r"core/assets/([A-Z]+\.md|head\.obj|head\.json|identity\.npz|masks/[a-z_]+\.png)",
@@ -52,10 +53,10 @@ NEEDED = (
     "core/weights/face_nets/NOTICE.md",
     "wildcap_addon/__init__.py",
     "wildcap_addon/relight/headless.py",
-    "core/contract/settings.py",
+    "core/settings/settings.py",
     "core/worker/__main__.py",
     "core/worker/client.py",
-    "core/solve/__init__.py",
+    "core/stages/solve/__init__.py",
     "core/assets/head.obj",
 )
 
@@ -89,9 +90,9 @@ def test_the_manifest_asks_for_files_and_network_with_a_reason_each():
 def test_the_stages_have_the_same_code_keys_from_the_zip_as_from_a_checkout(archive, tmp_path):
     with zipfile.ZipFile(archive) as file:
         file.extractall(tmp_path)
-    from core.contract import code_key, stages
+    from core.capture import code_key, stages
 
-    assert not (tmp_path / "core" / "synthetic").exists()
+    assert not (tmp_path / "research").exists()
     for stage in stages.STAGES:
         assert code_key.code_key(stage.module, tmp_path / "core") == code_key.code_key(stage.module), stage.name
 

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 import torch
 
-from core.contract.messages import Problem, Reporter
+from core.capture.messages import Problem, Reporter
 from core.face import eye_reader
 from core.face.eye_reader import SIDE_PX
 from core.face.parser_network import ParseNet
 from core.face.parts import cut
-from core.synthetic.identities import reserved_seeds
-from core.synthetic.people import eye_sights, figure, unlit
-from core.synthetic.people.person import sample_person
-from core.training import descent
-from core.training import eyes as training
-from core.training.descent import TrainingRun
+from research.people.identities import reserved_seeds
+from research.people.lifelike import eye_sights, figure, unlit
+from research.people.lifelike.person import sample_person
+from research.training import descent
+from research.training import eyes as training
+from research.training.descent import TrainingRun
 
 QUIET = Reporter("train", emit=lambda message: None)
 SEED = 3

@@ -6,7 +6,7 @@ kind of image it is."""
 import numpy as np
 import pytest
 
-from . import standin
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 U, V = standin.LEFT_CHEEK_UV

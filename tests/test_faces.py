@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from skimage.data import astronaut
 
-from core.contract.messages import Problem
+from core.capture.messages import Problem
 from core.face import faces
 from core.imaging import images
 

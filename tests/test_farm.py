@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What benchmarks.farm judges by: films, twins, and the account of what was begun and killed."""
+"""What research.benchmarks.farm judges by: films, twins, and the account of what was begun and killed."""
 
 import json
 
 import av
 
-from benchmarks import farm_batch
-from benchmarks.farm_batch import Begun, judge_account
 from core.batch.record import read_batch
 from core.batch.state import TO_DO, derive_state
+from research.benchmarks import farm_batch
+from research.benchmarks.farm_batch import Begun, judge_account
 
 
 def test_a_farm_is_laid_out_with_twins_and_again(tmp_path):

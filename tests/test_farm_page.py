@@ -11,9 +11,8 @@ import sys
 from core.batch.groups import GROUPS
 from core.batch.record import read_batch
 from core.batch.shots import HEADINGS
-
-from . import tiny_chain
-from .conftest import ROOT
+from tests import tiny_chain
+from tests.conftest import ROOT
 
 PAGE = (ROOT / "docs" / "farm.md").read_text(encoding="utf-8")
 SBATCH = """#!{python}

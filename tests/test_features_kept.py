@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.measures.features_kept import BROWS, contrast_kept, contrasts, joint
-from benchmarks.measures.slopes import slope
 from core.face import template
 from core.geometry.raster import interpolate
 from core.imaging import images
+from research.benchmarks.measures.features_kept import BROWS, contrast_kept, contrasts, joint
+from research.benchmarks.measures.slopes import slope
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 FACEOLAT, EVALUATE = SHARED / "data" / "faceolat", SHARED / "evaluate" / "feature_contrast.py"

@@ -5,8 +5,8 @@
 import numpy as np
 import pytest
 
-from benchmarks import figures
-from core.contract.messages import Problem
+from core.capture.messages import Problem
+from research.benchmarks import figures
 
 
 def test_a_record_is_read_as_it_was_written(tmp_path):

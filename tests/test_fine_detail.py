@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
-from core.contract.messages import Reporter
+from core.capture.messages import Reporter
 from core.imaging import images
-from core.texture.detail import fine_detail, finer
-from core.texture.held_picture import hold
-from core.texture.projection import UnwrappedView
-from core.upscale.detail import guide
+from core.stages.texture.detail import fine_detail, finer
+from core.stages.texture.held_picture import hold
+from core.stages.texture.projection import UnwrappedView
+from core.stages.upscale.detail import guide
 
 SIZE = 64
 QUIET = Reporter("texture")

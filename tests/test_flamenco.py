@@ -22,10 +22,9 @@ from core.batch.gate import accept_mask
 from core.batch.groups import GATE, GROUPS
 from core.batch.lines import PARTS
 from core.batch.record import read_batch
-from core.contract.capture import Capture
-
-from . import tiny_chain
-from .conftest import ROOT
+from core.capture.capture import Capture
+from tests import tiny_chain
+from tests.conftest import ROOT
 
 SCRIPT = (ROOT / "farm" / "flamenco" / "wildcap.js").read_text(encoding="utf-8")
 STAND_INS = """

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from .gui import conftest as gui
+from tests.gui import conftest as gui
 
 
 def outcomes(monkeypatch, *codes: int) -> list:

@@ -8,9 +8,9 @@ import json
 
 import pytest
 
-from core.contract.capture import Capture
-from core.contract.frame_records import FrameRecord, read_frames, write_frames
-from core.contract.messages import Problem
+from core.capture.capture import Capture
+from core.capture.frame_records import FrameRecord, read_frames, write_frames
+from core.capture.messages import Problem
 
 WRITTEN = """{
  "kind": "video",

@@ -15,14 +15,14 @@ import pycolmap
 import pytest
 from skimage.data import astronaut
 
-from core import frames
-from core.contract.capture import Capture
-from core.contract.frame_records import FrameRecord
-from core.contract.messages import CancelledError, Problem, Reporter
-from core.contract.settings import from_json
-from core.frames.colour import HLG, to_srgb
-from core.frames.select import select_views, sharpness, turns
+from core.capture.capture import Capture
+from core.capture.frame_records import FrameRecord
+from core.capture.messages import CancelledError, Problem, Reporter
 from core.imaging import images
+from core.settings.settings import from_json
+from core.stages import frames
+from core.stages.frames.colour import HLG, to_srgb
+from core.stages.frames.select import select_views, sharpness, turns
 
 SIZE = 240
 

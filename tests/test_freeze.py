@@ -6,11 +6,10 @@ import json
 
 import pytest
 
-from benchmarks import freeze
-from core.contract.capture import Capture
-from core.contract.messages import Problem
-
-from .recorded import make_entry
+from core.capture.capture import Capture
+from core.capture.messages import Problem
+from research.benchmarks import freeze
+from tests.recorded import make_entry
 
 
 @pytest.fixture

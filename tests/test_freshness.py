@@ -10,17 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import freshness, hashes, stages, together
-from core.contract.capture import FORMAT, Capture
-from core.contract.files import write_json
-from core.contract.hashes import hash_source, same_source
-from core.contract.messages import Log
-from core.contract.portable_paths import read_portable, write_portable
-from core.contract.settings import Settings, from_json
+from core.capture import freshness, hashes, stages, together
+from core.capture.capture import FORMAT, Capture
+from core.capture.files import write_json
+from core.capture.hashes import hash_source, same_source
+from core.capture.messages import Log
+from core.capture.portable_paths import read_portable, write_portable
+from core.settings.settings import Settings, from_json
 from core.worker.job import read_job, write_job
-
-from .recorded import CAMERAS, FRAMES, make, record, states
-from .refused import refused
+from tests.recorded import CAMERAS, FRAMES, make, record, states
+from tests.refused import refused
 
 SOLVE = stages.by_name("solve")
 

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables of benchmarks.geometry: what was measured stands in them, what was not is said."""
+"""The tables of research.benchmarks.geometry: what was measured stands in them, what was not is said."""
 
 import numpy as np
 
-from benchmarks import figures, geometry_table
-from benchmarks.costs import meter
+from research.benchmarks import figures, geometry_table
+from research.benchmarks.costs import meter
 
 RESULTS = {
     "sample": {
@@ -68,7 +68,10 @@ def test_what_is_published_makes_the_same_tables(tmp_path):
         },
     }
     figures.write_record(
-        tmp_path / "geometry.json", "geometry", "python -m benchmarks.geometry FOLDER", geometry_table.published(long)
+        tmp_path / "geometry.json",
+        "geometry",
+        "python -m research.benchmarks.geometry FOLDER",
+        geometry_table.published(long),
     )
     assert geometry_table.table(figures.read_record("geometry", tmp_path)["figures"]) == geometry_table.table(long)
 

@@ -11,18 +11,18 @@ import pycolmap
 import pytest
 from skimage.data import astronaut
 
-from core import frames
-from core.contract.capture import Capture
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.messages import Problem, Reporter
 from core.face import faces, template
 from core.face.glasses import sureness
-from core.frames.glasses import SURE_LOG_ODDS, judge
 from core.geometry.views import View
 from core.imaging import images
-from core.synthetic.identities import reserved_seeds
-from core.synthetic.people import glasses
-from core.training import glasses as training
+from core.settings.settings import from_json
+from core.stages import frames
+from core.stages.frames.glasses import SURE_LOG_ODDS, judge
+from research.people.identities import reserved_seeds
+from research.people.lifelike import glasses
+from research.training import glasses as training
 
 FACE = astronaut().astype(np.float32)[:300, 60:400] / 255
 

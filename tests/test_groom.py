@@ -7,7 +7,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from core.contract.files import replacing  # noqa: E402
+from core.capture.files import replacing  # noqa: E402
 from tests.test_acting import write_head  # noqa: E402
 
 

@@ -12,10 +12,10 @@ from core.face import lids, template
 from core.face.strands import SkinSurface, prisms
 from core.geometry import raster
 from core.geometry.meshes import joined
-from core.upscale import grooming, strokes, ways
-from core.upscale.hair import Hair
-from core.upscale.maps import HeadMaps
-from core.upscale.surface import HeadSurface, lay_out
+from core.stages.upscale import grooming, strokes, ways
+from core.stages.upscale.hair import Hair
+from core.stages.upscale.maps import HeadMaps
+from core.stages.upscale.surface import HeadSurface, lay_out
 
 SIZE = 1024
 SKIN, HAIR = np.array([0.5, 0.35, 0.28]), np.array([0.04, 0.03, 0.02])

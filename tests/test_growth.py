@@ -9,14 +9,13 @@ import cv2
 import numpy as np
 import pytest
 
-from core.contract.capture import Capture
-from core.contract.messages import Problem
+from core.capture.capture import Capture
+from core.capture.messages import Problem
 from core.face import shown_parts, template
 from core.imaging import images
-from core.upscale import hair
-from core.upscale.maps import HeadMaps
-
-from .hairy_head import SIZE, surface
+from core.stages.upscale import hair
+from core.stages.upscale.maps import HeadMaps
+from tests.hairy_head import SIZE, surface
 
 LIGHT, DARK = np.array([0.5, 0.35, 0.28]), np.array([0.07, 0.045, 0.035])
 """Skins, linear albedo."""

@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import _parser
-from core.contract.settings import known_settings
-
-from .conftest import ROOT
+from core.settings.settings import known_settings
+from tests.conftest import ROOT
 
 PAGES = {path.name: path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs" / "guide").glob("*.md"))}
 MESSAGES = re.findall(r"^\| (?!message|---|\*\*)(.+?) \|", PAGES["trouble.md"], flags=re.MULTILINE)

@@ -5,18 +5,17 @@
 import numpy as np
 import pytest
 
-from core import upscale
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import Reporter
-from core.contract.settings import from_json
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Reporter
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-from core.upscale import hair
-from core.upscale.maps import HeadMaps
-
-from .hairy_head import SIZE, painted, surface
+from core.settings.settings import from_json
+from core.stages import upscale
+from core.stages.upscale import hair
+from core.stages.upscale.maps import HeadMaps
+from tests.hairy_head import SIZE, painted, surface
 
 
 @pytest.fixture(scope="module")

@@ -11,16 +11,16 @@ import pytest
 
 pytest.importorskip("OpenImageIO")
 
-from core.contract.messages import Reporter  # noqa: E402
+from core.capture.messages import Reporter  # noqa: E402
 from core.face import template  # noqa: E402
 from core.face.head import Head  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
-from core.registration import hair  # noqa: E402
-from core.synthetic.painted_head import person, place_camera  # noqa: E402
-from core.texture import foreign, parts_shown  # noqa: E402
-from core.texture.held_picture import hold  # noqa: E402
-from core.texture.projection import observe  # noqa: E402
+from core.stages.registration import hair  # noqa: E402
+from core.stages.texture import foreign, parts_shown  # noqa: E402
+from core.stages.texture.held_picture import hold  # noqa: E402
+from core.stages.texture.projection import observe  # noqa: E402
+from research.people.painted_head import person, place_camera  # noqa: E402
 
 SIZE, AZIMUTHS = 256, (-50, -20, 0, 20, 50)
 

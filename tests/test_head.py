@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 pytest.importorskip("torch")
-from core.contract.capture import Capture
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.face.head import Head, read_filmed_head, read_head
 from core.geometry import meshes, raster
-
-from .painted_skin import SHORT
-from .test_delight import SUN, render_frames, write_cameras
+from core.settings.settings import from_json
+from tests.painted_skin import SHORT
+from tests.test_delight import SUN, render_frames, write_cameras
 
 SIZE = 64
 STAGES = ("delight", "texture", "shadow_mask", "solve", "upscale", "transfer")

@@ -5,12 +5,12 @@
 import numpy as np
 import pytest
 
-from benchmarks import head_closeups
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-from core.synthetic import sample, scene
-from core.synthetic.identities import subject_mesh
+from research.benchmarks import head_closeups
+from research.people import sample, scene
+from research.people.identities import subject_mesh
 
 
 def middle(place: int | str) -> np.ndarray:

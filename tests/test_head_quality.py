@@ -6,16 +6,15 @@ in."""
 import numpy as np
 import pytest
 
-from core import registration
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.geometry import meshes
-from core.registration import alignment, eyes, intersections, landmarks, quality
-from core.registration.correspondence import Scan
-from core.synthetic.identities import subject_mesh
-
-from .test_registration import _capture, known, scan_of  # noqa: F401
+from core.settings.settings import from_json
+from core.stages import registration
+from core.stages.registration import alignment, eyes, intersections, landmarks, quality
+from core.stages.registration.correspondence import Scan
+from research.people.identities import subject_mesh
+from tests.test_registration import _capture, known, scan_of  # noqa: F401
 
 
 def blenders(vertices, faces) -> set:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.imaging import images
-from core.texture.held_picture import MARGIN_PX, hold, read_held
+from core.stages.texture.held_picture import MARGIN_PX, hold, read_held
 
 ROWS, COLUMNS = slice(0, 256), slice(0, 256)
 

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 import torch
 
-from core import solve
-from core.contract.messages import Reporter
+from core.capture.messages import Reporter
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-
-from .own_heads import check_fitted, lay_over, person
-from .test_prior_layout import SIZE, capture, seen_layouts, settings  # noqa: F401
+from core.stages import solve
+from tests.own_heads import check_fitted, lay_over, person
+from tests.test_prior_layout import SIZE, capture, seen_layouts, settings  # noqa: F401
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 FACEKIT = SHARED / "data" / "ict_facekit"

@@ -7,7 +7,7 @@ import subprocess
 
 import pytest
 
-from benchmarks import inventory
+from research.benchmarks import inventory
 
 RECORDED = json.loads(inventory.RECORD.read_text(encoding="utf-8"))
 
@@ -21,5 +21,5 @@ def present() -> dict:
 
 @pytest.mark.parametrize("kind", RECORDED)
 def test_names_are_those_that_were_recorded(present, kind):
-    assert present[kind] == RECORDED[kind], "if that is meant, run `python -m benchmarks.inventory`"
+    assert present[kind] == RECORDED[kind], "if that is meant, run `python -m research.benchmarks.inventory`"
     assert len(present) == len(RECORDED)

@@ -11,16 +11,16 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 
 pytest.importorskip("OpenImageIO")
 
-from core.contract.eyes_record import Eyeball  # noqa: E402
-from core.contract.messages import Reporter  # noqa: E402
+from core.capture.eyes_record import Eyeball  # noqa: E402
+from core.capture.messages import Reporter  # noqa: E402
 from core.face import lids  # noqa: E402
 from core.face.eye_reader import SIDE_PX, EyeShares  # noqa: E402
 from core.face.head import FilmedHead  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
-from core.solve import iris  # noqa: E402
-from core.synthetic.painted_head import place_camera  # noqa: E402
-from core.synthetic.people import eyes, shape  # noqa: E402
+from core.stages.solve import iris  # noqa: E402
+from research.people.lifelike import eyes, shape  # noqa: E402
+from research.people.painted_head import place_camera  # noqa: E402
 
 SEED, SKIN = 4, np.array([0.42, 0.26, 0.19])
 AZIMUTHS = (-24, -12, 0, 12, 24)

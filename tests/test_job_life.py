@@ -12,9 +12,8 @@ from importlib import import_module
 
 import pytest
 
-from core.contract.capture import Capture
-
-from . import standin, tiny_chain
+from core.capture.capture import Capture
+from tests import standin, tiny_chain
 
 bpy = pytest.importorskip("bpy")
 
@@ -228,7 +227,7 @@ def test_an_interrupted_solve_is_offered_to_go_on_when_the_file_is_opened_again(
 
 def test_how_long_a_quality_takes_is_learned_from_the_last_solve(addon, jobs, tmp_path):
     timings = addon("timings")
-    settings = import_module(timings.__package__.replace("wildcap_addon", "core.contract.settings"))
+    settings = import_module(timings.__package__.replace("wildcap_addon", "core.settings.settings"))
     timings._rates.clear()
     assert timings.describe_minutes("cpu") == ""
     a_capture(tmp_path, "a")

@@ -13,9 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.capture import Capture
-
-from . import standin
+from core.capture.capture import Capture
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 
@@ -132,7 +131,7 @@ def test_the_preview_is_read_again_when_it_is_newer(addon, tmp_path):
 
 def test_the_edited_part_can_be_solved_when_only_the_mask_changed(addon, capture):
     captures, properties, status = addon("captures"), addon("properties"), addon("status")
-    mask_edit = import_module(addon("status").__package__.replace("wildcap_addon", "core.contract.mask_edit"))
+    mask_edit = import_module(addon("status").__package__.replace("wildcap_addon", "core.capture.mask_edit"))
     item, folder = captures.active(bpy.context), Capture(capture)
     status.refresh(bpy.context)
     assert "No solve" in status.of(item).whole_solve and not bpy.ops.wildcap.solve_edited.poll()

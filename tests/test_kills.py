@@ -25,17 +25,16 @@ import numpy as np  # noqa: E402
 import torch  # noqa: E402
 from safetensors import SafetensorError  # noqa: E402
 
-from benchmarks import kills_judge, kills_worker  # noqa: E402
-from benchmarks.kills_capture import BESIDE, STRANGERS, Undisturbed, capture_at  # noqa: E402
-from core.contract.files import replacing_folder  # noqa: E402
-from core.contract.hashes import read_hash  # noqa: E402
-from core.contract.messages import Problem  # noqa: E402
+from core.capture.files import replacing_folder  # noqa: E402
+from core.capture.hashes import read_hash  # noqa: E402
+from core.capture.messages import Problem  # noqa: E402
 from core.geometry.models import read_model, write_model  # noqa: E402
-from core.solve import checkpoint  # noqa: E402
-from core.solve.lighting import Lights  # noqa: E402
-from core.solve.problem import State  # noqa: E402
-
-from .recorded import make_entry  # noqa: E402
+from core.solver.lighting import Lights  # noqa: E402
+from core.solver.objective import State  # noqa: E402
+from core.stages.solve import checkpoint  # noqa: E402
+from research.benchmarks import kills_judge, kills_worker  # noqa: E402
+from research.benchmarks.kills_capture import BESIDE, STRANGERS, Undisturbed, capture_at  # noqa: E402
+from tests.recorded import make_entry  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 TRIALS = 5
@@ -46,7 +45,7 @@ def test_a_handful_of_kills_loses_nothing_and_ends_in_the_same_bytes():
     command = [
         sys.executable,
         "-m",
-        "benchmarks.kills",
+        "research.benchmarks.kills",
         "--count",
         str(TRIALS),
         "--seed",

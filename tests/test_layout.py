@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import stages
+from core.capture import stages
 
 ROOT = Path(__file__).resolve().parent.parent
 TOP = {
@@ -24,37 +24,28 @@ TOP = {
     "README.md",
     "__init__.py",
     "__main__.py",
-    "benchmarks",
     "blender_manifest.toml",
     "core",
     "docs",
     "farm",
     "pyproject.toml",
     "requirements",
+    "research",
     "tests",
     "wildcap_addon",
 }
 ROOMS = {
     "assets",
     "batch",
-    "cameras",
-    "contract",
-    "delight",
+    "capture",
     "deliver",
     "face",
-    "frames",
     "geometry",
     "imaging",
     "light",
-    "registration",
-    "scan",
-    "shadow_mask",
-    "solve",
-    "synthetic",
-    "texture",
-    "training",
-    "transfer",
-    "upscale",
+    "settings",
+    "solver",
+    "stages",
     "weights",
     "worker",
 }

@@ -14,13 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import lease, processes
-from core.contract.capture import Capture
-from core.contract.files import replacing, write_json
-from core.contract.messages import CancelledError, Problem
+from core.capture import lease, processes
+from core.capture.capture import Capture
+from core.capture.files import replacing, write_json
+from core.capture.messages import CancelledError, Problem
 from core.worker.job import wait_until_free, write_job
-
-from . import kept_capture
+from tests import kept_capture
 
 RACES = int(os.environ.get("WILDCAP_RACES", 160))
 
@@ -207,10 +206,10 @@ def test_a_worker_that_was_stopped_is_replaced_after_a_term_and_stays_out_when_i
     code = f"""
 import sys, time
 sys.path.insert(0, {str(Path(__file__).parents[1])!r})
-from core.contract import lease
-from core.contract.capture import Capture
-from core.contract.files import write_json
-from core.contract.messages import Problem
+from core.capture import lease
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from core.capture.messages import Problem
 
 lease.TERM_S = 0.5
 capture = Capture({str(capture.root)!r})

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.delight import lift
+from core.stages.delight import lift
 
 
 def _skin(side: int) -> tuple[np.ndarray, np.ndarray]:

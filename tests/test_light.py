@@ -12,7 +12,7 @@ from core.geometry import raster
 from core.geometry.meshes import Mesh
 from core.geometry.raster import RayCaster
 from core.light.spherical_harmonics import LAMBERT, UNIFORM, per_function, sh_basis
-from core.synthetic import light
+from research.people import light
 
 WHITE_SKY = np.zeros((9, 3))
 WHITE_SKY[0] = UNIFORM

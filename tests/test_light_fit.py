@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import pytest
 import torch
 
-from core.solve.light_fit import light_loss
-from core.solve.problem import Observation
-from core.solve.recipes import OURS
+from core.solver.lights import light_loss
+from core.solver.objective import Observation
+from core.solver.recipes import OURS
 
 SIZE = 24
 MISSING = 0.2

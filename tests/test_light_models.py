@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks import comparison_table, light_models, rerender
-from benchmarks.albedo_score import AlbedoTruth, HeadInView
-from core.solve.initial import Start
-from core.solve.lighting import Lights, Shader, constant_light
-from core.solve.problem import Observation, State
-from core.solve.recipes import OURS
+from core.solver.lighting import Lights, Shader, constant_light
+from core.solver.objective import Observation, State
+from core.solver.recipes import OURS
+from core.solver.start import Start
+from research.benchmarks import comparison_table, light_models, rerender
+from research.benchmarks.albedo_score import AlbedoTruth, HeadInView
 
 SIZE = 32
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.solve.lighting import Lights, Shader, constant_light, fit_global, interpolation_matrix, shading_basis
+from core.solver.lighting import Lights, Shader, constant_light, fit_global, interpolation_matrix, shading_basis
 
 
 def sphere(rows: int = 200, columns: int = 400):

@@ -4,7 +4,7 @@
 
 import pytest
 
-from . import standin
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 

@@ -18,11 +18,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import lock_resolver
-from benchmarks import locks as maker
-from core.contract.messages import Problem
+from core.capture.messages import Problem
 from core.worker import locks, pip_source, pip_steps
 from core.worker.environment import required
+from research.benchmarks import lock_resolver
+from research.benchmarks import locks as maker
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 
@@ -48,7 +48,7 @@ def test_every_lock_has_all_direct_requirements_and_a_hash_for_every_package(nam
     assert lock.verified and len(lock.lines) > len(required(REQUIREMENTS))
     for package, version in required(REQUIREMENTS).items():
         assert lock.lines[locks.normal(package)].startswith(f"{locks.normal(package)}=={version} --hash=sha256:"), (
-            f"run `python -m benchmarks.locks {name}`"
+            f"run `python -m research.benchmarks.locks {name}`"
         )
     assert all(re.fullmatch(r"[a-z0-9-]+==[\w.!]+( --hash=sha256:[0-9a-f]{64})+", line) for line in lock.lines.values())
     known = locks.known_sizes(REQUIREMENTS, name)
@@ -293,6 +293,9 @@ def test_the_longest_path_and_the_sizes_are_what_the_wheels_say():
 
 def test_the_table_has_a_line_for_every_lock():
     printed = subprocess.run(
-        [sys.executable, "-m", "benchmarks.locks", "--table"], cwd=REQUIREMENTS.parent, capture_output=True, text=True
+        [sys.executable, "-m", "research.benchmarks.locks", "--table"],
+        cwd=REQUIREMENTS.parent,
+        capture_output=True,
+        text=True,
     ).stdout
     assert all(f"| `{name}` | " in printed for name in locks.names())

@@ -11,20 +11,21 @@ import pycolmap
 import pytest
 import torch
 
-from core.contract.capture import Capture
+from core.capture.capture import Capture
 from core.face import template
 from core.face.head import read_head
 from core.geometry import frame_pictures, meshes, raster
 from core.geometry.views import View
 from core.imaging import images
 from core.light.shadow_edges import penumbra
-from core.solve import initial, maps, witnesses
-from core.solve.capture_evidence import read_evidence
-from core.solve.head_cells import make_head_cells
-from core.solve.marks import Mark, find_marks, is_unlike_shadow
-from core.solve.prior_files import load
-from core.solve.recipes import OURS
-from core.solve.sampler import Sampler, seed_noise
+from core.solver import start as initial
+from core.solver.extensions.marks import Mark, find_marks, is_unlike_shadow
+from core.solver.recipes import OURS
+from core.solver.sampler import Sampler, seed_noise
+from core.stages.solve import maps, witnesses
+from core.stages.solve.capture_evidence import read_evidence
+from core.stages.solve.head_cells import make_head_cells
+from core.stages.solve.prior_files import load
 
 SIZE = 512
 TEXEL = 1024 / SIZE

@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 import torch
 
-from core import solve
-from core.contract import mask_edit
-from core.contract.capture import Capture
-from core.contract.messages import CancelledError, Reporter
-from core.contract.stages import MAPS
+from core.capture import mask_edit
+from core.capture.capture import Capture
+from core.capture.messages import CancelledError, Reporter
+from core.capture.stages import MAPS
 from core.imaging import images
-from core.solve.window import find_window
-
-from .painted_skin import make, settings
+from core.stages import solve
+from core.stages.solve.window import find_window
+from tests.painted_skin import make, settings
 
 EDIT = (slice(60, 68), slice(40, 50))
 

@@ -6,9 +6,9 @@ wait for a click."""
 import numpy as np
 import pytest
 
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import Failed, Reporter, StageDone
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Failed, Reporter, StageDone
 from core.imaging import images
 from core.worker.job import write_job
 from core.worker.runner import run_job
@@ -18,16 +18,15 @@ from core.worker.runner import run_job
 def skin(tmp_path) -> Capture:
     """A face with a hard shadow and a rough mask of it."""
     pytest.importorskip("torch")
-    from .painted_skin import make
+    from tests.painted_skin import make
 
     return make(tmp_path / "a.wildcap")
 
 
 def test_the_tone_is_that_of_the_skin_outside_of_the_mask(skin):
     pytest.importorskip("torch")
-    from core.solve import tone
-
-    from .painted_skin import settings
+    from core.stages.solve import tone
+    from tests.painted_skin import settings
 
     def estimate() -> np.ndarray:
         report = Reporter("skin_tone")
@@ -46,9 +45,8 @@ def test_the_tone_is_that_of_the_skin_outside_of_the_mask(skin):
 
 def test_snapping_brings_a_rough_border_to_the_shadows_own(skin):
     pytest.importorskip("torch")
-    from core.solve import snapping
-
-    from .painted_skin import SIZE, settings
+    from core.stages.solve import snapping
+    from tests.painted_skin import SIZE, settings
 
     rough = images.read_mask(skin.shadow_mask_auto)  # a hard disc, wider than the shadow
     report = Reporter("mask_edges")

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from benchmarks import figures
-from benchmarks.measures.table import Column, format_table, standard_error, summarise, to_record
+from research.benchmarks import figures
+from research.benchmarks.measures.table import Column, format_table, standard_error, summarise, to_record
 
 COLUMNS = {
     "psnr": Column("PSNR, dB"),

@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.measures.agreement import agreement
-from benchmarks.measures.calibration import calibrate, negative_log_likelihood
-from benchmarks.measures.parts import score_parts
-from benchmarks.measures.references import blur_divided_out, face_height, flat_colour
-from benchmarks.measures.shared_light import fit_light, log_ratio, without_light
-from benchmarks.measures.tone import BEST_PSNR, psnr_after_gain, to_tone
 from core.imaging import images
 from core.light.spherical_harmonics import sh_basis
+from research.benchmarks.measures.agreement import agreement
+from research.benchmarks.measures.calibration import calibrate, negative_log_likelihood
+from research.benchmarks.measures.parts import score_parts
+from research.benchmarks.measures.references import blur_divided_out, face_height, flat_colour
+from research.benchmarks.measures.shared_light import fit_light, log_ratio, without_light
+from research.benchmarks.measures.tone import BEST_PSNR, psnr_after_gain, to_tone
 
 RNG = np.random.default_rng(5)
 N = 4000

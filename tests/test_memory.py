@@ -7,19 +7,18 @@ from types import SimpleNamespace
 import pytest
 import torch
 
-from core import solve
-from core.contract.capture import Capture
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import Settings, from_json
-from core.contract.stages import MAPS, by_name
-from core.solve.memory import sample_within_memory
-from core.solve.network import UNet, UNetLayout
-from core.solve.recipes import Recipe
-from core.solve.sampler import Sampler, seed_noise
-
-from .painted_skin import make, settings
-from .recorded import changed, record
-from .test_sampler import SmoothPrior, observation, shadow_problem, start
+from core.capture.capture import Capture
+from core.capture.messages import Problem, Reporter
+from core.capture.stages import MAPS, by_name
+from core.settings.settings import Settings, from_json
+from core.solver.prior.network import UNet, UNetLayout
+from core.solver.recipes import Recipe
+from core.solver.sampler import Sampler, seed_noise
+from core.stages import solve
+from core.stages.solve.memory import sample_within_memory
+from tests.painted_skin import make, settings
+from tests.recorded import changed, record
+from tests.test_sampler import SmoothPrior, observation, shadow_problem, start
 
 REFUSALS = [
     MemoryError(),
@@ -88,7 +87,7 @@ def test_a_step_that_did_not_fit_is_done_again_to_the_same_bytes(unbroken, at, b
 
 
 def test_lights_that_did_not_fit_start_over_too(unbroken, monkeypatch):
-    from core.solve import light_fit
+    from core.solver import lights as light_fit
 
     calls, loss = [], light_fit.light_loss
 
@@ -134,7 +133,7 @@ def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, mo
             def plain(norm, convolution, x, mapped):
                 return convolution(torch.nn.functional.gelu(norm(x, mapped)))
 
-            monkeypatch.setattr("core.solve.network_blocks.Shaped.convolve", plain)
+            monkeypatch.setattr("core.solver.prior.network_blocks.Shaped.convolve", plain)
         x, kept = torch.linspace(-1, 1, 5 * 32 * 32).reshape(1, 5, 32, 32).requires_grad_(), {}
 
         def pack(saved, kept=kept):

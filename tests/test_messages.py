@@ -4,7 +4,7 @@
 
 import pytest
 
-from core.contract.messages import (
+from core.capture.messages import (
     KINDS,
     Cancelled,
     CancelledError,

@@ -11,10 +11,9 @@ import ast
 
 import pytest
 
-from core.contract.messages import Problem
-from core.contract.settings import preset
-
-from . import message_sites
+from core.capture.messages import Problem
+from core.settings.settings import preset
+from tests import message_sites
 
 
 def test_every_sentence_that_an_artist_can_be_told_was_said_in_a_test(whole_run):
@@ -36,21 +35,21 @@ def test_reasons_reach_blender_in_one_place_alone():
 
 
 def test_what_other_processes_reached_counts(tmp_path, monkeypatch):
-    everything = message_sites._reached | {("core/contract/settings.py", line) for line in range(1, 1000)}
+    everything = message_sites._reached | {("core/settings/settings.py", line) for line in range(1, 1000)}
     monkeypatch.setattr(message_sites, "_reached", set(everything))
     message_sites.keep(tmp_path / "reached")
     monkeypatch.setattr(message_sites, "_reached", set())
     assert len(message_sites.unreached()) > 80
     message_sites.take_in(tmp_path / "reached")
     assert message_sites._reached == everything
-    assert not any(sentence.startswith("core/contract/settings.py") for sentence in message_sites.unreached())
+    assert not any(sentence.startswith("core/settings/settings.py") for sentence in message_sites.unreached())
 
 
 def test_a_sentence_is_noted_at_its_own_line():
     call = next(
-        call for call in message_sites.sentences("core/contract/settings.py") if "no quality" in ast.unparse(call)
+        call for call in message_sites.sentences("core/settings/settings.py") if "no quality" in ast.unparse(call)
     )
-    message_sites._reached -= {("core/contract/settings.py", line) for line in range(call.lineno, call.end_lineno + 1)}
+    message_sites._reached -= {("core/settings/settings.py", line) for line in range(call.lineno, call.end_lineno + 1)}
     assert any("no quality" in sentence for sentence in message_sites.unreached())
     with pytest.raises(Problem):
         preset("none")

@@ -6,7 +6,7 @@ import ast
 
 import pytest
 
-from benchmarks import mutants
+from research.benchmarks import mutants
 
 SOURCE = '''
 class Mask:

@@ -7,14 +7,13 @@ import shutil
 
 import pytest
 
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import Problem
-from core.contract.newest_maps import WORN, find_newest_maps
-from core.contract.settings import Settings, from_json
-
-from . import standin
-from .recorded import record
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Problem
+from core.capture.newest_maps import WORN, find_newest_maps
+from core.settings.settings import Settings, from_json
+from tests import standin
+from tests.recorded import record
 
 UPSCALE = stages.by_name("upscale")
 

@@ -12,16 +12,16 @@ import pytest
 
 pytest.importorskip("OpenImageIO")
 
-from core.contract.capture import Capture  # noqa: E402
-from core.contract.eyes_record import Eyeball, read_eyes, write_eyes  # noqa: E402
-from core.contract.messages import Problem, Reporter  # noqa: E402
+from core.capture.capture import Capture  # noqa: E402
+from core.capture.eyes_record import Eyeball, read_eyes, write_eyes  # noqa: E402
+from core.capture.messages import Problem, Reporter  # noqa: E402
 from core.face import eye_reader, faces, lids, template  # noqa: E402
 from core.face.faces import Eye  # noqa: E402
 from core.face.head import read_filmed_head, read_head  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.geometry.views import View  # noqa: E402
-from core.registration import eye_looks, eyeballs, landmarks, lid_marks  # noqa: E402
-from core.synthetic.people import shape  # noqa: E402
+from core.stages.registration import eye_looks, eyeballs, landmarks, lid_marks  # noqa: E402
+from research.people.lifelike import shape  # noqa: E402
 
 SEED, IRIS_M = 4, 0.0059
 QUIET = Reporter("registration", emit=lambda message: None)

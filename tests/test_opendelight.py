@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 import torch
 
-from core.contract.capture import Capture
-from core.contract.hashes import hash_value
-from core.contract.messages import CancelledError, Problem, Reporter
-from core.contract.settings import DelightSettings, from_json
-from core.delight.face_crop import cut_face, face_mask, ffhq_alignment, put_face_back
+from core.capture.capture import Capture
+from core.capture.hashes import hash_value
+from core.capture.messages import CancelledError, Problem, Reporter
 from core.face.faces import Face
 from core.imaging import images
-from core.synthetic.painted_head import photograph, place_camera
+from core.settings.settings import DelightSettings, from_json
+from core.stages.delight.face_crop import cut_face, face_mask, ffhq_alignment, put_face_back
+from research.people.painted_head import photograph, place_camera
 
-room = importlib.import_module("core.delight.opendelight")  # the package names its function alike
+room = importlib.import_module("core.stages.delight.opendelight")  # the package names its function alike
 BASE, ENHANCER, load = room.BASE, room.ENHANCER, room.load
 PUBLISHED = {name: getattr(room, name) for name in ("WIDTH", "DEPTH", "CHANNELS", "UNET")}
 NARROW = {"WIDTH": 64, "DEPTH": 2, "CHANNELS": 12, "UNET": 4}

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from core import registration
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.geometry import atlas, meshes
-from core.registration import alignment, carried, own_mesh, own_template, render_landmarks
-
-from .egg import egg
-from .own_heads import check_fitted, lay_over, person
+from core.settings.settings import from_json
+from core.stages import registration
+from core.stages.registration import alignment, carried, own_mesh, own_template, render_landmarks
+from tests.egg import egg
+from tests.own_heads import check_fitted, lay_over, person
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 TO_Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])

@@ -10,13 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.capture import Capture
-from core.contract.files import remove_file, replacing, replacing_folder
-from core.contract.messages import Log, Problem
+from core.capture.capture import Capture
+from core.capture.files import remove_file, replacing, replacing_folder
+from core.capture.messages import Log, Problem
 from core.worker.job import write_job
 from core.worker.runner import run_job
-
-from .kept_capture import contents, make, make_frames
+from tests.kept_capture import contents, make, make_frames
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -155,9 +154,9 @@ def test_a_link_in_place_of_a_file_or_folder_of_ours_is_kept_aside_and_what_it_l
 KILLED = """
 import os, sys
 sys.path.insert(0, {root!r})
-from core.contract import capture as module
-from core.contract.capture import Capture
-from core.contract.files import replacing_folder
+from core.capture import capture as module
+from core.capture.capture import Capture
+from core.capture.files import replacing_folder
 at = {at}
 count = 0
 rename = os.replace
@@ -227,7 +226,7 @@ def test_what_a_stage_needs_for_a_while_lies_in_the_capture_and_goes_with_its_pr
     code = f"""
 import sys, time
 sys.path.insert(0, {str(ROOT)!r})
-from core.contract.capture import Capture
+from core.capture.capture import Capture
 with Capture({str(capture.root)!r}).workspace() as work:
     (work / "database.db").write_text("half")
     print(work, flush=True)

@@ -7,12 +7,11 @@ import shutil
 
 import pytest
 
-from core.contract import ownership
-from core.contract.capture import Capture
-from core.contract.files import replacing
-from core.contract.hashes import read_hash
-
-from .kept_capture import contents, make, make_frames
+from core.capture import ownership
+from core.capture.capture import Capture
+from core.capture.files import replacing
+from core.capture.hashes import read_hash
+from tests.kept_capture import contents, make, make_frames
 
 
 @pytest.fixture

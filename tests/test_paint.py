@@ -6,7 +6,7 @@ tests/gui/."""
 import numpy as np
 import pytest
 
-from . import standin
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 

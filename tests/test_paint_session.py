@@ -8,7 +8,7 @@ import os
 import numpy as np
 import pytest
 
-from . import standin
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks import parts as benchmark
-from core.contract.messages import Problem, Reporter
+from core.capture.messages import Problem, Reporter
 from core.face import parser, template
 from core.face.parser_network import ParseNet, network_input
 from core.face.parts import BRIDGE, CHIN, PARTS, SIDE_PX, cut, inside, keep_beard, put_back, to_crop
 from core.geometry.meshes import vertex_uvs
-from core.synthetic.identities import reserved_seeds
-from core.synthetic.people import figure, snapshot, unlit
-from core.training import descent, snapshots
-from core.training import parser as training
-from core.training.descent import TrainingRun
-from core.training.seeds import named_subjects
+from research.benchmarks import parts as benchmark
+from research.people.identities import reserved_seeds
+from research.people.lifelike import figure, snapshot, unlit
+from research.training import descent, snapshots
+from research.training import parser as training
+from research.training.descent import TrainingRun
+from research.training.seeds import named_subjects
 
 QUIET = Reporter("train", emit=lambda message: None)
 SEED, VIEWS = 3, 2  # a man with cropped hair, a full beard and open eyes

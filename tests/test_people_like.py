@@ -14,10 +14,10 @@ pytest.importorskip("pycolmap")
 
 from core.face import lids, strands, template  # noqa: E402
 from core.geometry.meshes import Mesh, vertex_normals  # noqa: E402
-from core.synthetic import sample, scene  # noqa: E402
-from core.synthetic.canvas import canvas  # noqa: E402
-from core.synthetic.identities import reserved_seeds, subject_mesh  # noqa: E402
-from core.synthetic.people import clothes, eyes, facekit, figure, person, shape, traits, truth  # noqa: E402
+from research.people import sample, scene  # noqa: E402
+from research.people.canvas import canvas  # noqa: E402
+from research.people.identities import reserved_seeds, subject_mesh  # noqa: E402
+from research.people.lifelike import clothes, eyes, facekit, figure, person, shape, traits, truth  # noqa: E402
 
 SEED = 3  # a man with cropped hair, a full beard and open eyes
 SIZE = 256
@@ -249,8 +249,8 @@ def test_a_seed_is_one_person(someone):
 
 
 def test_training_never_draws_a_person_who_is_filmed():
-    from benchmarks import likenesses
-    from core.training.seeds import FIRST_SEED, HELD_OUT_SEED
+    from research.benchmarks import likenesses
+    from research.training.seeds import FIRST_SEED, HELD_OUT_SEED
 
     filmed = {each.seed for each in (*likenesses.LIKENESSES, *likenesses.HELD_BACK)}
     assert len(filmed) == 8 and filmed <= reserved_seeds()
@@ -258,7 +258,7 @@ def test_training_never_draws_a_person_who_is_filmed():
 
 
 def test_the_people_are_the_first_who_are_as_their_names_say():
-    from benchmarks import likenesses
+    from research.benchmarks import likenesses
 
     rule = {
         "bearded": lambda p: p.openness > 0 and (p.hair, p.beard) == ("cropped", "full"),

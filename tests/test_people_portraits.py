@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import torch
 
-from core.contract.messages import Reporter
-from core.delight.unet import FARTHEST_LOG, network_input
+from core.capture.messages import Reporter
 from core.face.parts import PARTS
 from core.imaging import images
-from core.synthetic.people import markings, portraits, relightable
-from core.synthetic.people.figure import make_figure
-from core.training import people
-from core.training.portraits import LEAST_WEIGHT, PortraitBatch, repainted
+from core.stages.delight.unet import FARTHEST_LOG, network_input
+from research.people.lifelike import markings, portraits, relightable
+from research.people.lifelike.figure import make_figure
+from research.training import people
+from research.training.portraits import LEAST_WEIGHT, PortraitBatch, repainted
 
 QUIET = Reporter("train", emit=lambda message: None)
 BEARDED = 1010

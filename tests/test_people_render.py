@@ -13,8 +13,8 @@ pytest.importorskip("pycolmap")
 pytest.importorskip("bpy")
 
 from core.imaging import images  # noqa: E402
-from core.synthetic import sample, scene  # noqa: E402
-from core.synthetic.people import figure, filmed, person, truth  # noqa: E402
+from research.people import sample, scene  # noqa: E402
+from research.people.lifelike import figure, filmed, person, truth  # noqa: E402
 
 SCALE, SAMPLES = 0.25, 24
 SHIRT, IRIS = (0.05, 0.30, 0.10), (0.02, 0.06, 0.25)

@@ -10,8 +10,8 @@ pytest.importorskip("pycolmap")
 from core.geometry import raster  # noqa: E402
 from core.geometry.meshes import Mesh  # noqa: E402
 from core.imaging import images  # noqa: E402
-from core.synthetic import sample, scene  # noqa: E402
-from core.synthetic.people import motion, phone  # noqa: E402
+from research.people import sample, scene  # noqa: E402
+from research.people.lifelike import motion, phone  # noqa: E402
 
 PLAIN = phone.Phone(
     shot=0,

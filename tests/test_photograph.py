@@ -8,9 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from core.contract.messages import Problem
-from core.delight.evening import ShadingEstimate
-from core.delight.surface import skin_weights
+from core.capture.messages import Problem
 from core.face import template
 from core.face.faces import BROW_LINES, EYE_LINES, Face
 from core.face.head import Head
@@ -18,10 +16,11 @@ from core.face.landmark_model import template_landmarks
 from core.geometry import raster
 from core.geometry.views import read_views
 from core.imaging import images
+from core.stages.delight.evening import ShadingEstimate
+from core.stages.delight.surface import skin_weights
+from tests.test_delight import SUN_COLOUR, capture, render_frames  # noqa: F401  a fixture
 
-from .test_delight import SUN_COLOUR, capture, render_frames  # noqa: F401  a fixture
-
-photograph = importlib.import_module("core.delight.photograph")
+photograph = importlib.import_module("core.stages.delight.photograph")
 IDENTITY = np.random.default_rng(5).normal(0, 0.7, len(template_landmarks().basis))
 SIDE, BRIGHT, DARK = 256, 0.5, 0.25
 OF_BROW = float(images.srgb_to_linear(np.float32(DARK)) / images.srgb_to_linear(np.float32(BRIGHT)))

@@ -8,11 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from core.contract.capture import Capture
-from core.frames.colour import to_srgb
+from core.capture.capture import Capture
 from core.imaging import images
-
-from .test_frames import SIZE, capture, moving_face, refused, take  # noqa: F401
+from core.stages.frames.colour import to_srgb
+from tests.test_frames import SIZE, capture, moving_face, refused, take  # noqa: F401
 
 
 def test_photographs_are_kept_larger_for_the_features_cameras_are_found_by(capture, tmp_path):  # noqa: F811

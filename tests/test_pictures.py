@@ -6,12 +6,11 @@ import ast
 import re
 from collections import Counter
 
-from benchmarks import subjects_sheet
-from benchmarks.results.gallery import SHOWN
-from benchmarks.window_pictures import PICTURES
-from core.synthetic.identities import reserved_seeds
-
-from .conftest import ROOT
+from research.benchmarks import subjects_sheet
+from research.benchmarks.results.gallery import SHOWN
+from research.benchmarks.window_pictures import PICTURES
+from research.people.identities import reserved_seeds
+from tests.conftest import ROOT
 
 THERE = {path.stem for path in (ROOT / "docs" / "pictures").iterdir()}
 SERIES = {"NAME": list(PICTURES), "gallery_NAME": [f"gallery_{name}" for name in SHOWN]}
@@ -26,10 +25,10 @@ def named(text: str) -> list[str]:
 
 def test_every_picture_is_named_by_the_one_benchmark_whose_command_makes_it():
     makers = {}
-    for path in sorted((ROOT / "benchmarks").glob("*.py")):
+    for path in sorted((ROOT / "research" / "benchmarks").glob("*.py")):
         told = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
         for name in named(told):
-            assert f"python -m benchmarks.{path.stem} " in told, f"{path.name} names {name} and has no command"
+            assert f"python -m research.benchmarks.{path.stem} " in told, f"{path.name} names {name} and has no command"
             makers.setdefault(name, []).append(path.stem)
     assert {name: by for name, by in makers.items() if len(by) > 1} == {}
     assert sorted(makers) == sorted(THERE)

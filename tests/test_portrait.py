@@ -9,9 +9,9 @@ import trimesh
 from core.geometry.meshes import Mesh
 from core.geometry.raster import RayCaster
 from core.imaging import images
-from core.synthetic import environments, olat, portrait, sight
-from core.synthetic.identities import subject_mesh
-from core.synthetic.skin import make_skin
+from research.people import environments, olat, portrait, sight
+from research.people.identities import subject_mesh
+from research.people.skin import make_skin
 
 
 def ball(radius: float = 0.1, centre=(0, 0, 0)) -> Mesh:

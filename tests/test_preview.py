@@ -4,12 +4,11 @@
 
 import numpy as np
 
-from core import solve
-from core.contract.messages import Preview, Reporter
+from core.capture.messages import Preview, Reporter
 from core.imaging import images
-from core.solve import drawing
-
-from .painted_skin import make, settings
+from core.stages import solve
+from core.stages.solve import drawing
+from tests.painted_skin import make, settings
 
 
 def test_a_solve_shows_pictures_that_change_and_how_its_loss_falls(tmp_path, monkeypatch):

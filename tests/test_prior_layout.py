@@ -13,23 +13,22 @@ import numpy as np
 import pytest
 import torch
 
-from core import solve
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
-from core.contract.stages import MAPS
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Problem, Reporter
+from core.capture.stages import MAPS
 from core.face import template
 from core.geometry import meshes, raster
 from core.imaging import images
-from core.solve import layout
-from core.solve.lighting import Lights
-from core.solve.maps import Maps
-from core.solve.prior_files import WEIGHTS, load
-
-from .painted_skin import SIZE, TONE, as_setting, make
-from .recorded import changed, record
-from .test_released_prior import weights_of, write
+from core.settings.settings import from_json
+from core.solver.lighting import Lights
+from core.stages import solve
+from core.stages.solve import layout
+from core.stages.solve.maps import Maps
+from core.stages.solve.prior_files import WEIGHTS, load
+from tests.painted_skin import SIZE, TONE, as_setting, make
+from tests.recorded import changed, record
+from tests.test_released_prior import weights_of, write
 
 MODEL = {
     "depths": [1, 1],

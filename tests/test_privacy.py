@@ -10,15 +10,14 @@ import sys
 import pytest
 
 from core.batch import task
-from core.contract import consent, report, switchlight_api
-from core.contract.capture import Capture
-from core.contract.messages import Problem
-from core.contract.settings import Settings
+from core.capture import consent, report, switchlight_api
+from core.capture.capture import Capture
+from core.capture.messages import Problem
+from core.settings.settings import Settings
 from core.worker import client, environment, terminal
 from core.worker.background import BackgroundTask
 from core.worker.job import write_job
-
-from . import recorded
+from tests import recorded
 
 KEY = "sk-Zoe-4711-do-not-tell"
 SCRIPT = '"><script>alert(1)</script>'
@@ -105,7 +104,7 @@ def test_what_a_worker_starts_does_not_inherit_the_key(key):
 
 
 def test_a_frame_that_changed_after_it_was_agreed_to_is_not_sent(tmp_path):
-    from core.delight import switchlight
+    from core.stages.delight import switchlight
 
     capture = Capture(tmp_path / "a.wildcap")
     capture.frames.mkdir(parents=True)

@@ -9,14 +9,13 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.contract import stages, unforeseen
-from core.contract.capture import Capture
-from core.contract.settings import from_json
+from core.capture import stages, unforeseen
+from core.capture.capture import Capture
+from core.settings.settings import from_json
 from core.worker import problem_report
 from core.worker.job import write_job
 from core.worker.problem_report import REMOVED, Scrubber
-
-from . import recorded
+from tests import recorded
 
 ROOT = Path(__file__).resolve().parent.parent
 KEY = "sk-Zoe-4711-do-not-tell"
@@ -79,7 +78,7 @@ def test_no_name_of_what_the_settings_name_elsewhere_is_left(capture, tmp_path):
 def test_what_helps_stays(capture):
     scrub = Scrubber(ROOT, Path("/opt/solver/bin/python"), capture)
     trace = (
-        f'  File "{ROOT}/core/scan/stereo.py", line 31, in match\n    depth = 3/4 * focal  # '
+        f'  File "{ROOT}/core/stages/scan/stereo.py", line 31, in match\n    depth = 3/4 * focal  # '
         'and/or\nZeroDivisionError: division by zero'
     )
     assert scrub(trace) == trace.replace(str(ROOT), "<WildCap>")

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from core.contract import processes
+from core.capture import processes
 
 
 def test_processes_are_told_apart():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import figures, hostile, kills
+from research.benchmarks import figures, hostile, kills
 
 TESTS = Path(__file__).resolve().parent
 PAGE = (TESTS.parent / "docs" / "promises.md").read_text(encoding="utf-8")

@@ -10,8 +10,7 @@ import subprocess
 import pytest
 
 from core.worker import locks
-
-from .conftest import ROOT
+from tests.conftest import ROOT
 
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 WORKFLOW = (ROOT / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8")

@@ -17,9 +17,8 @@ import pytest
 
 from core.batch import ray_task
 from core.batch.state import DONE
-
-from . import tiny_batch, tiny_chain
-from .tiny_batch import core, make, states
+from tests import tiny_batch, tiny_chain
+from tests.tiny_batch import core, make, states
 
 WAIT_S = 90
 pytestmark = pytest.mark.skipif(
@@ -31,7 +30,7 @@ pytestmark = pytest.mark.skipif(
 def code(tmp_path):
     """Rooms of a few lines, and leases that are soon out."""
     code = tiny_batch.build(tmp_path / "code")
-    lease = code / "core" / "contract" / "lease.py"
+    lease = code / "core" / "capture" / "lease.py"
     text = lease.read_text(encoding="utf-8")
     assert "TERM_S = 30.0\n" in text
     lease.write_text(text.replace("TERM_S = 30.0\n", "TERM_S = 3.0\n"), encoding="utf-8")

@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(r"^```(python|diff)\n(.*?)^```$", re.M | re.S)
-UNUSED = shutil.ignore_patterns("__pycache__", "sample", "sample_head", "training", "*.safetensors")
+UNUSED = shutil.ignore_patterns("__pycache__", "sample_head", "*.safetensors")
 
 
 def recipe(title: str) -> str:
@@ -66,12 +66,12 @@ def test_a_delighter_is_offered_with_its_card_and_run(code):
 import sys
 from types import SimpleNamespace
 import numpy as np
-from core import delight
-from core.contract import delighter_cards
-from core.contract.messages import Reporter
-from core.contract.settings import from_json
+from core.stages import delight
+from core.settings import delighter_cards
+from core.capture.messages import Reporter
+from core.settings.settings import from_json
 from core.imaging import images
-sys.modules["core.delight.evened"].read_views = lambda capture, selected_only: [SimpleNamespace(path=0.1), SimpleNamespace(path=0.6)]
+sys.modules["core.stages.delight.evened"].read_views = lambda capture, selected_only: [SimpleNamespace(path=0.1), SimpleNamespace(path=0.6)]
 images.read_srgb = lambda value: images.linear_to_srgb(np.full((4, 4, 3), value, np.float32))
 settings = from_json({"delight": {"delighter": "evened"}})
 found = list(delight.DELIGHTERS[settings.delight.delighter](None, settings, Reporter("delight")))
@@ -85,7 +85,7 @@ print([round(float(images.srgb_to_linear(each.image).mean()), 3) for each in fou
 def test_a_preset_is_listed(code):
     follow("Add a delivery preset", code)
     assert "godot" in run(code, "-m", "core", "presets").lower()
-    run(code, "-c", "from core.contract.settings import from_json; from_json({'deliver': {'preset': 'godot'}})")
+    run(code, "-c", "from core.settings.settings import from_json; from_json({'deliver': {'preset': 'godot'}})")
 
 
 def test_an_importer_reads_cameras_where_they_are_and_refuses_a_damaged_file(code, tmp_path):
@@ -103,8 +103,8 @@ def test_an_importer_reads_cameras_where_they_are_and_refuses_a_damaged_file(cod
         """
 from pathlib import Path
 import numpy as np
-from core.cameras.calibration import read_cameras
-from core.contract.messages import Problem
+from core.stages.cameras.calibration import read_cameras
+from core.capture.messages import Problem
 found = read_cameras(Path("face.transforms"))
 assert [camera.frame for camera in found] == [0, 1, 2] and found[0].params == (900, 900, 320, 240)
 assert np.allclose(found[0].rotation, np.diag([1, -1, -1])) and np.allclose(-found[0].rotation.T @ found[0].translation, [0.1, -0.5, 0.2])

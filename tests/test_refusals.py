@@ -5,9 +5,8 @@ already: test_messages_reached.py counts."""
 
 import pytest
 
-from core.contract.messages import Problem
-
-from . import standin
+from core.capture.messages import Problem
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 

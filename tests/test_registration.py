@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from core import registration
-from core.contract.capture import Capture
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.geometry import meshes
 from core.geometry.meshes import Mesh
 from core.geometry.views import read_views
 from core.imaging import images
-from core.registration import alignment, landmarks, nonrigid
-from core.registration.correspondence import Scan
-
-from .photographed_head import HEIGHT, WIDTH, write_cameras
+from core.settings.settings import from_json
+from core.stages import registration
+from core.stages.registration import alignment, landmarks, nonrigid
+from core.stages.registration.correspondence import Scan
+from tests.photographed_head import HEIGHT, WIDTH, write_cameras
 
 AZIMUTHS = (-40, -25, -10, 5, 20, 35)
 

@@ -9,7 +9,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
-from benchmarks import reimported  # noqa: E402
+from research.benchmarks import reimported  # noqa: E402
 
 KEPT = {"blender_glb": (54, 3), "blender_usd": (54, 4), "unreal_fbx": (54, 4), "character_creator_obj": (0, 5)}
 """Shape keys, and pictures in the materials (the skin's and the eyes')."""
@@ -33,7 +33,7 @@ def test_a_metahuman_gets_what_its_documentation_asks_for(addon, tmp_path):
     """One check for each requirement of "From Mesh": FBX or OBJ; the skin's albedo as its texture; eyes that are open
     and no empty sockets, with white that another material or its texture tells from the skin; besides, as the hint
     says, a static mesh in a neutral pose."""
-    from core.contract import sample_head
+    from core.capture import sample_head
 
     headless = addon("relight.headless")
     capture = sample_head.copy_to(tmp_path)

@@ -13,11 +13,11 @@ import pytest
 import torch
 from torch.nn import functional
 
-from core.contract.messages import Problem
-from core.solve import prior_files, released
-from core.solve.network import Condition, denoise
-from core.solve.prior import make_coordinates
-from core.solve.refusals import tell_refusals
+from core.capture.messages import Problem
+from core.solver.prior.network import Condition, denoise
+from core.solver.prior.prior import make_coordinates
+from core.stages.solve import prior_files, released
+from core.stages.solve.refusals import tell_refusals
 
 CONFIGS = {
     "posenc, patches of 2, attention, variance": (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
-from . import node_text  # noqa: E402
+from tests import node_text  # noqa: E402
 
 
 def test_assembling_again_keeps_the_artists_values_and_makes_nothing_new(addon, capture):

@@ -10,16 +10,16 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks import gallery, people, people_lights, relit  # noqa: E402
-from benchmarks.delight_measures import TONES, tone_group  # noqa: E402
-from benchmarks.relit_maps import Worn, make_rows, read_worn, worn_by, write_row  # noqa: E402
-from core.contract.capture import Capture  # noqa: E402
+from core.capture.capture import Capture  # noqa: E402
 from core.face import template
 from core.geometry.meshes import write_obj  # noqa: E402
 from core.imaging import images  # noqa: E402
-from core.synthetic import pigment  # noqa: E402
-from core.synthetic.identities import reserved_seeds  # noqa: E402
-from core.synthetic.parameters import sample_parameters  # noqa: E402
+from research.benchmarks import gallery, people, people_lights, relit  # noqa: E402
+from research.benchmarks.delight_measures import TONES, tone_group  # noqa: E402
+from research.benchmarks.relit_maps import Worn, make_rows, read_worn, worn_by, write_row  # noqa: E402
+from research.people import pigment  # noqa: E402
+from research.people.identities import reserved_seeds  # noqa: E402
+from research.people.parameters import sample_parameters  # noqa: E402
 
 SIZE = 16
 

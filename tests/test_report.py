@@ -7,11 +7,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from core.contract import report, stages
-from core.contract.capture import Capture
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import Settings, from_json
+from core.capture import report, stages
+from core.capture.capture import Capture
+from core.capture.messages import Problem, Reporter
 from core.imaging import images
+from core.settings.settings import Settings, from_json
 
 
 class Page(HTMLParser):

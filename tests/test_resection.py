@@ -10,20 +10,20 @@ import numpy as np
 import pycolmap
 import pytest
 
-from benchmarks.cameras_against_truth import similarity
-from core.cameras import _left_out, solving
-from core.cameras.joint import FREE_SIGMA_LOG, as_bundle, refine
-from core.cameras.landmarks import fit_rays, pupils
-from core.cameras.matches import Matches, tracks
-from core.cameras.resection import resect
-from core.cameras.solving import Solved, worth
-from core.cameras.world import agreeing_faces, find_head
-from core.contract.frame_records import FrameRecord
-from core.contract.messages import Reporter
+from core.capture.frame_records import FrameRecord
+from core.capture.messages import Reporter
 from core.face.bundle import TOLD_SIGMA_LOG, Observations, adjust
 from core.face.faces import Face
 from core.face.landmark_model import template_landmarks
-from core.synthetic.painted_head import FOCAL, HEIGHT, WIDTH, place_camera
+from core.stages.cameras import _left_out, solving
+from core.stages.cameras.joint import FREE_SIGMA_LOG, as_bundle, refine
+from core.stages.cameras.landmarks import fit_rays, pupils
+from core.stages.cameras.matches import Matches, tracks
+from core.stages.cameras.resection import resect
+from core.stages.cameras.solving import Solved, worth
+from core.stages.cameras.world import agreeing_faces, find_head
+from research.benchmarks.cameras_against_truth import similarity
+from research.people.painted_head import FOCAL, HEIGHT, WIDTH, place_camera
 
 AZIMUTHS = (-45, -20, 0, 25, 50)
 IDENTITY = np.random.default_rng(3).normal(0, 0.8, len(template_landmarks().basis))

@@ -8,11 +8,10 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks import figures, groomed, open_eyes, pages, results
-from benchmarks.results import comparison, delighters, eyes, geometry, index
-from benchmarks.results import scan as scan_page
-
-from .conftest import ROOT
+from research.benchmarks import figures, groomed, open_eyes, pages, results
+from research.benchmarks.results import comparison, delighters, eyes, geometry, index
+from research.benchmarks.results import scan as scan_page
+from tests.conftest import ROOT
 
 
 @pytest.mark.parametrize("name", results.NAMES)
@@ -199,9 +198,9 @@ def test_pictures_are_made_of_solved_captures_that_the_pages_show(tmp_path):
         str(ROOT / "docs" / "pictures" / f"{name}.jpg") for name in ("teaser", "gallery_sample", "gallery_dark")
     )
     assert made == {
-        ("benchmarks.teaser", teaser),
-        ("benchmarks.gallery", sample),
-        ("benchmarks.gallery", dark, str(tmp_path / "dark" / "maps")),
+        ("research.benchmarks.teaser", teaser),
+        ("research.benchmarks.gallery", sample),
+        ("research.benchmarks.gallery", dark, str(tmp_path / "dark" / "maps")),
     }
 
 

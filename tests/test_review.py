@@ -13,14 +13,13 @@ from core.__main__ import main
 from core.batch import review
 from core.batch.record import Batch, BatchFace, write_batch
 from core.batch.state import DONE, STOPPED, TO_DO, WAITING, FaceState
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.files import write_json
-from core.contract.messages import Problem
-from core.contract.settings import Settings
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from core.capture.messages import Problem
 from core.imaging import images
-
-from .test_report import Page
+from core.settings.settings import Settings
+from tests.test_report import Page
 
 FINDING = {"problem": "The light <changed>.", "remedy": "Lock the exposure.", "frames": ["1.jpg"]}
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import torch
 
-from core.contract.messages import Problem
-from core.solve import checkpoint
-from core.solve.light_fit import light_loss, update_lights
-from core.solve.lighting import Lights, Shader, constant_light
-from core.solve.prior import make_coordinates
-from core.solve.problem import Observation, State
-from core.solve.recipes import RECIPES, Recipe
-from core.solve.refusals import tell_refusals
-from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas, noise_schedule, seed_noise
+from core.capture.messages import Problem
+from core.solver.lighting import Lights, Shader, constant_light
+from core.solver.lights import light_loss, update_lights
+from core.solver.objective import Observation, State
+from core.solver.prior.prior import make_coordinates
+from core.solver.recipes import RECIPES, Recipe
+from core.solver.sampler import Sampler, ancestral_sigmas, karras_sigmas, noise_schedule, seed_noise
+from core.stages.solve import checkpoint
+from core.stages.solve.refusals import tell_refusals
 
 SIZE = 32
 MEAN, SPREAD = 0.1, 0.3

@@ -9,7 +9,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from core.contract.messages import Problem
+from core.capture.messages import Problem
 
 bpy = pytest.importorskip("bpy")
 

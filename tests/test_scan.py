@@ -11,18 +11,18 @@ import pycolmap
 import pytest
 import trimesh
 
-from core import scan
-from core.contract.capture import Capture
-from core.contract.messages import CancelledError, Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.messages import CancelledError, Reporter
 from core.geometry import meshes, raster
 from core.geometry.meshes import Mesh
 from core.geometry.views import read_views
 from core.imaging import images
-from core.scan.fusion import fuse
-from core.scan.pairs import BASELINES_DEG, choose_pairs
-from core.scan.rounds import NEAR_DEG, WIDE_DEG
-from core.scan.stereo import DepthMap
+from core.settings.settings import from_json
+from core.stages import scan
+from core.stages.scan.fusion import fuse
+from core.stages.scan.pairs import BASELINES_DEG, choose_pairs
+from core.stages.scan.rounds import NEAR_DEG, WIDE_DEG
+from core.stages.scan.stereo import DepthMap
 
 WIDTH, HEIGHT, FOCAL = 360, 480, 460.0
 CENTRE, RADII = np.array([0.0, 0.06, -0.02]), np.array([0.075, 0.09, 0.11])

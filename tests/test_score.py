@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks import albedo_score  # noqa: E402
-from benchmarks.albedo_score import AlbedoTruth, compare  # noqa: E402
-from core.contract.capture import Capture  # noqa: E402
+from core.capture.capture import Capture  # noqa: E402
 from core.imaging import images  # noqa: E402
+from research.benchmarks import albedo_score  # noqa: E402
+from research.benchmarks.albedo_score import AlbedoTruth, compare  # noqa: E402
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@
 import cv2
 import numpy as np
 
-from core.delight.evening import ShadingEstimate
-from core.delight.network import divide
-from core.delight.occlusion import remove_seams
 from core.imaging import images
+from core.stages.delight.evening import ShadingEstimate
+from core.stages.delight.network import divide
+from core.stages.delight.occlusion import remove_seams
 
 
 def test_no_outline_of_a_shadow_stays_on_skin_and_its_pores_and_a_brow_do():

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from core.__main__ import main
-from core.contract import sample_head
-from core.contract.capture import Capture
-from core.contract.messages import Done, Failed, Log, StageDone
+from core.capture import sample_head
+from core.capture.capture import Capture
+from core.capture.messages import Done, Failed, Log, StageDone
 from core.imaging import images
-from core.solve import self_test as tool
+from core.stages.solve import self_test as tool
 from core.worker import runner, self_test, terminal
 from core.worker.job import read_job
 
-SAMPLE = Path(__file__).parents[1] / "core" / "synthetic" / "sample"
+SAMPLE = Path(__file__).parents[1] / "research" / "people" / "sample"
 
 
 @pytest.fixture

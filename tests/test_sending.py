@@ -8,12 +8,11 @@ import os
 
 import pytest
 
-from core.contract import delighter_cards
-from core.contract import switchlight_api as service
-
-from . import standin
-from .drawn import Layout, drawn
-from .switchlight_server import KEY
+from core.capture import switchlight_api as service
+from core.settings import delighter_cards
+from tests import standin
+from tests.drawn import Layout, drawn
+from tests.switchlight_server import KEY
 
 bpy = pytest.importorskip("bpy")
 

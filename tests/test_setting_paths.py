@@ -4,10 +4,10 @@
 
 import pytest
 
-from core.contract.messages import Problem
-from core.contract.setting_paths import check_paths
-from core.contract.settings import from_json
-from core.contract.stages import NAMES
+from core.capture.messages import Problem
+from core.capture.stages import NAMES
+from core.settings.setting_paths import check_paths
+from core.settings.settings import from_json
 
 
 def check(stage: str, **values) -> None:

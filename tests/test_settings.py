@@ -7,10 +7,10 @@ from dataclasses import fields
 
 import pytest
 
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import Problem
-from core.contract.settings import (
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Problem
+from core.settings.settings import (
     QUALITIES,
     STAGE_KINDS,
     Settings,
@@ -24,8 +24,7 @@ from core.contract.settings import (
     to_json,
     tooltips,
 )
-
-from .recorded import changed, record
+from tests.recorded import changed, record
 
 EVERY = [(stage, field) for stage, kind in STAGE_KINDS.items() for field in fields(kind)]
 PATHS = [name for name, field in known_settings().items() if "path" in field.metadata]

@@ -10,7 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from .drawn import buttons  # noqa: E402
+from tests.drawn import buttons  # noqa: E402
 
 
 @pytest.fixture

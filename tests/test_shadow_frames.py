@@ -14,10 +14,9 @@ import pycolmap
 import pytest
 
 from core.__main__ import main
-from core.contract.capture import Capture
-from core.contract.files import write_json
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.face.head import Head, Unfolded
 from core.geometry import meshes, raster
@@ -25,15 +24,15 @@ from core.geometry.views import View
 from core.imaging import images
 from core.light.skylight import ambient_occlusion, radiance_transfer
 from core.light.spherical_harmonics import sh_basis
-from core.shadow_mask import run, sunless
-from core.shadow_mask.frames import filtered, softening
-from core.shadow_mask.lift import lift_shadows
-from core.shadow_mask.occlusion import FULL_ALPHA, baked_occlusion
-from core.shadow_mask.tidy import over_brows
-from core.synthetic.painted_head import place_camera
+from core.settings.settings import from_json
+from core.stages.shadow_mask import run, sunless
+from core.stages.shadow_mask.frames import filtered, softening
+from core.stages.shadow_mask.lift import lift_shadows
+from core.stages.shadow_mask.occlusion import FULL_ALPHA, baked_occlusion
+from core.stages.shadow_mask.tidy import over_brows
 from core.worker.job import read_job
-
-from .test_shadow_mask import SHADOW, SKIN, cheek, painted_blob
+from research.people.painted_head import place_camera
+from tests.test_shadow_mask import SHADOW, SKIN, cheek, painted_blob
 
 SIZE = 256  # of test_shadow_mask's pictures
 SMALL = 128

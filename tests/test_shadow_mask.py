@@ -12,16 +12,16 @@ import numpy as np
 import pycolmap
 import pytest
 
-from benchmarks.shadow_mask import scores
-from core.contract.capture import Capture
-from core.contract.files import write_json
-from core.contract.messages import Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from core.capture.messages import Reporter
 from core.face import template
 from core.geometry import meshes, raster
 from core.imaging import images
-from core.shadow_mask import run, share_on_edges
-from core.shadow_mask.tidy import tidy
+from core.settings.settings import from_json
+from core.stages.shadow_mask import run, share_on_edges
+from core.stages.shadow_mask.tidy import tidy
+from research.benchmarks.shadow_mask import scores
 
 SIZE = 256
 SKIN = np.array([0.42, 0.25, 0.18])

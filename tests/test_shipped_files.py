@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.contract import shipped_files, unforeseen
-from core.contract.messages import Problem
+from core.capture import shipped_files, unforeseen
+from core.capture.messages import Problem
 from core.face import faces, template
-from core.solve import prior_files
-from core.training import manifest
-from core.upscale import enlarge, whole_head
+from core.stages.solve import prior_files
+from core.stages.upscale import enlarge, whole_head
+from research.training import manifest
 
-network = importlib.import_module("core.delight.network")  # the room has a function of that name
+network = importlib.import_module("core.stages.delight.network")  # the room has a function of that name
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def core(tmp_path, monkeypatch) -> Path:
 
 
 def test_the_manifest_is_that_of_the_files():
-    assert shipped_files.read_manifest() == manifest.make_manifest(), "run `python -m core.training.manifest`"
+    assert shipped_files.read_manifest() == manifest.make_manifest(), "run `python -m research.training.manifest`"
     assert shipped_files.find_faults() == []
 
 

@@ -17,11 +17,11 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import links
+from core.capture import links
 
 bpy = pytest.importorskip("bpy")
 
-from .drawn import Layout  # noqa: E402
+from tests.drawn import Layout  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 TOOL = Path(bpy.utils.system_resource('SCRIPTS')) / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"

@@ -7,11 +7,11 @@ import numpy as np
 import pycolmap
 import pytest
 
-from core.cameras import colmap, skeleton
-from core.cameras.matches import read_matches
 from core.geometry.models import pose_of
 from core.imaging import images
-from core.synthetic.painted_head import photograph, place_camera
+from core.stages.cameras import colmap, skeleton
+from core.stages.cameras.matches import read_matches
+from research.people.painted_head import photograph, place_camera
 
 
 def film(turns):

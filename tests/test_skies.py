@@ -5,11 +5,11 @@
 import numpy as np
 import pytest
 
-from benchmarks.skies import count_independent, harmonic_shares, summarise_skies
 from core.light import sunlight
 from core.light.skylight import fibonacci_sphere
 from core.light.spherical_harmonics import LAMBERT, per_function, sh_basis
-from core.synthetic.environments import panorama_directions, without_lamp
+from research.benchmarks.skies import count_independent, harmonic_shares, summarise_skies
+from research.people.environments import panorama_directions, without_lamp
 
 DIRECTIONS = panorama_directions(64, 128)
 

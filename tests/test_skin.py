@@ -9,11 +9,11 @@ import pytest
 
 from core.face import template
 from core.geometry.meshes import Mesh
-from core.synthetic import pigment
-from core.synthetic.canvas import canvas, make_canvas
-from core.synthetic.regions import regions
-from core.synthetic.relief import normals
-from core.synthetic.skin import GROUND, SkinParameters, make_skin, paint_skin, sample_parameters
+from research.people import pigment
+from research.people.canvas import canvas, make_canvas
+from research.people.regions import regions
+from research.people.relief import normals
+from research.people.skin import GROUND, SkinParameters, make_skin, paint_skin, sample_parameters
 
 SIZE = 256
 PLAIN = SkinParameters(melanin=0.04, freckles=0.5, moles=40, age=60)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
-from . import flat_patch, node_text  # noqa: E402
-from .flat_patch import assembled, height_map, paint, seen, sockets, white_world  # noqa: E402
+from tests import flat_patch, node_text  # noqa: E402
+from tests.flat_patch import assembled, height_map, paint, seen, sockets, white_world  # noqa: E402
 
 EXPECTED = """
 ShaderNodeAttribute WildCap Regions: attribute_name=wildcap_roughness

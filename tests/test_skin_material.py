@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
-from . import flat_patch  # noqa: E402
-from .flat_patch import assembled, height_map, lamp, paint, seen, sockets, white_world  # noqa: E402
+from tests import flat_patch  # noqa: E402
+from tests.flat_patch import assembled, height_map, lamp, paint, seen, sockets, white_world  # noqa: E402
 
 F0 = (0.4 / 2.4) ** 2  # of IOR 1.4: 2.8 percent
 FACE = {
@@ -63,7 +63,8 @@ def test_a_smooth_black_patch_reflects_as_fresnel_says(patch, tmp_path):
 @pytest.mark.parametrize("subsurface", [1.0, 0.0])
 def test_under_even_light_a_patch_without_gloss_shows_its_albedo(patch, tmp_path, tone, subsurface):
     """Within 6 %, though light that goes under the skin comes back with losses: a sheet without a back loses more than
-    a head, for which it is 2 % (benchmarks/even_light.py); with the albedo as it is, up to 12 % were missing."""
+    a head, for which it is 2 % (research/benchmarks/even_light.py); with the albedo as it is, up to 12 % were
+    missing."""
     srgb = [12.92 * c if c < 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in tone]
     for name, pixel in (("diffuse_albedo.png", srgb), ("normal.png", (0.5, 0.5, 1)), ("specular_albedo.png", (0.4,))):
         paint(patch, name, [[tuple(pixel)] * 4] * 4)

@@ -9,13 +9,14 @@ import pytest
 pytest.importorskip("torch")
 import torch
 
-from core.contract.colour_values import format_skin_tone, parse_skin_tone
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.messages import Problem, Reporter
 from core.face.head import read_head
-from core.solve import look, population, prior, prior_files, tone
-from core.solve.skin_tone import EARLIER, GIVEN, SCENE, TEXTURE, WHITE_POINT, SkinTone, read_given_tone
-from core.training import tones
+from core.settings.colour_values import format_skin_tone, parse_skin_tone
+from core.settings.settings import from_json
+from core.solver.prior import prior
+from core.stages.solve import look, population, prior_files, tone
+from core.stages.solve.skin_tone import EARLIER, GIVEN, SCENE, TEXTURE, WHITE_POINT, SkinTone, read_given_tone
+from research.training import tones
 
 BRIGHT = np.array([1.4, 1.3, 1.2])
 
@@ -98,7 +99,7 @@ def test_the_population_is_of_measured_people():
 
 
 def test_groups_by_their_angle():
-    from core.solve.population import from_lab, name_group
+    from core.stages.solve.population import from_lab, name_group
 
     for angle, name in (
         (60, "very light"),
@@ -183,7 +184,7 @@ def test_a_prior_is_told_a_tone_and_stays_as_it_is():
 
 
 def test_the_artists_tone_wins_and_a_capture_without_cameras_asks_its_texture(tmp_path):
-    from .painted_skin import make, settings
+    from tests.painted_skin import make, settings
 
     capture, report = make(tmp_path / "a.wildcap"), Reporter("solve")
     head = read_head(capture)

@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 import torch
 
-from core import solve
-from core.contract.messages import CancelledError, Problem, Reporter
-from core.contract.settings import from_json
-from core.contract.stages import MAPS
+from core.capture.messages import CancelledError, Problem, Reporter
+from core.capture.stages import MAPS
 from core.face import template
 from core.face.head import read_head
 from core.imaging import images
-from core.solve import initial, tone
-from core.solve.capture_evidence import read_evidence
-from core.solve.evidence import soften_mask
-from core.solve.head_cells import make_head_cells
-from core.solve.prior_files import WEIGHTS, load
-from core.solve.problem import albedo
-from core.solve.recipes import RECIPES
-from core.synthetic.identities import reserved_seeds
-
-from .painted_skin import SIZE, TONE, as_setting, brief_light, make, settings  # noqa: F401
+from core.settings.settings import from_json
+from core.solver import start as initial
+from core.solver.evidence import soften_mask
+from core.solver.objective import albedo
+from core.solver.recipes import RECIPES
+from core.stages import solve
+from core.stages.solve import tone
+from core.stages.solve.capture_evidence import read_evidence
+from core.stages.solve.head_cells import make_head_cells
+from core.stages.solve.prior_files import WEIGHTS, load
+from research.people.identities import reserved_seeds
+from tests.painted_skin import SIZE, TONE, as_setting, brief_light, make, settings  # noqa: F401
 
 
 @pytest.fixture

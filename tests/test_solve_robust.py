@@ -12,17 +12,16 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from core import solve
-from core.contract.capture import Capture
-from core.contract.messages import Done, Failed, Log, Progress, Reporter
-from core.contract.stages import MAPS
+from core.capture.capture import Capture
+from core.capture.messages import Done, Failed, Log, Progress, Reporter
+from core.capture.stages import MAPS
 from core.face import template
 from core.imaging import images
+from core.stages import solve
 from core.worker.client import Worker
 from core.worker.job import write_job
-
-from .painted_skin import SHORT, SIZE, TONE, make, settings
-from .tiny_chain import follow
+from tests.painted_skin import SHORT, SIZE, TONE, make, settings
+from tests.tiny_chain import follow
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 import torch
 
-from core.contract.messages import Problem
+from core.capture.messages import Problem
 from core.geometry.meshes import Mesh
 from core.geometry.raster import RayCaster, interpolate
-from core.scan import splats
-from core.scan.fusion import fuse
-
-from .plain_splatting import rasterization_2dgs
+from core.stages.scan import splats
+from core.stages.scan.fusion import fuse
+from tests.plain_splatting import rasterization_2dgs
 
 SIDE, FOCAL, RADIUS = 32, 136.0, 1.0
 """Pictures of 70 mm of a large ball's front, from 0.3 m, 2.2 mm a pixel."""

@@ -13,9 +13,8 @@ from core.face import template
 from core.geometry import raster
 from core.geometry.meshes import vertex_normals
 from core.light.spherical_harmonics import sh_basis
-from core.solve import split as skin_or_light
-from core.solve.head_cells import make_head_cells
-from core.solve.split import (
+from core.solver.extensions import split as skin_or_light
+from core.solver.extensions.split import (
     COLOUR_AXES,
     Scales,
     Shapes,
@@ -26,6 +25,7 @@ from core.solve.split import (
     log_probability,
     split_captures,
 )
+from core.stages.solve.head_cells import make_head_cells
 
 SIZE = 384
 TONE = torch.tensor([0.4, 0.25, 0.2])[:, None, None]

@@ -6,10 +6,10 @@ record."""
 import numpy as np
 import pytest
 
-from benchmarks import figures, split, traits
-from benchmarks.measures.table import summarise, to_record
-from core.solve.head_cells import place_cells
-from core.training.traits import LargeShapes, deviations_at
+from core.stages.solve.head_cells import place_cells
+from research.benchmarks import figures, split, traits
+from research.benchmarks.measures.table import summarise, to_record
+from research.training.traits import LargeShapes, deviations_at
 
 
 def test_the_correlation_of_a_known_field_falls_as_it_was_made():

@@ -11,17 +11,16 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks import state, state_captures, state_scores  # noqa: E402
-from benchmarks.albedo_score import AlbedoTruth, HeadInView  # noqa: E402
-from benchmarks.measures.references import FLAT, NOTHING, TRUE  # noqa: E402
-from benchmarks.measures.tone import BEST_PSNR  # noqa: E402
-from benchmarks.state_captures import DELIT, SIZE, SOLVED  # noqa: E402
-from core.contract.capture import Capture  # noqa: E402
+from core.capture.capture import Capture  # noqa: E402
 from core.face import template  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.light.spherical_harmonics import sh_basis  # noqa: E402
-
-from .recorded import make_entry  # noqa: E402
+from research.benchmarks import state, state_captures, state_scores  # noqa: E402
+from research.benchmarks.albedo_score import AlbedoTruth, HeadInView  # noqa: E402
+from research.benchmarks.measures.references import FLAT, NOTHING, TRUE  # noqa: E402
+from research.benchmarks.measures.tone import BEST_PSNR  # noqa: E402
+from research.benchmarks.state_captures import DELIT, SIZE, SOLVED  # noqa: E402
+from tests.recorded import make_entry  # noqa: E402
 
 SKIN = np.float32([0.45, 0.28, 0.2])
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from . import standin
+from tests import standin
 
 bpy = pytest.importorskip("bpy")
 

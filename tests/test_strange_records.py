@@ -6,10 +6,9 @@ import json
 
 import pytest
 
-from core.contract import ownership, processes
-from core.contract.capture import Capture
-
-from .kept_capture import contents, make, make_frames
+from core.capture import ownership, processes
+from core.capture.capture import Capture
+from tests.kept_capture import contents, make, make_frames
 
 
 @pytest.fixture

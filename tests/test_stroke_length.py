@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from core.face import template
-from core.upscale import grooming, hair, stroke_length, strokes, ways
-from core.upscale.hair import Hair
-from core.upscale.maps import HeadMaps
-from core.upscale.surface import HeadSurface, lay_out
+from core.stages.upscale import grooming, hair, stroke_length, strokes, ways
+from core.stages.upscale.hair import Hair
+from core.stages.upscale.maps import HeadMaps
+from core.stages.upscale.surface import HeadSurface, lay_out
 
 SIZE, SKIN = 1024, np.array([0.5, 0.35, 0.28])
 

@@ -11,15 +11,15 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.cameras_against_truth import similarity
-from core import cameras, delight, frames, shadow_mask, texture
-from core.contract.capture import Capture
-from core.contract.messages import Log, Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.messages import Log, Problem, Reporter
 from core.geometry import meshes
 from core.geometry.views import read_views
 from core.imaging import images
-from core.synthetic import painted_head
+from core.settings.settings import from_json
+from core.stages import cameras, delight, frames, shadow_mask, texture
+from research.benchmarks.cameras_against_truth import similarity
+from research.people import painted_head
 
 
 def calibration(views: list) -> str:
@@ -130,7 +130,7 @@ def test_blenders_cameras_are_written_as_they_are_read(addon, tmp_path):
     from bpy_extras.object_utils import world_to_camera_view
     from mathutils import Vector
 
-    from core.cameras.calibration import read_cameras
+    from core.stages.cameras.calibration import read_cameras
 
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 600, 800, 100

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.cameras import solving
-from core.cameras.surroundings import MOST_FRAMES, spread_over, surroundings_stay
-from core.contract.capture import Capture
-from core.contract.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import Settings
+from core.capture.capture import Capture
+from core.capture.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
+from core.capture.messages import Problem, Reporter
 from core.face import faces
 from core.imaging import images
-from core.synthetic.painted_head import photograph, place_camera
+from core.settings.settings import Settings
+from core.stages.cameras import solving
+from core.stages.cameras.surroundings import MOST_FRAMES, spread_over, surroundings_stay
+from research.people.painted_head import photograph, place_camera
 
 TURNS = -28, -14, 0, 14, 28
 

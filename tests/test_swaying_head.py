@@ -10,19 +10,19 @@ import pycolmap
 import pytest
 from scipy.spatial.transform import Rotation
 
-from core.cameras import landmarks
-from core.cameras.matches import Matches
-from core.cameras.settled import MOST_LEFT_SHARE, head_boxes, on_head, settle
-from core.cameras.solving import Solved, _refined
-from core.cameras.world import PUPILS_M, HeadFrame
-from core.contract.capture import Capture
-from core.contract.frame_records import VIDEO, FrameRecord, Frames
-from core.contract.messages import Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.frame_records import VIDEO, FrameRecord, Frames
+from core.capture.messages import Reporter
 from core.face import template
 from core.face.faces import Face
 from core.geometry.models import pose_of
-from core.synthetic.painted_head import place_camera
+from core.settings.settings import from_json
+from core.stages.cameras import landmarks
+from core.stages.cameras.matches import Matches
+from core.stages.cameras.settled import MOST_LEFT_SHARE, head_boxes, on_head, settle
+from core.stages.cameras.solving import Solved, _refined
+from core.stages.cameras.world import PUPILS_M, HeadFrame
+from research.people.painted_head import place_camera
 
 AZIMUTHS = np.linspace(-40, 40, 17)
 NEIGHBOURS, WRONG, NOISE_PX, RAGGED_PX = 5, 0.2, 0.3, 2.0

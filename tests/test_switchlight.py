@@ -13,19 +13,18 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from core.contract import consent, files, switchlight_api
-from core.contract.capture import Capture
-from core.contract.messages import CancelledError, Problem, Reporter
-from core.contract.settings import from_json
-from core.delight import run, switchlight_calls
-from core.delight.switchlight_line import Patience
+from core.capture import consent, files, switchlight_api
+from core.capture.capture import Capture
+from core.capture.messages import CancelledError, Problem, Reporter
 from core.imaging import images
+from core.settings.settings import from_json
+from core.stages.delight import run, switchlight_calls
+from core.stages.delight.switchlight_line import Patience
+from tests import standin
+from tests.switchlight_server import KEY, Service
+from tests.test_delight import write_cameras
 
-from . import standin
-from .switchlight_server import KEY, Service
-from .test_delight import write_cameras
-
-switchlight = import_module("core.delight.switchlight")  # the room has a function of that name
+switchlight = import_module("core.stages.delight.switchlight")  # the room has a function of that name
 SIZE = 60, 80
 SETTINGS = from_json({"delight": {"delighter": "switchlight"}})
 BUSY = 503, {}, {"message": "Server is busy. Try again later."}

@@ -8,12 +8,11 @@ import json
 
 import pytest
 
-from core.contract import consent, switchlight_api
-from core.contract.messages import Problem
-
-from . import standin
-from .switchlight_server import KEY
-from .test_switchlight import agree, capture, delight, make, serve  # noqa: F401  (two are fixtures)
+from core.capture import consent, switchlight_api
+from core.capture.messages import Problem
+from tests import standin
+from tests.switchlight_server import KEY
+from tests.test_switchlight import agree, capture, delight, make, serve  # noqa: F401  (two are fixtures)
 
 
 def test_nothing_is_sent_without_consent_a_key_or_a_network(capture, serve, monkeypatch):  # noqa: F811

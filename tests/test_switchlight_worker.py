@@ -12,13 +12,12 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.contract import consent
-from core.contract import switchlight_api as service
-from core.contract.capture import Capture
+from core.capture import consent
+from core.capture import switchlight_api as service
+from core.capture.capture import Capture
 from core.worker.job import write_job
-
-from .switchlight_server import KEY, Service
-from .test_switchlight import make
+from tests.switchlight_server import KEY, Service
+from tests.test_switchlight import make
 
 ROOT = Path(__file__).resolve().parent.parent
 STAGE = ["--from", "delight", "--until", "delight", "--delighter", "switchlight"]

@@ -18,8 +18,8 @@ from core.face import faces, template  # noqa: E402
 from core.geometry import raster
 from core.geometry.meshes import vertex_normals  # noqa: E402
 from core.imaging import images
-from core.synthetic import sample, scene  # noqa: E402
-from core.synthetic.identities import reserved_seeds, subject_mesh  # noqa: E402
+from research.people import sample, scene  # noqa: E402
+from research.people.identities import reserved_seeds, subject_mesh  # noqa: E402
 
 WEIGHTS = Path(sample.__file__).parents[1] / "weights"
 SEED = sample.RESERVED["sample"]

@@ -6,12 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from core import texture
-from core.contract.messages import CancelledError, Problem, Progress, Reporter
-from core.contract.settings import from_json
+from core.capture.messages import CancelledError, Problem, Progress, Reporter
 from core.imaging import images
-
-from .photographed_head import capture_of, skin
+from core.settings.settings import from_json
+from core.stages import texture
+from tests.photographed_head import capture_of, skin
 
 SIZE = 256
 ROUND = (-70, -45, -20, 0, 20, 45, 70)

@@ -11,17 +11,16 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.detail import moles
-from core import texture
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
+from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.face.head import Head, read_head
-from core.texture import features, foreign
-from core.texture.held_picture import hold
-from core.texture.perceptual import refine
-
-from .photographed_head import capture_of, skin
+from core.settings.settings import from_json
+from core.stages import texture
+from core.stages.texture import features, foreign
+from core.stages.texture.held_picture import hold
+from core.stages.texture.perceptual import refine
+from research.benchmarks.detail import moles
+from tests.photographed_head import capture_of, skin
 
 SIZE = 256
 

@@ -9,15 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core import solve
-from core.contract import stages
-from core.contract.messages import Problem, Reporter
-from core.contract.together import captures_in, hash_told
+from core.capture import stages
+from core.capture.messages import Problem, Reporter
+from core.capture.together import captures_in, hash_told
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-
-from .painted_skin import SIZE, brief_light, make, settings  # noqa: F401
+from core.stages import solve
+from tests.painted_skin import SIZE, brief_light, make, settings  # noqa: F401
 
 
 @pytest.fixture

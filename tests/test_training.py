@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import torch
 
-from core.contract.messages import Problem, Reporter
+from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.imaging import images
-from core.solve.prior import build_network
-from core.solve.prior_files import load
-from core.synthetic import pigment
-from core.training import prior, skins
-from core.training.descent import TrainingRun
-from core.training.patches import Windows, mean_map, spread_about
+from core.solver.prior.prior import build_network
+from core.stages.solve.prior_files import load
+from research.people import pigment
+from research.training import prior, skins
+from research.training.descent import TrainingRun
+from research.training.patches import Windows, mean_map, spread_about
 
 QUIET = Reporter("train", emit=lambda message: None)
 

@@ -11,18 +11,17 @@ import cv2
 import numpy as np
 import pytest
 
-from core import transfer
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import CancelledError, Problem, Reporter
-from core.contract.settings import from_json
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import CancelledError, Problem, Reporter
 from core.geometry import atlas, baking, meshes, raster, surfaces
 from core.geometry.meshes import Mesh, vertex_normals
 from core.imaging import images
-from core.transfer import scan
-
-from .egg import egg
-from .photographed_head import capture_of, head, skin
+from core.settings.settings import from_json
+from core.stages import transfer
+from core.stages.transfer import scan
+from tests.egg import egg
+from tests.photographed_head import capture_of, head, skin
 
 SIZE = 256
 

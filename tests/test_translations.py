@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from .drawn import Layout, drawn
+from tests.drawn import Layout, drawn
 
 bpy = pytest.importorskip("bpy")
 

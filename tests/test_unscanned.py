@@ -10,16 +10,16 @@ import pycolmap
 import pytest
 from scipy.spatial import cKDTree
 
-from core import registration
-from core.contract.capture import Capture
-from core.contract.eyes_record import read_eyes
-from core.contract.messages import Reporter
-from core.contract.settings import from_json
+from core.capture.capture import Capture
+from core.capture.eyes_record import read_eyes
+from core.capture.messages import Reporter
 from core.geometry import meshes
 from core.geometry.views import read_points, read_views
 from core.imaging import images
-from core.registration import constraints, quality, silhouettes, unscanned
-from core.synthetic import painted_head
+from core.settings.settings import from_json
+from core.stages import registration
+from core.stages.registration import constraints, quality, silhouettes, unscanned
+from research.people import painted_head
 
 AZIMUTHS = (-72, -36, 0, 36, 72)
 SCALE = 1.5

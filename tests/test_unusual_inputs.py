@@ -21,12 +21,12 @@ av = pytest.importorskip("av")
 oiio = pytest.importorskip("OpenImageIO")
 Image, ImageOps = pytest.importorskip("PIL.Image"), pytest.importorskip("PIL.ImageOps")
 
-from core.contract import artist_landmarks  # noqa: E402
-from core.contract.json_files import read_json  # noqa: E402
-from core.contract.messages import Reporter  # noqa: E402
-from core.frames.video import read_video  # noqa: E402
+from core.capture import artist_landmarks  # noqa: E402
+from core.capture.json_files import read_json  # noqa: E402
+from core.capture.messages import Reporter  # noqa: E402
 from core.geometry import meshes  # noqa: E402
 from core.imaging import images  # noqa: E402
+from core.stages.frames.video import read_video  # noqa: E402
 from core.worker import command_settings  # noqa: E402
 
 NAMES = ("plain", "with blanks and (1)", "Zoë – l'été", "顔 📷", 'quo"te\'s', "UPPER.lower.x", "-rf", "%s{0}$HOME")

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.files import write_json
-from core.contract.freshness import SOURCE
-from core.contract.hashes import hash_source
-from core.contract.setting_values import setting
-from core.contract.settings import Settings, from_json
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from core.capture.freshness import SOURCE
+from core.capture.hashes import hash_source
+from core.settings.setting_values import setting
+from core.settings.settings import Settings, from_json
 
 RECORD = json.loads(Path(__file__).with_name("capture_0_2_0.json").read_text(encoding="utf-8"))
 FINISHED = [stages.by_name(name) for name in RECORD["stages"]]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from . import standin
-from .drawn import drawn
-from .recorded import record
+from tests import standin
+from tests.drawn import drawn
+from tests.recorded import record
 
 bpy = pytest.importorskip("bpy")
 
@@ -18,8 +18,8 @@ bpy = pytest.importorskip("bpy")
 @pytest.fixture
 def updated(addon, tmp_path, monkeypatch):
     """The stand-in's capture as if every stage had run, opened by an extension with other code. Returns its folder."""
-    from core.contract import stages
-    from core.contract.capture import Capture
+    from core.capture import stages
+    from core.capture.capture import Capture
 
     root = standin.make(tmp_path / "head.wildcap")
     standin.add_evidence(root)
@@ -58,7 +58,7 @@ def next_operator(addon) -> str:
 
 
 def test_what_older_code_made_is_shown_as_such_and_can_be_made_again_by_a_click(addon, updated, monkeypatch):
-    from core.contract import stages
+    from core.capture import stages
 
     assert look(addon).stages == dict.fromkeys(stages.NAMES, "older")
     texts = [text for text, _ in drawn(addon("panel").WILDCAP_PT_stages)]

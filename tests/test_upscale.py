@@ -10,16 +10,17 @@ import OpenImageIO as oiio
 import pytest
 import torch
 
-from core import upscale
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import CancelledError, Problem, Reporter
-from core.contract.settings import from_json
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import CancelledError, Problem, Reporter
 from core.face import template
 from core.imaging import images
-from core.upscale import gloss, network
-from core.upscale.enlarge import enlarge, load_network
-from core.upscale.maps import HeadMaps, read_maps
+from core.settings.settings import from_json
+from core.solver.upsampling import network
+from core.stages import upscale
+from core.stages.upscale import gloss
+from core.stages.upscale.enlarge import enlarge, load_network
+from core.stages.upscale.maps import HeadMaps, read_maps
 
 SMALL, LARGE = 256, 1024
 PLAIN = {"whole_head": False, "hair": False}  # test_whole_head.py and test_hair.py look at these
@@ -159,7 +160,7 @@ def test_strips_are_the_whole(busy, monkeypatch):
 
 
 def _with_strips(monkeypatch, rows: int, maps: HeadMaps, net: network.Rcan) -> np.ndarray:
-    monkeypatch.setattr("core.upscale.enlarge.STRIP_ROWS", rows)
+    monkeypatch.setattr("core.stages.upscale.enlarge.STRIP_ROWS", rows)
     return enlarge(maps, lambda share: None, network=net)
 
 
@@ -194,7 +195,7 @@ def test_a_block_begins_as_the_identity():
 
 
 def test_the_stage_takes_the_network(capture, busy, monkeypatch):
-    monkeypatch.setattr("core.upscale.enlarge.load_network", lambda: busy)
+    monkeypatch.setattr("core.stages.upscale.enlarge.load_network", lambda: busy)
     report = Reporter("upscale")
     upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "network", **PLAIN}}), report)
     assert report.figures["method"] == "network"
@@ -209,7 +210,7 @@ def test_the_stage_takes_the_network(capture, busy, monkeypatch):
 @pytest.mark.parametrize("size", [96, 128, 200])
 def test_the_network_ends_at_any_size(busy, monkeypatch, size):
     """Four times 32 is what it gives; more or less is resampled from that."""
-    monkeypatch.setattr("core.upscale.enlarge.load_network", lambda: busy)
+    monkeypatch.setattr("core.stages.upscale.enlarge.load_network", lambda: busy)
     large = upscale.enlarged(rough_maps(32), size, "network", "cpu", lambda share: None)
     assert large.shape == (size, size, 7) and np.abs(np.linalg.norm(large[..., 3:6], axis=2) - 1).max() < 1e-5
     assert 0 <= large[..., :3].min() and large[..., :3].max() <= 1

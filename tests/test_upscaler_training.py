@@ -5,12 +5,12 @@
 import numpy as np
 import pytest
 
-from core.contract.messages import Problem, Reporter
+from core.capture.messages import Problem, Reporter
 from core.imaging import images
-from core.training import fine_windows, upscaler
-from core.training.descent import TrainingRun
-from core.upscale import network
-from core.upscale.enlarge import load_network
+from core.solver.upsampling import network
+from core.stages.upscale.enlarge import load_network
+from research.training import fine_windows, upscaler
+from research.training.descent import TrainingRun
 
 
 @pytest.fixture(scope="module")

@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 import torch
 
-from core.solve import maps, prior, prior_files
-from core.solve.initial import mean_tone
-from core.solve.light_fit import light_loss
-from core.solve.lighting import Lights, Shader, interpolation_matrix, shading_basis
-from core.solve.network import Condition, denoise
-from core.solve.problem import Observation, State, albedo, blur_maps
-from core.solve.recipes import RECIPES, Recipe
-from core.solve.sampler import Sampler, ancestral_sigmas, karras_sigmas
+from core.solver.lighting import Lights, Shader, interpolation_matrix, shading_basis
+from core.solver.lights import light_loss
+from core.solver.objective import Observation, State, albedo, blur_maps
+from core.solver.prior import prior
+from core.solver.prior.network import Condition, denoise
+from core.solver.recipes import RECIPES, Recipe
+from core.solver.sampler import Sampler, ancestral_sigmas, karras_sigmas
+from core.solver.start import mean_tone
+from core.stages.solve import maps, prior_files
 
 VECTORS = Path(os.environ.get("WILDCAP_VECTORS", Path(__file__).parents[2] / "shared" / "vectors"))
 pytestmark = pytest.mark.skipif(not VECTORS.is_dir(), reason=f"the parity vectors are not at {VECTORS}")

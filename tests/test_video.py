@@ -11,11 +11,11 @@ import av
 import numpy as np
 import pytest
 
-from core.contract.messages import Reporter
-from core.frames import video
-from core.frames.colour import HLG, P3, PQ, REC709, REC2020, to_srgb
-from core.frames.source import evenly_in_time
+from core.capture.messages import Reporter
 from core.imaging import images
+from core.stages.frames import video
+from core.stages.frames.colour import HLG, P3, PQ, REC709, REC2020, to_srgb
+from core.stages.frames.source import evenly_in_time
 
 WEIGHTS = {1: (0.2126, 0.0722), 5: (0.299, 0.114), 9: (0.2627, 0.0593)}
 """Kr and Kb of the matrices Rec. 709, Rec. 601 and Rec. 2020."""

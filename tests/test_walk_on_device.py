@@ -11,12 +11,12 @@ import torch
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves
 
-from core.solve.lighting import Lights, Shader, constant_light
-from core.solve.network import UNet, UNetLayout
-from core.solve.prior import ConditionedPrior, Prior, ReleasedPrior, make_coordinates
-from core.solve.problem import Observation, State
-from core.solve.recipes import RECIPES
-from core.solve.sampler import Sampler, seed_noise
+from core.solver.lighting import Lights, Shader, constant_light
+from core.solver.objective import Observation, State
+from core.solver.prior.network import UNet, UNetLayout
+from core.solver.prior.prior import ConditionedPrior, Prior, ReleasedPrior, make_coordinates
+from core.solver.recipes import RECIPES
+from core.solver.sampler import Sampler, seed_noise
 
 SIZE = 32
 CARD = "meta"

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.contract.messages import Problem
+from core.capture.messages import Problem
 from core.worker import environment, locks, setup_commands, wheels
 
 HERE = locks.lock_name(environment.answer(sys.executable, locks.DESCRIBE))

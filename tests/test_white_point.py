@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from core.__main__ import main
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.colour_values import parse_white_point
-from core.contract.messages import Problem, Reporter
-from core.contract.settings import Settings, from_json
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Problem, Reporter
 from core.imaging import images
+from core.settings.colour_values import parse_white_point
+from core.settings.settings import Settings, from_json
+from tests.recorded import changed, record
 
-from .recorded import changed, record
-
-white_point = pytest.importorskip("core.solve.white_point")
+white_point = pytest.importorskip("core.stages.solve.white_point")
 LIGHT = np.array([0.9, 0.8, 0.6])
 QUAD = [[120, 140], [340, 160], [330, 300], [115, 285]]
 CHART = (

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 import torch
 
-from core.contract.messages import Reporter
+from core.capture.messages import Reporter
 from core.face import beard, template
-from core.solve.capture_evidence import BEARD_TRUST, FULL_CONFIDENCE
-from core.solve.confidence import estimate_confidence
-from core.upscale import grain
-from core.upscale.maps import HeadMaps
-from core.upscale.whole_head import complete, seen_well
-
-from .hairy_head import SIZE, painted, surface
-from .test_confidence import plain_evidence
+from core.stages.solve.capture_evidence import BEARD_TRUST, FULL_CONFIDENCE
+from core.stages.solve.confidence import estimate_confidence
+from core.stages.upscale import grain
+from core.stages.upscale.maps import HeadMaps
+from core.stages.upscale.whole_head import complete, seen_well
+from tests.hairy_head import SIZE, painted, surface
+from tests.test_confidence import plain_evidence
 
 WRONG = np.float32([1.4, 1.0, 0.8])
 """What the unseen part is off by: another tone, as the solver's mean face has it."""

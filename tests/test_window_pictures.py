@@ -6,11 +6,10 @@ import re
 
 import numpy as np
 
-from benchmarks import window_pictures
-from benchmarks.window_pictures import PICTURES, WindowPicture, draw
 from core.imaging import images
-
-from .conftest import ROOT
+from research.benchmarks import window_pictures
+from research.benchmarks.window_pictures import PICTURES, WindowPicture, draw
+from tests.conftest import ROOT
 
 
 def test_shots_are_cut_reduced_and_laid_side_by_side(tmp_path):

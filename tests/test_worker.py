@@ -16,14 +16,13 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import Cancelled, Done, Failed, Log, Problem, Progress, StageDone
-from core.contract.report import findings
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Cancelled, Done, Failed, Log, Problem, Progress, StageDone
+from core.capture.report import findings
 from core.worker.client import GRACE_S, Worker
-
-from . import tiny_chain
-from .tiny_chain import contents, follow, start
+from tests import tiny_chain
+from tests.tiny_chain import contents, follow, start
 
 
 @pytest.fixture(scope="module")

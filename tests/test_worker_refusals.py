@@ -11,16 +11,15 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.capture import Capture
-from core.contract.files import storage_problem
-from core.contract.messages import Done, Failed, Problem
+from core.capture.capture import Capture
+from core.capture.files import storage_problem
+from core.capture.messages import Done, Failed, Problem
 from core.worker import installation
 from core.worker.job import read_job, write_job
 from core.worker.locks import Lock
 from core.worker.pip_steps import PipStep
 from core.worker.runner import explained, run_job
-
-from .recorded import make_entry
+from tests.recorded import make_entry
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 

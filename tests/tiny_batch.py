@@ -8,14 +8,13 @@ import sys
 from pathlib import Path
 
 from core.batch.record import Batch, read_batch
-from core.contract.capture import Capture
-
-from . import tiny_chain
+from core.capture.capture import Capture
+from tests import tiny_chain
 
 DELIVER = '''
-from ..contract import delivery_plan, provenance
-from ..contract.files import replacing_folder, write_json
-from ..contract.messages import Problem
+from ..capture import delivery_plan, provenance
+from ..capture.files import replacing_folder, write_json
+from ..capture.messages import Problem
 
 def run(capture, settings, report):
     plan = delivery_plan.plan(capture, settings.deliver)

@@ -14,21 +14,21 @@ import time
 from pathlib import Path
 from py_compile import PycInvalidationMode
 
-from core.contract import stages
-from core.contract.capture import Capture
-from core.contract.messages import Message
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.messages import Message
 from core.worker.__main__ import NICE_VALUE
 from core.worker.client import Worker
 from core.worker.job import write_job
 
 ROOT = Path(__file__).resolve().parent.parent
-GROUND = ("__init__.py", "__main__.py", "batch", "contract", "worker")
+GROUND = ("__init__.py", "__main__.py", "batch", "capture", "settings", "worker")
 
 ROOM = '''
 import errno, hashlib, json, os, sys, time
-from ..contract import stages
-from ..contract.files import replacing, replacing_folder
-from ..contract.messages import Problem
+from ...capture import stages
+from ...capture.files import replacing, replacing_folder
+from ...capture.messages import Problem
 
 def run(capture, settings, report):
     stage = stages.by_name(__name__.rsplit(".", 1)[1])
@@ -92,10 +92,11 @@ def build(folder: Path) -> Path:
     core = folder / "core"
     copy_ground(core)
     for stage in stages.STAGES:
-        (core / stage.name).mkdir()
-        (core / stage.name / "__init__.py").write_text(ROOM, encoding="utf-8")
+        (core / "stages" / stage.name).mkdir(parents=True)
+        (core / "stages" / stage.name / "__init__.py").write_text(ROOM, encoding="utf-8")
+    shutil.copyfile(ROOT / "core" / "stages" / "__init__.py", core / "stages" / "__init__.py")
     shutil.copyfile(ROOT / "__main__.py", folder / "__main__.py")
-    (core / "solve" / "device.py").write_text(DEVICE, encoding="utf-8")
+    (core / "stages" / "solve" / "device.py").write_text(DEVICE, encoding="utf-8")
     compile_once(folder)
     return folder
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..core.contract import unforeseen
-from ..core.contract.messages import Problem
+from ..core.capture import unforeseen
+from ..core.capture.messages import Problem
 from . import captures, jobs, problems, status
 
 WIDTH_PX = 460

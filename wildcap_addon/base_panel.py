@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import bpy
 
-from ..core.contract.stages import Stage
+from ..core.capture.stages import Stage
 from . import captures
 from .properties import STAGE_KINDS
 

@@ -15,9 +15,9 @@ from ..core.batch import gate, local, state
 from ..core.batch.known_hashes import known_hashes
 from ..core.batch.record import NAME, Batch, BatchFace, read_batch
 from ..core.batch.state import STOPPED, FaceState
-from ..core.contract import lease, unforeseen
-from ..core.contract.json_files import is_number, read_json
-from ..core.contract.messages import Problem
+from ..core.capture import lease, unforeseen
+from ..core.capture.json_files import is_number, read_json
+from ..core.capture.messages import Problem
 
 EVERY_S = 0.5
 """Between two looks at who runs the batch, and how far that is."""

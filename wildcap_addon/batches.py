@@ -19,8 +19,8 @@ from ..core.batch import gate
 from ..core.batch.groups import GATE, group_named
 from ..core.batch.record import BatchFace
 from ..core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, FaceState
-from ..core.contract.files import write_json
-from ..core.contract.messages import Problem
+from ..core.capture.files import write_json
+from ..core.capture.messages import Problem
 from . import captures, extension
 from .batch_watch import BatchView, Watch, remembered
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import bpy
 
-from ..core.contract.capture import Capture
-from ..core.contract.messages import Problem
+from ..core.capture.capture import Capture
+from ..core.capture.messages import Problem
 
 HEAD_KEY = "wildcap_capture"
 """Custom property of a head object: its capture's folder."""

@@ -10,7 +10,7 @@ from zlib import crc32
 
 import bpy
 
-from ..core.contract.messages import Problem
+from ..core.capture.messages import Problem
 
 _items: list[tuple[str, str, str, int, int]] = []  # Blender keeps no reference to the strings of a dynamic enum
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.contract.capture import Capture
-from ..core.contract.messages import Problem
+from ..core.capture.capture import Capture
+from ..core.capture.messages import Problem
 from . import captures, colours, data_blocks, node_trees
 
 PREVIEW = "WildCap Preview"

@@ -15,10 +15,10 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.contract import messages, stages, unforeseen
-from ..core.contract.capture import Capture
-from ..core.contract.messages import Problem
-from ..core.contract.settings import Settings
+from ..core.capture import messages, stages, unforeseen
+from ..core.capture.capture import Capture
+from ..core.capture.messages import Problem
+from ..core.settings.settings import Settings
 from ..core.worker.background import BackgroundTask
 from ..core.worker.client import Worker
 from ..core.worker.job import read_job, write_job
@@ -127,7 +127,7 @@ def start_tool(
     at: Capture | None = None,
     **shared,
 ) -> Job:
-    """Starts one of core.contract.stages.TOOLS at a capture. Raises Problem when it cannot.
+    """Starts one of core.capture.stages.TOOLS at a capture. Raises Problem when it cannot.
 
     Parameters
     ----------

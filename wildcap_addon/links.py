@@ -14,8 +14,8 @@ from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
 import bpy
 
-from ..core.contract.capture import Capture
-from ..core.contract.settings import STAGE_KINDS
+from ..core.capture.capture import Capture
+from ..core.settings.settings import STAGE_KINDS
 from . import captures, preferences
 
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..core.contract import stages
-from ..core.contract.freshness import FINISHED
+from ..core.capture import stages
+from ..core.capture.freshness import FINISHED
 
 if TYPE_CHECKING:
     from .status import Status

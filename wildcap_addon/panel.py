@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.contract import stages
+from ..core.capture import stages
 from . import batches, captures, jobs, next_step, preferences, problems, status
 from .base_panel import WildcapPanel, region_width
 from .paint import session

@@ -9,8 +9,8 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.contract import links, switchlight_api
-from ..core.contract.messages import Problem
+from ..core.capture import links, switchlight_api
+from ..core.capture.messages import Problem
 from ..core.worker import environment
 from . import extension
 

@@ -7,7 +7,7 @@ import textwrap
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.contract.messages import Problem
+from ..core.capture.messages import Problem
 
 
 class Notice(Problem):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the .blend keeps: the list of captures and each one's settings. Groups are built from core.contract.settings.
+"""What the .blend keeps: the list of captures and each one's settings. Groups are built from core.capture.settings.
 
 Default, range, unit and tooltip of every setting are written there; run-time state lives in `jobs` and `status`.
 """
@@ -9,12 +9,13 @@ from dataclasses import fields
 
 import bpy
 
-from ..core.contract import delighter_cards, delivery_presets, stages
-from ..core.contract import settings as core_settings
-from ..core.contract.colour_values import format_skin_tone, parse_skin_tone
-from ..core.contract.messages import Problem
-from ..core.contract.setting_values import absolute_path
-from ..core.contract.settings import STAGE_KINDS
+from ..core.capture import stages
+from ..core.capture.messages import Problem
+from ..core.settings import delighter_cards, delivery_presets
+from ..core.settings import settings as core_settings
+from ..core.settings.colour_values import format_skin_tone, parse_skin_tone
+from ..core.settings.setting_values import absolute_path
+from ..core.settings.settings import STAGE_KINDS
 from . import captures, preferences
 from . import hdri as worlds
 

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import bpy
 
-from ..core.contract import consent, freshness, mask_edit, newest_maps, report, stages
-from ..core.contract.capture import Capture
-from ..core.contract.messages import Problem
+from ..core.capture import consent, freshness, mask_edit, newest_maps, report, stages
+from ..core.capture.capture import Capture
+from ..core.capture.messages import Problem
 from . import captures, properties
 
 INTERVAL_S = 1.0  # between two looks at the capture's folder
@@ -39,7 +39,7 @@ class Status:
     render: str = ""
     whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' where it can
     interrupted: bool = False  # a solve was stopped on its way, and can go on from its checkpoint
-    findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.contract.report.findings tells it
+    findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.capture.report.findings tells it
     problem: Problem | None = None
     missing: bool = False  # the folder is not there
     # what SwitchLight, where it is chosen, would get of the frames; None before there are any

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..core.contract.messages import Problem
+from ..core.capture.messages import Problem
 
 NAME = "wildcap"
 

@@ -14,9 +14,9 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.contract.files import write_json
-from ..core.contract.messages import Problem
-from ..core.contract.settings import QUALITIES, Settings, preset
+from ..core.capture.files import write_json
+from ..core.capture.messages import Problem
+from ..core.settings.settings import QUALITIES, Settings, preset
 from . import extension
 
 _rates: dict[str, float] = {}  # device -> seconds per million texels and step

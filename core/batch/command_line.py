@@ -14,9 +14,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from ..contract import lease, settings
-from ..contract.files import storage_problem
-from ..contract.messages import Cancelled, Failed, Problem
+from ..capture import lease
+from ..capture.files import storage_problem
+from ..capture.messages import Cancelled, Failed, Problem
+from ..settings import settings
 from ..worker import command_settings
 from ..worker.commands import add_command
 from ..worker.terminal import ProgressLine, print_message

@@ -11,11 +11,11 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from ..contract.capture import Capture
-from ..contract.files import write_json
-from ..contract.hashes import hash_file
-from ..contract.json_files import read_json
-from ..contract.messages import Problem
+from ..capture.capture import Capture
+from ..capture.files import write_json
+from ..capture.hashes import hash_file
+from ..capture.json_files import read_json
+from ..capture.messages import Problem
 
 NAME = "mask_accepted.json"
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..contract import stages
-from ..contract.messages import Problem
-from ..contract.stages import MASK_STAGE, NAMES, Stage
+from ..capture import stages
+from ..capture.messages import Problem
+from ..capture.stages import MASK_STAGE, NAMES, Stage
 
 GATE = "solve"
 """The group that a batch with an artist's gate begins only when the artist has looked at the mask."""

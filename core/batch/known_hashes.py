@@ -13,10 +13,10 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..contract.files import write_json
-from ..contract.hashes import take_known, tell_known
-from ..contract.json_files import read_json
-from ..contract.messages import Problem
+from ..capture.files import write_json
+from ..capture.hashes import take_known, tell_known
+from ..capture.json_files import read_json
+from ..capture.messages import Problem
 
 NAME = "hashes.json"
 

@@ -19,9 +19,9 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..contract.files import write_json
-from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progress
-from ..contract.stages import LABELS
+from ..capture.files import write_json
+from ..capture.messages import Cancelled, Done, Failed, Message, Problem, Progress
+from ..capture.stages import LABELS
 from .groups import GROUPS, StageGroup
 from .record import Batch, BatchFace
 from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, FaceState, derive_state

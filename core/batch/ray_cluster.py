@@ -16,9 +16,9 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 from .. import __version__
-from ..contract import lease
-from ..contract.hashes import hash_file
-from ..contract.messages import Problem, from_line
+from ..capture import lease
+from ..capture.hashes import hash_file
+from ..capture.messages import Problem, from_line
 from .groups import GROUPS, StageGroup
 from .local import CANCELLED, EVERY_S, Board, Tally, forget_stop, is_asked_to_stop
 from .ray_connection import connect

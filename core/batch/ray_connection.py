@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..contract.messages import Problem
+from ..capture.messages import Problem
 
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",

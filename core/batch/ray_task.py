@@ -20,10 +20,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .. import __version__
-from ..contract import lease
-from ..contract.capture import Capture
-from ..contract.hashes import hash_file
-from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progress, StageDone, to_line
+from ..capture import lease
+from ..capture.capture import Capture
+from ..capture.hashes import hash_file
+from ..capture.messages import Cancelled, Done, Failed, Message, Problem, Progress, StageDone, to_line
 from .groups import group_named
 from .local import CANCELLED, EVERY_S, check_result
 from .record import NAME, Batch, read_batch

@@ -15,13 +15,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..contract import settings as known
-from ..contract.capture import Capture
-from ..contract.files import write_json
-from ..contract.json_files import plain_name, read_json
-from ..contract.messages import Problem
-from ..contract.portable_paths import convert_settings, read_portable, write_portable
-from ..contract.settings import Settings
+from ..capture.capture import Capture
+from ..capture.files import write_json
+from ..capture.json_files import plain_name, read_json
+from ..capture.messages import Problem
+from ..capture.portable_paths import convert_settings, read_portable, write_portable
+from ..settings import settings as known
+from ..settings.settings import Settings
 
 FORMAT = 1
 NAME = "batch.json"

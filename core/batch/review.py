@@ -24,10 +24,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import __version__
-from ..contract import report
-from ..contract.capture import Capture
-from ..contract.files import replacing, storage_problem
-from ..contract.messages import Problem
+from ..capture import report
+from ..capture.capture import Capture
+from ..capture.files import replacing, storage_problem
+from ..capture.messages import Problem
 from .groups import GROUPS
 from .record import Batch, BatchFace
 from .review_page import MARK, PAGE, STYLE

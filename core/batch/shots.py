@@ -16,13 +16,13 @@ import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
 
-from ..contract import settings as known
-from ..contract.files import storage_problem
-from ..contract.json_files import plain_name
-from ..contract.messages import Problem
-from ..contract.setting_paths import check_paths
-from ..contract.setting_values import absolute_path
-from ..contract.stages import NAMES
+from ..capture.files import storage_problem
+from ..capture.json_files import plain_name
+from ..capture.messages import Problem
+from ..capture.stages import NAMES
+from ..settings import settings as known
+from ..settings.setting_paths import check_paths
+from ..settings.setting_values import absolute_path
 from ..worker.command_settings import read_file
 from .record import NAME, BatchFace
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..contract import delivery_plan, lease
-from ..contract.capture import Capture
-from ..contract.files import storage_problem
-from ..contract.freshness import FINISHED
-from ..contract.json_files import read_json
-from ..contract.messages import Problem
-from ..contract.settings import from_json, to_json
+from ..capture import delivery_plan, lease
+from ..capture.capture import Capture
+from ..capture.files import storage_problem
+from ..capture.freshness import FINISHED
+from ..capture.json_files import read_json
+from ..capture.messages import Problem
+from ..settings.settings import from_json, to_json
 from .gate import is_accepted
 from .groups import DELIVER, GATE, GROUPS, StageGroup
 from .record import Batch, BatchFace

@@ -17,9 +17,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from ..contract import switchlight_api
-from ..contract.capture import Capture
-from ..contract.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem
+from ..capture import switchlight_api
+from ..capture.capture import Capture
+from ..capture.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem
 from ..worker.client import THREAD_VARIABLES, Worker
 from ..worker.job import read_job, wait_until_free, write_job
 from .groups import DELIVER, GROUPS, StageGroup

@@ -11,18 +11,18 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from ..contract import delivery_plan, freshness, provenance, stages
-from ..contract.capture import Capture
-from ..contract.delivery_plan import PACKING, TEXTURES, DeliveryPlan
-from ..contract.delivery_presets import HAIR, SCAN_MAPS, MapPicture
-from ..contract.files import replacing_folder, write_json
-from ..contract.messages import Problem, Reporter
-from ..contract.settings import Settings
-from ..contract.stages import advise_again
+from ..capture import delivery_plan, freshness, provenance, stages
+from ..capture.capture import Capture
+from ..capture.delivery_plan import PACKING, TEXTURES, DeliveryPlan
+from ..capture.files import replacing_folder, write_json
+from ..capture.messages import Problem, Reporter
+from ..capture.stages import advise_again
 from ..face import template
 from ..face.head import read_head
 from ..geometry import meshes
 from ..imaging import images
+from ..settings.delivery_presets import HAIR, SCAN_MAPS, MapPicture
+from ..settings.settings import Settings
 from . import checks, maps, wavefront
 
 HEAD_TILE = 1001  # UDIM

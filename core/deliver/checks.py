@@ -5,11 +5,11 @@
 from __future__ import annotations
 
 from .. import __version__
-from ..contract import stages
-from ..contract.capture import Capture
-from ..contract.freshness import OLDER, STALE
-from ..contract.messages import Problem, Reporter
-from ..contract.settings import Settings
+from ..capture import stages
+from ..capture.capture import Capture
+from ..capture.freshness import OLDER, STALE
+from ..capture.messages import Problem, Reporter
+from ..settings.settings import Settings
 
 LAST = {"head": "upscale", "own_mesh": "transfer", "scan": "transfer"}
 """What is delivered -> the last stage that it comes from. A head's displacement, which the stage after it makes, is

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contract import skin_regions
-from ..contract.delivery_plan import DeliveryPlan
-from ..contract.delivery_presets import COLOUR, NORMAL, MapPicture
-from ..contract.messages import Problem
-from ..contract.stages import advise_remaking
+from ..capture import skin_regions
+from ..capture.delivery_plan import DeliveryPlan
+from ..capture.messages import Problem
+from ..capture.stages import advise_remaking
 from ..face import template
 from ..imaging import images
+from ..settings.delivery_presets import COLOUR, NORMAL, MapPicture
 
 F0 = 0.0278
 """What skin of an IOR of 1.4 reflects at normal incidence, ((1.4 - 1) / (1.4 + 1))^2, where the specular map is at its

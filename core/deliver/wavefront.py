@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import floor
 from pathlib import Path
 
-from ..contract.delivery_plan import DeliveryPlan
+from ..capture.delivery_plan import DeliveryPlan
 
 HEAD_TILE = 1001
 LINKS = {"base_color": "map_Kd", "normal": "norm", "roughness": "map_Pr", "specular": "map_Ks"}

@@ -6,7 +6,7 @@ upright crop of the eye.
     eye = read_eye(srgb, corners, left)
     eye.ball, eye.iris                         float32 [SIDE_PX, SIDE_PX]: shares of the crop's pixels
 
-`core train eyes` makes the weights, on synthetic people only. PyTorch is loaded when the first eye is read.
+`research.training eyes` makes the weights, on synthetic people only. PyTorch is loaded when the first eye is read.
 """
 
 from __future__ import annotations

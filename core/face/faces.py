@@ -16,8 +16,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ..contract import shipped_files
-from ..contract.messages import Problem
+from ..capture import shipped_files
+from ..capture.messages import Problem
 
 RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
 """Landmarks at the outer and inner corner of the person's right eye, and at the inner and outer of the left: they stay

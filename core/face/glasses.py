@@ -4,7 +4,7 @@
 through that.
 
 Rims, bridge and temples are thin lines where a bare face has none, bright or dark; hard shadows are steps, creases are
-faint. `python -m core train glasses` finds the plane, on synthetic people only.
+faint. `python -m research.training glasses` finds the plane, on synthetic people only.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from ..contract import shipped_files
+from ..capture import shipped_files
 from . import faces
 from .parts import from_centres
 

@@ -13,10 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..contract.capture import Capture
-from ..contract.eyes_record import read_eyes
-from ..contract.messages import Problem
-from ..contract.stages import advise_again
+from ..capture.capture import Capture
+from ..capture.eyes_record import read_eyes
+from ..capture.messages import Problem
+from ..capture.stages import advise_again
 from ..geometry import meshes, raster
 from ..geometry.meshes import Mesh
 from . import lids, template

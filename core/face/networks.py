@@ -12,7 +12,7 @@ from safetensors.torch import load_file
 from torch import nn
 from torch.nn import functional
 
-from ..contract import shipped_files
+from ..capture import shipped_files
 
 
 def has_files(weights: Path) -> bool:

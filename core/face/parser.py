@@ -6,9 +6,8 @@ of a face.
     parts = parse(srgb, face.landmarks)
     hairy = parts.of("hair", "beard")          float32 [H, W]
 
-`core train parser` makes the weights, on synthetic people only. PyTorch is loaded when the first picture is parsed: who
-only asks where faces are does without.
-"""
+`research.training parser` makes the weights, on synthetic people only. PyTorch is loaded when the first picture is
+parsed: who only asks where faces are does without."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from ..contract.messages import Problem
+from ..capture.messages import Problem
 from . import networks
 from .parts import PARTS
 

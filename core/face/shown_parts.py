@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..contract.capture import Capture
-from ..contract.messages import Problem
-from ..contract.stages import advise_again
+from ..capture.capture import Capture
+from ..capture.messages import Problem
+from ..capture.stages import advise_again
 from ..imaging import images
 from .parts import GROWTHS, keep_beard, keep_present
 

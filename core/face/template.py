@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built-in head: mesh with its frozen UVs, identity space, landmarks and UV masks. core/assets/build.py made the
-files."""
+"""The built-in head: mesh with its frozen UVs, identity space, landmarks and UV masks.
+research/people/base_head/build.py made the files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..contract import shipped_files
+from ..capture import shipped_files
 from ..geometry import meshes
 from ..geometry.meshes import Mesh
 from ..imaging import images

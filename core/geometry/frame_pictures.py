@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contract.capture import Capture
-from ..contract.frame_records import read_frames
-from ..contract.messages import Problem
-from ..contract.stages import advise_again
+from ..capture.capture import Capture
+from ..capture.frame_records import read_frames
+from ..capture.messages import Problem
+from ..capture.stages import advise_again
 from ..imaging import images
 from .views import View, read_views
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contract.messages import Problem
-from ..contract.regular_files import require_regular
-from ..contract.stages import advise_remaking
+from ..capture.messages import Problem
+from ..capture.regular_files import require_regular
+from ..capture.stages import advise_remaking
 
 MOST_OBJ_BYTES = 512 << 20
 """As lists of words, an OBJ takes about ten times its size while it is read: 5 GB of memory. It holds five million

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from ..contract.files import replacing
-from ..contract.messages import Problem
-from ..contract.stages import advise_remaking
+from ..capture.files import replacing
+from ..capture.messages import Problem
+from ..capture.stages import advise_remaking
 from .mesh_checks import MOST_OBJ_BYTES, MOST_PLY_BYTES, check_ply, damaged, find_fault, open_mesh
 
 OWN_OBJ = re.compile(

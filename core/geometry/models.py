@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from ..contract.regular_files import require_regular
+from ..capture.regular_files import require_regular
 
 PARAMS = {
     int(number): len(pycolmap.Camera.create_from_model_id(0, number, 1.0, 1, 1).params)

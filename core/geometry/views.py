@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from ..contract.capture import Capture
-from ..contract.frame_records import read_frames
-from ..contract.json_files import plain_name
-from ..contract.messages import Problem
-from ..contract.stages import advise_again
+from ..capture.capture import Capture
+from ..capture.frame_records import read_frames
+from ..capture.json_files import plain_name
+from ..capture.messages import Problem
+from ..capture.stages import advise_again
 from ..imaging import images
 from .models import pose_of, read_model
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from ..contract.files import final_name
-from ..contract.messages import Problem
-from ..contract.stages import advise_remaking
+from ..capture.files import final_name
+from ..capture.messages import Problem
+from ..capture.stages import advise_remaking
 
 MOST_PICTURE_BYTES = 3 << 30
 """Memory that one picture may take as float32, of which reading needs twice that at times: 16384 x 16384 RGB, which is

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contract.messages import Problem
+from ..capture.messages import Problem
 
 SUFFIXES = (".heic", ".heif")
 EXPORT = "Export it as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible)."

@@ -19,9 +19,9 @@ import cv2
 import numpy as np
 import OpenImageIO as oiio
 
-from ..contract.files import replacing
-from ..contract.messages import Problem
-from ..contract.stages import advise_remaking
+from ..capture.files import replacing
+from ..capture.messages import Problem
+from ..capture.stages import advise_remaking
 from . import heif
 from .checks import MOST_PICTURE_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
 

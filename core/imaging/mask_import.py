@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..contract import mask_history
-from ..contract.capture import Capture
-from ..contract.messages import Problem
-from ..contract.settings import Settings
+from ..capture import mask_history
+from ..capture.capture import Capture
+from ..capture.messages import Problem
+from ..settings.settings import Settings
 from . import images
 
 MOST_STRETCH_RATIO = 1.02

@@ -24,13 +24,14 @@ OUTLIER_RANGE_LOG = 3.0  # log units over which an outlier may lie, per channel
 SKY_MEAN = np.array([0, 0, 0.41, 0, 0, 0, -0.11, 0, 0])
 SKY_DEVIATION = np.array([0, 0.44, 0.29, 0.44, 0.40, 0.30, 0.40, 0.30, 0.40])
 """What environments are like without their sun or lamp: coefficients as shares of the first, the mean and deviation of
-35 panoramas turned about the vertical (python -m benchmarks.skies)."""
+35 panoramas turned about the vertical (python -m research.benchmarks.skies)."""
 # The prior's quadratic form [9, 9] in the coefficients of an environment of mean radiance one
 _OFF_MEAN = np.eye(9)[1:] - np.outer(SKY_MEAN[1:], np.eye(9)[0])
 _SKY_PRECISION = _OFF_MEAN.T @ np.diag((UNIFORM * SKY_DEVIATION[1:]) ** -2) @ _OFF_MEAN
 INDEPENDENT_SAMPLES = 15
-"""A face's bare skin counts as so many samples of its tone, for deviations from it reach 16 mm (core/solve/split.py,
-python -m benchmarks.skies)."""
+"""A face's bare skin counts as so many samples of its tone, for deviations from it reach 16 mm
+(core/solver/extensions/split.py,
+python -m research.benchmarks.skies)."""
 MIN_SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
 DIRECTIONS_AROUND = 12  # that are tried about the best so far: six on each of two rings
 FINER_DEG = (12.0, 4.0)  # how far about the best direction so far others are tried, one round after the other

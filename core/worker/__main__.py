@@ -16,8 +16,8 @@ import sys
 import threading
 from pathlib import Path
 
-from ..contract import switchlight_api
-from ..contract.messages import Message, to_line
+from ..capture import switchlight_api
+from ..capture.messages import Message, to_line
 from .runner import run_job
 
 NICE_VALUE = 15

@@ -16,8 +16,8 @@ import threading
 import time
 from collections.abc import Callable
 
-from ..contract import switchlight_api, unforeseen
-from ..contract.messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
+from ..capture import switchlight_api, unforeseen
+from ..capture.messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
 
 PLACES = frozenset({"PIP_USER", "PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_CONSTRAINT"})
 """Environment variables of pip's that would have packages elsewhere than in the environment they are for, or others

@@ -17,8 +17,8 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-from ..contract.files import storage_problem
-from ..contract.messages import Problem
+from ..capture.files import storage_problem
+from ..capture.messages import Problem
 from . import pip_source
 from .environment import answer, empty, python_of
 

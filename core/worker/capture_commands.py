@@ -9,9 +9,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..contract import artist_landmarks, deletion, report, stages
-from ..contract.capture import Capture
-from ..contract.messages import Problem
+from ..capture import artist_landmarks, deletion, report, stages
+from ..capture.capture import Capture
+from ..capture.messages import Problem
 from .commands import add_command
 from .job import last_settings
 

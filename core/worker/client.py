@@ -15,9 +15,9 @@ import threading
 import time
 from pathlib import Path
 
-from ..contract import switchlight_api
-from ..contract.files import storage_problem
-from ..contract.messages import FINAL, Cancelled, Failed, Log, Message, Problem, from_line
+from ..capture import switchlight_api
+from ..capture.files import storage_problem
+from ..capture.messages import FINAL, Cancelled, Failed, Log, Message, Problem, from_line
 
 GRACE_S = 0.7
 """How long a cancelled worker may take to reach its next report before it is stopped."""

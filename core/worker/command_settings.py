@@ -3,8 +3,8 @@
 """The settings on the command line: --set and --settings for every one, a flag for those that have one, and the list of
 all.
 
-Ground floor: standard library only. Names, types, choices and help come from the fields in contract/settings.py and
-contract/stage_settings.py.
+Ground floor: standard library only. Names, types, choices and help come from the fields in settings/settings.py and
+settings/stage_settings.py.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import textwrap
 from dataclasses import Field
 from pathlib import Path
 
-from ..contract.json_files import read_json
-from ..contract.messages import Problem
-from ..contract.setting_values import absolute_path, describe_values, value_from_text, value_to_text
-from ..contract.settings import STAGE_KINDS, Settings, find_setting, from_json, known_settings, tooltips
+from ..capture.json_files import read_json
+from ..capture.messages import Problem
+from ..settings.setting_values import absolute_path, describe_values, value_from_text, value_to_text
+from ..settings.settings import STAGE_KINDS, Settings, find_setting, from_json, known_settings, tooltips
 
 METAVARS = {"file": "FILE", "folder": "FOLDER", "file_or_folder": "PATH"}
 COMMANDS = {name: "deliver" if name.startswith("deliver.") else "run" for name in known_settings()}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import __version__
-from ..contract import shipped_files
+from ..capture import shipped_files
 from . import environment
 
 

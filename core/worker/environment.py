@@ -15,9 +15,9 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..contract import lease, processes, switchlight_api
-from ..contract.files import storage_problem
-from ..contract.messages import Problem
+from ..capture import lease, processes, switchlight_api
+from ..capture.files import storage_problem
+from ..capture.messages import Problem
 from .background import BackgroundTask
 
 PYTHONS = ((3, 11), (3, 12), (3, 13))
@@ -194,7 +194,7 @@ device, reason = "", ""
 if %(root)r and "torch" in sys.modules and not errors:
     sys.path.insert(0, %(root)r)
     try:
-        from core.solve.device import prove
+        from core.stages.solve.device import prove
         device, reason = prove().device, prove().reason
     except Exception as error:
         device, reason = "cpu", f"The network does not run: {type(error).__name__}: {error}".splitlines()[0]

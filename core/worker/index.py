@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..contract.messages import Problem
+from ..capture.messages import Problem
 from . import bare_environment, locks, pip_steps
 
 RETRIES = ("--retries", "1")

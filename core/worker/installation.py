@@ -16,8 +16,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..contract.files import storage_problem
-from ..contract.messages import Problem
+from ..capture.files import storage_problem
+from ..capture.messages import Problem
 from . import bare_environment, locks
 from .background import BackgroundTask
 from .environment import COMPUTE_FILE, alone_in, answer, python_of, required, verify

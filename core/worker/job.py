@@ -12,13 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..contract import stages
-from ..contract.capture import Capture
-from ..contract.files import write_json
-from ..contract.json_files import read_json
-from ..contract.messages import Problem
-from ..contract.portable_paths import convert_settings, read_portable, write_portable
-from ..contract.settings import Settings, from_json, preset
+from ..capture import stages
+from ..capture.capture import Capture
+from ..capture.files import write_json
+from ..capture.json_files import read_json
+from ..capture.messages import Problem
+from ..capture.portable_paths import convert_settings, read_portable, write_portable
+from ..settings.settings import Settings, from_json, preset
 
 
 @dataclass(frozen=True)

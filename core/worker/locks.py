@@ -3,9 +3,8 @@
 """Which packages go to which machine: requirements/locks/PLATFORM-PYTHON.txt names every one, with the hashes of its
 wheels.
 
-`python -m benchmarks.locks` writes them. Beside a lock may lie PLATFORM-PYTHON-cpu.txt or -cuda.txt: PyTorch's build
-for that device where the lock's own is another, or what that build needs besides. Standard library only.
-"""
+`python -m research.benchmarks.locks` writes them. Beside a lock may lie PLATFORM-PYTHON-cpu.txt or -cuda.txt: PyTorch's
+build for that device where the lock's own is another, or what that build needs besides. Standard library only."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..contract.messages import Problem
+from ..capture.messages import Problem
 
 PYTHONS = ((3, 11), (3, 13))
 """Versions of Python that there are locks for: those of Blender 4.2 to 5.0, and of 5.1 and newer."""

@@ -20,7 +20,7 @@ import urllib.parse
 import urllib.request
 from pathlib import Path
 
-from ..contract.messages import Problem
+from ..capture.messages import Problem
 from . import locks
 
 INDEX = "https://pypi.org/simple"

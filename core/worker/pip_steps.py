@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..contract.files import replacing
-from ..contract.messages import Problem
+from ..capture.files import replacing
+from ..capture.messages import Problem
 from . import locks
 from .environment import answer
 

@@ -25,16 +25,16 @@ from dataclasses import fields
 from pathlib import Path, PurePosixPath
 
 from .. import __version__
-from ..contract import settings as contract_settings
-from ..contract import stages, switchlight_api, unforeseen
-from ..contract.capture import Capture
-from ..contract.deletion import LOGS
-from ..contract.files import replacing
-from ..contract.frame_records import read_frames
-from ..contract.messages import Problem
-from ..contract.ownership import BOOKS
-from ..contract.portable_paths import convert_settings
-from ..contract.together import captures_in
+from ..capture import stages, switchlight_api, unforeseen
+from ..capture.capture import Capture
+from ..capture.deletion import LOGS
+from ..capture.files import replacing
+from ..capture.frame_records import read_frames
+from ..capture.messages import Problem
+from ..capture.ownership import BOOKS
+from ..capture.portable_paths import convert_settings
+from ..capture.together import captures_in
+from ..settings import settings as known_settings
 from . import doctor
 from .job import last_settings
 
@@ -259,7 +259,7 @@ def _chosen_paths(capture: Capture) -> list[Path]:
     paths: list[Path] = []
     told: list[dict] = []
     with contextlib.suppress(Problem, OSError):
-        told.append(contract_settings.to_json(last_settings(capture)))
+        told.append(known_settings.to_json(last_settings(capture)))
     with contextlib.suppress(Problem, OSError):
         told += [{name: entry.get("settings")} for name, entry in capture.read()["stages"].items()]
     for by_stage in told:
@@ -305,8 +305,8 @@ def _described(capture: Capture | None) -> dict:
     return {"stages": done, "stopped": record.get("stopped"), "settings": _without_path_settings(chosen)}
 
 
-def _without_path_settings(chosen: contract_settings.Settings) -> dict:
-    told = contract_settings.to_json(chosen)
+def _without_path_settings(chosen: known_settings.Settings) -> dict:
+    told = known_settings.to_json(chosen)
     for group in fields(chosen):
         of_group = getattr(chosen, group.name)
         for setting in fields(of_group) if isinstance(told[group.name], dict) else ():

@@ -12,9 +12,9 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..contract.capture import Capture
-from ..contract.files import storage_problem
-from ..contract.messages import Problem
+from ..capture.capture import Capture
+from ..capture.files import storage_problem
+from ..capture.messages import Problem
 
 
 @contextlib.contextmanager

@@ -16,10 +16,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from .. import __version__
-from ..contract import report, unforeseen
-from ..contract.files import storage_problem
-from ..contract.freshness import FINISHED, OLDER
-from ..contract.messages import (
+from ..capture import report, unforeseen
+from ..capture.files import storage_problem
+from ..capture.freshness import FINISHED, OLDER
+from ..capture.messages import (
     Cancelled,
     CancelledError,
     Done,
@@ -31,9 +31,9 @@ from ..contract.messages import (
     StageDone,
     out_of_memory,
 )
-from ..contract.setting_paths import check_paths
-from ..contract.settings import Settings
-from ..contract.stages import Stage
+from ..capture.stages import Stage
+from ..settings.setting_paths import check_paths
+from ..settings.settings import Settings
 from .job import JobRequest, read_job
 from .stage_log import at_work
 
@@ -218,7 +218,7 @@ def _with_device(step: Stage, settings: Settings, reporter: Reporter) -> Setting
     goes to its log."""
     if settings.device != "auto" or not step.on_device:
         return settings
-    proof = importlib.import_module("..solve.device", __package__).prove()
+    proof = importlib.import_module("..stages.solve.device", __package__).prove()
     reporter.log(f"Computing on {proof.device}: {proof.reason}")
     return replace(settings, device=proof.device)
 

@@ -1,18 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Self-Test: the job that solves a copy of the sample head again. Standard library only; what it computes is
-core.solve.self_test's."""
+core.stages.solve.self_test's."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from ..contract.capture import Capture
-from ..contract.sample_head import copy_to
+from ..capture.capture import Capture
+from ..capture.sample_head import copy_to
 from .job import write_job
 
 SKIN_TONE = "0.6793,0.5099,0.4424"
-"""The sample's own, sRGB: core/synthetic/sample/skin_tone.txt."""
+"""The sample's own, sRGB: research/people/sample/skin_tone.txt."""
 
 
 def prepare(folder: Path, seed: int = 0, device: str = "auto") -> Capture:

@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from ..contract.messages import Done, Failed, Problem, Progress
+from ..capture.messages import Done, Failed, Problem, Progress
 from . import index, installation, locks, wheels
 from .background import BackgroundTask
 from .commands import add_command

@@ -11,11 +11,11 @@ import time
 import traceback
 from collections.abc import Callable
 
-from ..contract import ownership
-from ..contract.capture import Capture
-from ..contract.files import storage_problem
-from ..contract.messages import Log, Message, Problem, Progress, Reporter
-from ..contract.stages import Stage
+from ..capture import ownership
+from ..capture.capture import Capture
+from ..capture.files import storage_problem
+from ..capture.messages import Log, Message, Problem, Progress, Reporter
+from ..capture.stages import Stage
 
 
 @contextlib.contextmanager

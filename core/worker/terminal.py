@@ -10,9 +10,9 @@ import sys
 import time
 from pathlib import Path
 
-from ..contract import stages, switchlight_api
-from ..contract.capture import Capture
-from ..contract.messages import Cancelled, Done, Failed, Log, Message, Progress, StageDone
+from ..capture import stages, switchlight_api
+from ..capture.capture import Capture
+from ..capture.messages import Cancelled, Done, Failed, Log, Message, Progress, StageDone
 from .client import Worker
 from .job import read_job
 

@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from ..contract.messages import Problem
+from ..capture.messages import Problem
 from . import locks, pip_steps
 
 

@@ -17,10 +17,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np  # noqa: E402
 
 from core.imaging import images  # noqa: E402
-from core.synthetic import scene  # noqa: E402
-from core.synthetic.people import filmed  # noqa: E402
-from core.synthetic.people.figure import make_figure  # noqa: E402
-from core.synthetic.people.person import Person, sample_person  # noqa: E402
+from research.people import scene  # noqa: E402
+from research.people.lifelike import filmed  # noqa: E402
+from research.people.lifelike.figure import make_figure  # noqa: E402
+from research.people.lifelike.person import Person, sample_person  # noqa: E402
 
 FIRST_SEED = 930001
 AZIMUTHS, HEIGHTS = (-54, -36, -18, 0, 18, 36, 54), (4, 10, 2, 8, 3, 11, 5)

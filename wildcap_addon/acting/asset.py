@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""core/assets/face_units.npz: how the built-in head is cut open, and how its units move it. core/assets/face_units.py
-made the file."""
+"""core/assets/face_units.npz: how the built-in head is cut open, and how its units move it.
+research/people/base_head/face_units.py made the file."""
 
 from __future__ import annotations
 

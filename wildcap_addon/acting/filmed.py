@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.contract.capture import Capture
-from ...core.contract.eyes_record import Eyeball, read_eyes, read_irises
+from ...core.capture.capture import Capture
+from ...core.capture.eyes_record import Eyeball, read_eyes, read_irises
 from .asset import FaceUnits, sockets
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import local_view
 from . import mesh
 from .asset import LEFT_EYE, SIDES, load

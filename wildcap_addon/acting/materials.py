@@ -132,7 +132,7 @@ def _told(iris: str | tuple) -> str:
 
 def picture(iris: tuple[float, float, float]) -> np.ndarray:
     """An eye as its UVs lay it out, sRGB float32 [SIZE_PX, SIZE_PX, 4]: rings around the pupil, the angle from it
-    growing outwards (core/assets/acting.py)."""
+    growing outwards (research/people/base_head/acting.py)."""
     y, x = (np.mgrid[:SIZE_PX, :SIZE_PX] + 0.5) / SIZE_PX - 0.5
     angle = np.pi * (2 * np.hypot(x, y)) ** (1 / 0.6)
     turn = np.arctan2(y, x)

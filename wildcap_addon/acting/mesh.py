@@ -14,8 +14,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.contract.capture import Capture
-from ...core.contract.messages import Problem
+from ...core.capture.capture import Capture
+from ...core.capture.messages import Problem
 from .. import captures
 from ..data_blocks import read_field
 from ..head import OUTER

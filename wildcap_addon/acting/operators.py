@@ -5,7 +5,7 @@ sliders back to zero."""
 
 import bpy
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import captures, head
 from ..base_operator import HeadOperator
 from . import gaze, materials, mesh

@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core.batch.gate import is_accepted
 from ...core.batch.record import GATES, Batch, read_batch
 from ...core.batch.state import WAITING
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import batches, captures, jobs, preferences
 from ..base_operator import BaseOperator, FileOperator
 from . import planning, running, walking

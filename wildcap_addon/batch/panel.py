@@ -6,7 +6,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import batches, captures, problems
 from ..base_panel import WildcapPanel, region_width
 from . import running

@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 
 from ...core.batch.record import GATES, Batch, BatchFace, read_batch, write_batch
-from ...core.contract.files import storage_problem
-from ...core.contract.json_files import plain_name
-from ...core.contract.messages import Problem
+from ...core.capture.files import storage_problem
+from ...core.capture.json_files import plain_name
+from ...core.capture.messages import Problem
 from .. import batches, captures, preferences, properties
 
 FOLDER = "batches"

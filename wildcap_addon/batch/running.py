@@ -12,9 +12,9 @@ import bpy
 
 from ...core.batch.local import ask_to_stop
 from ...core.batch.record import Batch
-from ...core.contract import switchlight_api, unforeseen
-from ...core.contract.files import storage_problem
-from ...core.contract.messages import Problem
+from ...core.capture import switchlight_api, unforeseen
+from ...core.capture.files import storage_problem
+from ...core.capture.messages import Problem
 from .. import batches, captures, incoming, jobs, preferences, problems, status
 
 INTERVAL_S = 0.5

@@ -5,9 +5,9 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract import deletion
-from ...core.contract.capture import Capture
-from ...core.contract.messages import Problem
+from ...core.capture import deletion
+from ...core.capture.capture import Capture
+from ...core.capture.messages import Problem
 from ...core.worker.background import BackgroundTask
 from .. import asking, batches, captures, jobs
 from ..base_operator import Dialog

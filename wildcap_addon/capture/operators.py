@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.capture import Capture
-from ...core.contract.messages import Problem
+from ...core.capture.capture import Capture
+from ...core.capture.messages import Problem
 from .. import captures, links
 from ..base_operator import CaptureOperator, FileOperator
 

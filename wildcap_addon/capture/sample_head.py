@@ -4,8 +4,8 @@
 
 import bpy
 
-from ...core.contract import sample_head
-from ...core.contract.newest_maps import find_newest_maps
+from ...core.capture import sample_head
+from ...core.capture.newest_maps import find_newest_maps
 from .. import captures, preferences
 from ..base_operator import BaseOperator
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scene's cameras as the JSON that the setting `cameras.import_from` reads
-(core/cameras/importers/blender_cameras.py says its layout).
+(core/stages/cameras/importers/blender_cameras.py says its layout).
 
 Not a button: `write_cameras(bpy.context.scene, "cameras.json")` from Blender's console or a script.
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.files import write_json
+from ...core.capture.files import write_json
 
 
 def write_cameras(scene: bpy.types.Scene, path: str) -> int:

@@ -9,9 +9,9 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract import hashes
-from ...core.contract.capture import Capture
-from ...core.contract.messages import Problem
+from ...core.capture import hashes
+from ...core.capture.capture import Capture
+from ...core.capture.messages import Problem
 from .. import captures, preferences, problems
 from ..base_operator import FileOperator
 from ..base_panel import WildcapPanel

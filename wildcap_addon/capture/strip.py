@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...core.contract.capture import Capture
-from ...core.contract.frame_records import read_frames
-from ...core.contract.messages import Problem
+from ...core.capture.capture import Capture
+from ...core.capture.frame_records import read_frames
+from ...core.capture.messages import Problem
 from .. import captures, frame_icons, status
 
 INTERVAL_S = 0.5

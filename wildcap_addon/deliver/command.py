@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract import delivery_presets
+from ...core.settings import delivery_presets
 from .. import captures, head, jobs, problems
 from ..terminal import Command
 from . import waiting

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.delivery_plan import DeliveryPlan
-from ...core.contract.messages import Problem
+from ...core.capture.delivery_plan import DeliveryPlan
+from ...core.capture.messages import Problem
 
 ADDONS = {".glb": "gltf", ".gltf": "gltf", ".fbx": "fbx"}
 """Exporters that are add-ons of Blender, which may be switched off: the operator of bpy.ops.export_scene."""

@@ -8,9 +8,9 @@ from contextlib import ExitStack
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract import delivery_plan
-from ...core.contract.delivery_plan import DeliveryPlan
-from ...core.contract.messages import Problem
+from ...core.capture import delivery_plan
+from ...core.capture.delivery_plan import DeliveryPlan
+from ...core.capture.messages import Problem
 from ...core.worker import read_only
 from .. import captures, jobs, properties
 from ..base_operator import BaseOperator, Dialog

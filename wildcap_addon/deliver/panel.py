@@ -6,8 +6,8 @@ scan are made by."""
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract import stages
-from ...core.contract.delivery_presets import FORMATS, PICTURES, PRESETS
+from ...core.capture import stages
+from ...core.settings.delivery_presets import FORMATS, PICTURES, PRESETS
 from .. import captures, problems
 from ..base_panel import CapturePanel, draw_settings, region_width
 from . import stand, waiting

@@ -15,10 +15,10 @@ from pathlib import Path
 import bpy
 from mathutils import Matrix
 
-from ...core.contract import delivery_plan
-from ...core.contract.delivery_plan import PACKING, DeliveryPlan
-from ...core.contract.messages import Problem
-from ...core.contract.ownership import free_place
+from ...core.capture import delivery_plan
+from ...core.capture.delivery_plan import PACKING, DeliveryPlan
+from ...core.capture.messages import Problem
+from ...core.capture.ownership import free_place
 from .. import captures, colours, head, node_trees
 from ..data_blocks import read_field
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract import delivery_plan, provenance
-from ...core.contract.delivery_plan import PACKING, DeliveryPlan
-from ...core.contract.messages import Problem
+from ...core.capture import delivery_plan, provenance
+from ...core.capture.delivery_plan import PACKING, DeliveryPlan
+from ...core.capture.messages import Problem
 from .. import captures, problems
 from . import files, stand
 

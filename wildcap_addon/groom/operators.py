@@ -8,10 +8,10 @@ import zlib
 import bpy
 import numpy as np
 
-from ...core.contract.capture import Capture
-from ...core.contract.messages import Problem
-from ...core.contract.newest_maps import find_newest_maps
-from ...core.contract.stages import STRANDS, advise_again
+from ...core.capture.capture import Capture
+from ...core.capture.messages import Problem
+from ...core.capture.newest_maps import find_newest_maps
+from ...core.capture.stages import STRANDS, advise_again
 from .. import captures
 from ..base_operator import HeadOperator
 from . import curves

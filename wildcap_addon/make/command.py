@@ -7,7 +7,7 @@ import argparse
 import subprocess
 from pathlib import Path
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import jobs, preferences
 from ..terminal import Command
 

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import captures
 from ..base_operator import JobOperator
 from . import results

@@ -14,9 +14,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.contract.capture import Capture
-from ...core.contract.files import storage_problem
-from ...core.contract.messages import Problem
+from ...core.capture.capture import Capture
+from ...core.capture.files import storage_problem
+from ...core.capture.messages import Problem
 from . import mask_image
 
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.contract import mask_history
-from ...core.contract.capture import Capture
-from ...core.contract.files import replacing
-from ...core.contract.messages import Problem
+from ...core.capture import mask_history
+from ...core.capture.capture import Capture
+from ...core.capture.files import replacing
+from ...core.capture.messages import Problem
 from .. import colours
 
 

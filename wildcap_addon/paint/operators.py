@@ -4,9 +4,9 @@
 
 import bpy
 
-from ...core.contract import stages
-from ...core.contract.capture import Capture
-from ...core.contract.messages import Problem
+from ...core.capture import stages
+from ...core.capture.capture import Capture
+from ...core.capture.messages import Problem
 from .. import captures, jobs
 from ..base_operator import BaseOperator, CaptureOperator
 from . import edits, mask_image, session

@@ -5,7 +5,7 @@ Which of them it is, the scene says, for an undo may take the sheet away or brin
 
 import bpy
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import captures
 from . import sheet, view
 

@@ -13,9 +13,9 @@ from dataclasses import asdict, dataclass, field
 
 import bpy
 
-from ...core.contract import unforeseen
-from ...core.contract.capture import Capture
-from ...core.contract.messages import Problem
+from ...core.capture import unforeseen
+from ...core.capture.capture import Capture
+from ...core.capture.messages import Problem
 from .. import captures, head, problems
 from . import before, brush, keeping, mask_image, places, sheet, view
 

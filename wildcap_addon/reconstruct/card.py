@@ -6,8 +6,8 @@ one, its own settings and needs."""
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract import delighter_cards
-from ...core.contract import switchlight_api as service
+from ...core.capture import switchlight_api as service
+from ...core.settings import delighter_cards
 from .. import preferences, problems, status
 
 COLUMNS = 3

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.files import storage_problem
-from ...core.contract.messages import Problem
+from ...core.capture.files import storage_problem
+from ...core.capture.messages import Problem
 from .. import captures
 from ..base_operator import BaseOperator, CaptureOperator, FileOperator
 from . import delighters

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from mathutils import Matrix, Quaternion
 
-from ...core.contract.json_files import plain_name
-from ...core.contract.messages import Problem
-from ...core.contract.stages import advise_again
+from ...core.capture.json_files import plain_name
+from ...core.capture.messages import Problem
+from ...core.capture.stages import advise_again
 
 PARAMETERS = {0: 3, 1: 4, 2: 4, 3: 5, 4: 8, 5: 8, 6: 12, 7: 5, 8: 4, 9: 5, 10: 12}
 """Number of parameters of each camera model, by COLMAP's number for it"""

@@ -12,9 +12,9 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
-from ...core.contract.capture import Capture
-from ...core.contract.messages import Problem
-from ...core.contract.stages import advise_again
+from ...core.capture.capture import Capture
+from ...core.capture.messages import Problem
+from ...core.capture.stages import advise_again
 from .. import colours
 from ..data_blocks import read_pixels
 

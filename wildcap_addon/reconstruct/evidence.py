@@ -11,10 +11,10 @@ from collections.abc import Iterable
 
 import bpy
 
-from ...core.contract.capture import Capture
-from ...core.contract.frame_records import read_frames
-from ...core.contract.messages import Problem
-from ...core.contract.stages import advise_again
+from ...core.capture.capture import Capture
+from ...core.capture.frame_records import read_frames
+from ...core.capture.messages import Problem
+from ...core.capture.stages import advise_again
 from .. import captures, local_view
 from . import colmap_cameras
 

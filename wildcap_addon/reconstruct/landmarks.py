@@ -10,11 +10,11 @@ world.
 import bpy
 from mathutils import Vector
 
-from ...core.contract import artist_landmarks
-from ...core.contract.capture import Capture
-from ...core.contract.json_files import read_json
-from ...core.contract.messages import Problem
-from ...core.contract.stages import advise_again
+from ...core.capture import artist_landmarks
+from ...core.capture.capture import Capture
+from ...core.capture.json_files import read_json
+from ...core.capture.messages import Problem
+from ...core.capture.stages import advise_again
 from .. import captures, local_view
 
 COLLECTION = "WildCap Landmarks"

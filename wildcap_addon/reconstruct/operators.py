@@ -4,8 +4,8 @@
 
 import bpy
 
-from ...core.contract import stages
-from ...core.contract.messages import Problem
+from ...core.capture import stages
+from ...core.capture.messages import Problem
 from .. import captures, head, jobs
 from ..base_operator import BaseOperator, HeadOperator, JobOperator
 from . import evidence, landmarks

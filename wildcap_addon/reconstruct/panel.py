@@ -5,7 +5,7 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract import stages
+from ...core.capture import stages
 from .. import captures, problems
 from ..base_panel import CapturePanel, draw_settings, region_width
 from . import card, delighters, landmarks

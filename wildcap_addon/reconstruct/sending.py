@@ -6,8 +6,8 @@ how much; and take that back."""
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract import consent
-from ...core.contract.messages import Problem
+from ...core.capture import consent
+from ...core.capture.messages import Problem
 from .. import captures, frame_icons, preferences, properties
 from ..base_operator import CaptureOperator, Dialog
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.contract.files import replacing
-from ...core.contract.messages import Problem
+from ...core.capture.files import replacing
+from ...core.capture.messages import Problem
 
 CATALOGUE = "6c1f7a52-8e0d-4f6b-9b7e-3d5a0c94e217"
 LINE = f"{CATALOGUE}:WildCap/Skin:WildCap-Skin"

@@ -5,8 +5,8 @@ same light and at the same exposure."""
 
 import bpy
 
-from ...core.contract.messages import Problem
-from ...core.contract.newest_maps import find_newest_maps
+from ...core.capture.messages import Problem
+from ...core.capture.newest_maps import find_newest_maps
 from .. import captures, head
 from ..base_operator import BaseOperator
 from . import material

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract.files import place_file
+from ...core.capture.files import place_file
 from ..data_blocks import load_pixels
 from ..properties import LIGHTS
 from . import captions, lights, output, picture, reel

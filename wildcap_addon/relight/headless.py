@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import captures, colours, hdri, head
 from ..hdri import Hdri
 from . import contact_sheet, lights, material, output, reel

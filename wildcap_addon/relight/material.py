@@ -12,9 +12,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.capture import Capture
-from ...core.contract.messages import Problem
-from ...core.contract.newest_maps import find_newest_maps
+from ...core.capture.capture import Capture
+from ...core.capture.messages import Problem
+from ...core.capture.newest_maps import find_newest_maps
 from .. import captures, data_blocks, head, node_trees
 from . import asset, node_group, regions
 

@@ -13,7 +13,7 @@ sockets, their values, and an artist's own nodes and links stay.
 
 import bpy
 
-from ...core.contract import skin_regions
+from ...core.capture import skin_regions
 from ..data_blocks import find
 
 NAME = "WildCap Skin"
@@ -25,7 +25,7 @@ SCATTERING_RGB = (1.0, 0.37, 0.19)
 """Mean free paths of red, green and blue light over red's (Jensen et al. 2001, skin1: 3.67, 1.37 and 0.68 mm)"""
 GIVEN_BACK = (0.954, 0.932, 0.928)
 """Share of its Base Color that skin gives back under even light by Cycles's *Random Walk (Skin)*, red, green, blue: the
-mean over six tones of `python -m benchmarks.even_light`. The other random walk gives back 0.78 to 0.91."""
+mean over six tones of `python -m research.benchmarks.even_light`. The other random walk gives back 0.78 to 0.91."""
 TYPICAL_SPECULAR = 0.35
 """Mean of the specular map on cheeks and forehead where nobody measured it. The map holds levels for an IOR of 1.5, of
 which 0.35 is skin's 2.8 percent"""

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract import unforeseen
-from ...core.contract.files import place_file, place_folder, storage_problem
-from ...core.contract.messages import Problem
+from ...core.capture import unforeseen
+from ...core.capture.files import place_file, place_folder, storage_problem
+from ...core.capture.messages import Problem
 from .. import problems, status
 from ..data_blocks import find
 from . import lights

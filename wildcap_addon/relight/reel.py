@@ -12,7 +12,7 @@ from math import tau
 import bpy
 from mathutils import Matrix
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from ..hdri import Hdri
 from . import lights, picture, sky
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.contract import skin_regions
+from ...core.capture import skin_regions
 from ..data_blocks import load_pixels, read_field
 
 ATTRIBUTE = "wildcap_roughness"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from ...core.worker import environment
 from ...core.worker.background import BackgroundTask
 from .. import jobs, preferences

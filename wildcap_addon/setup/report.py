@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from ...core.worker import problem_report
 from ...core.worker.background import BackgroundTask
 from .. import captures, jobs, preferences, problems

@@ -9,7 +9,7 @@ from bpy_extras import view3d_utils
 from mathutils import Vector
 from mathutils.geometry import barycentric_transform
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import captures, colours
 from ..base_operator import BaseOperator
 from ..data_blocks import read_pixels

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.capture import Capture
+from ...core.capture.capture import Capture
 from .. import captures, head, jobs
 
 _ended: set[str] = set()  # captures whose solve has ended while somebody painted

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ...core.contract.messages import Problem
+from ...core.capture.messages import Problem
 from .. import captures, jobs, status, undo
 from ..base_operator import BaseOperator, JobOperator
 from . import live, preview

@@ -5,8 +5,8 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract import stages
-from ...core.contract.colour_values import describe_estimate
+from ...core.capture import stages
+from ...core.settings.colour_values import describe_estimate
 from .. import captures, jobs, problems, properties, status, timings
 from ..base_panel import CapturePanel, WildcapPanel, draw_settings, region_width
 from . import preview

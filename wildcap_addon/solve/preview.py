@@ -6,7 +6,7 @@ artist's back."""
 import bpy
 import bpy.utils.previews
 
-from ...core.contract.capture import Capture
+from ...core.capture.capture import Capture
 
 NAMES = ("albedo", "shading", "loss")
 ROW_SCALE = 11.5

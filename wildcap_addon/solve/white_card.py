@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.contract.messages import Problem
-from ...core.contract.settings import CARDS
+from ...core.capture.messages import Problem
+from ...core.settings.settings import CARDS
 from .. import captures, jobs, undo
 from ..base_operator import CaptureOperator, JobOperator
 from .eyedropper import colour_at

@@ -3,10 +3,9 @@
 """EEVEE beside Cycles on the lit cheek of the sample head: same maps, lamps and camera, in linear light, without the
 denoiser.
 
-Leaves dist/gui/engines.json, which benchmarks/engines.py reads, {light: {what: {channel: EEVEE over Cycles}}}, and the
-pictures beside it. What: `surface` has no subsurface; `random_walk_skin` is WildCap Skin as it comes, `random_walk` the
-same with Cycles's other random walk, as it was in 0.1.0.
-"""
+Leaves dist/gui/engines.json, which research/benchmarks/engines.py reads, {light: {what: {channel: EEVEE over Cycles}}},
+and the pictures beside it. What: `surface` has no subsurface; `random_walk_skin` is WildCap Skin as it comes,
+`random_walk` the same with Cycles's other random walk, as it was in 0.1.0."""
 
 import json
 import sys

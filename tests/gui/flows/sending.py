@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 import addon  # noqa: E402
 import driver as d  # noqa: E402
 
-from core.contract import switchlight_api  # noqa: E402
+from core.capture import switchlight_api  # noqa: E402
 from tests import standin  # noqa: E402
 from tests.switchlight_server import KEY, Service  # noqa: E402
 

@@ -44,7 +44,7 @@ def of(obj, number: int) -> RiggedEyeball:
     inner = np.flatnonzero(asset.kind == LEFT_EYE + number)
     rows, out = len(asset.template) + len(asset.copies) + inner, np.linalg.norm(asset.uvs[inner] - 0.5, axis=1)
     rest = places(keys[0])
-    # the UV grows with the angle from the gaze (core/assets/acting.py)
+    # the UV grows with the angle from the gaze (research/people/base_head/acting.py)
     white = rest[rows[np.pi * (2 * out) ** (1 / 0.6) > WHITE_RAD]]
     fit = np.linalg.lstsq(np.concatenate([2 * white, np.ones((len(white), 1))], 1), (white**2).sum(1), rcond=None)[0]
     centre, pupil = fit[:3], rows[out.argmin()]

@@ -1,0 +1,236 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cameras that are nearly right, made right: poses, focal lengths, identity and matched points adjusted at once, with
+what structure from motion left out.
+
+Cameras say which of all matches can be true, and more of them make better cameras. The face's landmarks, on a head of
+people's size and shape, hold what a few photographs alone leave open.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pycolmap
+
+from ...capture.messages import Reporter
+from ...face import faces
+from ...face.bundle import TOLD_SIGMA_LOG, Bundle, Observations, adjust
+from ...face.landmark_model import template_landmarks
+from ...geometry.models import pose_of
+from .matches import Matches
+from .resection import LEAST_MATCHES, agreeing, place_by_matches
+from .world import PUPILS_M, agreeing_faces, find_head
+
+AGREE_WIDTH_SHARES = (0.0125, 0.006, 0.004)
+"""Shares of the face's width by which matches may miss, round by round."""
+WIDE_WIDTH_SHARES = (0.06, 0.025)
+"""What goes before for cameras that may be some pixels off."""
+FEATURE_SIGMA_SHARE = 1 / 3000
+"""Deviation of a match, as a share of a picture's longer side: features are looked for at 2,000 pixels."""
+FREE_SIGMA_LOG = 3.0
+"""Spread of the logarithm of a focal length that no file told: what matches tells it."""
+FEWEST_TRACKS = 60  # below, what matches on the head says too little to refine by
+
+
+def refine(
+    model: pycolmap.Reconstruction,
+    face_by_name: dict[str, faces.Face],
+    matches: Matches,
+    told: Mapping[str, float],
+    report: Reporter,
+    missing: Sequence[dict] = (),
+    agree: Sequence[float] = AGREE_WIDTH_SHARES,
+) -> pycolmap.Reconstruction:
+    """The cameras refined by what matches on the head.
+
+    Parameters
+    ----------
+    model : cameras, of any world
+    face_by_name : the face in each frame that shows one
+    matches : between the frames
+    told : name -> focal length in pixels, of the frames whose file tells one
+    report : hears of progress
+    missing : [{names, width, height, focal_px}] like camera groups, of frames that have no camera yet and may get one
+        by their matches; they share the lens of the frames of their size, unless another one was told of those
+    agree : as AGREE_WIDTH_SHARES, wider first where the cameras may be off
+
+    Returns
+    -------
+    The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one
+    explains less.
+
+    Raises
+    ------
+    Problem
+        Where no face is found.
+    """
+    head = find_head(model, face_by_name, PUPILS_M)
+    model = pycolmap.Reconstruction(model)
+    model.transform(head.world_from_model)
+    seen_faces = agreeing_faces(model, face_by_name)
+    registered = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
+    names = [image.name for image in registered]
+    straight = straightened(model, registered, matches)
+    bundle = as_bundle(model, registered, told)
+    marks = _landmarks(model, registered, seen_faces)
+    width = float(np.median([face.box[2] - face.box[0] for face in seen_faces.values()]))
+    before = None
+    for step, share in enumerate(agree):
+        report.progress(step, len(agree), "refining cameras by what matches")
+        added, tracks, bundle = agreeing(bundle, names, straight, share * width)
+        before = before or (len(tracks) if share <= AGREE_WIDTH_SHARES[0] else None)
+        if len(tracks) < FEWEST_TRACKS:
+            return model
+        seen = Observations(
+            *(np.concatenate([a, b]) for a, b in zip((marks.camera, marks.point, marks.pixel), added, strict=True))
+        )
+        bundle = adjust(bundle, seen, 30)
+    if len(tracks) < 0.8 * before:
+        report.log("The cameras were not refined by the face: less would match than before.")
+        return model
+    lenses = _told_of_lenses(model, registered, told)
+    groups = [{**group, "lens": same[-1]} for group in missing if (same := _lenses_of(group, model, lenses))]
+    late = _late(bundle, model, groups, names, tracks, straight)
+    if late:
+        report.log(f"Placed by what matches the refined cameras: {', '.join(sorted(late))}.")
+    return rebuilt(model, bundle, registered, tracks, matches, late, groups)
+
+
+def _told_of_lenses(model: pycolmap.Reconstruction, registered: list, told: Mapping[str, float]) -> dict:
+    """Number of a camera -> the focal length that a file told of it, None where none did."""
+    lenses = dict.fromkeys(model.cameras)
+    return lenses | {image.camera_id: told[image.name] for image in registered if image.name in told}
+
+
+def _lenses_of(group: dict, model: pycolmap.Reconstruction, lenses: Mapping[int, float | None]) -> list[int]:
+    """Numbers of the cameras that may have taken a group of frames."""
+    return [
+        number
+        for number, camera in model.cameras.items()
+        if (camera.width, camera.height) == (group["width"], group["height"])
+        and (None in (lenses[number], group["focal_px"]) or lenses[number] == group["focal_px"])
+    ]
+
+
+def as_bundle(model: pycolmap.Reconstruction, registered: list, told: Mapping[str, float]) -> Bundle:
+    """The model's cameras, in the head's world, of the frames `registered`; each focal length with the one that was
+    told as its prior, where one was."""
+    lenses = _told_of_lenses(model, registered, told)
+    numbers = sorted(model.cameras)
+    poses = [pose_of(image) for image in registered]
+    focal = np.array([model.cameras[number].mean_focal_length() for number in numbers])
+    used = [model.cameras[image.camera_id] for image in registered]
+    return Bundle(
+        np.array([pose.rotation.matrix() for pose in poses]),
+        np.array([pose.translation for pose in poses]),
+        focal,
+        np.array([lenses[number] or own for number, own in zip(numbers, focal, strict=True)]),
+        np.array([TOLD_SIGMA_LOG if lenses[number] else FREE_SIGMA_LOG for number in numbers]),
+        np.array([numbers.index(image.camera_id) for image in registered]),
+        np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]),
+        np.zeros(len(template_landmarks().basis)),
+        template_landmarks().mean.copy(),
+        FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used),
+    )
+
+
+def _landmarks(model: pycolmap.Reconstruction, registered: list, face_by_name: dict[str, faces.Face]) -> Observations:
+    count, camera, pixel = len(template_landmarks().mean), [], []
+    for i, image in enumerate(registered):
+        if image.name in face_by_name:
+            camera.append(np.full(count, i))
+            pixel.append(
+                _straight(model.cameras[image.camera_id], face_by_name[image.name].landmarks[:, :2].astype(np.float64))
+            )
+    return Observations(np.concatenate(camera), np.tile(np.arange(count), len(camera)), np.concatenate(pixel))
+
+
+def _straight(camera: pycolmap.Camera, pixels: np.ndarray) -> np.ndarray:
+    """Pixels [N, 2] as a lens without distortion, with square pixels, would show them."""
+    plane = np.asarray(camera.cam_from_img(pixels)).reshape(-1, 2)
+    return plane * camera.mean_focal_length() + [camera.principal_point_x, camera.principal_point_y]
+
+
+def straightened(model: pycolmap.Reconstruction, registered: list, matches: Matches) -> Matches:
+    """The matches with pixels as lenses without distortion would show them."""
+    camera_of = {image.name: model.cameras[image.camera_id] for image in registered}
+    keypoints = {
+        name: _straight(camera_of[name], pixels) if name in camera_of and len(pixels) else pixels
+        for name, pixels in matches.keypoints.items()
+    }
+    return Matches(keypoints, matches.pairs)
+
+
+def _late(
+    bundle: Bundle, model: pycolmap.Reconstruction, groups: list[dict], names: list[str], tracks: list, matches: Matches
+) -> dict[str, tuple]:
+    numbers = sorted(model.cameras)
+    focal = np.array([bundle.focal[numbers.index(group["lens"])] for group in groups])
+    group_of = {name: i for i, group in enumerate(groups) for name in group["names"] if name in matches.keypoints}
+    return place_by_matches(replace(bundle, focal=focal), groups, group_of, names, tracks, matches) if group_of else {}
+
+
+def rebuilt(
+    model: pycolmap.Reconstruction,
+    bundle: Bundle,
+    registered: list,
+    tracks: list,
+    matches: Matches,
+    late: Mapping[str, tuple] = MappingProxyType({}),
+    groups: Sequence[dict] = (),
+) -> pycolmap.Reconstruction:
+    """A model with a bundle's cameras and, as its points, the tracks.
+
+    Parameters
+    ----------
+    model : whose lenses are kept but for their focal lengths
+    bundle : poses, focal lengths and points
+    registered : the model's images, in the bundle's order
+    tracks : of the bundle's points
+    matches : whose keypoints they join
+    late : rotation and translation by the name of frames that were placed afterwards
+    groups : camera groups, of these
+    """
+    rebuilt, numbers = pycolmap.Reconstruction(), sorted(model.cameras)
+    for number in numbers:
+        camera = pycolmap.Camera(model.cameras[number].todict())
+        params, ratio = np.array(camera.params), bundle.focal[numbers.index(number)] / camera.mean_focal_length()
+        params[list(camera.focal_length_idxs())] *= ratio
+        camera.params = params
+        rebuilt.add_camera_with_trivial_rig(camera)
+    poses = {
+        image.name: (bundle.rotations[i], bundle.translations[i], image.camera_id) for i, image in enumerate(registered)
+    }
+    poses |= {
+        name: (*pose, next(group["lens"] for group in groups if name in group["names"])) for name, pose in late.items()
+    }
+    index: dict[str, list[int]] = {name: [] for name in poses}
+    members: list[list] = []
+    image_number = {name: number for number, name in enumerate(sorted(poses), 1)}
+    for track in tracks:
+        members.append([])
+        for name, keypoint in track:
+            members[-1].append(pycolmap.TrackElement(image_number[name], len(index[name])))
+            index[name].append(keypoint)
+    for name in sorted(poses):
+        rotation, translation, lens = poses[name]
+        keypoints = matches.keypoints[name][index[name]] if index[name] else np.zeros((0, 2))
+        image = pycolmap.Image(name=name, camera_id=lens, image_id=image_number[name], keypoints=keypoints)
+        pose = np.concatenate([rotation, np.reshape(translation, (3, 1))], 1)
+        rebuilt.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
+    first = len(template_landmarks().mean)
+    for place, elements in zip(bundle.points[first:], members, strict=True):
+        rebuilt.add_point3D(place, pycolmap.Track(elements), np.full(3, 128, np.uint8))
+    rebuilt.update_point_3d_errors()
+    return rebuilt
+
+
+def holds_every_frame(model: pycolmap.Reconstruction) -> bool:
+    """Whether every registered frame sees as many matched points as its pose needs."""
+    seen = Counter(element.image_id for point in model.points3D.values() for element in point.track.elements)
+    return all(seen[number] >= LEAST_MATCHES for number, image in model.images.items() if image.has_pose)

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""frames + cameras + head -> delit/NNNNN.png, the frames without most of their light (sRGB, 16 bit).
+
+Which frames: those the chosen delighter serves. Where it also says which light it made up for, delit/shadow/NNNNN.png
+holds that (grey, 8 bit), for the shadow_mask stage.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...capture.capture import Capture
+from ...capture.files import replacing_folder
+from ...capture.messages import Problem, Reporter
+from ...capture.stages import advise_again
+from ...imaging import images
+from ...settings.settings import Settings
+from .contract import Delighter, Photographer
+from .folder import folder
+from .network import network
+from .none import delight_photograph as leave_photograph
+from .none import none
+from .opendelight import delight_photograph as delight_with_opendelight
+from .opendelight import opendelight
+from .photograph import delight_photograph as delight_with_network
+from .shading import shading
+from .switchlight import switchlight
+
+DELIGHTERS: dict[str, Delighter] = {
+    "network": network,
+    "shading": shading,
+    "switchlight": switchlight,
+    "opendelight": opendelight,
+    "folder": folder,
+    "none": none,
+}
+PHOTOGRAPHERS: dict[str, Photographer] = {
+    "network": delight_with_network,
+    "opendelight": delight_with_opendelight,
+    "none": leave_photograph,
+}
+"""Those that also serve a photograph that belongs to no capture."""
+
+
+def run(capture: Capture, settings: Settings, report: Reporter) -> None:
+    """Runs the delighter of `settings.delight.delighter` and replaces the folder delit/ by what it yields. Raises
+    Problem where that is nothing."""
+    shown = []
+    with replacing_folder(capture.delit) as delit:
+        for result in DELIGHTERS[settings.delight.delighter](capture, settings, report):
+            stem = Path(result.view.name).stem
+            images.write_srgb(delit / f"{stem}.png", result.image, bits=16)
+            if result.shadow is not None:
+                images.write_data(delit / "shadow" / f"{stem}.png", result.shadow)
+            shown.append((result.view, _small(result.view.read()), _small(result.image)))
+            report.check()
+        if not shown:
+            raise Problem("None of the frames that were chosen for the texture has a camera.", advise_again("cameras"))
+    report.figure("delighter", settings.delight.delighter)
+    report.figure("delit_views", len(shown))
+    middle = shown[:: max(1, len(shown) // 4)][:4]
+    images.write_srgb(
+        capture.picture("delight", "views"), np.vstack([np.hstack([pair[i] for pair in middle]) for i in (1, 2)])
+    )
+
+
+def _small(image: np.ndarray, height: int = 320) -> np.ndarray:
+    return images.resize(image, round(image.shape[1] * height / image.shape[0]), height)

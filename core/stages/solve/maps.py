@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From the sampler's last state to the maps of the capture folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from ...capture.capture import Capture
+from ...capture.files import replacing_folder
+from ...capture.messages import Reporter
+from ...imaging import images
+from ...solver.evidence import Evidence
+from ...solver.extensions.marks import draw_cover
+from ...solver.extensions.split import enlarge_field
+from ...solver.objective import Observation, State, albedo
+from ...solver.solution import Solution
+from ...solver.start import Start, mean_tone
+from .checkpoint import write_solution
+from .confidence import estimate_confidence
+
+MIN_ALBEDO = 0.004  # linear albedo below which no skin or hair lies
+
+
+@dataclass(frozen=True)
+class Maps:
+    """[S, S(, 3)] float32. diffuse and shading linear, diffuse * shading = I_UV; normal packed into [0, 1], tangent
+    space, OpenGL Y+; specular and confidence in [0, 1]; gain [3]: what the albedo was multiplied by to be of the skin
+    tone."""
+
+    diffuse: np.ndarray
+    specular: np.ndarray
+    normal: np.ndarray
+    shading: np.ndarray
+    confidence: np.ndarray
+    gain: torch.Tensor
+
+
+def finish_maps(state: State, evidence: Evidence, start: Start, gain: torch.Tensor | None = None) -> Maps:
+    """Reads the maps out of \\hat x_0.
+
+    The albedo is rescaled once so that the mean of the confident facial skin is the skin tone; the shading takes the
+    inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn sample would be as
+    likely, but would look like something that was measured. So is the specular albedo, of which no term of the
+    likelihood knows.
+
+    Parameters
+    ----------
+    state : of the sampler, at its end
+    evidence : of the capture
+    start : what the run began with
+    gain : [3], by which the albedo is rescaled if it was found before
+    """
+    shader = start.observations[1].shader
+    seen = evidence.weight.sqrt()
+    x = torch.lerp(start.reference, state.denoised, seen)[0]
+    with torch.no_grad():
+        beside = enlarge_field(start.local, evidence.size).exp() / start.exposure
+        shading = shader.total(state.lights).clamp_min(1e-3) * beside
+    diffuse = albedo(x[None])
+    if start.marks:  # what is known to be no light is the skin's, be it ever so unlikely to the prior
+        kept = torch.from_numpy(draw_cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
+        diffuse = torch.lerp(diffuse, evidence.texture / shading, kept)
+    diffuse = diffuse.clamp_min(MIN_ALBEDO)
+    if gain is None:
+        gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, start.recipe.rescale)
+    normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
+    specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
+    each = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], seen)  # the mean face is of the tone already
+    delivered = to_picture((diffuse * each).clamp(MIN_ALBEDO, 1))
+    return Maps(
+        delivered,
+        specular,
+        to_picture(normal),
+        to_picture(shading / each),
+        estimate_confidence(evidence, delivered),
+        gain,
+    )
+
+
+def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
+    """Linear factors [3] that bring the mean under `weight` to `tone` [3]: the mean of linear values, or ("srgb") of
+    values to the power 1 / 2.2."""
+    if rescale == "none":
+        return torch.ones(3)
+    gamma = 1.0 if rescale == "linear" else 2.2
+    return (tone ** (1 / gamma) / mean_tone(diffuse ** (1 / gamma), weight)).pow(gamma).clamp(0.2, 5.0)
+
+
+def write_maps(
+    capture: Capture,
+    maps: Maps,
+    solution: Solution,
+    conditions: dict[str, str],
+    only: tuple[slice, slice] | None = None,
+) -> None:
+    """The folder maps/, whole or not at all, with what a later solve of a part goes on from.
+
+    Parameters
+    ----------
+    capture : whose maps they are
+    maps : that were solved
+    solution : the state behind them
+    conditions : mask_edit's
+    only : rows and columns that are new; the others keep the values that their files have
+    """
+
+    def put(write: Callable, name: str, image: np.ndarray, **options) -> None:
+        if only is not None:
+            before = images.read_data(capture.maps / name)
+            before[only] = image.reshape(*image.shape[:2], -1)[only]
+            image = before
+        write(folder / name, image, **options)
+
+    with replacing_folder(capture.maps) as folder:
+        put(images.write_srgb, "diffuse_albedo.png", images.linear_to_srgb(maps.diffuse), bits=16)
+        put(images.write_linear, "diffuse_albedo.exr", maps.diffuse)
+        put(images.write_data, "specular_albedo.png", maps.specular, bits=16)
+        put(images.write_data, "normal.png", maps.normal, bits=16)
+        put(images.write_linear, "shading.exr", maps.shading)
+        put(images.write_data, "confidence.png", maps.confidence)
+        write_solution(folder / capture.solved.name, solution, conditions)
+
+
+def write_preview(capture: Capture, state: State, observations: dict[int, Observation], report: Reporter) -> None:
+    """Writes preview/albedo.png and shading.png of a running solve, at the size it works at just now.
+
+    Parameters
+    ----------
+    capture : that is solved
+    state : of the sampler
+    observations : by coarsening factor
+    report : hears of the pictures
+    """
+    o = next(o for o in observations.values() if o.weight.shape == state.denoised.shape[-2:])
+    with torch.no_grad():
+        shading = o.shader.total(state.lights).clamp_min(0).cpu()
+    scale = 0.6 / max(float(np.percentile(shading.numpy(), 95)), 1e-6)
+    for name, image in (("albedo", albedo(state.denoised).cpu()), ("shading", scale * shading)):
+        images.write_srgb(capture.preview / f"{name}.png", images.linear_to_srgb(to_picture(image)))
+        report.preview(f"preview/{name}.png")
+
+
+def to_picture(planes: torch.Tensor) -> np.ndarray:
+    """[C, H, W] -> [H, W, C]."""
+    return np.ascontiguousarray(planes.permute(1, 2, 0).numpy(), np.float32)

@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size, the head completed; with masks of
+hair, the skin below it, and single hairs.
+
+Albedo, normals and specular are enlarged by a network, or by Lanczos resampling, which adds no detail; light and
+confidence by resampling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+
+import numpy as np
+
+from ...capture.capture import Capture
+from ...capture.files import replacing_folder
+from ...capture.messages import Reporter
+from ...capture.stages import STRANDS
+from ...face.head import read_head
+from ...face.shown_parts import read_parts
+from ...face.strands import Strands
+from ...imaging import images
+from ...settings.settings import Settings
+from . import detail, drawing, gloss, grooming, hair
+from .maps import HeadMaps, read_maps
+from .surface import lay_out
+from .whole_head import complete
+
+STRIP_ROWS = 256
+"""Rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make
+another."""
+WRITERS = 2
+"""Maps that are encoded at once: each takes 0.5 GB meanwhile."""
+CROP_SIDE_SHARE = 0.12
+"""Side of the report's picture, as a share of the map."""
+SHARES = {"network": 0.8, "lanczos": 0.3}  # of the time that the enlarging takes
+
+
+def run(capture: Capture, settings: Settings, report: Reporter) -> None:
+    """Writes capture.maps_4k, whole or not at all."""
+    size, method = settings.upscale.size, settings.upscale.method
+    guided = settings.upscale.frames_detail and capture.texture_detail.is_file()
+    maps = read_maps(capture.maps, capture.texture_confidence)
+    report.figure("method", method)
+    report.figure("size_from_px", len(maps.diffuse))
+    report.figure("size_px", size)
+    report.figure("frames_detail", "used" if guided else "none")
+    report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
+    maps, hair_maps, hairs = _whole(capture, maps, settings, report)
+    share = SHARES[method]
+    large = enlarged(
+        maps, size, method, settings.compute_device, lambda done: report.progress(share * done, 1, "enlarging")
+    )
+    with replacing_folder(capture.maps_4k) as folder:
+        srgb = large[..., :3]
+        if guided:
+            texture = len(images.read_mask(capture.texture_confidence))
+            detail.guide(
+                srgb,
+                images.read_data(capture.texture_detail),
+                texture,
+                lambda done: report.progress(share, 1, "fine detail"),
+            )
+        _picture(capture, srgb)
+        _write_together(
+            [
+                lambda: images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16, check=report.check),
+                lambda: images.write_data(
+                    folder / "normal.png",
+                    _mapped(large[..., 3:6], lambda vectors: vectors * 0.5 + 0.5),
+                    bits=16,
+                    check=report.check,
+                ),
+                *(
+                    []
+                    if hair_maps is None
+                    else [
+                        lambda: hair.write(folder, srgb, *hair_maps, report.check),
+                        lambda: grooming.write(folder / STRANDS, hairs),
+                    ]
+                ),
+                lambda: images.write_linear(
+                    folder / "diffuse_albedo.exr", _mapped(srgb, images.srgb_to_linear), check=report.check
+                ),
+                lambda: images.write_data(folder / "specular_albedo.png", large[..., 6], bits=16, check=report.check),
+                lambda: images.write_data(
+                    folder / "confidence.png", _resampled(maps.confidence, size), check=report.check
+                ),
+                lambda: images.write_linear(folder / "shading.exr", _resampled(maps.shading, size), check=report.check),
+            ],
+            lambda done: report.progress(share + done * (1 - share), 1, "writing the maps"),
+        )
+    report.progress(1, 1)
+
+
+def _whole(
+    capture: Capture, maps: HeadMaps, settings: Settings, report: Reporter
+) -> tuple[HeadMaps, tuple | None, dict[str, Strands]]:
+    """The maps of the whole head; the hair's masks, the albedo without it and where that differs, or None where they
+    are not asked for; single hairs."""
+    options = settings.upscale
+    if not (options.whole_head or options.hair):
+        return maps, None, {}
+    report.progress(0, 1, "laying out the head")
+    surface = lay_out(read_head(capture).mesh, len(maps.diffuse), report.check)
+    if options.whole_head:
+        report.progress(0, 1, "completing neck, ears and scalp")
+        seen, maps = maps, complete(maps, surface, report, settings.seed)
+        images.write_srgb(
+            capture.picture("upscale", "before_and_after_completion"), drawing.turned(surface, [seen, maps])
+        )
+    if not options.hair:
+        return maps, None, {}
+    report.progress(0, 1, "finding brows, lashes and beard")
+    parts = read_parts(capture, surface.size)
+    report.figure("hair_told_by", "strokes" if parts is None else "frames and strokes")
+    masks = hair.find(maps, surface, parts, report.check)
+    report.check()
+    cleaned, share = hair.clean(maps, masks, surface, settings.seed, report.check)
+    for name in ("brows", "lashes", "beard"):
+        report.figure(f"{name}_cm2", round(float((getattr(masks, name) * surface.texel**2).sum()) / 100, 2))
+    behind = round(100 * float((masks.hidden * masks.brows).sum() / max(masks.brows.sum(), 1e-6)))
+    if behind:
+        report.figure("brows_hidden_percent", behind)
+        report.log(
+            f"Hair covers {behind} % of the brows: there they are grown like the other side, or as brows usually are."
+        )
+    images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, masks, cleaned))
+    report.progress(0, 1, "growing hair")
+    hairs = grooming.groom(maps, masks, cleaned, surface, settings.seed, check=report.check)
+    report.figure("hairs", sum(len(strands.points) for strands in hairs.values()))
+    return maps, (masks, cleaned, share), hairs
+
+
+def enlarged(maps: HeadMaps, size: int, method: str, device: str, progress) -> np.ndarray:
+    """The maps at another size. The network makes four times as many texels of a side; more or fewer than that are
+    resampled.
+
+    Parameters
+    ----------
+    maps : of the head
+    size : texels along a side
+    method : "network" or "lanczos"
+    device : that torch computes on
+    progress : hears the share done
+
+    Returns
+    -------
+    Diffuse (sRGB), unit normal and specular: float32 [size, size, 7].
+    """
+    if method == "network" and size > len(maps.diffuse):
+        from .enlarge import enlarge  # torch is only needed here
+
+        large = enlarge(maps, progress, device)
+        if len(large) == size:
+            return large
+        return _joined(images.srgb_to_linear(large[..., :3]), large[..., 3:6], large[..., 6], size, progress)
+    return _joined(maps.diffuse, maps.normal, maps.specular, size, progress)
+
+
+def _joined(diffuse: np.ndarray, normal: np.ndarray, specular: np.ndarray, size: int, progress) -> np.ndarray:
+    """Maps [S, S(, C)], the diffuse linear, resampled to float32 [size, size, 7], the diffuse sRGB."""
+    joined = np.empty((size, size, 7), np.float32)
+    joined[..., :3], joined[..., 6] = _resampled(diffuse, size), _resampled(specular, size)
+    progress(0.6)
+    joined[..., 3:6] = _resampled(normal, size)
+    progress(1.0)
+    _by_strips(joined[..., :3], images.linear_to_srgb)
+    _by_strips(
+        joined[..., 3:6], lambda vectors: vectors / np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6)
+    )
+    return joined
+
+
+def _resampled(image: np.ndarray, size: int) -> np.ndarray:
+    """[H, W(, C)] -> [size, size(, C)], within the range of `image`: Lanczos overshoots at hard edges, and no albedo is
+    negative."""
+    if image.shape[:2] == (size, size):
+        return image
+    return np.clip(images.resize(image, size, size), image.min(), image.max())
+
+
+def _write_together(writes: list[Callable[[], None]], tick: Callable[[float], None]) -> None:
+    """Runs all of them, WRITERS at a time. `tick` hears the share done several times a second, and may raise to cancel,
+    as each of them may."""
+    with ThreadPoolExecutor(WRITERS) as pool:
+        running = [pool.submit(write) for write in writes]
+        try:
+            left = set(running)
+            while left:
+                left = wait(running, timeout=0.2, return_when=FIRST_EXCEPTION).not_done
+                for ended in set(running) - left:
+                    ended.result()  # raises what it raised
+                tick(1 - len(left) / len(writes))
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _mapped(image: np.ndarray, operation: Callable) -> np.ndarray:
+    """A copy with a texel-wise operation applied."""
+    image = image.copy()
+    _by_strips(image, operation)
+    return image
+
+
+def _by_strips(image: np.ndarray, operation) -> None:
+    """Applies a texel-wise operation in place."""
+    for row in range(0, len(image), STRIP_ROWS):
+        image[row : row + STRIP_ROWS] = operation(image[row : row + STRIP_ROWS])
+
+
+def _picture(capture: Capture, srgb: np.ndarray) -> None:
+    """A crop from the middle of the map, texel by texel."""
+    side = int(CROP_SIDE_SHARE * len(srgb))
+    start = (len(srgb) - side) // 2
+    images.write_srgb(capture.picture("upscale", "crop"), srgb[start : start + side, start : start + side])

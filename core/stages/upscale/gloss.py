@@ -1,0 +1,25 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How glossy the solved skin is on the whole: materials take the specular map against its mean on cheeks and forehead,
+which is skin's 2.8 percent."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...face import template
+
+WITHOUT = ("nose", "eyes", "brows", "lips", "nostrils")
+
+
+def on_cheeks_and_forehead(specular: np.ndarray, confidence: np.ndarray) -> float:
+    """The mean of the specular albedo [S, S] there, where the texture was seen; `confidence` [S, S] in [0, 1]. Over all
+    of the region where nothing was."""
+    size = len(specular)
+    where = template.mask("skin", size) > 0.5
+    for name in WITHOUT:
+        where &= template.mask(name, size) < 0.5
+    lips = template.mask("lips", size).sum(1)
+    where[int(np.average(np.arange(size), weights=lips)) :] = False  # a chin is neither
+    seen = where * confidence
+    return float(np.average(specular, weights=seen if seen.sum() > 0 else where))

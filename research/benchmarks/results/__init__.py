@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pages of docs/results, out of the records in research/records (`make results`):
+
+    python -m research.benchmarks.results [--check] [--captures FOLDER]
+
+Runs no benchmark: each leaves its record by its own --json (research/benchmarks/figures.py). NAME.py in here is the
+page docs/results/NAME.md: TITLE, SAYS (what it shows, below the title), RECORDS, and `sections`, which takes the
+figures of these records in that order and gives headings with Markdown. --check writes nothing and ends with code 1
+where a page is not as the records have it.
+
+No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures:
+--captures names a folder with sample.wildcap (as `make demo` leaves it) and NAME.wildcap
+(research/benchmarks/people.py). Others are made by their page's benchmark (--picture, --pictures)."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+from core.capture.messages import Problem
+
+from .. import figures
+from ..pages import page_text, replace_text
+
+ROOT = figures.ROOT
+NAMES = tuple(module.name for module in iter_modules(__path__) if module.name != "__main__")
+"""The pages' names."""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where something differs")
+    parser.add_argument("--captures", type=Path, help="solved captures, for teaser.jpg and the gallery's pictures")
+    asked = parser.parse_args()
+    try:
+        new = pages()
+    except Problem as problem:
+        print(problem, file=sys.stderr)
+        return 1
+    wrong = [
+        f"{path.relative_to(ROOT)} is not as the records have it: run `make results`."
+        for path, text in new.items()
+        if not path.is_file() or path.read_text(encoding="utf-8") != text
+    ]
+    for path, text in {} if asked.check else new.items():
+        replace_text(path, text)
+    for command in pictures(asked.captures.resolve()) if asked.captures else ():
+        print(" ".join(command), flush=True)
+        subprocess.run([sys.executable, "-m", *command], cwd=ROOT, check=True)
+    wrong = [*(wrong if asked.check else ()), *strangers()]
+    print(*wrong, sep="\n", end="\n" * bool(wrong), file=sys.stderr)
+    return 1 if wrong else 0
+
+
+def pages() -> dict[Path, str]:
+    """Path and text of every page. Raises Problem where a record is missing."""
+    return {ROOT / "docs" / "results" / f"{name}.md": page(name) for name in NAMES}
+
+
+def page(name: str) -> str:
+    """The text of docs/results/NAME.md."""
+    module = import_module(f"{__name__}.{name}")
+    records = [figures.read_record(record) for record in module.RECORDS]
+    sections = module.sections(*(figures.Figures.of(record["figures"]) for record in records))
+    if name == "index":  # of the records of many pages
+        return page_text(module.TITLE, [], sections)
+    return page_text(module.TITLE, records, [("", module.SAYS), *sections])
+
+
+def strangers() -> list[str]:
+    """What lies in docs/results and is no page of ours."""
+    there = sorted((ROOT / "docs" / "results").glob("*.md"))
+    return [
+        f"{path.relative_to(ROOT)} has no research/benchmarks/results/{path.stem}.py that writes it."
+        for path in there
+        if path.stem not in NAMES
+    ]
+
+
+def pictures(captures: Path) -> Iterator[list[str]]:
+    """Module and arguments of the commands that draw the pages' pictures of the solved captures in a folder."""
+    target = ROOT / "docs" / "pictures"
+    for capture in sorted(path for path in captures.glob("*.wildcap") if (path / "maps" / "normal.png").is_file()):
+        name, truth = capture.stem, captures / capture.stem / "maps"
+        if name == "sample":
+            yield ["research.benchmarks.teaser", str(capture), str(target / "teaser.jpg")]
+        if (target / f"gallery_{name}.jpg").is_file():
+            known = ["--truth", str(truth)] if truth.is_dir() else []
+            yield ["research.benchmarks.gallery", str(capture), str(target / f"gallery_{name}.jpg"), *known]

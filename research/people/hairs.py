@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair as the texture shows it: brows of single strokes, the stubble of a beard and its blue shadow, a cropped
+scalp."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from core.geometry.noise import octaves
+
+from .canvas import Canvas
+from .spots import strew
+
+
+def grow_brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+    """How much of each texel brow hair covers.
+
+    Parameters
+    ----------
+    on : what is painted on
+    ground : of the same head, where hairs root
+    region : [M] in [0, 1] on the ground, where brows grow
+    density : 1 is a usual brow
+    rng : of single hairs
+
+    Returns
+    -------
+    [N] in [0, 1], on `on`.
+    """
+    # a sparse brow is a narrow one
+    roots, texel = strew(ground, 1.2 * density * np.clip(region * 2.2 - 1.3 + 0.8 * min(density, 1.2), 0, 1), rng)
+    outer = np.abs(roots[:, 0:1]) / np.abs(ground.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
+    # near the nose hairs stand up, then lie along the brow, and at the tail point down
+    rise = np.clip(1.6 - 2.3 * outer, -0.3, 1.3) + rng.normal(0, 0.2, outer.shape)
+    normal = ground.normal[texel]
+    direction = np.sign(roots[:, 0:1]) * _along(normal, [1.0, 0, 0]) + rise * _along(normal, [0, 0, 1.0])
+    return _strokes(on, roots, direction, rng.uniform(4.5, 8, len(roots)), 0.11, np.full(len(roots), -0.25), rng)
+
+
+def grow_stubble(
+    on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float, rng: np.random.Generator
+) -> np.ndarray:
+    """How much of each texel beard hair covers.
+
+    Parameters
+    ----------
+    on : what is painted on
+    ground : of the same head, where hairs root
+    region : [M] in [0, 1] on the ground, where a beard grows
+    density : hairs per mm^2 in the full of the region
+    length : in mm; 0.3 is shaven yesterday
+    rng : of single hairs
+
+    Returns
+    -------
+    [N] in [0, 1], on `on`.
+    """
+    roots, texel = strew(ground, density * np.clip(region * 1.3 - 0.15, 0, 1) ** 1.5, rng)
+    aside = np.sign(roots[:, 0:1]) * 0.25 + rng.normal(0, 0.35, (len(roots), 1))
+    down = aside * _along(ground.normal[texel], [1.0, 0, 0]) - _along(ground.normal[texel], [0, 0, 1.0])
+    return _strokes(on, roots, down, length * rng.uniform(0.4, 1.3, len(roots)), 0.06, np.zeros(len(roots)), rng)
+
+
+def beard_shadow(albedo: np.ndarray, amount: np.ndarray) -> np.ndarray:
+    """albedo [N, 3] over hair below the surface, amount [N] in [0, 1]: red light reaches deeper and loses more, so the
+    shade is bluish grey."""
+    return albedo * (1 - amount[:, None] * np.array([0.42, 0.30, 0.22], np.float32))
+
+
+def grow_cropped_hair(on: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+    """How much of each texel very short hair of the scalp covers.
+
+    Parameters
+    ----------
+    on : what is painted on
+    region : [N] in [0, 1] on it, the scalp
+    density : mean cover in [0, 1] in the full of the region
+    rng : of the grain
+
+    Returns
+    -------
+    [N] in [0, 1].
+    """
+    cover, there = np.zeros_like(region), region > 0.01
+    grain = octaves(on.position[there], [0.6, 1.1], rng)
+    patchy = octaves(on.position[there], [9.0], rng)
+    cover[there] = np.clip(region[there] ** 1.5 * density * (1 + 0.20 * grain + 0.05 * patchy), 0, 1)
+    return cover
+
+
+def _along(normal: np.ndarray, way: list[float]) -> np.ndarray:
+    """The unit direction nearest to `way` [3] in the plane across each normal [M, 3]."""
+    flat = np.asarray(way) - (normal @ np.asarray(way))[:, None] * normal
+    return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-3)
+
+
+def _strokes(
+    on: Canvas,
+    roots: np.ndarray,
+    direction: np.ndarray,
+    length: np.ndarray,
+    width: float,
+    bend: np.ndarray,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """Cover [N] of hairs `width` mm thick and `length` [M] mm long from roots [M, 3] along direction [M, 3], sinking by
+    `bend` (a share of the length)."""
+    cover = np.zeros(len(on.position), np.float32)
+    if not len(roots):
+        return cover
+    finest = 0.55 * on.texel_mm
+    step = max(0.12, finest)
+    count = np.maximum(1, np.ceil(length / step).astype(int))
+    hair = np.repeat(np.arange(len(roots)), count)
+    along = (np.arange(len(hair)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[hair]
+    direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    points = roots[hair] + direction[hair] * (along * length[hair])[:, None]
+    points[:, 2] += bend[hair] * along**2 * length[hair]
+    _, nearest = on.tree.query(points, distance_upper_bound=8.0)  # lays the straight hair onto the surface
+    kept = nearest < len(cover)
+    hair, along, lifted = hair[kept], along[kept], points[kept] - on.position[nearest[kept]]
+    on_surface = on.position[nearest[kept]] + np.clip(lifted, -finest, finest)
+    radius = max(width, finest)
+    texel, point, distance = on.near(on_surface, np.full(len(on_surface), 1.5 * radius))
+    taper = (1 - 0.7 * along[point] ** 2) * rng.uniform(0.6, 1.0, len(roots))[hair[point]]
+    # each hair counts once per texel: the strongest of its samples, then hairs cover each other
+    share = np.clip(1 - distance / (1.5 * radius), 0, 1) * taper * min(1.0, 2 * width / radius)
+    order = np.lexsort((-share, texel, hair[point]))
+    key = hair[point][order].astype(np.int64) * len(cover) + texel[order]
+    first = np.concatenate([[True], key[1:] != key[:-1]]) if len(key) else np.zeros(0, bool)
+    left = np.zeros(len(cover), np.float64)
+    np.add.at(left, texel[order][first], np.log1p(-np.minimum(share[order][first], 0.95)))
+    return (1 - np.exp(left)).astype(np.float32)

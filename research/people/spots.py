@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Round things on the skin: pores, freckles, moles. Strewn over the surface by a density per mm^2, then splatted to the
+texels near them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from core.geometry.noise import noise
+
+from .canvas import Canvas
+
+
+def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Random points of the surface, float32 [M, 3] in mm, and the ground's texel under each, int [M].
+
+    `density` [N] in points per mm^2, on `ground`: one canvas for all sizes, so that a subject's marks stay where they
+    are at any size.
+    """
+    expected = np.cumsum(np.asarray(density, np.float64) * ground.area)
+    texel = np.searchsorted(expected, rng.uniform(0, expected[-1], rng.poisson(expected[-1])), side="right")
+    texel = np.minimum(texel, len(expected) - 1)
+    row, column = np.nonzero(ground.covered)
+    row, column = row[texel], column[texel]
+    right = ground.bled_position[row, np.minimum(column + 1, ground.size - 1)]
+    below = ground.bled_position[np.minimum(row + 1, ground.size - 1), column]
+    here, share = ground.position[texel], rng.uniform(-0.5, 0.5, (len(texel), 2, 1)).astype(np.float32)
+    steps = np.stack([right - here, below - here], 1)
+    steps[np.linalg.norm(steps, axis=-1) > 3 * np.sqrt(ground.area[texel])[:, None] + 0.1] = 0  # across a seam
+    return here + (steps * share).sum(1), texel
+
+
+def splat_spots(
+    on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, blend=np.maximum
+) -> np.ndarray:
+    """Bell-shaped spots. A radius below the texel's size becomes the texel's size, with the strength lowered by the
+    same share of area.
+
+    Parameters
+    ----------
+    on : what they lie on
+    points : [M, 3], in mm
+    radius : [M], in mm; they end at twice that
+    strength : [M], in the middle
+    blend : ufunc, where they overlap
+
+    Returns
+    -------
+    float32 [N].
+    """
+    out = np.zeros(len(on.position), np.float32)
+    if len(points):
+        finest = 0.6 * on.texel_mm
+        wide = np.maximum(radius, finest)
+        texel, point, distance = on.near(points, 2 * wide)
+        bell = (1 - (distance / (2 * wide[point])) ** 2) ** 2
+        blend.at(out, texel, (bell * (strength * (radius / wide) ** 2)[point]).astype(np.float32))
+    return out
+
+
+def splat_patches(
+    on: Canvas,
+    points: np.ndarray,
+    radius: np.ndarray,
+    strength: np.ndarray,
+    rng: np.random.Generator,
+    ragged: float = 0.25,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Flat spots with a ragged edge (a mole's stain), and their dome.
+
+    Parameters
+    ----------
+    on : what they lie on
+    points : [M, 3], in mm
+    radius : [M], in mm
+    strength : [M], from 0
+    rng : of the edge and the grain
+    ragged : twice the deviation of the edge, in radii
+
+    Returns
+    -------
+    Stain and dome, float32 [N] each: the strength in the middle, that of the stain within its grain.
+    """
+    stain, dome = np.zeros(len(on.position), np.float32), np.zeros(len(on.position), np.float32)
+    if len(points):
+        texel, point, distance = on.near(points, radius * 1.6 + 0.3)
+        edge = noise(on.position[texel], 1.3, rng, smooth=True) if len(texel) else np.zeros(0)
+        inward = 1 - distance / radius[point] + ragged * 0.5 * edge
+        softness = 0.25 + 0.25 / np.maximum(radius[point], 0.3)
+        np.maximum.at(
+            stain,
+            texel,
+            (strength[point] * np.clip(inward / softness + 0.3, 0, 1) * (1 + 0.12 * edge)).astype(np.float32),
+        )
+        np.maximum.at(
+            dome, texel, (strength[point] * np.clip(1 - (distance / radius[point]) ** 2, 0, 1)).astype(np.float32)
+        )
+    return stain, dome
