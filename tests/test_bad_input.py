@@ -28,7 +28,7 @@ from core.worker.job import write_job
 from tests.tiny_chain import follow
 
 ROOT = Path(__file__).resolve().parent.parent
-SAMPLE = ROOT / "core" / "synthetic" / "sample" / "capture.mp4"
+SAMPLE = ROOT / "research" / "people" / "sample" / "capture.mp4"
 ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1"}
 
 

@@ -25,7 +25,7 @@ from . import same_maps
 from .films import read_film
 
 ROOT = Path(__file__).resolve().parents[2]
-SAMPLE = ROOT / "core" / "synthetic" / "sample" / "capture.mp4"
+SAMPLE = ROOT / "research" / "people" / "sample" / "capture.mp4"
 FRAMES = 12
 KINDS = 4
 """How many different captures there are: each is another cut of the sample video with another seed."""

@@ -26,7 +26,7 @@ from core.worker.job import write_job
 from .kills_worker import Forked, Moment, fork_worker, in_fork
 
 ROOT = Path(__file__).resolve().parents[2]
-SAMPLE = ROOT / "core" / "synthetic" / "sample"
+SAMPLE = ROOT / "research" / "people" / "sample"
 SETTINGS = {
     "frames": {"max_frames": 8, "long_side": 320, "views": 3},
     "cameras": {"import_from": str(SAMPLE / "cameras.json")},

@@ -17,7 +17,7 @@ import bpy
 import driver as d
 import numpy as np
 
-VIDEO = addon.CHECKOUT / "core" / "synthetic" / "sample" / "capture.mp4"
+VIDEO = addon.CHECKOUT / "research" / "people" / "sample" / "capture.mp4"
 
 
 def drag_in_zip():

@@ -39,7 +39,7 @@ from ..films import read_film
 from .rows import GROWTH, ROWS, WHOLES, StageRun, cell, disturbed, growth, table, together
 from .stage import measure_stage
 
-VIDEO = figures.ROOT / "core" / "synthetic" / "sample" / "capture.mp4"
+VIDEO = figures.ROOT / "research" / "people" / "sample" / "capture.mp4"
 NOISE = 1.5
 """Deviation of a repeated frame's noise, in steps of 255."""
 LEFT_OUT = shutil.ignore_patterns(
