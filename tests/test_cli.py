@@ -201,8 +201,6 @@ def test_a_failure_is_two_lines(tiny, capture, film):
         ("run", "a", "b", "--checkpoint", "c"),
         ("status", "/no/such/capture"),
         ("mask", "import", "CAPTURE", "mask.png"),
-        ("train",),
-        ("train", "patience"),
     ],
 )
 def test_what_cannot_be_is_refused_in_two_lines(capture, words):

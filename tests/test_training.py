@@ -15,6 +15,7 @@ from core.imaging import images
 from core.solver.prior.prior import build_network
 from core.stages.solve.prior_files import load
 from research.people import pigment
+from research.training import __main__ as trainings
 from research.training import prior, skins
 from research.training.descent import TrainingRun
 from research.training.patches import Windows, mean_map, spread_about
@@ -172,3 +173,10 @@ def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypat
     )
     with pytest.raises(Problem, match="other data"):
         prior.train_prior("cpu", out, QUIET, TrainingRun(0.03, cache))
+
+
+@pytest.mark.parametrize("words, said", [([], "is missing"), (["patience"], "Unknown training: 'patience'")])
+def test_a_training_that_there_is_not_is_told_which_there_are(capsys, words, said):
+    assert trainings.main(words) == 2
+    told = capsys.readouterr().err
+    assert said in told and "prior" in told and "descent" not in told
