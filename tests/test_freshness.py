@@ -247,7 +247,7 @@ def test_a_stage_that_asks_what_the_parser_saw_is_stale_when_that_changes():
     asking = {
         stage
         for stage in stages.STAGES
-        for file in (core / stage.module.split(".")[1]).rglob("*.py")
+        for file in core.joinpath(*stage.module.split(".")[1:]).rglob("*.py")
         if "shown_parts" in file.read_text(encoding="utf-8")
     }
     assert {stage.name for stage in asking} == {"shadow_mask", "solve", "upscale"}
