@@ -17,6 +17,7 @@ from tests.test_acting import (  # noqa: E402
     shown,
     write_head,
 )
+from tests.test_acting import head as head  # noqa: E402  (a fixture)
 from tests.test_gaze import degrees  # noqa: E402
 
 KINDS = {

@@ -41,7 +41,7 @@ def reads(tmp_path_factory) -> dict[str, int]:
         patched.setattr(meshes, "read_obj", lambda path: found.append(path) or read(path))
         for stage in STAGES:
             found.clear()
-            importlib.import_module(f"core.{stage}").run(capture, from_json(SETTINGS), Reporter(stage))
+            importlib.import_module(f"core.stages.{stage}").run(capture, from_json(SETTINGS), Reporter(stage))
             counted[stage] = found.count(capture.head)
     return counted
 

@@ -21,7 +21,7 @@ from core.imaging import images
 from research.people import sample, scene  # noqa: E402
 from research.people.identities import reserved_seeds, subject_mesh  # noqa: E402
 
-WEIGHTS = Path(sample.__file__).parents[1] / "weights"
+WEIGHTS = Path(sample.__file__).parents[2] / "core" / "weights"
 SEED = sample.RESERVED["sample"]
 
 

@@ -26,4 +26,4 @@ def begin_at_delight(source: Capture, folder: Path) -> Capture:
 def run_stages(capture: Capture, settings: Settings, *stages: str) -> None:
     """Runs these stages, whether they are fresh or not; nothing is written to the capture's record."""
     for stage in stages:
-        importlib.import_module(f"core.{stage}").run(capture, settings, Reporter(stage))
+        importlib.import_module(f"core.stages.{stage}").run(capture, settings, Reporter(stage))

@@ -45,7 +45,7 @@ def main() -> None:
     settings = from_json({"cameras": {"import_from": str(asked.folder / "rig.json")}, "delight": {"delighter": "none"}})
     for stage in STAGES:
         report = Reporter(stage)
-        import_module(f"core.{stage}").run(capture, settings, report)
+        import_module(f"core.stages.{stage}").run(capture, settings, report)
         print(stage, json.dumps(report.figures))
         for finding in report.findings:
             print("  finding:", finding["problem"])
