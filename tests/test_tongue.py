@@ -11,7 +11,15 @@ BVHTree = pytest.importorskip("mathutils.bvhtree").BVHTree
 
 from core.capture import sample_head  # noqa: E402
 from tests.test_acting import COPIES, HEAD, TEMPLATE, write_head  # noqa: E402
-from tests.test_close_up import about_the_mouth, as_set, keep_only_the_mouth, seen, set_face, things, tree_of  # noqa: E402
+from tests.test_close_up import (  # noqa: E402
+    about_the_mouth,
+    as_set,
+    keep_only_the_mouth,
+    seen,
+    set_face,
+    things,
+    tree_of,
+)
 from tests.test_close_up import drawn_once as drawn_once  # noqa: E402  (a fixture)
 
 HIGHEST = {"built-in": 0.52, "of another person": 0.52, "captured": 2 / 3}
