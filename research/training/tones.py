@@ -30,7 +30,7 @@ from core.light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from core.stages.solve.look import FRONT, Look, summarise_look, weigh_skin
 from core.stages.solve.population import MODEL_FILE, SHEEN_REFLECTANCE, to_coordinates, to_lab
 
-from ..people import light
+from ..people import light, pigment
 from ..people.exposure import phone_exposure
 from ..people.parameters import sample_parameters
 from ..people.skin import make_skin
@@ -45,12 +45,11 @@ FACIAL_SITES = {"2": "cheek", "3": "cheek bone", "4": "chin", "6": "forehead", "
 REQUIRED_SITES = {"2", "6"}
 SURFACE_REFLECTANCE = 0.028
 """Specular reflection at the skin's surface, which the archive's instruments include (Fresnel, index 1.4)."""
-XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 WHITE_XYZ = np.array([0.9505, 1.0, 1.089])  # D65, 2 degrees
 LIGHTNESS = np.arange(20.0, 70.5, 1.0)
 """L* of the fitted figures: the measured people's span."""
 SMOOTHING_L = 2.0  # deviation in L* by which the counts of people are smoothed
-DEGREE = 4  # of the polynomials of skin's colour by L*; the least error on an origin left out, of 1 to 4
+DEGREES = range(1, 5)  # of the polynomials of skin's colour by L*, of which the best on origins left out is taken
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,7 @@ def read_people(spectra: Path) -> tuple[np.ndarray, np.ndarray]:
                 sites[person][row["location"]].append([float(row[band]) / 100 for band in "XYZ"])
     whole = {person: places for person, places in sites.items() if REQUIRED_SITES <= places.keys()}
     xyz = np.array([np.mean([np.mean(repeats, 0) for repeats in places.values()], 0) for places in whole.values()])
-    linear = (xyz - SURFACE_REFLECTANCE * WHITE_XYZ) @ XYZ_TO_SRGB.T
+    linear = (xyz - SURFACE_REFLECTANCE * WHITE_XYZ) @ pigment.XYZ_TO_SRGB.T
     return linear, np.array([ethnicity for _, ethnicity, _ in whole])
 
 
@@ -135,9 +134,10 @@ def fit_people(linear: np.ndarray, origin: np.ndarray) -> dict:
     weight /= weight.sum()
     lightness, ratios = to_lab(linear)[:, 0], to_coordinates(linear)[:, 1:]
     counts = np.exp(-0.5 * ((LIGHTNESS[:, None] - lightness) / SMOOTHING_L) ** 2) @ weight
-    of_lightness = _fit_polynomial(lightness[:, None], ratios, weight, DEGREE)
+    degree = min(DEGREES, key=lambda each: _left_out_error(lightness[:, None], ratios, weight, origin, each))
+    of_lightness = _fit_polynomial(lightness[:, None], ratios, weight, degree)
     error = ratios - of_lightness(lightness[:, None])
-    open_l = np.sqrt(np.mean([_colour_error(lightness, ratios, weight, origin == name) for name in np.unique(origin)]))
+    open_l = np.sqrt(_left_out_error(ratios, lightness[:, None], weight, origin, 1))
     result = {
         "lightness": LIGHTNESS,
         "share": counts / counts.sum(),
@@ -148,11 +148,16 @@ def fit_people(linear: np.ndarray, origin: np.ndarray) -> dict:
     return {name: np.round(array, 5).tolist() for name, array in result.items()}
 
 
-def _colour_error(lightness: np.ndarray, ratios: np.ndarray, weight: np.ndarray, left_out: np.ndarray) -> float:
-    """Mean squared error of L* [N] by the ratios [N, 2], of those left out [N] by a fit to the others."""
-    known = ~left_out
-    of_colour = _fit_polynomial(ratios[known], lightness[known, None], weight[known], 1)
-    return float(np.mean(np.square(lightness[left_out] - of_colour(ratios[left_out])[:, 0])))
+def _left_out_error(
+    inputs: np.ndarray, outputs: np.ndarray, weight: np.ndarray, origin: np.ndarray, degree: int
+) -> float:
+    """Mean squared error of outputs [N, O], each origin's by a fit to the others, the mean over origins."""
+    errors = []
+    for name in np.unique(origin):
+        out = origin == name
+        fit = _fit_polynomial(inputs[~out], outputs[~out], weight[~out], degree)
+        errors.append(np.square(outputs[out] - fit(inputs[out])).mean())
+    return float(np.mean(errors))
 
 
 def _fit_polynomial(

@@ -8,8 +8,8 @@ phones make of simulated people, or around what a measured white surface says. T
 (`research.training tones` fits both): the people that were measured, their origins weighed alike; or, where a white
 surface tells the light and the prior must not draw a person to the middle, the same skin with every lightness alike.
 The estimate is the posterior's mean, so it never leaves the measured range. What is around the person does not count:
-even among simulated people before simulated walls it gained nothing, and white and black grounds moved real ones by 60
-L*."""
+it says little of the exposure, and white and black grounds moved real people by up to 64 L* (the page skin_tone.md).
+"""
 
 from __future__ import annotations
 
