@@ -21,10 +21,9 @@ BLENDERS ?= 4.2.0 4.5.15 5.0.1 5.2.3
 PYTHON3.13 ?= $(firstword $(shell python3.13 -c 'import sys; print(sys.executable)' 2>/dev/null) $(wildcard ~/.pyenv/versions/3.13.*/bin/python) python3.13)
 .blenders/5.1.% .blenders/5.2.%: OWN_PYTHON = $(PYTHON3.13)
 
-# What of the tests needs Blender.
-IN_BLENDER = addon artists_work captures setup evidence choices eyedropper white_card paint paint_session paint_left operators job_life live relight working_space skin_material skin_kept reel groom gaze close_up close_up_kept tongue make next_step refusals draw translations sending acting acting_changed cut_open updates delete_face save_report batch_panel batch_walk
+PROCESSES = --numprocesses auto --maxprocesses 4 --dist loadfile
 
-.PHONY: demo test test-failed results test-blenders test-gui test-gui-newest zip site clean
+.PHONY: demo test test-research test-failed results test-blenders test-gui test-gui-newest zip site clean
 
 demo: $(VENV)/installed
 	$(BIN)/python -m research.benchmarks.demo $(DEMO)
@@ -32,9 +31,11 @@ demo: $(VENV)/installed
 test: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
-	rm -rf .reached
-	$(BIN)/python -m pytest tests --ignore=tests/gui --ignore=tests/test_messages_reached.py --numprocesses auto --maxprocesses 4 --dist loadfile --reached .reached
-	$(BIN)/python -m pytest tests/test_messages_reached.py --messages --reached .reached
+	$(BIN)/python -m pytest tests --ignore=tests/gui $(PROCESSES)
+
+# The subjects, trainings and benchmarks of research.
+test-research: $(VENV)/installed
+	$(BIN)/python -m pytest research/tests $(PROCESSES)
 
 # The pages of docs/results, out of the records that the benchmarks left in research/records.
 results: $(VENV)/installed
@@ -42,13 +43,12 @@ results: $(VENV)/installed
 
 # What failed in `make test`, once more by itself: a shared machine may stand still for as long as a test waits.
 test-failed: $(VENV)/installed
-	$(BIN)/python -m pytest tests --ignore=tests/gui --ignore=tests/test_messages_reached.py --last-failed --last-failed-no-failures none --reached .reached
-	$(BIN)/python -m pytest tests/test_messages_reached.py --messages --reached .reached
+	$(BIN)/python -m pytest tests research/tests --ignore=tests/gui --last-failed --last-failed-no-failures none
 
 # Two at a time; what one prints comes when it has ended.
 test-blenders: $(BLENDERS:%=.blenders/%/installed)
 	printf '%s\n' $(BLENDERS) | xargs --max-procs=2 --replace=VERSION sh -c \
-	    '.blenders/VERSION/bin/python -m pytest $(IN_BLENDER:%=tests/test_%.py) > .blenders/VERSION.log 2>&1; ended=$$?; cat .blenders/VERSION.log; exit $$ended'
+	    '.blenders/VERSION/bin/python -m pytest tests/wildcap_addon > .blenders/VERSION.log 2>&1; ended=$$?; cat .blenders/VERSION.log; exit $$ended'
 
 .blenders/%/installed: Makefile
 	$(or $(OWN_PYTHON),$(PYTHON)) -m venv .blenders/$*
@@ -84,4 +84,4 @@ $(VENV)/installed: requirements/worker.txt requirements/test.txt requirements/fa
 	touch $@
 
 clean:
-	rm -rf .demo .blenders .reached dist
+	rm -rf .demo .blenders dist

@@ -6,7 +6,6 @@ The bpy wheel hangs at exit when a class stays registered, so the fixture disabl
 """
 
 import atexit
-import importlib.util
 import os
 import shutil
 import sys
@@ -16,9 +15,7 @@ from pathlib import Path
 
 import pytest
 
-import core.capture.messages
 from core.worker.client import SPINS, THREAD_VARIABLES
-from tests import deprecations, message_sites
 
 ROOT = Path(__file__).resolve().parent.parent
 MODULE = "bl_ext.user_default.wildcap"
@@ -45,44 +42,6 @@ MEMORY_DISK, ROOM = Path("/dev/shm"), 6e9
 if os.access(MEMORY_DISK, os.W_OK) and shutil.disk_usage(MEMORY_DISK).free > ROOM:
     os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY_DISK))
 
-LAST = "test_messages_reached.py"
-WHOLE = pytest.StashKey()
-
-
-def pytest_addoption(parser):
-    parser.addoption(
-        "--messages", action="store_true", help="judge which messages were reached even where not all tests ran"
-    )
-    parser.addoption(
-        "--reached",
-        type=Path,
-        metavar="FOLDER",
-        help="where the processes of a run keep which messages they reached; what is there counts",
-    )
-
-
-def pytest_configure(config):
-    config.pluginmanager.register(deprecations.Watch(ROOT))
-    message_sites.watch_problems(core.capture.messages.Problem)
-    if config.option.reached:
-        message_sites.take_in(config.option.reached)
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(config, items):
-    """The judgement of the messages comes last; it counts where no file was left out and no test deselected."""
-    items.sort(key=lambda item: item.path.name == LAST)
-    files = {path.name for path in Path(__file__).parent.glob("test_*.py")}
-    collected = {item.path.name for item in items}
-    config.stash[WHOLE] = files <= collected and not config.option.keyword and not config.option.markexpr
-
-
-@pytest.fixture
-def whole_run(request) -> bool:
-    """Whether all tests are run, with a Blender to run them in."""
-    ran = request.config.stash[WHOLE] and importlib.util.find_spec("bpy") is not None
-    return ran or request.config.option.messages
-
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config):
@@ -100,8 +59,6 @@ def pytest_unconfigure(config):
 
 def pytest_sessionfinish(session):
     session.config.stash[STATUS] = session.exitstatus
-    if session.config.option.reached:
-        message_sites.keep(session.config.option.reached)
 
 
 @pytest.fixture(scope="session")
@@ -114,8 +71,6 @@ def enabled_extension():
     repository.mkdir(parents=True, exist_ok=True)
     (repository / "wildcap").symlink_to(ROOT, target_is_directory=True)
     assert addon_utils.enable(MODULE, default_set=True) is not None, "Blender could not enable the extension"
-    message_sites.watch_problems(import_module(f"{MODULE}.core.capture.messages").Problem)
-    message_sites.watch_reasons(import_module(f"{MODULE}.wildcap_addon.base_operator").BaseOperator)
     yield MODULE
     addon_utils.disable(MODULE, default_set=True)
 
@@ -142,7 +97,7 @@ def capture(tmp_path, wildcap):
     """An open, solved capture in a folder with a space and an accent."""
     import bpy
 
-    from tests import standin
+    from tests.fixtures import standin
 
     root = standin.make(tmp_path / "Zoë et moi" / "head.wildcap")
     bpy.ops.wildcap.open_capture(directory=str(root))
@@ -153,7 +108,7 @@ def capture(tmp_path, wildcap):
 def batches(addon, monkeypatch, tmp_path):
     """The add-on's view of batches, over a chain of tiny rooms; no batch of a test is left running, or known to the
     next one."""
-    from tests import batch_faces, tiny_chain
+    from tests.fixtures import batch_faces, tiny_chain
 
     module, running = addon("batches"), addon("batch.running")
     monkeypatch.setattr(addon("jobs"), "ROOT", tiny_chain.build(tmp_path / "code"))

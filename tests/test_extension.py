@@ -14,7 +14,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = Path(bpy.utils.system_resource('SCRIPTS'))
 TOOL = SCRIPTS / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
 TAGS = SCRIPTS / "modules" / "_bpy_internal" / "extensions" / "tags.py"

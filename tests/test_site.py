@@ -21,9 +21,9 @@ from core.capture import links
 
 bpy = pytest.importorskip("bpy")
 
-from tests.drawn import Layout  # noqa: E402
+from tests.fixtures.drawn import Layout  # noqa: E402
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[1]
 TOOL = Path(bpy.utils.system_resource('SCRIPTS')) / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 

@@ -83,7 +83,7 @@ def solver(speed: Figures, part: Figures) -> str:
         Low memory takes a third off the peak, not half: what a single layer works on, the network's input and the
         evidence at full size stay. *float32* above is a processor without bfloat16; a GPU was not at hand. The work
         is not cropped to the box of what was seen: our UV square is nearly filled by it. A draft's normals and specular
-        are those the prior expects of its albedo, in one evaluation (`tests/test_draft.py` holds it to less error than
-        the closed form leaves).
+        are those the prior expects of its albedo, in one evaluation (`tests/core/solver/test_draft.py`
+        holds it to less error than the closed form leaves).
         """,
     )

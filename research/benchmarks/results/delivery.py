@@ -30,8 +30,9 @@ def sections(own: Figures, carried: Figures, atlas: Figures) -> Sections:
                 ),
                 f"""
         That says how near the surfaces lie, not whether a cheek's middle is a cheek's middle. For a mesh whose answer
-        is known (the built-in head, coarser, in centimetres, Y up) `tests/test_own_template.py` keeps the vertices in
-        the face within 1 mm of where they belong (median; 95 %: 2 mm). Lids stay as your mesh has them: open eyes stay
+        is known (the built-in head, coarser, in centimetres, Y up)
+        `tests/core/stages/registration/test_own_template.py` keeps the vertices in the face within 1 mm of where they
+        belong (median; 95 %: 2 mm). Lids stay as your mesh has them: open eyes stay
         open over the head's closed ones. Teeth can show between lips that only touch. Ears follow the shape around
         them, not their folds. Mouth, sockets and what lies below the neck get a smooth continuation of the skin; the
         confidence map is black there.

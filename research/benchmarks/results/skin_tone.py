@@ -48,7 +48,7 @@ def sections(tone: Figures, real: Figures) -> Sections:
         {scan.scene.lightness:+.1f} L*, delta E {scan.scene.delta_e:.1f} (stated deviation {scan.scene.stated:.1f}); the
         sample ({sample.lightness:.1f}) by {sample.scene.lightness:+.1f}, {sample.scene.delta_e:.1f} (stated
         {sample.scene.stated:.1f}). A ColorChecker drawn into a frame gives its light within 2 percent
-        (`tests/test_white_point.py`). Not measured: a real card.
+        (`tests/core/stages/solve/test_white_point.py`). Not measured: a real card.
         """,
             ),
         ),

@@ -22,7 +22,7 @@ import second  # noqa: E402
 from core.batch import record  # noqa: E402
 from core.capture import sample_head  # noqa: E402
 from core.settings.settings import from_json, preset  # noqa: E402
-from tests import batch_faces  # noqa: E402
+from tests.fixtures import batch_faces  # noqa: E402
 
 NAMES = ("anna", "bert")
 QUICK = {

@@ -17,8 +17,8 @@ import addon  # noqa: E402
 import driver as d  # noqa: E402
 
 from core.capture import switchlight_api  # noqa: E402
-from tests import standin  # noqa: E402
-from tests.switchlight_server import KEY, Service  # noqa: E402
+from tests.fixtures import standin  # noqa: E402
+from tests.fixtures.switchlight_server import KEY, Service  # noqa: E402
 
 
 def flow():

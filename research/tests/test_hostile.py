@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hostile inputs: each is met with a good end or a refusal that names it. And the judge of them finds what is wrong."""
+
+import json
+import os
+import secrets
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("OpenImageIO")
+pytest.importorskip("pycolmap")
+if not sys.platform.startswith("linux"):
+    pytest.skip("the limits of memory are Linux's", allow_module_level=True)
+
+from research.benchmarks import hostile_run  # noqa: E402
+from research.benchmarks.hostile_cases import Case  # noqa: E402
+from research.benchmarks.hostile_run import Ended  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_hostile_inputs_do_no_harm():
+    """Others each time; what is printed of a fault tells the seed, and WILDCAP_HOSTILE=COUNT:SEED tries the same ones
+    again."""
+    count, _, seed = os.environ.get("WILDCAP_HOSTILE", f"25:{secrets.randbelow(1_000_000)}").partition(":")
+    command = [
+        sys.executable,
+        "-m",
+        "research.benchmarks.hostile",
+        "--count",
+        count,
+        "--seed",
+        seed,
+        "--until",
+        "scan",
+        "--delighter",
+        "none",
+    ]
+    ended = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
+    assert ended.returncode == 0, ended.stdout[-4000:] + ended.stderr[-2000:]
+
+
+@pytest.fixture
+def case(tmp_path) -> Case:
+    """One whose output is a sound OBJ, and whose spoiled file lies beside the capture."""
+    place = tmp_path / "case"
+    root = place / "face.wildcap"
+    root.mkdir(parents=True)
+    (root / "capture.json").write_text(json.dumps({"format": 2, "source": "", "stages": {}}))
+    (root / "head.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (root / "written.jsonl").write_text(json.dumps({"path": "head.obj", "hash": "x"}) + "\n")
+    (place / "brought").mkdir()
+    (place / "brought" / "mask.png").write_bytes(b"spoiled")
+    return Case(
+        place,
+        ["mask", "import", str(root), "mask.png"],
+        place / "brought" / "mask.png",
+        ("mask.png",),
+        ("head.obj",),
+        "",
+        b"spoiled",
+    )
+
+
+def ended(code: int, errors: str = "", **other) -> Ended:
+    return Ended(
+        **{"code": code, "output": errors, "errors": errors, "seconds": 1.0, "peak": 1 << 28, "hung": False, **other}
+    )
+
+
+def test_the_judge_is_content_with_a_good_end_and_with_a_refusal_that_names_the_file(case):
+    assert hostile_run.judge(case, ended(0)) == []
+    assert hostile_run.judge(case, ended(2, "mask.png is damaged.\nSave it again.\n")) == []
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (ended(1, "Traceback (most recent call last):\n  x\n"), "traceback"),
+        (ended(-11), "SIGSEGV"),
+        (ended(0, hung=True), "did not end"),
+        (ended(0, peak=5 << 30), "GB"),
+        (ended(2, "An error inside WildCap stopped it.\nRun again.\n"), "inside WildCap"),
+        (ended(2, "A picture is damaged.\nSave it again.\n"), "does not name mask.png"),
+        (ended(2, "mask.png is damaged\n"), "no problem and remedy"),
+    ],
+)
+def test_the_judge_finds_every_bad_end(case, found, words):
+    assert any(words in fault for fault in hostile_run.judge(case, found))
+
+
+def test_the_judge_finds_what_is_not_finite_lost_or_elsewhere(case):
+    root = case.place / "face.wildcap"
+    (root / "head.obj").write_text("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert "head.obj holds what is no finite number" in hostile_run.judge(case, ended(0))
+    (root / "head.obj").unlink()
+    assert "head.obj was not written" in hostile_run.judge(case, ended(0))
+    case.spoiled.write_bytes(b"mended by us")
+    (case.place / "left.tmp").write_bytes(b"")
+    found = hostile_run.judge(case, ended(2, "mask.png is damaged.\nSave it again.\n"))
+    assert any("is nowhere any more" in fault for fault in found) and "left.tmp lies beside the capture" in found

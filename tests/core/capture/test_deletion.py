@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Deleting a face: the list says all that goes, exactly that goes, and nothing that WildCap did not write."""
+
+import os
+
+import pytest
+
+from core.__main__ import main
+from core.capture import deletion, ownership
+from core.capture.capture import Capture
+from core.capture.files import replacing
+from core.capture.messages import Problem
+from tests.fixtures import delivered, kept_capture
+from tests.fixtures.kept_capture import make_frames
+
+
+@pytest.fixture
+def capture(tmp_path) -> Capture:
+    """Frames, a render, a log and a delivery of ours; a file that was changed, and three of somebody else's, one by a
+    link to a folder elsewhere."""
+    capture = delivered.make(tmp_path / "Zoë et moi.wildcap")
+    ownership.claim_all(capture.root)
+    delivered.deliver(capture, **delivered.OBJ)
+    make_frames(capture, "00000.jpg", "00001.jpg")
+    with replacing(capture.renders / "sun.png") as temporary:
+        temporary.write_bytes(b"render")
+    capture.logs.mkdir(exist_ok=True)
+    (capture.logs / "solve.log").write_text("log")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "film.mp4").write_bytes(b"mine")
+    return capture
+
+
+def strangers(capture: Capture) -> dict[str, bytes]:
+    """Puts files of somebody else's into a capture; what must be there afterwards."""
+    (capture.frames / "00001.jpg").write_text("retouched")
+    (capture.renders / "graded.psd").write_text("mine")
+    (capture.root / "notes").mkdir()
+    (capture.root / "notes" / "solve.log").write_text("mine, too")
+    os.symlink(capture.root.parent / "elsewhere", capture.root / "shots")
+    return {"frames/00001.jpg": b"retouched", "renders/graded.psd": b"mine", "notes/solve.log": b"mine, too"}
+
+
+def test_all_of_a_face_goes_and_its_folder_and_nothing_beside_it(capture):
+    found = deletion.plan(capture)
+    labels = {group.label for group in found.groups}
+    assert {"Frames", "Renders", "Exports", "Logs", "Maps"} <= labels and found.staying == ()
+    assert found.size == sum(path.stat().st_size for path in capture.root.rglob("*") if path.is_file())
+    assert deletion.delete(capture).staying == ()
+    assert not capture.root.exists() and (capture.root.parent / "elsewhere" / "film.mp4").read_bytes() == b"mine"
+
+
+def test_what_others_put_there_or_changed_is_named_and_stays(capture):
+    kept = strangers(capture)
+    found = deletion.plan(capture)
+    assert set(found.staying) == {*kept, "shots"}
+    told = " ".join(deletion.lines(found))
+    assert "4 files stay" in told and all(name in told for name in found.staying)
+    deletion.delete(capture)
+    left = kept_capture.contents(capture.root)
+    assert left == kept and (capture.root.parent / "elsewhere" / "film.mp4").read_bytes() == b"mine"
+    assert (capture.root / "shots").is_symlink() and not capture.json.exists()
+
+
+def test_an_empty_folder_of_somebody_s_stays(capture):
+    (capture.root / "ideas").mkdir()
+    deletion.delete(capture)
+    assert [path.name for path in capture.root.iterdir()] == ["ideas"]
+
+
+def test_killed_at_any_file_it_can_be_asked_for_again(capture, monkeypatch):
+    kept = strangers(capture)
+    unlink = type(capture.root).unlink
+    for moment in range(1, 400):
+        left = iter(range(moment))
+
+        def counted(path, *arguments, left=left, **options):
+            if path.name != "lock" and next(left, None) is None:
+                raise KeyboardInterrupt
+            unlink(path, *arguments, **options)
+
+        monkeypatch.setattr(type(capture.root), "unlink", counted)
+        try:
+            deletion.delete(capture)
+            break
+        except KeyboardInterrupt:
+            pass
+        finally:
+            monkeypatch.setattr(type(capture.root), "unlink", unlink)
+    assert moment > 3 and not (capture.root / ownership.RECORD).exists()
+    assert {name: text for name, text in kept_capture.contents(capture.root).items() if name in kept} == kept
+
+
+def test_the_terminal_lists_first_and_deletes_when_told_to(capture, capsys):
+    assert main(["delete", str(capture.root)]) == 0
+    assert "Renders" in capsys.readouterr().out and capture.head.exists(), "it only told"
+    assert main(["delete", str(capture.root), "--yes"]) == 0 and not capture.root.exists()
+    assert main(["delete", str(capture.root)]) == 2 and "There is no capture" in capsys.readouterr().err
+
+
+def test_a_face_that_is_worked_on_is_refused(capture):
+    with capture.locked(), pytest.raises(Problem, match="work"):
+        deletion.delete(Capture(capture.root))
+    assert capture.head.exists()

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an update of WildCap makes of a capture that 0.2.0 finished, by its record (capture_0_2_0.json): every stage is
+made by older code, and none is out of date until an input or a setting changes."""
+
+import json
+from dataclasses import asdict, make_dataclass, replace
+from pathlib import Path
+
+import pytest
+
+from core.capture import stages
+from core.capture.capture import Capture
+from core.capture.files import write_json
+from core.capture.freshness import SOURCE
+from core.capture.hashes import hash_source
+from core.settings.setting_values import setting
+from core.settings.settings import Settings, from_json
+
+RECORD = json.loads((Path(__file__).parents[2] / "fixtures" / "capture_0_2_0.json").read_text(encoding="utf-8"))
+FINISHED = [stages.by_name(name) for name in RECORD["stages"]]
+TEMPLATE = "registration.template"
+
+
+@pytest.fixture
+def finished(tmp_path) -> Capture:
+    """A capture with that record, beside its film and the artist's own head; its files hold their own names."""
+    (tmp_path / "film.mp4").write_bytes(b"a film")
+    (tmp_path / "my head.obj").write_bytes(b"a head")
+    capture = Capture(tmp_path / "face.wildcap")
+    named = {name for entry in RECORD["stages"].values() for name, told in entry["inputs"].items() if told}
+    for name in {*named, *(name for stage in FINISHED for name in stage.writes)} - {SOURCE, TEMPLATE}:
+        path = capture.root / name / "one" if name.endswith("/") else capture.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(name.encode())
+    write_json(capture.json, RECORD)
+    return capture
+
+
+def made_with(capture: Capture, **changed) -> Settings:
+    """The settings that it was made with, with others laid over them."""
+    chosen = from_json(
+        {
+            "seed": 3,
+            "frames": {"mirrored": True},
+            "cameras": {"interpupillary_mm": 61.0},
+            "registration": {"template": str(capture.root.parent / "my head.obj")},
+            "solve": {"skin_tone": "0.69,0.54,0.46"},
+        }
+    )
+    return from_json(changed, chosen)
+
+
+def stale(capture: Capture, settings: Settings) -> dict[str, tuple[str, ...]]:
+    """Stage -> what changed, of those that are out of date; every other one has to be made by older code."""
+    verdicts = {stage.name: capture.verdict(stage, settings) for stage in FINISHED}
+    assert {verdict.state for verdict in verdicts.values()} <= {"older", "stale"}
+    return {name: verdict.changed for name, verdict in verdicts.items() if verdict.state == "stale"}
+
+
+def test_the_record_of_0_2_0_is_whole_and_comes_back_as_it_was_written(finished):
+    assert len(FINISHED) == 10 and finished.read() == RECORD
+    write_json(finished.json, finished.read())
+    finished.set_source(finished.root.parent / "film.mp4")
+    assert Capture(finished.root).read() == RECORD
+    assert RECORD["source_stamp"] == hash_source(finished.source)
+
+
+def test_every_stage_that_an_older_version_finished_is_made_by_older_code_and_none_is_out_of_date(finished):
+    settings = made_with(finished)
+    assert stale(finished, settings) == {}
+    reasons = {finished.verdict(stage, settings).reason() for stage in FINISHED}
+    assert reasons == {"made by older code (WildCap 0.2.0)"}
+    assert finished.made_from(finished.root.parent / "film.mp4") and finished.read() == RECORD, (
+        "looking changes nothing"
+    )
+
+
+@pytest.mark.parametrize("stage", FINISHED, ids=lambda stage: stage.name)
+def test_a_setting_that_a_stage_has_got_since_makes_nothing_stale(finished, stage):
+    before = made_with(finished)
+    own = getattr(before, stage.name)
+    kind = make_dataclass("Later", [("smoothing", int, setting(3))], bases=(type(own),), frozen=True)
+    assert stale(finished, replace(before, **{stage.name: kind(**asdict(own))})) == {}
+    chosen = replace(before, **{stage.name: kind(**asdict(own), smoothing=4)})
+    assert stale(finished, chosen) == {stage.name: (f"{stage.name}.smoothing",)}
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"frames": {"mirrored": False}}, {"frames": ("frames.mirrored",)}),
+        ({"cameras": {"interpupillary_mm": 63.0}}, {"cameras": ("cameras.interpupillary_mm",)}),
+        ({"scan": {"pairs": 48}}, {"scan": ("scan.pairs",)}),
+        ({"registration": {"template": ""}}, {"registration": (TEMPLATE,)}),
+        ({"delight": {"delighter": "none"}}, {"delight": ("delight.delighter",)}),
+        ({"texture": {"size": 2048}}, {"texture": ("texture.size",)}),
+        ({"shadow_mask": {"dilate_px": 4}}, {"shadow_mask": ("shadow_mask.dilate_px",)}),
+        ({"solve": {"skin_tone": "auto"}}, {"solve": ("solve.skin_tone",)}),
+        ({"upscale": {"hair": False}}, {"upscale": ("upscale.hair",)}),
+        ({"transfer": {"size": 2048}}, {"transfer": ("transfer.size",)}),
+        ({"seed": 4}, dict.fromkeys((stage.name for stage in FINISHED if "seed" in stage.shared), ("seed",))),
+        ({"solve": {"low_memory": True, "checkpoint_every": 9}}, {}),
+    ],
+    ids=str,
+)
+def test_a_setting_that_changed_is_told(finished, changed, told):
+    assert stale(finished, made_with(finished, **changed)) == told
+
+
+def test_an_input_that_changed_is_told(finished):
+    beside = finished.root.parent
+    finished.shadow_mask.write_bytes(b"painted since")
+    assert stale(finished, made_with(finished)) == {"solve": ("shadow_mask.png",)}
+    (beside / "my head.obj").write_bytes(b"another head")
+    (beside / "film.mp4").write_bytes(b"A FILM")  # as long as the other
+    told = {"frames": (SOURCE,), "registration": (TEMPLATE,), "solve": ("shadow_mask.png",)}
+    assert stale(finished, made_with(finished)) == told
+    for name in ("film.mp4", "my head.obj"):
+        (beside / name).unlink()
+    assert stale(finished, made_with(finished)) == {"solve": ("shadow_mask.png",)}, "what is gone tells no change"

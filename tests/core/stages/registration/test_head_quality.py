@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clean heads: cuts and folds are counted by Blender's own triangle test, mended, and open eyes do not pull the lids
+in."""
+
+import numpy as np
+import pytest
+
+from core.capture.messages import Problem, Reporter
+from core.face import template
+from core.geometry import meshes
+from core.settings.settings import from_json
+from core.stages import registration
+from core.stages.registration import alignment, eyes, intersections, landmarks, quality
+from core.stages.registration.correspondence import Scan
+from research.people.identities import subject_mesh
+from tests.core.stages.registration.test_registration import _capture, known, scan_of  # noqa: F401
+
+
+def blenders(vertices, faces) -> set:
+    """Pairs of triangles that cut each other, as Blender's 3D Print Toolbox counts them."""
+    pytest.importorskip("bpy")
+    from mathutils.bvhtree import BVHTree
+
+    tree = BVHTree.FromPolygons(vertices.tolist(), faces.tolist(), epsilon=0.0)
+    return {(a, b) for a, b in tree.overlap(tree) if a < b}
+
+
+def test_two_triangles_through_each_other_are_found():
+    vertices = np.array(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, -1], [0.3, 0.2, 1], [0.2, 0.3, 1], [2, 0, 0], [2, 1, 0.0]]
+    )
+    faces = np.array([[0, 1, 2], [3, 4, 5], [1, 6, 7]])
+    assert intersections.intersecting(vertices, faces).tolist() == [[0, 1]]
+    assert len(intersections.intersecting(vertices + [0, 0, 5 * 1], faces[[0, 2]])) == 0
+
+
+@pytest.mark.parametrize("seed", [1, 70])
+def test_a_head_that_cuts_itself_is_mended(seed):
+    """These synthetic people are caricatures whose lips and ears pass through themselves."""
+    rest, head = template.load(), subject_mesh(seed)
+    ours = {tuple(pair) for pair in intersections.intersecting(head.vertices, head.faces).tolist()}
+    theirs = blenders(head.vertices, head.faces)
+    assert len(theirs) > 20 and len(ours & theirs) > 0.95 * len(theirs)
+    pose = alignment.similarity(rest.vertices, head.vertices, np.ones(len(rest.vertices)))
+    mended = intersections.mended(rest.moved(pose.apply(rest.vertices)), head.vertices)
+    moved = np.linalg.norm(mended - head.vertices, axis=1)
+    assert blenders(mended, head.faces) == set()
+    assert not intersections.flipped(rest, mended).any()
+    assert (moved > 0).mean() < 0.02 and moved.max() < 0.004, "all but the spot stays where it is"
+
+
+def test_open_eyes_do_not_pull_the_lids_in(tmp_path, monkeypatch, known):  # noqa: F811
+    model, truth, points, _ = known
+    lids = registration._per_vertex(model.mesh, template.mask("eyes", 512))
+    changed, marks = _eyes_opened(truth, points, lids)
+    found = landmarks.Landmarks(marks, np.ones(468), 0.0, {}, 0.35)
+    depth, heads = {}, {}
+    for name, opening in (("seen", 0.35), ("missed", 0.10)):
+        capture = _capture(tmp_path / name, truth, model, points, monkeypatch)
+        meshes.write_ply(capture.scan, scan_of(model, changed))
+        seen = landmarks.Landmarks(found.points, found.trust, 0.0, landmarks.find().images, opening)
+        monkeypatch.setattr(landmarks, "find", lambda *_, seen=seen: seen)
+        monkeypatch.setattr(landmarks, "onto_surface", lambda found, *_: found)
+        report = Reporter("registration")
+        registration.run(capture, from_json({"registration": {"iterations": 8}}), report)
+        heads[name] = meshes.read_obj(capture.head)
+        depth[name] = np.percentile(np.linalg.norm(heads[name].vertices - truth, axis=1)[lids > 0.9], 90)
+        assert report.figures["flipped_triangles"] == 0 and report.figures["eye_opening"] == opening
+    assert depth["seen"] < 0.0004 and depth["missed"] > 2 * depth["seen"], "closed lids stand before an open eye"
+    assert blenders(heads["seen"].vertices, heads["seen"].faces) == set()
+
+
+def test_eyes_are_judged_from_the_front():
+    closed_but_for_the_side = [(50.0, (0.5, 0.4)), (3.0, (0.1, 0.2)), (-10.0, (0.25, 0.09)), (-48.0, (0.4, 0.4))]
+    assert not eyes.are_open(eyes.opening(closed_but_for_the_side))
+    assert eyes.are_open(eyes.opening([(0.0, (0.33, 0.34)), (12.0, (0.30, 0.36)), (-15.0, (0.29, 0.31))]))
+    assert not eyes.are_open(eyes.opening([(60.0, (0.4, 0.4))])), "nobody looked: as the template"
+
+
+def test_the_missing_side_is_named(known):  # noqa: F811
+    model, truth, _, _ = known
+    follow = registration.weights_of(model)[0]
+    whole = scan_of(model, truth)
+    half = whole.faces[(whole.vertices[whole.faces].mean(1) @ [1, 0, 0]) > truth[follow > 0.5, 0].mean() - 0.005]
+    scan, report = Scan(meshes.Mesh(whole.vertices, half)), Reporter("registration")
+    head = model.mesh.moved(truth)
+    distances = scan.distances(truth[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
+    quality.judge(report, head, scan, distances, follow)
+    text = " ".join(finding["problem"] for finding in report.findings)
+    assert "the right side of the face" in text and "the left side" not in text
+    with pytest.raises(Problem, match="only 0 %"):
+        quality.judge(report, head, scan, distances[:0], follow)
+
+
+def _eyes_opened(truth, points, lids):
+    """The head's vertices with 4 mm deep eyes between the lids, and the marks of opened lids."""
+    changed, marks = truth.copy(), points.copy()
+    for inner, outer in ((133, 33), (362, 263)):
+        middle = (points[inner] + points[outer]) / 2
+        axis = points[outer] - points[inner]
+        across = (truth - middle) @ (axis / np.linalg.norm(axis)) / 0.013
+        near = (lids > 0.3) & (np.linalg.norm(truth - middle, axis=1) < 0.02)
+        inside = (across**2 + ((truth - middle)[:, 2] / 0.007) ** 2 < 1) & near
+        changed[inside, 1] += 0.004
+    rims = np.array(eyes.LID_MARKS)
+    middles = np.where(
+        (marks[rims, 0] < points[[33, 263], 0].mean())[:, None], points[[33, 133]].mean(0), points[[263, 362]].mean(0)
+    )
+    marks[rims, 2] += np.where(marks[rims, 2] > middles[:, 2], 0.005, -0.003)
+    return changed, marks
