@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from research.benchmarks.results.blender import acting_table
 
 from core.capture import stages
 from core.capture.capture import Capture
@@ -19,7 +20,6 @@ from research.benchmarks.costs import __main__ as terminal
 from research.benchmarks.costs import chain, meter
 from research.benchmarks.costs.rows import GROWTH, ROWS, WHOLES, StageRun, growth, table, together
 from research.benchmarks.costs.stage import measure_stage, over, preset
-from research.benchmarks.results.blender import acting_table
 
 DONE = {"seconds": 12.4, "processor_s": 20.0, "peak_mb": 1640, "load": 0.1, "others": 0.05}
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -119,7 +119,7 @@ def test_a_process_alone_is_measured_to_its_end_or_its_limit():
     assert ended.code is None and time.monotonic() - began < 10
 
 
-@pytest.mark.parametrize("record", ["costs", "solver_speed", "blender_memory"])
+@pytest.mark.parametrize("record", ["costs"])
 def test_a_record_is_made_by_a_command_that_exists(record, capsys):
     word = figures.read_record(record)["command"].removeprefix("python -m research.benchmarks.costs ").split()[0]
     assert f"research.benchmarks.costs {word} " in costs.__doc__ and f"research/records/{record}.json" in costs.__doc__

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m research.benchmarks.costs chain | solver | blender | acting | stage: one module each, loaded when it is
-asked for, so that its libraries do not count as another's memory."""
+"""Run `chain`, or one `stage` in this process: only that module is loaded, so no other library counts as its memory."""
 
 from __future__ import annotations
 
@@ -11,7 +10,7 @@ from importlib import import_module
 
 from .. import costs
 
-COMMANDS = ("chain", "solver", "blender", "acting", "stage")
+COMMANDS = ("chain", "stage")
 
 
 def main(arguments: list[str]) -> None:

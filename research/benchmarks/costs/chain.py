@@ -12,7 +12,7 @@ start from a copy of what it made in WORK, or of --capture. OUT.json is written 
 on where it was stopped. A stage that takes longer than --limit-s is ended and told as "over"; one beside which other
 processes took more than 0.2 cores is told with that, and is measured once more with --again. "float32" is the standard
 solve and 4K stage with the networks as a processor without bfloat16 runs them. The rows frames-N are the whole chain on
-N frames of --film, such as that of research.benchmarks.long_films; without it, of the sample's 60 played to and fro,
+N frames of --film; without it, of the sample's 60 played to and fro,
 with new noise in every frame: more pictures, not more to see."""
 
 from __future__ import annotations

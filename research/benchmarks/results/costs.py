@@ -1,24 +1,23 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/results/costs.md: time and memory of the chain, stage by stage, and what grows with what; a step of the solver,
-and what was done about it."""
+"""docs/results/costs.md: time and memory of the chain, stage by stage, and what grows with what."""
 
 from __future__ import annotations
 
 from ..costs.rows import table
-from ..figures import Figures, markdown
+from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "Time and memory"
 SAYS = (
-    "Each stage's seconds and peak memory at three qualities, and how they grow with frames, views and texels; a "
-    "step of the solver, plain and as it is; an edited part."
+    "Each stage's seconds and peak memory at three qualities, and how they grow with frames, views and texels; an "
+    "edited part."
 )
-RECORDS = ("costs", "solver_speed", "edited_part")
+RECORDS = ("costs", "edited_part")
 
 
-def sections(costs: Figures, speed: Figures, part: Figures) -> Sections:
-    return [("The chain", chain(costs)), ("The solver", solver(speed, part))]
+def sections(costs: Figures, part: Figures) -> Sections:
+    return [("The chain", chain(costs)), ("An edited part", edit(part))]
 
 
 def chain(costs: Figures) -> str:
@@ -35,7 +34,7 @@ def chain(costs: Figures) -> str:
         meanwhile the cell says so: its seconds are an upper bound. Frames and cameras of a draft have the standard's
         settings and are not measured twice. This processor ran the networks in {here.networks}; *float32* has solve and
         4K as a processor runs them that does not multiply bfloat16. frames-N is the whole chain on a film of so many
-        frames (`research.benchmarks.long_films`).
+        frames.
         """,
         table(costs),
         f"""
@@ -50,40 +49,14 @@ def chain(costs: Figures) -> str:
     )
 
 
-def solver(speed: Figures, part: Figures) -> str:
-    return prose(
-        f"""
-        Each row runs in a process of its own, {speed.python_gib:.2f} GiB of whose peak are Python and its libraries;
-        two threads, nothing else running. A step is the mean of four that go down the sizes of the walk at 1024.
-
-        - *plain*: float32, channels first, the whole size from the first step on
-        - *ours*: bfloat16, channels last, coarse to fine
-        - *draft*: closed form instead of the network's gradient; the whole stage takes 30 steps at 512, *standard* 20
-          at 1024
-        """,
-        markdown(
-            ["1024", "a step", "to plain", "peak memory"],
-            [
-                [name, f"{row.seconds_per_step:.2f} s", f"{row.to_plain:.2f}", f"{row.peak_gib:.2f} GiB"]
-                for name, row in speed.steps.items()
-            ],
-        ),
-        markdown(
-            ["the whole stage, loading included", "seconds", "allowed", "peak memory"],
-            [
-                [name, f"{row.seconds:.0f} s", f"{row.allowed} s", f"{row.peak_gib:.2f} GiB"]
-                for name, row in speed.stage.items()
-            ],
-        ),
-        f"""
+def edit(part: Figures) -> str:
+    return prose(f"""
         After a mask edit of {part.edited_texels} x {part.edited_texels} texels in the finished scan, {part.rows} x
         {part.columns} texels were solved again in {part.seconds} s, {part.seconds_with_loading} s with loading
         (allowed: 25).
 
-        Low memory takes a third off the peak, not half: what a single layer works on, the network's input and the
-        evidence at full size stay. *float32* above is a processor without bfloat16; a GPU was not at hand. The work
-        is not cropped to the box of what was seen: our UV square is nearly filled by it. A draft's normals and specular
-        are those the prior expects of its albedo, in one evaluation (`tests/core/solver/test_draft.py`
-        holds it to less error than the closed form leaves).
-        """,
-    )
+        *float32* above is a processor without bfloat16; a GPU was not at hand. The work is not cropped to the box of
+        what was seen: our UV square is nearly filled by it. A draft's normals and specular are those the prior expects
+        of its albedo, in one evaluation (`tests/core/solver/test_draft.py` holds it to less error than the closed form
+        leaves).
+        """)

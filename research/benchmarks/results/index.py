@@ -45,9 +45,9 @@ GROUPS = {
         "prior",
         "confidence",
     ),
-    "Before the solve": ("geometry", "eyes", "delighters", "answers", "photographs", "shadows", "skin_tone"),
-    "After the solve": ("head", "upscale", "whole_head", "hair", "even_light", "engines", "delivery", "reimported"),
-    "Time and memory": ("costs", "blender"),
+    "Before the solve": ("geometry", "eyes", "delighters", "photographs", "shadows", "skin_tone"),
+    "After the solve": ("upscale", "whole_head", "hair", "even_light", "delivery"),
+    "Time and memory": ("costs",),
 }
 ELSEWHERE = """
     - **Elsewhere**: [promises](../promises.md), [farm](../farm.md), [cameras](../cameras.md), [scan and
