@@ -88,7 +88,7 @@ def over_people(summary: Figures, method: str) -> str:
 
 def headline(of: Figures) -> str:
     """The same answers on every set: PSNR in dB."""
-    summary, sample, scan, minutes = of.state.summary, of.demo.rows, of.scan_albedo.rows, of.costs.together
+    summary, sample, scan, costs = of.state.summary, of.demo.rows, of.scan_albedo.rows, of.costs
     relit, people = of.relit.sample, of.relit_people.mean
 
     def others(row: str) -> list[str | None]:
@@ -119,8 +119,9 @@ def headline(of: Figures) -> str:
         markdown(head, rows),
         f"""
         The true skin tone is given to all; in the first column each picture gets one gain per channel on top. On
-        sample and scan the filmed frames stand for their texture. A face takes [{minutes.standard.minutes:.1f} minutes
-        on 2 cores](costs.md), of 300 frames {minutes["frames-300"].minutes:.1f}.
+        sample and scan the filmed frames stand for their texture. A face takes
+        [{costs.standard.together.minutes:.1f} minutes on 2 cores](costs.md), of 300 frames
+        {costs["frames-300"].together.minutes:.1f}.
         """,
     )
 
