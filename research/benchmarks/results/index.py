@@ -22,7 +22,6 @@ RECORDS = (
     "relit",
     "relit_people",
     "scan_albedo",
-    "whole_chain",
     "costs",
     "comparison",
     "photographs",
@@ -205,7 +204,7 @@ def losses(of: Figures) -> str:
     against = paired({name: one for name, one in of.comparison.subjects.items() if name != "scan"})["delit"]
     relit, people, tones = of.relit.sample, of.relit_people.mean, of.skin_tone.groups
     known = of.confidence.summary[SHIPPED]
-    alone, scalp = of.whole_chain.rows["scan, network"], of.whole_head.synthetic.scalp
+    scalp = of.whole_head.synthetic.scalp
     return prose(f"""
         - **In {sum(map(flat_wins, of.state.captures.values()))} of {len(of.state.captures)} captures one flat colour is
           as near to the truth** in the picture as our albedo (over people {answers["flat colour"].psnr.mean:.2f} and
@@ -214,8 +213,7 @@ def losses(of: Figures) -> str:
         - **The delighter decides**: on a bearded man under seven lamps it leaves {lamps.network.light_slope.mean:.2f}
           of a change of the light, {lamps.network.psnr.mean:.1f} dB where a flat colour has
           {lamps["flat colour"].psnr.mean:.1f} ([photographs](photographs.md)). On the head scan the solve takes beard
-          and cheeks for light, and loses {alone.solve_off.psnr - alone.solved.psnr:.1f} dB to the delit texture
-          ([scan](scan.md)).
+          and cheeks for light ([scan](scan.md)).
         - **On delit synthetic people one environment is as good a light as ours**: ours is ahead of it by
           {"{:+.2f} ± {:.2f}".format(*against["environment"]["PSNR, dB"])} dB, of ten regions by
           {"{:+.2f} ± {:.2f}".format(*against["regions 10"]["PSNR, dB"])} dB ([page](comparison.md)).
