@@ -51,7 +51,7 @@ def test_a_place_of_another_kind_or_without_what_it_holds_is_refused(tmp_path):
     (tmp_path / "config.json").touch()
     (tmp_path / "ckpt.pth").touch()
     check("solve", prior=str(tmp_path))
-    with pytest.raises(Problem, match="is no capture"):
+    with pytest.raises(Problem, match="capture"):
         check("solve", together=str(tmp_path))
     (tmp_path / "capture.json").touch()
     check("solve", together=str(tmp_path))
