@@ -91,23 +91,37 @@ def test_stages_lists_the_chain(capsys):
 
 
 def test_run_until_then_on_with_options_that_reach_the_stages(tiny, capture, film, tmp_path):
+    place = tmp_path / "mine"
+    place.mkdir()
     for name in ("config.json", "ckpt.pth"):
-        (tmp_path / name).touch()
+        (place / name).touch()
     begun = core(tiny, "run", film, capture.root, "--until", "cameras", "--quality", "draft")
     assert begun.returncode == 0 and "Cameras      done in" in begun.stdout and "Scan" not in begun.stdout, begun.stderr
     assert "report.html" in begun.stdout.splitlines()[-1] and capture.report.is_file()
     words = "--skin-tone 0.6,0.5,0.4 --delighter folder --seed 0 --quality draft".split()
-    ended = core(tiny, "run", "-", capture.root, *words, "--folder", tmp_path, "--prior", tmp_path)
+    ended = core(tiny, "run", "-", capture.root, *words, "--folder", place, "--prior", place)
     assert ended.returncode == 0 and "Frames       unchanged" in ended.stdout, ended.stderr
     assert "4K Maps      done in" in ended.stdout
     solve, delight = (capture.read()["stages"][name]["settings"] for name in ("solve", "delight"))
-    assert read_portable(solve["prior"], capture.root) == tmp_path and solve["skin_tone"] == "0.6,0.5,0.4"
+    assert read_portable(solve["prior"], capture.root) == place and solve["skin_tone"] == "0.6,0.5,0.4"
     assert solve["steps"] == preset("draft").solve.steps
-    assert (delight["delighter"], delight["folder"]) == ("folder", ".."), "it travels with the capture"
+    assert (delight["delighter"], delight["folder"]) == ("folder", "../mine"), "it travels with the capture"
     status = core(tiny, "status", capture.root).stdout
     assert str(film) in status and status.count("done") == len(stages.STAGES)
     forced = core(
-        tiny, "run", film, capture.root, *words, "--folder", tmp_path, "--from", "delight", "--until", "delight"
+        tiny,
+        "run",
+        film,
+        capture.root,
+        *words,
+        "--folder",
+        place,
+        "--prior",
+        place,
+        "--from",
+        "delight",
+        "--until",
+        "delight",
     )
     assert forced.stdout.count("done in") == 1
 

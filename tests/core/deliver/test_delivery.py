@@ -105,12 +105,12 @@ def test_pngs_have_the_depth_and_say_their_colour_space(shared, tmp_path, pictur
     paths = {"albedo": "diffuse_albedo.png", "normal": "normal.png", "specular": "specular_albedo.png"}
     maps = deliver.maps.Sources({name: shared.maps / path for name, path in paths.items()}, SIDE, 0.4, 0.3)
     for picture in plan.preset.maps:
-        deliver.maps.write(picture, maps, tmp_path / picture.name.format(name="a"), plan)
-    bits, kind, chunks = delivered.png(tmp_path / "a_albedo")
+        deliver.maps.write(picture, maps, tmp_path / f"{picture.name.format(name='a')}.png", plan)
+    bits, kind, chunks = delivered.png(tmp_path / "a_albedo.png")
     assert (bits, kind) == (depth, 2) and tag in chunks and (b"sRGB" in chunks) == (colour == "srgb")
-    assert b"sRGB" not in delivered.png(tmp_path / "a_specular_level")[2]
-    assert delivered.png(tmp_path / "a_normal")[0] == depth
-    albedo = images.read_data(tmp_path / "a_albedo")
+    assert b"sRGB" not in delivered.png(tmp_path / "a_specular_level.png")[2]
+    assert delivered.png(tmp_path / "a_normal.png")[0] == depth
+    albedo = images.read_data(tmp_path / "a_albedo.png")
     linear = albedo if colour == "linear" else images.srgb_to_linear(albedo)
     truth = images.read_linear(shared.maps / "diffuse_albedo.exr")
     assert np.allclose(linear, truth, atol=4e-3 if depth == 8 else 3e-4)
