@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The card of each delighter: what it is and whose, where it runs, what leaves the machine and what it costs. Written
-here and nowhere else.
+"""The card of each delighter: where it runs, what leaves the machine and what it costs.
 
-Ground floor: standard library only. Shown by the add-on beside the choice, by `python -m core delighters`, and in
-docs/delighters.md.
+Shown by the add-on beside the choice, by `python -m core delighters`, and in docs/delighters.md.
 """
 
 from __future__ import annotations
@@ -17,8 +15,11 @@ from .settings import DelightSettings
 
 @dataclass(frozen=True)
 class Card:
-    """Whole sentences for an artist. `settings` are the fields of DelightSettings that are this delighter's own;
-    `needed` says of those that may not stay empty what is missing then."""
+    """Whole sentences for an artist.
+
+    `settings` are the fields of DelightSettings that only this delighter uses; `needed` has (field, sentence) of those
+    that must not stay empty.
+    """
 
     title: str
     what: str
@@ -34,7 +35,7 @@ class Card:
 
     @property
     def sends(self) -> bool:
-        """Whether anything leaves the machine."""
+        """True if anything leaves the machine."""
         return self.leaves != NOTHING
 
 
@@ -48,7 +49,7 @@ FACTS = (
     ("weights", "Weights"),
     ("licence", "Licence"),
 )
-"""The rows of a card below what the delighter is: field, and how it is called."""
+"""Rows of a card: field and label."""
 
 CARDS = {
     "network": Card(
@@ -135,28 +136,27 @@ CARDS = {
 
 
 def choices() -> tuple[str, ...]:
-    """The delighters there are, in the order they are offered."""
+    """Return the delighters in the order of the menu."""
     return next(f for f in fields(DelightSettings) if f.name == "delighter").metadata["choices"]
 
 
 def missing(settings, delighter: str) -> list[str]:
-    """What a delighter lacks of its own settings, whole sentences. `settings` has the fields of DelightSettings."""
+    """Return sentences on the settings that a delighter needs and that are empty."""
     return [why for name, why in CARDS[delighter].needed if not getattr(settings, name)]
 
 
 def text() -> str:
-    """All cards for a terminal."""
+    """Format all cards for a terminal."""
     width = max(len(label) for _, label in FACTS)
     cards = []
-    for name in choices():
-        card = CARDS[name]
+    for name, card in CARDS.items():
         rows = [f"  {label:{width}}  {getattr(card, field)}" for field, label in FACTS]
         cards.append("\n".join([f"{name}: {card.what}", *rows]))
     return "\n\n".join(cards)
 
 
 def markdown() -> str:
-    """All cards for docs/delighters.md."""
+    """Format all cards for docs/delighters.md."""
     cards = []
     for name, card in CARDS.items():
         rows = [f"| {label} | {getattr(card, field)} |" for field, label in FACTS]

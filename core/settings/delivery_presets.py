@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a head goes: per target the names, packing, units and normals of its maps; per file format what it cannot hold.
-Written here and nowhere else.
+"""Delivery presets: names, packing, units and normals of the maps per target, and what each file format drops.
 
-Ground floor: standard library only. Shown by the add-on beside the choice, by `python -m core presets`, and in
-docs/guide/deliver.md.
+Shown by the add-on beside the choice, by `python -m core presets`, and in docs/guide/deliver.md.
 """
 
 from __future__ import annotations
@@ -19,9 +17,11 @@ F0 = ("f0", "f0", "f0")
 
 @dataclass(frozen=True)
 class MapPicture:
-    """One file of a map set. `channels` are terms of core/deliver/maps.py or the constants "0" and "1"; COLOUR is
-    stored in the chosen colour space, NORMAL as OpenGL or DirectX, DATA as it is. `slot` is the input of the exported
-    material that the file is linked to, '' for none."""
+    """One file of a map set.
+
+    `channels` are terms of core/deliver/maps.py or the constants "0" and "1". COLOUR is stored in the chosen colour
+    space, NORMAL as OpenGL or DirectX, DATA as it is. `slot` is the linked input of the exported material, '' for none.
+    """
 
     name: str
     channels: tuple[str, ...]
@@ -31,8 +31,7 @@ class MapPicture:
 
 @dataclass(frozen=True)
 class Format:
-    """A mesh file. `unit` and `normals` '': the preset decides. `pictures`: the kinds it can refer to. `drops`: what it
-    loses, whole sentences."""
+    """A mesh file. `drops`: sentences on what it loses. `unit` and `normals` '': the preset decides."""
 
     title: str
     suffix: str
@@ -45,8 +44,10 @@ class Format:
 
 @dataclass(frozen=True)
 class DeliveryPreset:
-    """A target. `hint` says in one sentence how it is brought in there; `open_eyes`: it wants the head with its lids
-    open, and no shape keys. Y is up in every format but USD, which says its own axis."""
+    """A target program. `hint` says how to import the delivery; `open_eyes`: open lids and no shape keys.
+
+    Y is up in every format but USD, which has its own axis.
+    """
 
     title: str
     hint: str
@@ -226,7 +227,7 @@ HAIR = (
     MapPicture("{name}_beard_mask", ("beard",)),
     MapPicture("{name}_clean_albedo", ("clean.r", "clean.g", "clean.b"), COLOUR),
 )
-"""What goes along with every preset where the capture has it: masks to groom hair by, and the skin below."""
+"""Added to every preset if the capture has them: masks to groom hair by, and the skin below."""
 
 WHAT = {
     "head": ("Head", "The head in its own UVs, with its shape keys"),
@@ -237,22 +238,20 @@ SCAN_MAPS = (
     MapPicture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
     MapPicture("{name}_lit", ("lit.r", "lit.g", "lit.b"), COLOUR),
 )
-"""Of the scan, whatever the preset: it has no other maps."""
+"""Maps of the scan, for every preset."""
 
 
 def markdown() -> str:
-    """The table of docs/guide/deliver.md."""
+    """Format the tables of docs/guide/deliver.md."""
     lines = ["| preset | mesh | unit | normals | pictures | maps |", "| --- | --- | --- | --- | --- | --- |"]
     for preset in PRESETS.values():
         names = ", ".join(
             f"`{picture.name.format(name='NAME')}{'.1001' if preset.numbered else ''}`" for picture in preset.maps
         )
-        normals = {"opengl": "OpenGL, Y+", "directx": "DirectX, Y-"}[FORMATS[preset.format].normals or preset.normals]
-        lines.append(
-            f"| {preset.title} | {FORMATS[preset.format].title} | "
-            f"{FORMATS[preset.format].unit or preset.unit} | {normals} "
-            f"| {PICTURES[preset.pictures]} | {names} |"
-        )
+        format = FORMATS[preset.format]
+        normals = {"opengl": "OpenGL, Y+", "directx": "DirectX, Y-"}[format.normals or preset.normals]
+        row = (preset.title, format.title, format.unit or preset.unit, normals, PICTURES[preset.pictures], names)
+        lines.append(f"| {' | '.join(row)} |")
     lines += ["", "| format | what it drops |", "| --- | --- |"]
     return "\n".join(
         [*lines, *(f"| {each.title} (`{each.suffix}`) | {' '.join(each.drops)} |" for each in FORMATS.values())]
