@@ -36,14 +36,14 @@ def main(arguments: list[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         options = _parser().parse_args(arguments)
-        return options.command(options)
+        return options.command(options) or 0
     except KeyboardInterrupt:
         return 130
     except Exception as error:  # a traceback would not help the user
-        known = isinstance(error, Problem)
-        problem = error if known else unforeseen.explain(error, "the command", _log_of(arguments))
-    print(problem.problem, problem.remedy, sep="\n", file=sys.stderr)
-    return 2
+        if not isinstance(error, Problem):
+            error = unforeseen.explain(error, "the command", _log_of(arguments))
+        print(error.problem, error.remedy, sep="\n", file=sys.stderr)
+        return 2
 
 
 def _log_of(arguments: list[str]) -> Path | None:
@@ -159,38 +159,34 @@ def _deliver(options: argparse.Namespace) -> int:
             "Only Blender can finish a delivery without its mesh (deliver.whole off).",
             "Leave deliver.whole on, or deliver from the add-on's panel.",
         )
-    chosen = {**settings.to_json(last_settings(capture)), "deliver": delivery}
+    job_settings = {**settings.to_json(last_settings(capture)), "deliver": delivery}
     with read_only.stand_in(capture, delivery.get("folder", "")) as writable:
-        plan = delivery_plan.plan(writable, settings.from_json(chosen).deliver)
+        plan = delivery_plan.plan(writable, settings.from_json(job_settings).deliver)
         delivery_plan.check_target(plan)
-        code = terminal.follow(ROOT, writable, write_job(writable, tool="deliver", settings=chosen), {})
+        code = terminal.follow(ROOT, writable, write_job(writable, tool="deliver", settings=job_settings), {})
     if code == 0:
         print(plan.target)
     return code
 
 
-def _settings(options: argparse.Namespace) -> int:
+def _settings(options: argparse.Namespace) -> None:
     print(command_settings.list_settings())
-    return 0
 
 
-def _presets(options: argparse.Namespace) -> int:
+def _presets(options: argparse.Namespace) -> None:
     print(delivery_presets.markdown())
-    return 0
 
 
-def _stages(options: argparse.Namespace) -> int:
+def _stages(options: argparse.Namespace) -> None:
     for stage in stages.STAGES:
         print(f"{stage.name:13} {' '.join(stage.reads) or 'the video or photographs'} -> {' '.join(stage.writes)}")
-    return 0
 
 
-def _delighters(options: argparse.Namespace) -> int:
+def _delighters(options: argparse.Namespace) -> None:
     print(delighter_cards.markdown().rstrip() if options.markdown else delighter_cards.text())
-    return 0
 
 
-def _white(options: argparse.Namespace) -> int:
+def _white(options: argparse.Namespace) -> None:
     from .imaging.images import read_srgb  # these need OpenImageIO, OpenCV and torch
     from .stages.solve import white_point
 
@@ -211,7 +207,6 @@ def _white(options: argparse.Namespace) -> int:
         white = report.figures["white_point"]
         print(f"ColorChecker in {report.figures['white_point_frame']}")
     print(f"--white-point {','.join(f'{v:.4f}' for v in white)}")
-    return 0
 
 
 def _doctor(options: argparse.Namespace) -> int:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Landmarks placed by the artist: landmarks_artist.json, {"points": {INDEX: [x, y, z]}}.
 
-Positions are in metres of the capture's world. An index is one of the 468 of MediaPipe's face mesh, as in landmarks.json. Only the add-on and `core landmarks` write
-the file; in the stage registration its points win over those found in the frames.
+Positions are in metres of the capture's world. An index is one of the 468 of MediaPipe's face mesh.
+Only the add-on and `core landmarks` write the file; in the stage registration its points win over those of the frames.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from ..settings.settings import Settings
 from . import capture_record, freshness, lease, ownership, stages
-from .files import storage_problem, write_json
+from .files import storage_problems, write_json
 from .freshness import Verdict
 from .hashes import hash_source, same_source
 from .json_files import is_number, read_json
@@ -29,7 +29,7 @@ FORMAT = 2
 
 
 class Capture:
-    """The folder of one face. Nothing is cached but file hashes."""
+    """Folder of one face. Nothing is cached but file hashes."""
 
     def __init__(self, root: str | Path):
         self.root = Path(root)
@@ -112,7 +112,7 @@ class Capture:
 
     @property
     def source(self) -> Path | None:
-        """The video or folder of photographs, which may be gone; None if none was chosen."""
+        """Video or folder of photographs, which may be gone; None if none was chosen."""
         return freshness.source_of(self.root, self.read())
 
     def refuse_inside(self, source: str | Path) -> None:
@@ -180,11 +180,11 @@ class Capture:
     def forget(self, names: Collection[str]) -> None:
         """Mark stages as not done; their files stay until they are written again."""
         record = self.read()
-        kept = {**record, "stages": {name: entry for name, entry in record["stages"].items() if name not in names}}
-        if kept.get("stopped", {}).get("stage") in names:
-            del kept["stopped"]
-        if kept != record:
-            write_json(self.json, kept)
+        changed = {**record, "stages": {name: entry for name, entry in record["stages"].items() if name not in names}}
+        if changed.get("stopped", {}).get("stage") in names:
+            del changed["stopped"]
+        if changed != record:
+            write_json(self.json, changed)
 
     # -- freshness
 
@@ -206,11 +206,9 @@ class Capture:
     def workspace(self):
         """Yield a temporary folder in the capture; that of a killed stage goes with the next run."""
         folder = self.root / f".work.{os.getpid()}.{time.monotonic_ns()}.tmp"
-        try:
+        with storage_problems(folder):
             ownership.note_temporary(self.root, folder)
             folder.mkdir(parents=True)
-        except OSError as error:
-            raise storage_problem(error, folder) from error
         try:
             yield folder
         finally:
@@ -230,10 +228,8 @@ class Capture:
 
     def refuse_strangers(self) -> None:
         """Raise Problem if the folder, which is no capture yet, is not empty."""
-        try:
+        with storage_problems(self.root):
             strangers = [path.name for path in sorted(self.root.iterdir())] if self.root.is_dir() else []
-        except OSError as error:
-            raise storage_problem(error, self.root) from error
         if strangers:
             raise Problem(
                 f"{self.root} is not a capture folder: it contains {strangers[0]}.",
@@ -253,9 +249,7 @@ class Capture:
         """Hold the capture's lease (`lease.hold_file`), and clear away what killed workers left."""
         self.claim()
         with contextlib.ExitStack() as stack:
-            try:
+            with storage_problems(self.root):
                 stack.enter_context(lease.hold(self.root, tell, cancelled=cancelled))
                 ownership.clear_leftovers(self.root)
-            except OSError as error:
-                raise storage_problem(error, self.root) from error
             yield

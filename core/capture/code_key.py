@@ -47,16 +47,16 @@ def data_files(module: str, core: Path = CORE) -> list[str]:
     return sorted({name for read in _closure(module, core).values() for name in read.data})
 
 
-def write_canonically(node, text: list[str], met: list[ast.AST] | None = None) -> None:
+def write_canonically(node, text: list[str], references: list[ast.AST] | None = None) -> None:
     """Append a syntax tree, or a part of one, to `text`: the same pieces under every Python that can parse it.
 
-    Docstrings are left out, and so are empty fields, because new versions add some. `met` collects the nodes by which a
-    module names another.
+    Docstrings are left out, and so are empty fields, because new versions add some. `references` collects the nodes by
+    which a module names another.
     """
     kind = type(node)
     if isinstance(node, ast.AST):
-        if met is not None and kind in (ast.ImportFrom, ast.JoinedStr):
-            met.append(node)
+        if references is not None and kind in (ast.ImportFrom, ast.JoinedStr):
+            references.append(node)
         text.append("(" + kind.__name__)
         for name, words in _written_fields(kind):
             value = getattr(node, name, None)
@@ -64,12 +64,12 @@ def write_canonically(node, text: list[str], met: list[ast.AST] | None = None) -
                 text.append(words + ascii(value))
             elif value is not None and value != []:
                 text.append(words)
-                write_canonically(_merge_constants(value) if kind is ast.JoinedStr else value, text, met)
+                write_canonically(_merge_constants(value) if kind is ast.JoinedStr else value, text, references)
         text.append(")")
     elif kind is list:
         for item in node:
             if not _is_text(item):
-                write_canonically(item, text, met)
+                write_canonically(item, text, references)
                 text.append(",")
     else:
         text.append(ascii(node))
@@ -102,9 +102,9 @@ def _read_module(core: Path, file: str, changed: int) -> Module:
     # importing a module runs its packages first
     imports = [_file_of(core, package[:depth]) for depth in range(1, len(package) + 1)]
     text: list[str] = []
-    met: list[ast.AST] = []
-    write_canonically(tree, text, met)
-    for node in met:
+    references: list[ast.AST] = []
+    write_canonically(tree, text, references)
+    for node in references:
         if isinstance(node, ast.JoinedStr):
             imports.append(_run_module(core, package, node))
         elif node.level:

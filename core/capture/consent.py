@@ -16,7 +16,7 @@ from pathlib import Path
 
 from . import switchlight_api as service
 from .capture import Capture
-from .files import storage_problem, write_json
+from .files import storage_problems, write_json
 from .frame_records import read_frames
 from .hashes import hash_file, hash_value
 from .json_files import read_json
@@ -109,10 +109,8 @@ def give(capture: Capture, plan: Sending) -> None:
 
 def withdraw(capture: Capture) -> None:
     """Withdraw the consent: nothing more is sent. Answers stay."""
-    try:
+    with storage_problems(capture.consent):
         capture.consent.unlink(missing_ok=True)
-    except OSError as error:
-        raise storage_problem(error, capture.consent) from error
 
 
 def is_given(capture: Capture, plan: Sending) -> bool:

@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from . import ownership, stages, unforeseen
 from .capture import Capture
 from .delivery_plan import PROVENANCE, is_as_delivered, read_delivered
-from .files import storage_problem
+from .files import storage_problems
 from .messages import Problem
 
 LOGS = frozenset(
@@ -70,7 +70,7 @@ class FileGroup:
 
 @dataclass(frozen=True)
 class Deletion:
-    """The files that go (paths in the capture), also by kind, and those that stay."""
+    """Files that go (paths in the capture), also by kind, and files that stay."""
 
     going: tuple[str, ...]
     groups: tuple[FileGroup, ...]
@@ -87,7 +87,7 @@ def plan(capture: Capture) -> Deletion:
     _require(capture)
     going, staying = [], []
     kinds: dict[str, list[int]] = {}
-    try:
+    with storage_problems(capture.root):
         for path in ownership.files_in(capture.root):
             inside = ownership.path_inside(capture.root, path)
             if _is_ours(capture, path, inside):
@@ -95,8 +95,6 @@ def plan(capture: Capture) -> Deletion:
                 kinds.setdefault(GROUPS.get(inside.partition("/")[0], REST), []).append(path.lstat().st_size)
             else:
                 staying.append(inside)
-    except OSError as error:
-        raise storage_problem(error, capture.root) from error
     groups = [FileGroup(label, len(sizes), sum(sizes)) for label, sizes in kinds.items()]
     return Deletion(tuple(going), tuple(sorted(groups, key=lambda group: -group.size)), tuple(staying))
 
@@ -108,22 +106,19 @@ def delete(capture: Capture) -> Deletion:
     file cannot be deleted.
     """
     _require(capture)
-    with capture.locked():
+    with capture.locked(), storage_problems(capture.root):
         deletion = plan(capture)
-        try:
-            # a delivery's provenance last: it tells whose the other files are
-            for inside in sorted(deletion.going, key=lambda inside: PurePosixPath(inside).name == PROVENANCE):
-                if inside not in ownership.BOOKS:
-                    (capture.root / inside).unlink(missing_ok=True)
-            parents = (PurePosixPath(inside).parents for inside in (*deletion.going, *FOLDERS))
-            folders = {folder.as_posix() for each in parents for folder in each if folder.name}
-            for folder in sorted(folders, reverse=True):
-                with contextlib.suppress(OSError):  # missing, or not empty
-                    (capture.root / folder).rmdir()
-            for name in (capture.job.name, capture.json.name, ownership.RECORD):
-                (capture.root / name).unlink(missing_ok=True)
-        except OSError as error:
-            raise storage_problem(error, capture.root) from error
+        # a delivery's provenance last: it tells whose the other files are
+        for inside in sorted(deletion.going, key=lambda inside: PurePosixPath(inside).name == PROVENANCE):
+            if inside not in ownership.BOOKS:
+                (capture.root / inside).unlink(missing_ok=True)
+        parents = (PurePosixPath(inside).parents for inside in (*deletion.going, *FOLDERS))
+        folders = {folder.as_posix() for each in parents for folder in each if folder.name}
+        for folder in sorted(folders, reverse=True):
+            with contextlib.suppress(OSError):  # missing, or not empty
+                (capture.root / folder).rmdir()
+        for name in (capture.job.name, capture.json.name, ownership.RECORD):
+            (capture.root / name).unlink(missing_ok=True)
     with contextlib.suppress(OSError):  # not empty
         capture.root.rmdir()
     return deletion

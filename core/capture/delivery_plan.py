@@ -19,7 +19,7 @@ from pathlib import Path
 from ..settings.delivery_presets import FORMATS, PICTURES, PRESETS, DeliveryPreset, Format
 from ..settings.settings import DeliverSettings
 from .capture import Capture
-from .files import storage_problem
+from .files import storage_problems
 from .messages import Problem, name_some
 from .ownership import free_place, remove_empty_folders
 
@@ -31,7 +31,7 @@ MADE_BY = "WildCap for Blender"
 
 @dataclass(frozen=True)
 class DeliveryPlan:
-    """A delivery. `name` begins the name of every file; `capture` is the name of the capture's folder.
+    """Delivery to be made. `name` begins the name of every file; `capture` is the name of the capture's folder.
 
     `pictures`: 'png8', 'png16' or 'exr'. `colour`: 'srgb' or 'linear'. `normals`: 'opengl' or 'directx'. `unit`: 'm' or
     'cm'. `staged` becomes the folder `target` when it is complete. `replace`: replace a delivery of another capture,
@@ -143,7 +143,7 @@ def put_in_place(plan: DeliveryPlan) -> None:
     Raises Problem if that fails; then everything is as before.
     """
     old = plan.target.with_name(f".{plan.target.name}.old")
-    try:
+    with storage_problems(plan.target):
         _recover(plan.target, old)
         check_target(plan)
         if plan.target.exists():
@@ -155,14 +155,12 @@ def put_in_place(plan: DeliveryPlan) -> None:
                 os.replace(old, plan.target)
             raise
         _recover(plan.target, old)
-    except OSError as error:
-        raise storage_problem(error, plan.target) from error
 
 
 def discard(plan: DeliveryPlan) -> None:
     """Remove the leftovers of an unfinished delivery."""
-    for left in [plan.staged, *plan.target.parent.glob(f".{plan.staged.name}.*.tmp")]:
-        shutil.rmtree(left, ignore_errors=True)
+    for path in [plan.staged, *plan.target.parent.glob(f".{plan.staged.name}.*.tmp")]:
+        shutil.rmtree(path, ignore_errors=True)
 
 
 def check_target(plan: DeliveryPlan) -> None:

@@ -20,7 +20,7 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Eyeball:
-    """An eyeball in the world, in metres.
+    """Eyeball in the world, in metres.
 
     `gaze` is a unit vector. `openness` of the lids is 1 at MakeHuman's widest. `iris_radius` is 0 if no frame showed
     the iris. `views` counts the frames that showed the eye (0: placed by the other eye, or by the head).

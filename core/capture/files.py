@@ -58,14 +58,13 @@ def replacing(path: Path):
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
     root = path.parent if path.name == "capture.json" else ownership.root_of(path)  # capture.json makes the capture
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if root is not None:
-            ownership.note_temporary(root, temporary)
-        yield temporary
-        _flush(temporary)
-        place_file(temporary, path)
-    except OSError as error:
-        raise storage_problem(error, path) from error
+        with storage_problems(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if root is not None:
+                ownership.note_temporary(root, temporary)
+            yield temporary
+            _flush(temporary)
+            place_file(temporary, path)
     finally:
         with contextlib.suppress(OSError):  # missing, or its folder is a file
             temporary.unlink()
@@ -78,14 +77,13 @@ def replacing_folder(path: Path):
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     root = ownership.root_of(path)
     try:
-        shutil.rmtree(temporary, ignore_errors=True)
-        if root is not None:
-            ownership.note_temporary(root, temporary)
-        temporary.mkdir(parents=True)
-        yield temporary
-        place_folder(temporary, path)
-    except OSError as error:
-        raise storage_problem(error, path) from error
+        with storage_problems(path):
+            shutil.rmtree(temporary, ignore_errors=True)
+            if root is not None:
+                ownership.note_temporary(root, temporary)
+            temporary.mkdir(parents=True)
+            yield temporary
+            place_folder(temporary, path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
@@ -160,13 +158,20 @@ def _rename(path: Path, into: Path) -> None:
 def remove_file(path: Path) -> None:
     """Remove a file of a capture if it exists; one that is not as WildCap wrote it is kept aside."""
     root = ownership.root_of(path)
-    try:
+    with storage_problems(path):
         if path.is_file():
             if root is not None and not ownership.is_ours(root, path):
                 ownership.keep_aside(root, path)
             else:
                 check_lease(root or path.parent)
                 path.unlink()
+
+
+@contextlib.contextmanager
+def storage_problems(path: Path):
+    """Raise an OSError of the block as the Problem of writing `path`."""
+    try:
+        yield
     except OSError as error:
         raise storage_problem(error, path) from error
 

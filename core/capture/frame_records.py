@@ -56,7 +56,7 @@ class FrameRecord:
 
     @property
     def shown(self) -> str:
-        """The name by which the artist knows it."""
+        """Name by which the artist knows it."""
         return self.source or self.name
 
 
@@ -65,7 +65,7 @@ KEYS = {field.name for field in fields(FrameRecord)}
 
 @dataclass(frozen=True)
 class Frames:
-    """A capture's frames in order. kind: VIDEO, PHOTOGRAPHS, or None if the file does not say it."""
+    """Frames of a capture in order. kind: VIDEO, PHOTOGRAPHS, or None if the file does not say it."""
 
     records: tuple[FrameRecord, ...]
     kind: str | None = None

@@ -222,10 +222,10 @@ def _clear(succession: Path) -> None:
 
 def _clear_asides(path: Path) -> None:
     """Remove leftovers of processes that were killed while they took a lease over."""
-    for left in path.parent.glob(f"{path.name}.*"):
-        content = _read(left)
+    for aside in path.parent.glob(f"{path.name}.*"):
+        content = _read(aside)
         if content and is_gone(content):
-            left.unlink(missing_ok=True)
+            aside.unlink(missing_ok=True)
 
 
 def _refresh(lease: Lease, ended: threading.Event) -> None:

@@ -39,11 +39,11 @@ def obstacle(capture: Capture, settings: Settings) -> str:
 def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     """Return all that a solve depends on beside the painted masks: name -> hash."""
     stage = stages.by_name("solve")
-    chosen = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
+    own = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
     files = {
         name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.optional_reads) if name not in PAINTED
     }
-    inputs = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
+    inputs = {**files, "the solver's settings": own, "the solver's code": code_key(stage.module)}
     return {
         name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest()
         for name, value in inputs.items()

@@ -25,7 +25,7 @@ NO_MEMORY = (
 
 
 class Problem(Exception):
-    """A failure the user can act on: a problem and its remedy, both whole sentences."""
+    """Failure the user can act on: a problem and its remedy, both whole sentences."""
 
     def __init__(self, problem: str, remedy: str):
         super().__init__(f"{problem} {remedy}")
@@ -67,7 +67,7 @@ class Log:
 
 @dataclass(frozen=True)
 class Preview:
-    """A picture in the capture has new content; `path` is relative to the capture folder."""
+    """New content of a picture in the capture; `path` is relative to the capture folder."""
 
     stage: str
     path: str
@@ -75,7 +75,7 @@ class Preview:
 
 @dataclass(frozen=True)
 class StageDone:
-    """A stage ended; `skipped` if it was fresh. `figures` are its quality figures."""
+    """End of a stage; `skipped` if it was fresh. `figures` are its quality figures."""
 
     stage: str
     seconds: float
@@ -85,21 +85,21 @@ class StageDone:
 
 @dataclass(frozen=True)
 class Done:
-    """The job succeeded."""
+    """Success of the job."""
 
     seconds: float
 
 
 @dataclass(frozen=True)
 class Cancelled:
-    """The user cancelled the job; finished stages are kept."""
+    """End of a job that the user cancelled; finished stages are kept."""
 
     stage: str
 
 
 @dataclass(frozen=True)
 class Failed:
-    """The job failed with a Problem."""
+    """Failure of the job by a Problem."""
 
     stage: str
     problem: str
@@ -129,7 +129,7 @@ def from_line(line: str) -> Message:
 
 
 class Reporter:
-    """A stage's progress, log, previews, quality figures and findings.
+    """Progress, log, previews, quality figures and findings of a stage.
 
     Every call but `figure` raises CancelledError once `cancelled()` is true, so a stage that reports several times a
     second needs no code of its own for a cancel.

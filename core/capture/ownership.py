@@ -102,8 +102,8 @@ def remove_empty_folders(folder: Path) -> None:
 
 def clear_leftovers(root: Path) -> None:
     """Remove the temporary files of processes that have ended, and recover folders that they had put aside."""
-    for left, by in read_record(root)[1].items():
-        path = root / left
+    for name, by in read_record(root)[1].items():
+        path = root / name
         # a link must not lead out of the capture
         if is_gone(by) and os.path.lexists(path) and path.parent.resolve().is_relative_to(root.resolve()):
             if path.suffix == ".old":
@@ -209,7 +209,7 @@ def is_leftover(root: Path, path: Path) -> bool:
     """
     inside = PurePosixPath(path_inside(root, path))
     owners = [
-        by for left, by in read_record(root)[1].items() if inside.is_relative_to(left) and not left.endswith(".old")
+        by for name, by in read_record(root)[1].items() if inside.is_relative_to(name) and not name.endswith(".old")
     ]
     return bool(owners) and not path.is_symlink() and all(is_gone(by) for by in owners)
 

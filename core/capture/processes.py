@@ -118,9 +118,9 @@ def _ask_windows(pid: int) -> tuple[str, bool]:
         return "", ctypes.get_last_error() == ACCESS_DENIED
     handle, code, times = wintypes.HANDLE(handle), wintypes.DWORD(), [wintypes.FILETIME() for _ in range(4)]
     try:
-        known = kernel.GetProcessTimes(handle, *map(ctypes.byref, times))
+        dated = kernel.GetProcessTimes(handle, *map(ctypes.byref, times))
         runs = not kernel.GetExitCodeProcess(handle, ctypes.byref(code)) or code.value == STILL_ACTIVE
-        return f"{times[0].dwHighDateTime}:{times[0].dwLowDateTime}" if known else "", runs
+        return f"{times[0].dwHighDateTime}:{times[0].dwLowDateTime}" if dated else "", runs
     finally:
         kernel.CloseHandle(handle)
 

@@ -97,9 +97,9 @@ def sha256(path: Path, tick: Callable[[], None]) -> str:
 def _sources(source: Path | None, record: dict, tick: Callable[[], None]) -> list[dict]:
     """Return name, size and hash of the video or photographs; no hash if they have been deleted or changed."""
     sources = []
-    for name, size, known in record.get("source_stamp", []):
+    for name, size, digest in record.get("source_stamp", []):
         file = source / name if source is not None and source.is_dir() else source
-        there = file is not None and same_source([[name, size, known]], hash_source(file))
+        there = file is not None and same_source([[name, size, digest]], hash_source(file))
         sources.append({"name": name, "bytes": size, "sha256": sha256(file, tick) if there else "not there any more"})
     return sources
 

@@ -30,7 +30,7 @@ STRIP_ROWS = 256
 
 
 class Sources:
-    """The maps of one UV tile, read on demand, at one size.
+    """Maps of one UV tile, read on demand, at one size.
 
     `paths`: albedo, normal, specular, clean, lit ... -> file. `roughness` is that of the cheeks, `mean` the specular
     map's on facial skin, `unit` in metres. `regions`: the UVs are those of the built-in head, whose other regions are

@@ -31,7 +31,7 @@ class MapPicture:
 
 @dataclass(frozen=True)
 class Format:
-    """A mesh file. `drops`: sentences on what it loses. `unit` and `normals` '': the preset decides."""
+    """Mesh file. `drops`: sentences on what it loses. `unit` and `normals` '': the preset decides."""
 
     title: str
     suffix: str
@@ -44,7 +44,7 @@ class Format:
 
 @dataclass(frozen=True)
 class DeliveryPreset:
-    """A target program. `hint` says how to import the delivery; `open_eyes`: open lids and no shape keys.
+    """Target program. `hint` says how to import the delivery; `open_eyes`: open lids and no shape keys.
 
     Y is up in every format but USD, which has its own axis.
     """

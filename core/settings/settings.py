@@ -33,7 +33,7 @@ from .stage_settings import (
 
 @dataclass(frozen=True)
 class Settings:
-    """The settings of all stages, and those that they share."""
+    """Settings of all stages, and those that they share."""
 
     seed: int = setting(0, min=0, max=2**31 - 1, flag="--seed")
     """The same seed gives the same maps"""
@@ -55,7 +55,7 @@ class Settings:
 
     @property
     def compute_device(self) -> str:
-        """The device by name; a worker replaces auto by a tested one before a stage runs, else it is the CPU."""
+        """Device by name; a worker replaces auto by a tested one before a stage runs, else it is the CPU."""
         return "cpu" if self.device == "auto" else self.device
 
 
