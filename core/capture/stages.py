@@ -28,8 +28,8 @@ class Stage:
     name: str
     label: str
     module: str
-    reads: tuple[str, ...]
-    writes: tuple[str, ...]
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
     optional_reads: tuple[str, ...] = ()
     shared: tuple[str, ...] = ()
     on_device: bool = False
@@ -55,7 +55,7 @@ PARTS = "texture_parts.png"
 
 STAGES = (
     # Extract upright sRGB frames of one exposure from the video or photographs, and select the views.
-    Stage(name="frames", label="Frames", module="core.stages.frames", reads=(), writes=("frames/",)),
+    Stage(name="frames", label="Frames", module="core.stages.frames", writes=("frames/",)),
     # Solve calibrated, upright, metric cameras, or import them from another program.
     Stage(
         name="cameras",
@@ -169,18 +169,14 @@ TOOLS = (
         label="Skin Tone",
         module="core.stages.solve.tone",
         reads=SOLVE_INPUTS,
-        writes=(),
         on_device=True,
     ),
-    Stage(
-        name="white_point", label="White Point", module="core.stages.solve.white_point", reads=("frames/",), writes=()
-    ),
+    Stage(name="white_point", label="White Point", module="core.stages.solve.white_point", reads=("frames/",)),
     Stage(
         name="self_test",
         label="Self-Test",
         module="core.stages.solve.self_test",
         reads=SOLVE_INPUTS,
-        writes=(),
         on_device=True,
     ),
     Stage(
@@ -188,7 +184,6 @@ TOOLS = (
         label="Deliver",
         module="core.deliver",
         reads=("head.obj", *(name for name in SOLVED if name.endswith(".png"))),
-        writes=(),
     ),
 )
 """Run by the worker for one button each: no stage depends on them, and capture.json does not record them."""

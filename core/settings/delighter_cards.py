@@ -12,6 +12,8 @@ from dataclasses import dataclass, fields
 from ..capture import switchlight_api as service
 from .settings import DelightSettings
 
+NOTHING = "Nothing."
+
 
 @dataclass(frozen=True)
 class Card:
@@ -25,11 +27,11 @@ class Card:
     what: str
     best_for: str
     runs: str
-    leaves: str
-    costs: str
-    shadows: str
     weights: str
     licence: str
+    leaves: str = NOTHING
+    costs: str = NOTHING
+    shadows: str = "No."
     settings: tuple[str, ...] = ()
     needed: tuple[tuple[str, str], ...] = ()
 
@@ -39,7 +41,6 @@ class Card:
         return self.leaves != NOTHING
 
 
-NOTHING = "Nothing."
 FACTS = (
     ("best_for", "Best for"),
     ("runs", "Where it runs"),
@@ -57,8 +58,6 @@ CARDS = {
         "Our own network looks at each frame and at the head's shape, and takes light and shadow out of it.",
         best_for="Most captures: ordinary light, with or without hard shadows.",
         runs="On your machine, on the processor or on a GPU.",
-        leaves=NOTHING,
-        costs=NOTHING,
         shadows="Yes: it says of every pixel how much of the main light is blocked there.",
         weights="Come with the extension.",
         licence="GPL-3.0-or-later, code and weights; trained on synthetic faces of our own, with some painted skins "
@@ -70,8 +69,6 @@ CARDS = {
         "nothing can be invented.",
         best_for="Soft light. Hard shadows are left to the mask and the solver.",
         runs="On your machine, on the processor; seconds per frame.",
-        leaves=NOTHING,
-        costs=NOTHING,
         shadows="Yes, where there is a sun: those of the head itself, and of what stands beside it.",
         weights="None.",
         licence="GPL-3.0-or-later.",
@@ -88,7 +85,6 @@ CARDS = {
         costs=f"Per frame {service.amount(service.CREDITS_PER_PICTURE)} of your account, or "
         f"{service.amount(service.CREDITS_PER_PREVIEW)} for a small picture "
         f"of {service.PREVIEW_PX} px at most. An answer that has come is never paid for again.",
-        shadows="No.",
         weights="None on your machine.",
         licence=f"{service.COMPANY}'s terms ({service.WEBSITE}): what comes back may not be used to train a model.",
         settings=("switchlight_preview",),
@@ -98,9 +94,6 @@ CARDS = {
         "The published delighting network of the paper OpenDelight, where you have its weights.",
         best_for="Comparing, and whoever has the weights.",
         runs="On your machine; a GPU is of great help.",
-        leaves=NOTHING,
-        costs=NOTHING,
-        shadows="No.",
         weights="Yours to bring: the folder with the authors' two files. It was not verified on real weights.",
         licence="Our code GPL-3.0-or-later; the weights are under their authors' terms.",
         settings=("checkpoint",),
@@ -112,9 +105,7 @@ CARDS = {
         best_for="Using the best model that you have access to. Name the pictures like the frames; neither crop nor "
         "turn them.",
         runs="Wherever you made the pictures.",
-        leaves=NOTHING,
         costs="Nothing here.",
-        shadows="No.",
         weights="None here.",
         licence="You have to keep to the licence of the program that made the pictures.",
         settings=("folder",),
@@ -126,9 +117,6 @@ CARDS = {
         best_for="A face that was filmed under an overcast sky or in a light tent; and to see what the others are "
         "worth.",
         runs="On your machine, at once.",
-        leaves=NOTHING,
-        costs=NOTHING,
-        shadows="No.",
         weights="None.",
         licence="GPL-3.0-or-later.",
     ),

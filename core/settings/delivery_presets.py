@@ -42,7 +42,7 @@ class Format:
     shape_keys: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DeliveryPreset:
     """Target program. `hint` says how to import the delivery; `open_eyes`: open lids and no shape keys.
 
@@ -51,12 +51,12 @@ class DeliveryPreset:
 
     title: str
     hint: str
-    format: str
-    unit: str
-    normals: str
-    pictures: str
-    numbered: bool
     maps: tuple[MapPicture, ...]
+    format: str = "fbx"
+    unit: str = "cm"
+    normals: str = "opengl"
+    pictures: str = "png8"
+    numbered: bool = False
     open_eyes: bool = False
 
 
@@ -102,14 +102,12 @@ PICTURES = {"png8": "PNG, 8 bit", "png16": "PNG, 16 bit", "exr": "EXR, half floa
 
 PRESETS = {
     "blender": DeliveryPreset(
-        "Blender",
-        "Import it: the maps are linked; for skin with scattering, Assemble Material in this add-on.",
-        "glb",
-        "m",
-        "opengl",
-        "png16",
-        False,
-        (
+        title="Blender",
+        hint="Import it: the maps are linked; for skin with scattering, Assemble Material in this add-on.",
+        format="glb",
+        unit="m",
+        pictures="png16",
+        maps=(
             MapPicture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_normal", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_roughness", ("roughness",), DATA, "roughness"),
@@ -117,26 +115,18 @@ PRESETS = {
         ),
     ),
     "metahuman": DeliveryPreset(
-        "MetaHuman from Mesh",
-        "Import it as a static mesh for a MetaHuman Identity, which wants open eyes: the head has them, and no shape "
-        "keys.",
-        "fbx",
-        "cm",
-        "directx",
-        "png8",
-        False,
-        (MapPicture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),),
+        title="MetaHuman from Mesh",
+        hint="Import it as a static mesh for a MetaHuman Identity, which wants open eyes: the head has them, and no "
+        "shape keys.",
+        normals="directx",
+        maps=(MapPicture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),),
         open_eyes=True,
     ),
     "unreal": DeliveryPreset(
-        "Unreal",
-        "Leave Flip Green Channel off; switch sRGB off for all maps but BaseColor.",
-        "fbx",
-        "cm",
-        "directx",
-        "png8",
-        False,
-        (
+        title="Unreal",
+        hint="Leave Flip Green Channel off; switch sRGB off for all maps but BaseColor.",
+        normals="directx",
+        maps=(
             MapPicture("T_{name}_BaseColor", ALBEDO, COLOUR, "base_color"),
             MapPicture("T_{name}_N", TANGENT, NORMAL, "normal"),
             MapPicture("T_{name}_ORM", ("1", "roughness", "0")),
@@ -144,43 +134,29 @@ PRESETS = {
         ),
     ),
     "unity_hdrp": DeliveryPreset(
-        "Unity HDRP",
-        "A Lit material of the type Subsurface Scattering; reflectance at normal incidence comes from its diffusion "
-        "profile (IOR 1.4).",
-        "fbx",
-        "cm",
-        "opengl",
-        "png8",
-        False,
-        (
+        title="Unity HDRP",
+        hint="A Lit material of the type Subsurface Scattering; reflectance at normal incidence comes from its "
+        "diffusion profile (IOR 1.4).",
+        maps=(
             MapPicture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_NormalMap", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_MaskMap", ("0", "1", "1", "smoothness")),
         ),
     ),
     "unity_urp": DeliveryPreset(
-        "Unity URP",
-        "A Lit material with the workflow Specular; its smoothness is in the specular map's alpha.",
-        "fbx",
-        "cm",
-        "opengl",
-        "png8",
-        False,
-        (
+        title="Unity URP",
+        hint="A Lit material with the workflow Specular; its smoothness is in the specular map's alpha.",
+        maps=(
             MapPicture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_BumpMap", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_SpecGlossMap", (*F0, "smoothness"), COLOUR),
         ),
     ),
     "character_creator": DeliveryPreset(
-        "Character Creator",
-        "Give it to Headshot's mesh mode, or as a prop with the maps in its PBR channels.",
-        "obj",
-        "cm",
-        "opengl",
-        "png8",
-        False,
-        (
+        title="Character Creator",
+        hint="Give it to Headshot's mesh mode, or as a prop with the maps in its PBR channels.",
+        format="obj",
+        maps=(
             MapPicture("{name}_Diffuse", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_Normal", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_Roughness", ("roughness",), DATA, "roughness"),
@@ -188,14 +164,11 @@ PRESETS = {
         ),
     ),
     "arnold": DeliveryPreset(
-        "Arnold",
-        "The files are named after standard_surface's parameters: specular is a weight for specular_IOR 1.4.",
-        "fbx",
-        "cm",
-        "opengl",
-        "exr",
-        True,
-        (
+        title="Arnold",
+        hint="The files are named after standard_surface's parameters: specular is a weight for specular_IOR 1.4.",
+        pictures="exr",
+        numbered=True,
+        maps=(
             MapPicture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_normal_camera", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_specular", ("weight",), DATA, "specular"),
@@ -204,14 +177,11 @@ PRESETS = {
         ),
     ),
     "redshift": DeliveryPreset(
-        "Redshift",
-        "The files are named after the Standard Material's inputs: refl_weight is for refl_ior 1.4.",
-        "fbx",
-        "cm",
-        "opengl",
-        "exr",
-        True,
-        (
+        title="Redshift",
+        hint="The files are named after the Standard Material's inputs: refl_weight is for refl_ior 1.4.",
+        pictures="exr",
+        numbered=True,
+        maps=(
             MapPicture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_bump_input", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_refl_weight", ("weight",), DATA, "specular"),
