@@ -21,6 +21,7 @@ PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic
 """Suffixes read from a folder of photographs."""
 LITTER = frozenset({"thumbs.db", "desktop.ini"})
 """Files that Windows leaves in a folder of pictures."""
+DIGEST_BYTES = 16
 _hashes: dict[tuple, str] = {}
 
 
@@ -40,9 +41,7 @@ def read_hash(path: Path) -> str:
 
 def hash_bytes(content: bytes) -> str:
     """Return what `read_hash` returns for a file with this content."""
-    digest = _hasher()
-    digest.update(content)
-    return digest.hexdigest()
+    return hashlib.blake2b(content, digest_size=DIGEST_BYTES).hexdigest()
 
 
 def hash_value(value) -> str:
@@ -133,4 +132,4 @@ def _hash_sampled(file: BinaryIO, size: int) -> str:
 
 
 def _hasher():
-    return hashlib.blake2b(digest_size=16)
+    return hashlib.blake2b(digest_size=DIGEST_BYTES)
