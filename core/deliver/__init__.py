@@ -43,42 +43,61 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         raise Problem(
             f"{plan.format.title} is written by Blender.", "Choose OBJ here, or deliver from the add-on's panel."
         )
-    tiles = _tiles(capture, plan, settings)
-    several, roughness = len(tiles) > 1, settings.deliver.roughness / 100
+    tiles, roughness = _tiles(capture, plan, settings), settings.deliver.roughness / 100
     # a damaged mesh must not be delivered
     if mesh == capture.head:
         read_head(capture)
     else:
         meshes.read_obj(mesh)
-    mean, regions = _mean_specular(capture), plan.what == "head"
-    pictures = _pictures(plan, settings)
     delivery_plan.discard(plan)
     with replacing_folder(plan.staged) as folder:
-        (folder / TEXTURES).mkdir()
-        made, size = [], 0
-        for i, (tile, paths) in enumerate(tiles.items()):
-            sources = maps.Sources(paths, int(settings.deliver.size), roughness, mean, UNIT_M[plan.unit], regions)
-            available = [picture for picture in pictures if sources.has(picture)]
-            for j, picture in enumerate(available):
-                number = f".{tile}" if plan.numbered or several else ""
-                name = f"{picture.name.format(name=plan.name)}{number}{plan.suffix}"
-                report.progress(i + j / len(available), len(tiles), f"writing {name}")
-                maps.write(picture, sources, folder / TEXTURES / name, plan)
-                made.append({"file": f"{TEXTURES}/{name}", "tile": tile, "kind": picture.kind, "slot": picture.slot})
-            size = max(size, sources.size)
-        report.progress(len(tiles), len(tiles), "writing what it was made from")
+        written, size = _write_maps(folder, capture, plan, tiles, settings, report)
+        report.progress(len(tiles), len(tiles), "writing the provenance")
         write_json(folder / delivery_plan.PROVENANCE, provenance.collect(capture, plan, settings, report.check))
         if settings.deliver.whole:
-            wavefront.write(mesh, folder / plan.mesh, plan, made, roughness)
+            wavefront.write(mesh, folder / plan.mesh, plan, written, roughness)
             provenance.finish(folder)
         else:
-            packing = {"name": plan.name, "mesh": plan.mesh, "several": several, "maps": made, "roughness": roughness}
+            several = len(tiles) > 1
+            packing = {
+                "name": plan.name,
+                "mesh": plan.mesh,
+                "several": several,
+                "maps": written,
+                "roughness": roughness,
+            }
             (folder / PACKING).write_text(json.dumps(packing, indent=1), encoding="utf-8")
     if settings.deliver.whole:
         delivery_plan.put_in_place(plan)
-    report.figure("files", len(made))
+    report.figure("files", len(written))
     report.figure("size_px", size)
     report.figure("delivered_to", str(plan.target))
+
+
+def _write_maps(
+    folder: Path,
+    capture: Capture,
+    plan: DeliveryPlan,
+    tiles: dict[int, dict[str, Path]],
+    settings: Settings,
+    report: Reporter,
+) -> tuple[list[dict], int]:
+    """Write the maps of all UV tiles; return {"file", "tile", "kind", "slot"} of each, and their largest side."""
+    (folder / TEXTURES).mkdir()
+    size, roughness = int(settings.deliver.size), settings.deliver.roughness / 100
+    mean, on_head = _mean_specular(capture), plan.what == "head"
+    written, sizes = [], [0]
+    for i, (tile, paths) in enumerate(tiles.items()):
+        sources = maps.Sources(paths, size, roughness, mean, UNIT_M[plan.unit], on_head)
+        available = [picture for picture in _pictures(plan, settings) if sources.has(picture)]
+        for j, picture in enumerate(available):
+            number = f".{tile}" if plan.numbered or len(tiles) > 1 else ""
+            name = f"{picture.name.format(name=plan.name)}{number}{plan.suffix}"
+            report.progress(i + j / len(available), len(tiles), f"writing {name}")
+            maps.write(picture, sources, folder / TEXTURES / name, plan)
+            written.append({"file": f"{TEXTURES}/{name}", "tile": tile, "kind": picture.kind, "slot": picture.slot})
+        sizes.append(sources.size)
+    return written, max(sizes)
 
 
 def _pictures(plan: DeliveryPlan, settings: Settings) -> list[MapPicture]:

@@ -7,11 +7,9 @@ import json
 import pytest
 
 from core.__main__ import main
-from core.capture import artist_landmarks, stages
+from core.capture import artist_landmarks
 from core.capture.messages import Problem
-from core.settings.settings import Settings
 from tests.fixtures.kept_capture import make
-from tests.fixtures.recorded import changed, record
 
 
 @pytest.fixture
@@ -54,12 +52,3 @@ def test_a_bad_file_is_a_problem_and_changes_nothing(capture, tmp_path, text):
         artist_landmarks.read(bad)
     assert main(["landmarks", "import", str(capture.root), str(bad)]) == 2
     assert not capture.landmarks_artist.exists()
-
-
-def test_registration_is_stale_after_an_edit(capture):
-    stage = stages.by_name("registration")
-    record(capture, stage, Settings())
-    artist_landmarks.put(capture, {1: (0, -0.04, -0.04)})
-    assert changed(capture, stage, Settings()) == ("landmarks_artist.json",)
-    artist_landmarks.put(capture, {1: None})
-    assert changed(capture, stage, Settings()) == ()
