@@ -250,6 +250,6 @@ class Capture:
         self.claim()
         with contextlib.ExitStack() as stack:
             with storage_problems(self.root):
-                stack.enter_context(lease.hold(self.root, tell, cancelled=cancelled))
+                stack.enter_context(lease.hold_file(self.lock, tell, cancelled=cancelled))
                 ownership.clear_leftovers(self.root)
             yield

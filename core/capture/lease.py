@@ -140,11 +140,6 @@ def hold_file(
                 path.unlink(missing_ok=True)
 
 
-def hold(root: Path, *options, **named) -> contextlib.AbstractContextManager[Lease]:
-    """Hold the lease of the folder of a capture or batch, with the options of `hold_file`."""
-    return hold_file(root / "lock", *options, **named)
-
-
 def _make(lease: Lease) -> bool:
     """Create the lock file; return False if it exists. Empty for a moment, it counts as being made."""
     content = {**identify_process(), "since": time.strftime("%Y-%m-%dT%H:%M:%S"), "token": lease.token}

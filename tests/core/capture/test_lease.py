@@ -81,7 +81,7 @@ def test_one_that_was_killed_while_it_took_a_lease_over_leaves_nothing_beside_it
 
     def take_over():
         lease.Path.unlink = lambda *_, **__: os._exit(9)
-        lease.hold(capture.root).__enter__()
+        lease.hold_file(capture.lock).__enter__()
 
     os.waitpid(fork(take_over), 0)
     assert len(list(capture.root.glob("lock*"))) == 2
@@ -230,7 +230,7 @@ def test_never_two_inside(capture, beginning):
 
     def enter() -> int:
         try:
-            with lease.hold(capture.root):
+            with lease.hold_file(capture.lock):
                 os.close(os.open(inside, os.O_CREAT | os.O_EXCL))
                 os.unlink(inside)
                 return 0
