@@ -73,7 +73,7 @@ def test_what_cannot_be_solved_together_is_refused(two, tmp_path):
     second.texture.unlink()
     for named, problem in (
         (first.root, "this capture itself"),
-        (tmp_path / "nothing", "no capture"),
+        (tmp_path / "nothing", "capture"),
         (second.root, "no texture"),
         (other.root, "not WildCap's head"),
     ):
