@@ -164,9 +164,10 @@ def discard(plan: DeliveryPlan) -> None:
 
 
 def check_target(plan: DeliveryPlan) -> None:
-    """Raise Problem if the target is not an earlier delivery, or if foreign files are in the way.
+    """Raise Problem if the target must not be replaced.
 
-    Unless the plan replaces them, also for another capture's delivery and for delivered files that somebody changed.
+    Files that no delivery wrote are always kept; another capture's delivery, and delivered files that were changed
+    since, unless the plan replaces them.
     """
     target = plan.target
     if not target.exists() or target.is_dir() and not any(target.iterdir()):
@@ -177,8 +178,8 @@ def check_target(plan: DeliveryPlan) -> None:
             f"{target} contains files that no delivery has put there.",
             "Move them away, or choose another folder to deliver to.",
         )
-    other = _read_provenance(target).get("capture")
-    other = other.get("name") if isinstance(other, dict) else None
+    capture = _read_provenance(target).get("capture")
+    other = capture.get("name") if isinstance(capture, dict) else None
     if isinstance(other, str) and other not in ("", plan.capture) and not plan.replace:
         raise Problem(
             f"{target} contains the delivery of another capture, {other}.",

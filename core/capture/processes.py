@@ -39,9 +39,8 @@ def identify_process() -> dict:
 
 def is_gone(process: dict) -> bool:
     """Return whether a process has certainly ended; one of another machine or container cannot be checked."""
-    name, run, space = _place(process)
-    _, our_run, our_space = _place({"host": name_host()})
-    if name != socket.gethostname():
+    (name, run, space), (our_name, our_run, our_space) = _split(process.get("host")), _split(name_host())
+    if name != our_name:
         return False
     if run and run != our_run:
         return True  # the machine was restarted
@@ -53,8 +52,8 @@ def is_gone(process: dict) -> bool:
 
 def is_at_work(process: dict) -> bool:
     """Return whether a process runs beside us and is not stopped."""
-    name, _, space = _place(process)
-    if name != socket.gethostname() or space not in ("", _place({"host": name_host()})[2]) or is_gone(process):
+    (name, _, space), (our_name, _, our_space) = _split(process.get("host")), _split(name_host())
+    if name != our_name or space not in ("", our_space) or is_gone(process):
         return False
     if process.get("began") and not _began(process["pid"]):
         return False  # hidden, of another user: the number may be another process's
@@ -63,11 +62,9 @@ def is_at_work(process: dict) -> bool:
     return True
 
 
-def _place(process: dict) -> tuple[str, str, str]:
-    """Return name, run and space of a process's host; '' if unknown."""
-    name, _, rest = str(process.get("host")).partition("/")
-    run, _, space = rest.partition("/")
-    return name, run, space
+def _split(host) -> list[str]:
+    """Split NAME/RUN/SPACE; '' for unknown parts."""
+    return (str(host).split("/", 2) + ["", ""])[:3]
 
 
 def _began(pid: int) -> str:
