@@ -26,10 +26,9 @@ GIVEN_VARIABLE = "WILDCAP_SWITCHLIGHT_CONSENT"
 """Environment variable by which the terminal's --send-frames reaches the worker: the place of the capture."""
 NOTICE = (
     "{pictures} of this capture leave your machine: they show a person's face. Ask that person first.",
-    "They go to {company}, a company, at {host}, with your key and nothing else. What it does with them is told at "
-    "{website}.",
+    "They are sent to {company}, a company, at {host}, with your key and nothing else. Its terms are at {website}.",
     "{company} charges your account with {credits}.",
-    "What comes back may not be used to train a model, as its terms say.",
+    "Its terms forbid training a model on what comes back.",
 )
 """Shown before anything is sent."""
 NOTICE_KEPT = "{kept} more have their answer already and are not paid again."
@@ -67,9 +66,7 @@ def selected(capture: Capture) -> list[str]:
     except Problem:
         names = []
     if not names:
-        raise Problem(
-            "This capture has no frames yet that could be sent.", "Reconstruct first: it stops before anything is sent."
-        )
+        raise Problem("This capture has no frames to send yet.", "Reconstruct first: it stops before anything is sent.")
     return names
 
 

@@ -184,7 +184,7 @@ def check_target(plan: DeliveryPlan) -> None:
         raise Problem(
             f"{target} contains the delivery of another capture, {other}.",
             "Deliver to another folder, rename the capture, or deliver again with Replace Changed Files "
-            "(--replace) to give the other delivery up.",
+            "(--replace) to overwrite it.",
         )
     changed = [
         name
@@ -193,16 +193,15 @@ def check_target(plan: DeliveryPlan) -> None:
     ]
     if changed and not plan.replace:
         raise Problem(
-            f"{name_some(changed)} in {target} changed since the last delivery, which would be replaced.",
-            "Move what you want to keep to another folder, or deliver again with Replace Changed Files "
-            "(--replace) to give it up.",
+            f"Files in {target} were changed since the last delivery: {name_some(changed)}.",
+            "Move them to another folder, or deliver again with Replace Changed Files (--replace) to overwrite them.",
         )
     new = {path.relative_to(plan.staged).as_posix() for path in plan.staged.rglob("*") if path.is_file()}
     blocked = sorted(name for name in new - delivered.keys() if (target / name).exists())
     if blocked:
         raise Problem(
-            f"{name_some(blocked)} in {target} is in the way: no delivery has put it there.",
-            "Move it to another folder, or deliver to another one.",
+            f"Files in {target} are in the way, which no delivery has put there: {name_some(blocked)}.",
+            "Move them to another folder, or deliver to another one.",
         )
 
 

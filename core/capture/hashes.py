@@ -102,7 +102,7 @@ def add_hashes(root: Path, entries: list) -> None:
     """Add the hashes that `list_hashes` listed to the cache. Raises ValueError or TypeError for anything else."""
     hashes = {(kind, os.path.join(root, path), size, when): digest for kind, path, size, when, digest in entries}
     if not all(isinstance(digest, str) for digest in hashes.values()):
-        raise ValueError("a hash is no text")
+        raise ValueError("a hash is not a text")
     for key, digest in hashes.items():
         _hashes.setdefault(key, digest)
 

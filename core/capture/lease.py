@@ -56,7 +56,7 @@ def check_lease(root: Path) -> None:
     if lease is not None and not lease.holds():
         raise Problem(
             "Another worker has taken this capture over while this one was asleep; nothing more was written here.",
-            "Look at what the other one does, and run again when it has ended: finished stages are kept.",
+            "Wait until the other one has ended, then run again: finished stages are kept.",
         )
 
 
