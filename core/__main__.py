@@ -187,20 +187,23 @@ def _delighters(options: argparse.Namespace) -> None:
 
 
 def _white(options: argparse.Namespace) -> None:
-    from .imaging.images import read_srgb  # these need OpenImageIO, OpenCV and torch
-    from .stages.solve import white_point
-
     capture = Capture(options.capture)
     if bool(options.frame) != bool(options.at):
         raise Problem(
             "--frame and --at go together.",
             "Name a frame and a pixel of the card in it, or neither to look for a ColorChecker.",
         )
+    if options.frame and not (capture.frames / options.frame).is_file():
+        raise Problem(
+            f"There is no frame {capture.frames / options.frame}.",
+            "Name one of the pictures in the capture's frames folder.",
+        )
+    from .imaging.images import read_srgb  # these need OpenImageIO, OpenCV and torch
+    from .stages.solve import white_point
+
     if options.frame:
-        path = capture.frames / options.frame
-        if not path.is_file():
-            raise Problem(f"There is no frame {path}.", "Name one of the pictures in the capture's frames folder.")
-        white = white_point.measure_card_white(read_srgb(path), *options.at, options.card).tolist()
+        pixels = read_srgb(capture.frames / options.frame)
+        white = white_point.measure_card_white(pixels, *options.at, options.card).tolist()
     else:
         report = Reporter("white_point")
         white_point.run(capture, settings.Settings(), report)

@@ -94,8 +94,13 @@ def test_run_until_then_on_with_options_that_reach_the_stages(tiny, capture, fil
     begun = core(tiny, "run", film, capture.root, "--until", "cameras", "--quality", "draft")
     assert begun.returncode == 0 and "Cameras      done in" in begun.stdout and "Scan" not in begun.stdout, begun.stderr
     assert "report.html" in begun.stdout.splitlines()[-1] and capture.report.is_file()
-    words = "--skin-tone 0.6,0.5,0.4 --delighter folder --seed 0 --quality draft".split()
-    ended = core(tiny, "run", "-", capture.root, *words, "--folder", place, "--prior", place)
+    words = [
+        *"--skin-tone 0.6,0.5,0.4 --delighter folder --seed 0 --quality draft --folder".split(),
+        place,
+        "--prior",
+        place,
+    ]
+    ended = core(tiny, "run", "-", capture.root, *words)
     assert ended.returncode == 0 and "Frames       unchanged" in ended.stdout, ended.stderr
     assert "4K Maps      done in" in ended.stdout
     solve, delight = (capture.read()["stages"][name]["settings"] for name in ("solve", "delight"))
@@ -104,21 +109,7 @@ def test_run_until_then_on_with_options_that_reach_the_stages(tiny, capture, fil
     assert (delight["delighter"], delight["folder"]) == ("folder", "../mine"), "it travels with the capture"
     status = core(tiny, "status", capture.root).stdout
     assert str(film) in status and status.count("done") == len(stages.STAGES)
-    forced = core(
-        tiny,
-        "run",
-        film,
-        capture.root,
-        *words,
-        "--folder",
-        place,
-        "--prior",
-        place,
-        "--from",
-        "delight",
-        "--until",
-        "delight",
-    )
+    forced = core(tiny, "run", film, capture.root, *words, "--from", "delight", "--until", "delight")
     assert forced.stdout.count("done in") == 1
 
 
