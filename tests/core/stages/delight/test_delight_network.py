@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighting network and what surrounds it: its input, two answers put together, division, training that goes on."""
+"""The delighting network and what surrounds it: its input, two answers put together, and division."""
 
 import importlib
 import json
@@ -8,22 +8,15 @@ import json
 import cv2
 import numpy as np
 import pytest
-import torch
 
-from core.capture.messages import Problem, Reporter
-from core.geometry.meshes import vertex_normals
+from core.capture.messages import Problem
 from core.imaging import images
 from core.stages.delight.evening import ShadingEstimate
 from core.stages.delight.lit_head import MAX_ALBEDO
 from core.stages.delight.network import WEIGHTS, crop, divide, load_network, square_around
 from core.stages.delight.second_opinion import Weighing, continue_beyond, weigh_in
-from core.stages.delight.unet import CHANNELS, SIDE_PX, DelightNet, network_input
-from research.people import olat, sight
-from research.people.identities import reserved_seeds, subject_mesh
-from research.training import delighter, people
-from research.training.descent import TrainingRun
-
-QUIET = Reporter("train", emit=lambda message: None)
+from core.stages.delight.unet import network_input
+from research.people.identities import reserved_seeds
 
 
 def test_a_crop_finds_a_place_again():
@@ -54,13 +47,6 @@ def test_geometry_enters_as_what_it_leaves_unexplained():
     layers, _ = network_input(srgb, light, light, np.zeros((64, 64, 3), np.float32), head)
     assert layers[6:12, :, :32] == pytest.approx(1, abs=1e-3)
     assert not layers[6:12, :, 32:].any() and layers[15, 0, 0] == 1
-
-
-def test_an_untrained_network_says_nothing_and_sees_any_size():
-    net = DelightNet([16, 16, 16, 16], [1, 1, 1, 1])
-    for side in (64, 96):
-        shading, shadow = net(torch.randn(1, CHANNELS, side, side))
-        assert shading.shape == (1, 3, side // 2, side // 2) and not shading.any() and not shadow.any()
 
 
 def test_beyond_the_square_the_fitted_light_takes_over_at_the_same_level():
@@ -127,52 +113,3 @@ def test_two_answers_are_weighed_by_how_far_they_lie_apart_over_the_skin_of_a_ca
         assert both.shading[12:16, :28] == pytest.approx(weight, rel=0.01, abs=0.01)
         assert not both.shading[:, 28:].any(), "off the head"
     assert weigh_in([look], [answer], [0 * skin], weighing) == [look], "no skin tells the level"
-
-
-CONFIG = {
-    "model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1]},
-    "training": dict(pairs=1, echo=2, rate=1e-3, minutes=1, skins=1, people=1, views=1, held_out=1, seed=0, workers=0),
-}
-
-
-def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
-    def prepare_here(seeds, views, work, *rest):
-        for seed in seeds:
-            if not people.is_prepared(seed, views, work):
-                people._prepare_one((seed, views, work))
-
-    monkeypatch.setitem(delighter.CONFIGS, "cpu", CONFIG)
-    monkeypatch.setattr(delighter, "prepare", prepare_plain_sights)
-    # here and of small maps; that processes of their own prepare people is tested in test_people_portraits.py
-    monkeypatch.setattr(delighter, "prepare_people", prepare_here)
-    monkeypatch.setattr(people, "TEXELS", 256)
-    out, work = tmp_path / "out.safetensors", tmp_path / "work"
-
-    def train(name, *run, **options):
-        return delighter.train_delighter("cpu", tmp_path / name, QUIET, TrainingRun(*run, work=work, **options))
-
-    with pytest.raises(Problem, match="no people"):
-        train(out.name, growing=True)
-    first, second = train(out.name, 0.01), train(out.name, 0.02)
-    assert second["steps"] > first["steps"] > 0 and second["started"] == "random weights" and len(second["people"]) == 1
-    (work / "state.pt").unlink()
-    assert train("third.safetensors", 0.01, start=out)["started"] == "the weights before"
-    assert json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["held_out"]["none"] > 0
-    assert not set(second["seeds"]) & set(second["held_out_seeds"])
-
-
-def prepare_plain_sights(seeds, views, work, *rest):
-    """Sights of subjects with plain skin: what `prepare` makes in seconds, in tenths of one."""
-    for seed in seeds:
-        place = work / f"subject_{seed}"
-        if place.is_dir():
-            continue
-        place.mkdir(parents=True)
-        mesh, rng = subject_mesh(seed), np.random.default_rng(seed)
-        visible = np.ones((len(mesh.vertices), olat.LIGHTS), bool)
-        stage = olat.LightStage(mesh, vertex_normals(mesh).astype(np.float32), visible)
-        np.save(place / "visible.npy", np.packbits(visible, axis=1))
-        plain = np.broadcast_to(np.float32([0, 0, 1]), (64, 64, 3))
-        view = sight.random_camera(sight.landmarks_of(stage), SIDE_PX, rng)
-        diffuse, gloss = np.full((64, 64, 3), 0.3, np.float32), np.full((64, 64), 0.03, np.float32)
-        sight.save(place / "0.npz", sight.trace_sight(stage, view, diffuse, gloss, plain, rng))

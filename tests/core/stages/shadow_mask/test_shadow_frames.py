@@ -15,7 +15,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 from core.settings.settings import from_json
 from core.stages.shadow_mask import run
-from core.stages.shadow_mask.frames import filtered, softening
+from core.stages.shadow_mask.frames import clean_mask, softening
 from core.stages.shadow_mask.lift import lift_shadows
 from tests.fixtures.lit_head import write_cameras
 from tests.fixtures.photographed_head import photograph
@@ -118,7 +118,7 @@ def test_a_frames_mask_loses_specks_and_pinholes():
     alpha = np.zeros((400, 300), np.float32)
     alpha[100:200, 100:200] = 0.9
     alpha[150, 150], alpha[300:303, 50:53] = 0, 1
-    mask = filtered(alpha, 0.5)
+    mask = clean_mask(alpha, 0.5)
     assert mask[150, 150] == 1 and mask[301, 51] == 0 and mask[120:180, 120:180].min() == 1
     assert mask.sum() == pytest.approx(10000, rel=0.02)
 

@@ -40,9 +40,9 @@ def proposed(texture: np.ndarray, dilate_px: float = 0) -> np.ndarray:
     bare = head.covered & (template.mask("scalp", SIZE) < 0.5)
     normals = raster.bleed(head.spread(head.normals), head.covered)
     evidence = ShadowEvidence(
-        texture, texture, normals, 1.0 - nowhere, bare, bare & FACE, plain_skin(SIZE), template.mask("brows", SIZE)
+        texture, texture, normals, bare, bare & FACE, plain_skin(SIZE), template.mask("brows", SIZE)
     )
-    return propose(evidence, nowhere, 0.5, dilate_px).mask
+    return propose(evidence, nowhere, 1.0 - nowhere, 0.5, dilate_px).mask
 
 
 def test_painted_shadow_is_found_and_the_mask_grows_with_the_setting():
