@@ -20,8 +20,7 @@ from ...geometry.raster import bleed, interpolate
 from ...imaging import images
 from ...light.skylight import ambient_occlusion, radiance_transfer
 from ...settings.settings import Settings
-from .frames import read_frame_shadows
-from .lift import lift_shadows
+from .frames import lift_shadows, read_frame_shadows
 from .occlusion import baked_occlusion
 from .residual import find_shadow
 from .snap import snap_to_edges

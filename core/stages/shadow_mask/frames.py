@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shadows in single frames: from the delighter, or from pictures whose shadows any tool has softened.
+"""Shadows in single frames, from the delighter or from pictures whose shadows any tool has softened, and in UV.
 
 The latter is the paper's way (appendix "Shadow Detection"; it softens by DiFaReli). Each frame's mask is thresholded,
-median filtered and freed of small regions before it is lifted.
+median filtered and freed of small regions before it is lifted to the texture.
 """
 
 from __future__ import annotations
@@ -15,8 +15,12 @@ import cv2
 import numpy as np
 
 from ...capture.capture import Capture
+from ...capture.messages import Reporter
+from ...face.head import Unfolded
 from ...geometry.frame_pictures import pictures_of, read_picture
+from ...geometry.raster import sample
 from ...geometry.views import View, read_views
+from ...geometry.visibility import points_in_view, silhouette_distance
 from ...imaging import images
 from ...settings.settings import Settings
 from .tidy import without_small_regions
@@ -28,6 +32,8 @@ UNTOUCHED_SHARE = 0.25  # share of the pixels, the least lightened, that are lit
 BLUR_SIDE_SHARE = 0.003  # deviation, of the longer side: a tool's pictures may lack the pores
 MEDIAN_SIDE_SHARE = 0.008  # window of the median filter, of the longer side
 SMALLEST_AREA_SHARE = 2e-4  # smaller regions are dropped, share of the frame
+GRAZING_COSINE = 0.2  # cosine of the steepest viewing angle that counts
+EDGE_SIDE_SHARE = 0.012  # distance to a silhouette from which a view counts in full, of the longer side
 
 
 @dataclass(frozen=True)
@@ -82,3 +88,19 @@ def clean_mask(alpha: np.ndarray, threshold: float) -> np.ndarray:
     mask = cv2.medianBlur(mask, max(3, round(MEDIAN_SIDE_SHARE * max(mask.shape)) | 1))
     mask = without_small_regions(mask, SMALLEST_AREA_SHARE * mask.size)
     return cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 0.7)
+
+
+def lift_shadows(head: Unfolded, count: int, masks: Iterable[tuple[View, np.ndarray]], report: Reporter) -> np.ndarray:
+    """Return the share of the views' votes for shadow, [S, S] in [0, 1], 0 where none votes.
+
+    Masks are [H, W] in [0, 1], `count` in all. A vote counts less at grazing angles and near silhouettes.
+    """
+    total, weight = np.zeros(len(head.points)), np.zeros(len(head.points))
+    for i, (view, mask) in enumerate(masks):
+        report.progress(count + 2 * i, 4 * count, "Lifting the frames' shadows")
+        visible, cosine, pixels = points_in_view(head.caster, view, head.points, head.normals, GRAZING_COSINE)
+        away = sample(silhouette_distance(head.caster, view, scale=0.25, slope=12), pixels[visible])
+        trust = cosine[visible] ** 2 * np.clip(away / (EDGE_SIDE_SHARE * max(view.width, view.height)), 0.02, 1)
+        total[visible] += trust * sample(mask, pixels[visible])
+        weight[visible] += trust
+    return head.spread(total / np.maximum(weight, 1e-6))

@@ -15,8 +15,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 from core.settings.settings import from_json
 from core.stages.shadow_mask import run
-from core.stages.shadow_mask.frames import clean_mask, softening
-from core.stages.shadow_mask.lift import lift_shadows
+from core.stages.shadow_mask.frames import clean_mask, lift_shadows, softening
 from tests.fixtures.lit_head import write_cameras
 from tests.fixtures.photographed_head import photograph
 from tests.fixtures.shadowed_skin import SHADOW, SIZE, SKIN, blob, cheek, overlap, shaded, surface
