@@ -18,7 +18,7 @@ from core.capture.hashes import hash_value
 from core.capture.messages import CancelledError, Problem, Reporter
 from core.face.faces import Face
 from core.imaging import images
-from core.settings.settings import DelightSettings, from_json
+from core.settings.settings import from_json
 from core.stages.delight.face_crop import cut_face, face_mask, ffhq_alignment, put_face_back
 from research.people.painted_head import photograph, place_camera
 
@@ -87,12 +87,12 @@ def test_names_and_shapes_are_the_published_ones(monkeypatch):
         assert (len(shapes), hash_value(shapes)) == (count, answer)
 
 
-def test_a_known_answer(checkpoint):
+def test_a_known_answer_with_both_files_and_with_the_first(tmp_path, checkpoint):
     """Found the same, to 1e-6, by a second implementation in plain functions that is not kept."""
     picture = torch.from_numpy(np.random.default_rng(1).random((1, 3, 96, 96), np.float32))
-    networks = load(str(checkpoint))
-    for chosen, answer in ((networks._replace(enhancer=None), WITHOUT_ENHANCER), (networks, WITH_ENHANCER)):
-        found = room.delight_crop(chosen, picture)
+    (tmp_path / BASE).write_bytes((checkpoint / BASE).read_bytes())
+    for path, answer in ((tmp_path / BASE, WITHOUT_ENHANCER), (checkpoint, WITH_ENHANCER)):
+        found = room.delight_crop(load(str(path)), picture)
         assert found.shape == picture.shape and found.min() >= 0 and found.max() <= 1
         assert found[0, :, ::48, ::48].flatten().numpy() == pytest.approx(answer, abs=1e-4)
 
@@ -144,9 +144,12 @@ def frames(monkeypatch, folder, pictures):
     monkeypatch.setattr(room, "CROP_PX", 64)
 
 
+def settings_of(checkpoint):
+    return from_json({"delight": {"delighter": "opendelight", "checkpoint": str(checkpoint)}})
+
+
 def run(folder, checkpoint, report):
-    settings = from_json({"delight": {"delighter": "opendelight", "checkpoint": str(checkpoint)}})
-    return list(room.opendelight(Capture(folder), settings, report))
+    return list(room.opendelight(Capture(folder), settings_of(checkpoint), report))
 
 
 def test_frames_with_a_face_are_delit_and_others_left_out(tmp_path, monkeypatch, checkpoint, portrait):
@@ -155,6 +158,8 @@ def test_frames_with_a_face_are_delit_and_others_left_out(tmp_path, monkeypatch,
     results = run(tmp_path, checkpoint, report)
     assert [result.view.name for result in results] == ["00000.png", "00002.png"]
     assert report.figures == {"frames_without_face": 1, "detail_enhanced": True}
+    alone, shadow = room.delight_photograph(images.read_srgb(results[0].view.path), settings_of(checkpoint).delight)
+    assert np.array_equal(alone, results[0].image) and shadow is None
     changed = np.abs(results[0].image - portrait).max(-1) > 0.02
     rows, columns = (np.flatnonzero(changed.any(axis)) for axis in (1, 0))
     assert results[0].shadow is None and results[0].image.shape == portrait.shape and 0.05 < changed.mean() < 0.5
@@ -166,7 +171,7 @@ def test_a_picture_without_a_face_is_a_problem(tmp_path, monkeypatch, checkpoint
     with pytest.raises(Problem, match="no face"):
         run(tmp_path, checkpoint, Reporter("delight"))
     with pytest.raises(Problem, match="no face"):
-        room.delight_photograph(np.full_like(portrait, 0.4), DelightSettings(checkpoint=str(checkpoint)))
+        room.delight_photograph(np.full_like(portrait, 0.4), settings_of(checkpoint).delight)
 
 
 def test_a_cancel_is_heard_inside_a_frame(tmp_path, monkeypatch, checkpoint, portrait):
@@ -174,17 +179,6 @@ def test_a_cancel_is_heard_inside_a_frame(tmp_path, monkeypatch, checkpoint, por
     calls = iter([False] * 20)
     with pytest.raises(CancelledError):
         run(tmp_path, checkpoint, Reporter("delight", cancelled=lambda: next(calls, True)))
-
-
-def test_a_photograph_alone(monkeypatch, checkpoint, portrait):
-    monkeypatch.setattr(room, "CROP_PX", 64)
-    image, shadow = room.delight_photograph(portrait, DelightSettings(checkpoint=str(checkpoint)))
-    assert image.shape == portrait.shape and shadow is None and np.abs(image - portrait).max() > 0.05
-
-
-def test_without_the_second_file_the_detail_is_not_enhanced(tmp_path, checkpoint):
-    (tmp_path / BASE).write_bytes((checkpoint / BASE).read_bytes())
-    assert load(str(tmp_path / BASE)).enhancer is None and load(str(checkpoint)).enhancer is not None
 
 
 def without(state: dict, name: str) -> dict:

@@ -15,7 +15,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 from core.settings.settings import from_json
 from core.stages.shadow_mask import run
-from core.stages.shadow_mask.frames import clean_mask, lift_shadows, softening
+from core.stages.shadow_mask.frames import clean_mask, lift_shadows, read_frame_shadows, softening
 from tests.fixtures.lit_head import write_cameras
 from tests.fixtures.photographed_head import photograph
 from tests.fixtures.shadowed_skin import SHADOW, SIZE, SKIN, blob, cheek, overlap, shaded, surface
@@ -69,6 +69,8 @@ def proposal(capture: Capture, **settings) -> tuple[np.ndarray, dict]:
 def test_the_delighters_shadows_become_the_proposal_and_the_clean_texture_has_none(capture):
     mask, figures = proposal(capture)
     assert mask.max() < 0.1 and figures["frames_judged_by"] == "nothing"
+    network = from_json({"delight": {"delighter": "network"}})
+    assert read_frame_shadows(capture, network).source == "texture", "it does not look for a sun by itself"
     write_shadows(capture, ON_CHEEK)
     mask, figures = proposal(capture)
     assert overlap(mask, ON_CHEEK) > 0.75 and figures["frames_judged_by"] == "shading"
