@@ -64,28 +64,33 @@ def refine(
             targets.append(target)
     if not targets or steps < 1:
         return log_texture, {}
-    rng = np.random.default_rng(0)
     covered = surface.covered_at(len(log_texture))
     start = _tensor(raster.bleed(log_texture, covered), device)  # [1, 3, S, S]
-    change = torch.zeros_like(start, requires_grad=True)
-    optimiser = torch.optim.Adam([change], lr=LEARNING_RATE, betas=(0.8, 0.99))
-    schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / steps))
     checks = [_tile(target, np.random.default_rng(1), device) for target in targets[:: max(1, len(targets) // 4)]]
     before = _losses(start, checks, features, report)
-    order = np.concatenate([rng.permutation(len(targets)) for _ in range(-(-steps // len(targets)))])[:steps]
-    for step, index in enumerate(order):
-        report.progress(step, steps, f"perceptual step {step + 1} of {steps}")
-        optimiser.zero_grad()
-        _loss(start + change, _tile(targets[index], rng, device), features).backward()
-        optimiser.step()
-        schedule.step()
-    moved = change.detach()[0].cpu().numpy().transpose(1, 2, 0)
+    moved = _optimise(start, targets, features, steps, report)
     scale = len(log_texture) / 1024
     fine = moved - blurred(moved, covered.astype(np.float32), KEPT_SIGMA_TEXELS * scale)
     fine *= cv2.GaussianBlur(face_mask.astype(np.float32), (0, 0), 4 * scale)[..., None] * covered[..., None]
     refined = log_texture + fine
     after = _losses(_tensor(raster.bleed(refined, covered), device), checks, features, report)
     return refined.astype(np.float32), {"before": before, "after": after}
+
+
+def _optimise(start: Tensor, targets: list[Target], features: Features, steps: int, report: Reporter) -> np.ndarray:
+    """Return the change [S, S, 3] of a log texture [1, 3, S, S] that lowers the loss, by a random tile per step."""
+    rng = np.random.default_rng(0)
+    change = torch.zeros_like(start, requires_grad=True)
+    optimiser = torch.optim.Adam([change], lr=LEARNING_RATE, betas=(0.8, 0.99))
+    schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / steps))
+    order = np.concatenate([rng.permutation(len(targets)) for _ in range(-(-steps // len(targets)))])[:steps]
+    for step, index in enumerate(order):
+        report.progress(step, steps, f"perceptual step {step + 1} of {steps}")
+        optimiser.zero_grad()
+        _loss(start + change, _tile(targets[index], rng, start.device), features).backward()
+        optimiser.step()
+        schedule.step()
+    return change.detach()[0].cpu().numpy().transpose(1, 2, 0)
 
 
 def _target(observation: UnwrappedView, surface: Unfolded, face_mask: np.ndarray) -> Target | None:
@@ -116,7 +121,7 @@ def _target(observation: UnwrappedView, surface: Unfolded, face_mask: np.ndarray
     return Target(picture, (texel / size * 2 - 1).astype(np.float32).reshape(*y.shape, 2), trust)
 
 
-def _tile(target: Target, rng: np.random.Generator, device: str) -> tuple[Tensor, Tensor, Tensor]:
+def _tile(target: Target, rng: np.random.Generator, device: str | torch.device) -> tuple[Tensor, Tensor, Tensor]:
     """Draw a part of a view around a trusted pixel, its sides at most TILE_PX.
 
     Returns picture [1, 3, t, t'], grid [1, RAYS_PER_SIDE t, RAYS_PER_SIDE t', 2], trust [1, 1, t, t'].
@@ -169,7 +174,7 @@ def _srgb(linear: Tensor) -> Tensor:
     return torch.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear.clamp(min=0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def _tensor(picture: np.ndarray, device: str) -> Tensor:
+def _tensor(picture: np.ndarray, device: str | torch.device) -> Tensor:
     """Convert [h, w(, C)] to [1, C, h, w]."""
     picture = np.atleast_3d(picture).transpose(2, 0, 1)
     return torch.from_numpy(np.ascontiguousarray(picture))[None].to(device)
