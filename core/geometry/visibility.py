@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Visibility of surface points in a view, and their distance to its silhouettes."""
+"""Visibility of surface points in a view and from the sun, and their distance to silhouettes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from .raster import RayCaster, render_view, visible_from
 from .views import View, lengths
+
+OFF_M = 1e-3  # distance at which rays towards the sun start off the surface
 
 
 def points_in_view(
@@ -24,6 +26,14 @@ def points_in_view(
     inside = ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)  # nan is not
     seen = np.flatnonzero(inside & (cosine > grazing_cosine))
     return seen[visible_from(caster, points[seen], normals[seen], view.centre)], cosine, pixels
+
+
+def reached_by_sun(caster: RayCaster, points: np.ndarray, normals: np.ndarray, sun: np.ndarray) -> np.ndarray:
+    """Return bool [N], True for surface points [N, 3] that face the direction [3] with nothing in between."""
+    reached = normals @ sun > 0
+    origins = points[reached] + OFF_M * normals[reached]
+    reached[reached] = ~caster.blocked(origins, np.repeat(sun[None], len(origins), 0))
+    return reached
 
 
 def silhouette_distance(caster: RayCaster, view: View, scale: float, slope: float) -> np.ndarray:

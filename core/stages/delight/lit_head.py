@@ -13,6 +13,7 @@ from ...face.head import Head
 from ...geometry.meshes import Mesh
 from ...geometry.raster import RayCaster, interpolate
 from ...geometry.views import View
+from ...geometry.visibility import reached_by_sun
 from ...light.skylight import radiance_transfer
 from ...light.sunlight import Light, fit_light
 from .surface import skin_weights, smooth_normals, vertex_colours
@@ -59,9 +60,9 @@ class LitHead:
         ambient = self.light.ambient(interpolate(self.transfer, self.mesh.faces, face, bary))
         free = np.zeros(face.shape)
         if self.light.has_sun:
-            facing = (face >= 0) & (normal @ self.light.sun > 0)
-            position = interpolate(self.mesh.vertices, self.mesh.faces, face, bary)[facing] + 1e-3 * normal[facing]
-            free[facing] = ~self.caster.blocked(position, np.repeat(self.light.sun[None], len(position), 0))
+            here = face >= 0
+            position = interpolate(self.mesh.vertices, self.mesh.faces, face, bary)[here]
+            free[here] = reached_by_sun(self.caster, position, normal[here], self.light.sun)
         return ambient, self.light.direct(normal), free, normal
 
 
@@ -96,18 +97,12 @@ def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.n
             "The selected frames show no bare skin of the face.",
             "Film the face from in front as well, or choose another delighter: Folder or None.",
         )
-    facing, origins = normals[skin], head.mesh.vertices[skin] + 1e-3 * normals[skin]
-
-    def reaches(direction: np.ndarray) -> np.ndarray:
-        free = facing @ direction > 0
-        free[free] = ~head.caster.blocked(origins[free], np.repeat(direction[None], free.sum(), 0))
-        return free.astype(float)
-
+    points, facing = head.mesh.vertices[skin], normals[skin]
     light, lit, inlier = fit_light(
         colours[skin],
         facing,
         transfer[skin],
-        reaches,
+        lambda sun: reached_by_sun(head.caster, points, facing, sun).astype(float),
         weights[skin],
         step=lambda done, of: report.progress(3 * of + done, 8 * of, "Fitting the light"),
     )

@@ -12,12 +12,12 @@ import numpy as np
 from ...capture.messages import Reporter
 from ...face.head import Unfolded
 from ...geometry.raster import interpolate
+from ...geometry.visibility import reached_by_sun
 from ...light.sunlight import fit_light, log_likelihood
 from .tidy import cohere
 
 FIT_TEXELS = 1200  # of skin that the light is fitted to
 FEWEST_TEXELS = 200  # with fewer nothing is fitted
-OFF_M = 1e-3  # distance at which rays start off the surface
 SUNLIT_PROBABILITIES = 0.05, 0.65  # of texels that the head itself hides from the sun, and of the others
 
 
@@ -45,7 +45,7 @@ def out_of_sun(
         colours[fit],
         head.normals[fit],
         transfer[fit],
-        lambda sun: _sees(head, fit, sun),
+        lambda sun: reached_by_sun(head.caster, head.points[fit], head.normals[fit], sun).astype(float),
         np.ones(len(fit)),
         lambda done, of: report.progress(2 * of + 3 * done, 8 * of, "Fitting the light"),
     )
@@ -55,16 +55,6 @@ def out_of_sun(
     sunlit = ambient + light.direct(head.normals)
     likely = log_likelihood(log - np.log(ambient)) - log_likelihood(log - np.log(sunlit))
     low, high = SUNLIT_PROBABILITIES
-    prior = low + (high - low) * _sees(head, np.arange(len(head.points)), light.sun)
+    prior = low + (high - low) * reached_by_sun(head.caster, head.points, head.normals, light.sun)
     odds = head.spread(np.clip(likely + 6 * (sensitivity - 0.5), -12, 12) - np.log(prior / (1 - prior)))
     return cohere(np.where(skin, odds, 0), judged)  # other texels than plain skin follow their neighbours
-
-
-def _sees(head: Unfolded, texels: np.ndarray, sun: np.ndarray) -> np.ndarray:
-    """Return 1 for covered texels [N] from which the head leaves the sun visible, else 0."""
-    facing = texels[head.normals[texels] @ sun > 0]
-    free = np.zeros(len(head.points))
-    free[facing] = ~head.caster.blocked(
-        head.points[facing] + OFF_M * head.normals[facing], np.repeat(sun[None], len(facing), 0)
-    )
-    return free[texels]

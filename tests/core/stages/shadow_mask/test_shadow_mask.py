@@ -14,6 +14,7 @@ from core.capture.files import write_json
 from core.capture.messages import Reporter
 from core.face import template
 from core.geometry import meshes, raster
+from core.geometry.visibility import reached_by_sun
 from core.imaging import images
 from core.light.skylight import ambient_occlusion, radiance_transfer
 from core.light.spherical_harmonics import sh_basis
@@ -113,7 +114,9 @@ def test_the_suns_shadow_is_found_by_the_filmed_texture_alone(monkeypatch, trans
     monkeypatch.setattr(sunless, "FIT_TEXELS", 250)
     head = surface(SMALL)
     sun = np.array([0.45, -0.70, 0.55]) / np.linalg.norm([0.45, -0.70, 0.55])
-    reached = head.spread(sunless._sees(head, np.arange(len(head.points)), sun)) * (blob(cheek(1), 0.11, SMALL) < 0.5)
+    reached = head.spread(reached_by_sun(head.caster, head.points, head.normals, sun)) * (
+        blob(cheek(1), 0.11, SMALL) < 0.5
+    )
     radiance = 0.9 * sh_basis(np.array([0.0, -0.5, 0.87]))[:, None] * [0.8, 0.9, 1.0] + 1.2 * np.eye(9)[:, :1]
     sky = np.maximum(raster.interpolate(transfer, head.mesh.faces, head.face, head.bary) @ radiance, 0.01)
     direct = (reached * np.maximum(head.spread(head.normals) @ sun, 0))[..., None] * [1.6, 1.4, 1.1]
