@@ -46,7 +46,7 @@ def _delight(view: View, head: LitHead) -> Delit:
 def light_in_frame(
     view: View, head: LitHead, srgb: np.ndarray
 ) -> tuple[tuple[slice, slice], np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return the part of a frame [H, W, 3] with the head, there the two of `light_seen`, and where the head is.
+    """Return the part of a frame [H, W, 3] with the head, the results of `light_seen` there, and the head's pixels.
 
     None if the frame does not show it.
     """
@@ -61,7 +61,7 @@ def light_in_frame(
 def light_seen(
     linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray, side: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the light that the fit expects in a linear picture [h, w, 3] which shows the head as a raster says.
+    """Return the light that the fit expects in a linear picture [h, w, 3] of the head with raster `face`, `bary`.
 
     That is the skin's linear colour [h, w, 3], continued past the head's edge, and the share of the sun [h, w] in [0,
     1]. side: the longer side of the frame in pixels, at the picture's scale.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shadows in single frames, from the delighter or from pictures whose shadows any tool has softened, and in UV.
+"""Shadows in single frames, from the delighter or from pictures whose shadows any tool has softened, lifted to UV.
 
 The latter is the paper's way (appendix "Shadow Detection"; it softens by DiFaReli). Each frame's mask is thresholded,
 median filtered and freed of small regions before it is lifted to the texture.
@@ -38,7 +38,7 @@ EDGE_SIDE_SHARE = 0.012  # distance to a silhouette from which a view counts in 
 
 @dataclass(frozen=True)
 class FrameShadows:
-    """Shadow masks float32 [H, W] in [0, 1] of single views, each read when its turn comes.
+    """Shadow masks float32 [H, W] in [0, 1] of single views, read one at a time.
 
     source: "softened" pictures, a delighter's name, "texture" if only the filmed texture can tell, or "" if the
     delighter looked for a sun and found none.
@@ -62,7 +62,7 @@ def read_frame_shadows(capture: Capture, settings: Settings) -> FrameShadows:
     figures = capture.read()["stages"].get("delight", {}).get("figures", {})
     delighter = str(figures.get("delighter", settings.delight.delighter))
     paths = {path.stem: path for path in (capture.delit / "shadow").glob("*.png")}
-    if not paths:  # Shading looks for a sun as the texture would be searched for one
+    if not paths:  # Shading has fitted a sun already
         return FrameShadows("" if delighter == "shading" else "texture")
     views = [view for view in read_views(capture) if view.path.stem in paths]
     masks = ((view, clean_mask(images.read_mask(paths[view.path.stem]), threshold)) for view in views)

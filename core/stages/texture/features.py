@@ -31,7 +31,7 @@ VGG_LAYERS = (0, 2, None, 5, 7, None, 10, 12, 14, None, 17, 19, 21, None, 24, 26
 
 @dataclass(frozen=True)
 class Features:
-    """A network on a device: `layers(picture [1, 3, h, w], sRGB in [0, 1])` returns tensors [1, C, h', w'].
+    """Network on a device: `layers(picture [1, 3, h, w], sRGB in [0, 1])` returns tensors [1, C, h', w'].
 
     weights: [C] per layer (None: all one); name: for reports.
     """

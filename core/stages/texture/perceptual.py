@@ -35,7 +35,7 @@ KEPT_SIGMA_TEXELS = 8.0  # in texels of a 1024 map: coarser changes are undone, 
 
 @dataclass
 class Target:
-    """A view's picture and where its rays meet the map, cut to the head."""
+    """Picture of a view, and where its rays meet the map, cut to the head."""
 
     picture: np.ndarray  # float32 [h, w, 3] sRGB
     grid: np.ndarray  # float32 [RAYS_PER_SIDE * h, RAYS_PER_SIDE * w, 2]: the map as grid_sample counts it, in [-1, 1]

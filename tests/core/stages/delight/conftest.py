@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture and a service for the tests of SwitchLight."""
+"""A capture and a service for the tests of SwitchLight, and a faster fit of light."""
 
 from importlib import import_module
 
@@ -8,9 +8,17 @@ import pytest
 
 from core.capture import consent, switchlight_api
 from core.capture.capture import Capture
+from core.light import sunlight
+from core.light.skylight import fibonacci_sphere
 from core.stages.delight.switchlight_line import Patience
 from tests.fixtures.switchlight_capture import make
 from tests.fixtures.switchlight_server import KEY, Service
+
+
+@pytest.fixture
+def brief_search(monkeypatch):
+    """A quarter of the directions in which the sun is searched: for tests in which it need not be found as surely."""
+    monkeypatch.setattr(sunlight, "fibonacci_sphere", lambda count: fibonacci_sphere(count // 4))
 
 
 @pytest.fixture

@@ -51,7 +51,7 @@ def deviation(capture: Capture, share: float) -> float:
     return float(np.quantile(np.abs(log - np.median(log, 0)).max(1), share))
 
 
-def test_light_of_the_sky_is_divided_out_of_two_profiles_that_share_hardly_any_skin(tmp_path):
+def test_light_of_the_sky_is_divided_out_of_two_profiles_that_share_hardly_any_skin(tmp_path, brief_search):
     """No point of the skin is seen twice, so those that one view alone shows tell the light."""
     capture = make(tmp_path / "two.wildcap", (-80, 80), (120, 160))
     render_frames(capture, NO_SUN)
@@ -64,7 +64,7 @@ def test_light_of_the_sky_is_divided_out_of_two_profiles_that_share_hardly_any_s
     assert not list((capture.delit / "shadow").glob("*.png"))  # no sun, so nothing was in shadow
 
 
-def test_sun_with_self_shadows_and_stripes_of_leaves_is_divided_out(tmp_path):
+def test_sun_with_self_shadows_and_stripes_of_leaves_is_divided_out(tmp_path, brief_search):
     """By the network; and the stripes are found by the delighter Shading, as its card says."""
     capture = make(tmp_path / "sun.wildcap", (-30, 0), (180, 240))
     render_frames(capture, SUN_COLOUR)

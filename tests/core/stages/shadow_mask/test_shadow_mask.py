@@ -16,7 +16,8 @@ from core.face import template
 from core.geometry import meshes, raster
 from core.geometry.visibility import reached_by_sun
 from core.imaging import images
-from core.light.skylight import ambient_occlusion, radiance_transfer
+from core.light import sunlight
+from core.light.skylight import ambient_occlusion, fibonacci_sphere, radiance_transfer
 from core.light.spherical_harmonics import sh_basis
 from core.settings.settings import from_json
 from core.stages.shadow_mask import ShadowEvidence, propose, run, share_on_edges, sunless
@@ -112,6 +113,7 @@ def transfer():
 
 def test_the_suns_shadow_is_found_by_the_filmed_texture_alone(monkeypatch, transfer):
     monkeypatch.setattr(sunless, "FIT_TEXELS", 250)
+    monkeypatch.setattr(sunlight, "fibonacci_sphere", lambda count: fibonacci_sphere(count // 4))
     head = surface(SMALL)
     sun = np.array([0.45, -0.70, 0.55]) / np.linalg.norm([0.45, -0.70, 0.55])
     reached = head.spread(reached_by_sun(head.caster, head.points, head.normals, sun)) * (
