@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from research.people.lifelike import eye_sights, figure, unlit
+from core.capture.messages import Reporter
+from research.people.lifelike import figure, unlit
 from research.people.lifelike.person import sample_person
+from research.training import eyes
 
 TINY = {"widths": [8, 8, 8, 8], "depths": [1, 1, 1, 1]}
-FIGURES, PARSER_VIEWS, EYE_VIEWS = (1000, 9000), 2, 4
+FIGURES, PARSER_VIEWS = (1000, 9000), 2
 
 
 @pytest.fixture(scope="session")
@@ -34,10 +36,12 @@ def parser_work(scene, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def eyes_work(scene, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("eyes")
-    for seed in FIGURES:
-        (folder / f"figure_{seed}").mkdir()
-        for view in range(EYE_VIEWS):
-            sight = eye_sights.see_eye(scene, view % 2 == 1, np.random.default_rng([seed, view]))
-            eye_sights.save(folder / f"figure_{seed}" / f"{view}.npz", sight)
+    folder, made = tmp_path_factory.mktemp("eyes"), []
+    options = eyes.CONFIGS["cpu"]["training"] | {"figures": 1, "held_out": 1, "poses": 1}
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setitem(eyes.CONFIGS, "cpu", {"model": TINY, "training": options})
+        patched.setattr(eyes, "make_figure", lambda person, texels: made.append(person) or scene.figure)
+        for _ in range(2):
+            eyes.prepare_figures("cpu", folder, Reporter("train", emit=lambda message: None))
+    assert len(made) == 2, "figures that are there are not made again"
     return folder

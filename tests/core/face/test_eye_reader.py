@@ -6,13 +6,11 @@ has never seen."""
 import numpy as np
 import pytest
 
-from core.capture.messages import Reporter
 from core.face import eye_reader
 from core.face.eye_reader import SIDE_PX
 from core.face.parts import cut
 from research.people.lifelike import eye_sights
 from research.training import eyes as training
-from tests.core.face.conftest import EYE_VIEWS, TINY
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +35,7 @@ def test_a_sight_knows_the_white_and_the_iris_of_the_eye_in_its_middle(sights):
     for sight, left in zip(sights, (False, True), strict=True):
         ball = sight.ball.astype(np.float32) / 255
         outer, inner = sight.corners
-        assert sight.left is left and (outer[0] > inner[0]) == left
+        assert bool(sight.left) is left and (outer[0] > inner[0]) == left
         assert np.abs((outer + inner) / 2 - eye_sights.SIZE / 2).max() < 1
         eyes = sight.unlit.shares[..., eye_sights.EYES] / 255.0
         assert (ball.sum(-1) <= eyes + 0.02).all(), "lashes belong to the eyes but not to the ball"
@@ -61,7 +59,7 @@ def test_an_example_is_a_right_eye(sights):
 
 def test_the_shipped_reader_sees_eyes_that_it_never_saw(eyes_work):
     rng, both = np.random.default_rng(6), np.zeros((2, 2))
-    for view in range(EYE_VIEWS):
+    for view in range(training.VIEWS):
         sight = eye_sights.load(eyes_work / "figure_9000" / f"{view}.npz")
         for _ in range(3):
             picture, ball = eye_sights.photograph_eye(sight, rng)
@@ -72,14 +70,3 @@ def test_the_shipped_reader_sees_eyes_that_it_never_saw(eyes_work):
                 both[k] += [((seen > 0.5) & (there > 0.5)).sum(), ((seen > 0.5) | (there > 0.5)).sum()]
     ball, iris = both[:, 0] / both[:, 1]
     assert ball > 0.65 and iris > 0.5, (ball, iris)
-
-
-def test_missing_figures_are_made_once_with_both_eyes(tmp_path, scene, monkeypatch):
-    options = training.CONFIGS["cpu"]["training"] | {"figures": 1, "held_out": 1, "poses": 1}
-    monkeypatch.setitem(training.CONFIGS, "cpu", {"model": TINY, "training": options})
-    made = []
-    monkeypatch.setattr(training, "make_figure", lambda person, texels: made.append(1) or scene.figure)
-    for _ in range(2):
-        training.prepare_figures("cpu", tmp_path, Reporter("train", emit=lambda message: None))
-    assert len(made) == 2 and training.is_prepared(1000, 1, tmp_path) and training.is_prepared(9000, 1, tmp_path)
-    assert [eye_sights.load(tmp_path / "figure_9000" / f"{view}.npz").left for view in range(4)] == [False, True] * 2

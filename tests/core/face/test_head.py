@@ -21,8 +21,8 @@ SIZE = 64
 STAGES = ("delight", "texture", "shadow_mask", "solve", "upscale", "transfer")
 SETTINGS = {
     "delight": {"delighter": "shading"},
-    "texture": {"size": 128},
-    "solve": {**SHORT, "skin_tone": "auto", "steps": 2},
+    "texture": {"size": 256},
+    "solve": {**SHORT, "skin_tone": "auto", "steps": 4},
     "transfer": {"scan": False},
     "upscale": {"size": 1024, "method": "lanczos"},
 }

@@ -93,7 +93,7 @@ def test_a_killed_training_continues_to_the_same_weights(reader, request, tmp_pa
     monkeypatch.setattr(descent, "time", SimpleNamespace(monotonic=lambda: 40.0 * next(ticks)))
     work = request.getfixturevalue("eyes_work" if reader.training is eyes else "parser_work")
     loss, weights = reader.training.loss, []
-    for kill in (None, 12):
+    for kill in (None, 9):
         folder, steps = tmp_path / str(kill), []
         folder.mkdir()
         for figure in work.glob("figure_*"):
@@ -106,14 +106,14 @@ def test_a_killed_training_continues_to_the_same_weights(reader, request, tmp_pa
             return loss(network, batch, device)
 
         monkeypatch.setattr(reader.training, "loss", counted)
-        run, out = TrainingRun(12, folder), folder / "out.safetensors"
+        run, out = TrainingRun(6, folder), folder / "out.safetensors"
         if kill:
             with pytest.raises(KeyboardInterrupt):
                 reader.train("cpu", out, QUIET, run)
         card = reader.train("cpu", out, QUIET, run)
         weights.append({name: value.clone() for name, value in reader.load(out).state_dict().items()})
-    assert card["steps"] == 18 and card["prepared"] == 1 and card["held_out"], card
+    assert card["steps"] == 9 and card["prepared"] == 1 and card["held_out"], card
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
     options["figures"] = 2
     with pytest.raises(Problem, match="other data"):
-        reader.train("cpu", out, QUIET, TrainingRun(12, folder, growing=True))
+        reader.train("cpu", out, QUIET, TrainingRun(6, folder, growing=True))

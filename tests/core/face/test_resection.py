@@ -200,7 +200,7 @@ def test_of_two_ways_the_one_that_places_more_frames_wins_unless_nothing_but_the
 def test_frames_that_did_not_fit_are_named_by_their_source(scene, time_s, source, blurred):
     model = model_of(dict(list(scene[1].items())[:3]), (FOCAL,))
     records = [
-        FrameRecord(f"{i}.jpg", source=f"IMG {i}.jpg", time_s=time_s, selected=True, sharpness=sharpness)
+        FrameRecord(name=f"{i}.jpg", source=f"IMG {i}.jpg", time_s=time_s, selected=True, sharpness=sharpness)
         for i, sharpness in enumerate((1.0, 1.0, 1.0, 0.1 if blurred else 1.0))
     ]
     report = Reporter("cameras")

@@ -3,12 +3,15 @@
 """Clean heads: cuts and folds are counted by Blender's own triangle test, mended, and open eyes do not pull the lids
 in."""
 
+import json
+
 import numpy as np
 import pytest
 
 from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.geometry import meshes
+from core.geometry.views import read_views
 from core.settings.settings import from_json
 from core.stages import registration
 from core.stages.registration import alignment, eyes, intersections, landmarks, quality
@@ -50,17 +53,42 @@ def test_a_head_that_cuts_itself_is_mended(seed):
     assert (moved > 0).mean() < 0.02 and moved.max() < 0.004, "all but the spot stays where it is"
 
 
-def test_open_eyes_do_not_pull_the_lids_in(tmp_path, monkeypatch):
-    model, truth, points, _ = known()
-    lids = registration._per_vertex(model.mesh, template.mask("eyes", 512))
-    changed, marks = _eyes_opened(truth, points, lids)
-    capture, report = scanned(tmp_path, monkeypatch, changed, marks, 0.35), Reporter("registration")
-    monkeypatch.setattr(landmarks, "onto_surface", lambda found, *_: found)
-    registration.run(capture, from_json({"registration": {"iterations": 5}}), report)
+@pytest.fixture(scope="module")
+def lids():
+    return registration._per_vertex(known().model.mesh, template.mask("eyes", 512))
+
+
+@pytest.fixture(scope="module")
+def registered(lids, tmp_path_factory):
+    """A capture with open eyes after the stage, and its report."""
+    changed, marks = _eyes_opened(known().truth, known().points, lids)
+    report = Reporter("registration")
+    with pytest.MonkeyPatch.context() as patched:
+        capture = scanned(tmp_path_factory.mktemp("Café") / "Müller.wildcap", patched, changed, marks, 0.35)
+        patched.setattr(landmarks, "onto_surface", lambda found, *_: found)
+        registration.run(capture, from_json({"registration": {"iterations": 5}}), report)
+    return capture, report
+
+
+def test_open_eyes_do_not_pull_the_lids_in(registered, lids):
+    capture, report = registered
     head = meshes.read_obj(capture.head)
-    assert np.percentile(np.linalg.norm(head.vertices - truth, axis=1)[lids > 0.9], 90) < 0.0004
+    assert np.percentile(np.linalg.norm(head.vertices - known().truth, axis=1)[lids > 0.9], 90) < 0.0004
     assert report.figures["flipped_triangles"] == 0 and report.figures["eye_opening"] == 0.35
     assert blenders(head.vertices, head.faces) == set()
+
+
+def test_the_stage_writes_a_head_of_the_frozen_topology(registered):
+    capture, report = registered
+    model, truth, points, _ = known()
+    head = meshes.read_obj(capture.head)
+    assert template.is_built_in(head) and report.figures["head_to_scan_median_mm"] < 0.5
+    follow = registration.weights_of(model)[0] > 0.5
+    assert np.median(np.linalg.norm(head.vertices - truth, axis=1)[follow]) < 0.001
+    stored = json.loads(capture.landmarks.read_text())
+    assert np.linalg.norm(np.array(stored["points"]["152"]) - points[152]) < 0.001
+    assert set(stored["images"]) == {view.name for view in read_views(capture)}
+    assert capture.picture("registration", "wireframe").is_file()
 
 
 def test_eyes_are_judged_from_the_front():
@@ -82,6 +110,8 @@ def test_the_missing_side_is_named():
     assert "right side" in text and "left side" not in text
     with pytest.raises(Problem, match="only 0 %"):
         quality.judge(report, head, scan, distances[:0], follow)
+    with pytest.raises(Problem, match="5 mm"):
+        quality.judge(report, head, scan, distances + 0.005, follow)
 
 
 def _eyes_opened(truth, points, lids):

@@ -2,22 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Registration against a known head: identity, pose, landmarks and scan are made, and must be found again."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 from core.capture.capture import Capture
 from core.capture.messages import Problem, Reporter
-from core.face import template
 from core.geometry import meshes
-from core.geometry.views import read_views
 from core.settings.settings import from_json
 from core.stages import registration
 from core.stages.registration import alignment, landmarks, nonrigid
 from core.stages.registration.correspondence import Scan
-from tests.fixtures.scanned_head import grey_views, known, scan_of, scanned
+from tests.fixtures.scanned_head import grey_views, known, scan_of
 
 
 def test_similarity_is_found_exactly():
@@ -66,28 +62,6 @@ def test_a_known_head_is_recovered():
     assert hole.sum() > 20 and error[hole].max() < 0.0015, "a hole in the scan is bridged"
     assert np.percentile(error[~face], 90) < 0.015, "ears, scalp and neck come along"
     assert not nonrigid.flipped_triangles(model.mesh.moved(truth), model.mesh.moved(vertices))
-
-
-def test_the_stage_writes_a_head_of_the_frozen_topology(tmp_path, monkeypatch):
-    model, truth, points, _ = known()
-    capture, report = scanned(tmp_path / "Café Müller.wildcap", monkeypatch), Reporter("registration")
-    registration.run(capture, from_json({"registration": {"iterations": 4}}), report)
-    head = meshes.read_obj(capture.head)
-    assert template.template_hash(head) == template.template_hash(template.load())
-    follow = registration.weights_of(model)[0] > 0.5
-    assert np.median(np.linalg.norm(head.vertices - truth, axis=1)[follow]) < 0.001
-    assert report.figures["flipped_triangles"] == 0 and report.figures["head_to_scan_median_mm"] < 0.5
-    stored = json.loads(capture.landmarks.read_text())
-    assert np.linalg.norm(np.array(stored["points"]["152"]) - points[152]) < 0.001
-    assert set(stored["images"]) == {view.name for view in read_views(capture)}
-    assert capture.picture("registration", "wireframe").is_file()
-
-
-def test_a_scan_of_something_else_is_a_problem(tmp_path, monkeypatch):
-    capture = scanned(tmp_path, monkeypatch, surface=known().truth + [0, 0.3, 0])
-    with pytest.raises(Problem, match="scan"):
-        registration.run(capture, from_json({"registration": {"iterations": 2}}), Reporter("registration"))
-    assert not capture.head.exists()
 
 
 def test_frames_without_a_face_are_a_problem(tmp_path):

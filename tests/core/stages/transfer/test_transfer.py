@@ -178,7 +178,7 @@ def capture(finished, tmp_path) -> Capture:
 
 
 def settings_of(**values):
-    return from_json({"transfer": {"size": 128, "scan_size": 256, "scan_detail_mm": 4.0, **values}})
+    return from_json({"transfer": {"size": 256, "scan_size": 256, "scan_detail_mm": 4.0, **values}})
 
 
 def test_the_scan_is_delivered_with_its_colours(capture):
