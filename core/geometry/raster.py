@@ -170,6 +170,20 @@ def render_view(caster: RayCaster, view: View, scale: float = 1.0) -> tuple[np.n
     return face, bary, distance
 
 
+def silhouette_distance(caster: RayCaster, view: View, scale: float, jump_px: float) -> np.ndarray:
+    """Return the pixels [H, W] to the nearest silhouette of the mesh in a view.
+
+    A silhouette is where the mesh ends or a nearer part of it hides a farther one: the distance jumps, within a 3 x 3
+    window of the picture at `scale`, by more than `jump_px` of that picture's pixels as wide as they are there.
+    """
+    _, _, distance = render_view(caster, view, scale)
+    depth = np.where(np.isfinite(distance), distance, 1e3)
+    footprint = 1 / (scale * view.camera.mean_focal_length())  # metres across a pixel, per metre of distance
+    jump = cv2.morphologyEx(depth.astype(np.float32), cv2.MORPH_GRADIENT, np.ones((3, 3))) > jump_px * footprint * depth
+    away = cv2.distanceTransform((~jump).astype(np.uint8), cv2.DIST_L2, 5) / scale
+    return cv2.resize(away, (view.width, view.height), interpolation=cv2.INTER_LINEAR)
+
+
 def _box(mesh: Mesh, view: View, width: int, height: int) -> tuple[slice, slice]:
     """The rows and columns of a picture of that size within which a view shows the mesh; all where a part of it lies
     behind the camera."""

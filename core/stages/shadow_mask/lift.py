@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import cv2
 import numpy as np
 
 from ...capture.messages import Reporter
 from ...face.head import Unfolded
-from ...geometry.raster import RayCaster, render_view, sample, visible_from
+from ...geometry.raster import sample, silhouette_distance, visible_from
 from ...geometry.views import View
 
 GRAZING_COSINE = 0.2  # cosine of the steepest angle under which a texel is judged
@@ -46,7 +45,7 @@ def lift_shadows(head: Unfolded, count: int, masks: Iterable[tuple[View, np.ndar
         )
         seen = seen[visible_from(head.caster, head.points[seen], head.normals[seen], view.centre)]
         inner = np.clip(
-            sample(_silhouette_distance(head.caster, view), pixels[seen])
+            sample(silhouette_distance(head.caster, view, 0.25, 12), pixels[seen])
             / (EDGE_SIDE_SHARE * max(view.width, view.height)),
             0.02,
             1,
@@ -55,13 +54,3 @@ def lift_shadows(head: Unfolded, count: int, masks: Iterable[tuple[View, np.ndar
         total[seen] += trust * sample(mask, pixels[seen])
         weight[seen] += trust
     return head.spread(total / np.maximum(weight, 1e-6))
-
-
-def _silhouette_distance(caster: RayCaster, view: View, scale: float = 0.25) -> np.ndarray:
-    """[H, W]: pixels to where the head ends or a nearer part of it hides a farther one."""
-    _, _, distance = render_view(caster, view, scale)
-    depth = np.where(np.isfinite(distance), distance, 1e3).astype(np.float32)
-    footprint = 1 / (scale * view.camera.mean_focal_length())  # metres across a pixel, per metre of distance
-    jump = cv2.morphologyEx(depth, cv2.MORPH_GRADIENT, np.ones((3, 3))) > 12 * footprint * depth
-    away = cv2.distanceTransform((~jump).astype(np.uint8), cv2.DIST_L2, 5) / scale
-    return cv2.resize(away, (view.width, view.height), interpolation=cv2.INTER_LINEAR)

@@ -16,6 +16,8 @@ from .held_picture import HeldPicture
 
 MARGIN_PX = (1.5, 12.0)
 """Pixels from a silhouette at which a texel starts to count, and counts in full."""
+JUMP_PX = 16
+"""Jump of the depth that is a silhouette, in pixels: across the two that 3 x 3 span, a surface at 83 degrees."""
 GRAZING_COSINE = 0.15
 """Cosine of the steepest viewing angle that counts."""
 POINTS_AT_ONCE = 1 << 18
@@ -83,7 +85,7 @@ def observe(
     """
     count, scale = len(surface.points), [picture.shape[1] / view.width, picture.shape[0] / view.height]
     pixels, quality, distance = np.empty((count, 2), np.float32), np.empty(count), np.empty(count)
-    seen, silhouette = np.empty(count, bool), _silhouette_distance(surface.caster, view)
+    seen, silhouette = np.empty(count, bool), raster.silhouette_distance(surface.caster, view, 0.5, JUMP_PX)
     for first in range(0, count, POINTS_AT_ONCE):
         chunk = slice(first, first + POINTS_AT_ONCE)
         xy, quality[chunk], distance[chunk], seen[chunk] = _look(view, surface, chunk, silhouette)
@@ -116,14 +118,3 @@ def _look(
     near, far = MARGIN_PX
     ramp = np.clip((margin - near) / (far - near), 0, 1)
     return xy, np.where(seen, np.clip((cosine - GRAZING_COSINE) / (1 - GRAZING_COSINE), 0, 1) * ramp, 0), distance, seen
-
-
-def _silhouette_distance(caster: raster.RayCaster, view: View, scale: float = 0.5) -> np.ndarray:
-    """[H, W]: pixels to the nearest depth jump (one part of the head before another, or before the background)."""
-    _, _, distance = raster.render_view(caster, view, scale)
-    footprint = 1 / (scale * view.camera.mean_focal_length())  # metres across a pixel, per metre of distance
-    depth = np.where(np.isfinite(distance), distance, 1e3)
-    # 3 x 3 spans two pixels: 83 degrees
-    jump = cv2.morphologyEx(depth.astype(np.float32), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 16 * footprint * depth
-    to_jump = cv2.distanceTransform((~jump).astype(np.uint8), cv2.DIST_L2, 5) / scale
-    return cv2.resize(to_jump, (view.width, view.height), interpolation=cv2.INTER_LINEAR)
