@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a few views tell of a head without a scan, as one kind of constraint: a point of the surface should move so far
-along a direction.
+"""Evidence of a few views as one kind of constraint: a point of the surface should move so far along a direction.
 
 A landmark in a picture constrains the two directions across its ray, a matched point the surface's normal, a silhouette
 the normal in the picture.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
@@ -20,20 +17,23 @@ from .alignment import HeadModel
 from .landmarks import Landmarks
 
 LEAST_COSINE, FULL_COSINE = 0.15, 0.45
-"""Cosines between a landmark's normal and its view: below the first it has slid onto the outline and says nothing, from
-the second on it counts fully."""
+"""Cosines between a landmark's normal and its view: below the first it has slid onto the outline and counts for
+nothing, from the second on it counts fully."""
 DEPTH_SHARE = 0.06
-"""What a depth taken from the mean head counts for beside a landmark's place in the picture: people differ from it by a
-centimetre, and a net's mark errs by 2.5 mm."""
+"""Weight of a depth taken from the mean head beside a landmark's place in the picture: people differ from it by a
+centimetre, a network's mark errs by 2.5 mm."""
 MOST_ANGLE_DEG = 60.0
-"""Between a matched point's mean viewing direction and the surface's normal: beyond, the point lies on something
-behind."""
+"""Maximum angle between a matched point's mean viewing direction and the surface's normal: beyond, the point lies on
+something behind."""
 
 
 @dataclass(frozen=True)
 class Constraints:
-    """M points of a mesh, at corners int64 [M, 3] with bary [M, 3], that should move by distance [M] (metres) along
-    unit direction [M, 3] in the world; weight [M] in [0, 1]: how far each is believed beside its like."""
+    """Points of a mesh that should move.
+
+    M points at corners int64 [M, 3] with bary [M, 3] should move by distance [M] (metres) along unit direction [M, 3]
+    in the world; weight [M] in [0, 1] relates points of a kind.
+    """
 
     corners: np.ndarray
     bary: np.ndarray
@@ -45,7 +45,7 @@ class Constraints:
         return len(self.distance)
 
     def at(self, vertex_values: np.ndarray) -> np.ndarray:
-        """Values of the vertices [..., V, C] at the points [..., M, C]."""
+        """Interpolate values of the vertices [..., V, C] at the points [..., M, C]."""
         return (vertex_values[..., self.corners, :] * self.bary[..., None]).sum(-2)
 
 
@@ -56,17 +56,11 @@ def joined(constraints: list[Constraints]) -> Constraints:
 def from_landmarks(
     model: HeadModel, vertices: np.ndarray, views: list[View], landmarks: Landmarks, trust: np.ndarray, reach: float
 ) -> Constraints:
-    """Two constraints per view and landmark that is seen squarely enough. A single view does not tell depths, so there
-    each landmark is also held, loosely, to the depth that it was lifted to.
+    """Constrain landmarks that are seen squarely enough, in two directions per view.
 
-    Parameters
-    ----------
-    model : the template
-    vertices : [V, 3], in metres, as the head lies now
-    views : cameras, in the same world
-    landmarks : with their pixels in the views
-    trust : [468] in [0, 1]
-    reach : metres; what misses by much more counts for little
+    A single view does not show depth, so there each landmark is also held, loosely, to the depth it was lifted to.
+    vertices [V, 3] in metres are the head's now; a landmark that misses by much more than `reach` metres counts for
+    little.
     """
     at = model.at_landmarks(vertices)
     normals = model.at_landmarks(vertex_normals(model.mesh.moved(vertices)))
@@ -101,16 +95,10 @@ def from_landmarks(
 
 
 def from_points(mesh: Mesh, follow: np.ndarray, points: np.ndarray, towards: np.ndarray, reach: float) -> Constraints:
-    """One constraint per matched point that lies near the part of the mesh that follows, on the side that the views it
-    was seen in look at.
+    """Constrain the mesh to matched points [N, 3] near its followed part, on the side that faces their views.
 
-    Parameters
-    ----------
-    mesh : in metres
-    follow : [V] in [0, 1], above 0.5 the part that follows
-    points : [N, 3], in metres
-    towards : [N, 3], unit, mean direction to the views that a point was seen in
-    reach : metres
+    follow [V] in [0, 1] weighs the vertices; towards [N, 3] is the unit mean direction to the views of a point;
+    distances beyond `reach` metres do not count.
     """
     if not len(points):
         return none()

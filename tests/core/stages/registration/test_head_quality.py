@@ -55,7 +55,7 @@ def test_a_head_that_cuts_itself_is_mended(seed):
 
 @pytest.fixture(scope="module")
 def lids():
-    return registration._per_vertex(known().model.mesh, template.mask("eyes", 512))
+    return registration._per_vertex(known().model.mesh, "eyes")
 
 
 @pytest.fixture(scope="module")

@@ -99,7 +99,7 @@ def test_only_positions_change_in_the_artists_file(tmp_path):
 def test_it_is_found_however_it_lies():
     turn = render_landmarks._turns()[7]
     mesh = template.load()
-    pose = render_landmarks._find_pose(mesh.moved(mesh.vertices @ turn * 37 + [500, -3, 20]), None)
+    pose = render_landmarks._find_pose(mesh.moved(mesh.vertices @ turn * 37 + [500, -3, 20]), Reporter("x"))
     assert np.allclose(pose.turn, turn)
 
 
@@ -168,4 +168,4 @@ def test_a_mesh_without_a_face_is_refused(monkeypatch):
     monkeypatch.setattr(render_landmarks, "_turns", lambda: [np.eye(3)])
     ball = trimesh.creation.icosphere(4, 1.0)
     with pytest.raises(Problem, match="No face was found"):
-        render_landmarks.find(meshes.Mesh(ball.vertices, ball.faces))
+        render_landmarks.find(meshes.Mesh(ball.vertices, ball.faces), Reporter("x"))

@@ -11,7 +11,7 @@ from core.capture.messages import Problem, Reporter
 from core.geometry import meshes
 from core.settings.settings import from_json
 from core.stages import registration
-from core.stages.registration import alignment, landmarks, nonrigid
+from core.stages.registration import alignment, intersections, landmarks, nonrigid
 from core.stages.registration.correspondence import Scan
 from tests.fixtures.scanned_head import grey_views, known, scan_of
 
@@ -61,7 +61,7 @@ def test_a_known_head_is_recovered():
     hole = beside < 0.010
     assert hole.sum() > 20 and error[hole].max() < 0.0015, "a hole in the scan is bridged"
     assert np.percentile(error[~face], 90) < 0.015, "ears, scalp and neck come along"
-    assert not nonrigid.flipped_triangles(model.mesh.moved(truth), model.mesh.moved(vertices))
+    assert not intersections.flipped(model.mesh.moved(truth), vertices).any()
 
 
 def test_frames_without_a_face_are_a_problem(tmp_path):
