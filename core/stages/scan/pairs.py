@@ -1,32 +1,24 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames are matched with each other: near enough to look alike, far enough to measure depth, from all around the
-head."""
-
-from __future__ import annotations
+"""Choice of frames to match: near enough to look alike, far enough to measure depth, from all around the head."""
 
 import numpy as np
 
 BASELINES_DEG = ((4.0, 9.0), (2.5, 14.0), (1.5, 30.0))
-"""Angles between two cameras as seen from the head, from the best range to what a handful of photographs leaves."""
+"""Angles between two cameras as seen from the head, from the best range to what a handful of photographs allows."""
 
 LEAST_ACROSS = 0.7
-"""Least share of the way between two cameras that must lie across their view, as of 45 degrees: along it, the second
-sees little but the same picture larger."""
+"""Minimum share of the way between two cameras that lies across their view, as of 45 degrees: along it, the second sees
+little but the same picture larger."""
 
 
 def choose_pairs(
     centres: np.ndarray, sharpness: np.ndarray, count: int, baselines: tuple = BASELINES_DEG
 ) -> list[tuple[int, int]]:
-    """Pairs of cameras, spread over the directions they look from. Wider or narrower baselines are taken only where the
-    best range leaves a direction without a pair.
+    """Choose at most `count` pairs of cameras, spread over the directions they look from.
 
-    Parameters
-    ----------
-    centres : [N, 3], of the cameras; the head lies at the origin
-    sharpness : [N]; the sharper, and those that lie side by side, are preferred
-    count : of pairs, at most
-    baselines : ranges of degrees between two cameras as the head sees them, the best first
+    centres [N, 3] are the cameras', the head lies at the origin. Sharper ones, and those side by side, are preferred.
+    baselines are ranges of degrees, the best first: others are used only where it leaves a direction without a pair.
     """
     directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
     first, second = np.triu_indices(len(centres), 1)

@@ -53,7 +53,7 @@ def photograph(yaw: float, pitch: float) -> tuple[splats.UndistortedFrame, np.nd
     colour = 0.5 + 0.22 * np.stack([np.sin(points @ w) for w in ([330, 0, 150], [-150, 0, 300], [200, 0, -280])], -1)
     picture = np.where(hit[..., None], colour.reshape(SIDE, SIDE, 3), 0.9).astype(np.float32)  # a white wall behind
     depth = np.where(hit, (distance / length).reshape(SIDE, SIDE), np.nan)
-    return splats.UndistortedFrame(picture, hit, rotation, centre, FOCAL, origin), depth
+    return splats.UndistortedFrame(rotation, centre, FOCAL, origin, picture, hit), depth
 
 
 @pytest.fixture(scope="module")
