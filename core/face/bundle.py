@@ -94,7 +94,7 @@ def place_by_landmarks(groups: list[dict], group_of: dict, names: list[str], pix
             projected = cv2.projectPoints(model.mean[trusted], turn, shift, matrix, None)[0][:, 0]
             total += np.median(np.linalg.norm(projected - pixels[name][trusted], axis=1)) / np.ptp(pixels[name][:, 0])
             poses.append((cv2.Rodrigues(turn)[0], shift[:, 0]))
-        # a face far away looks much the same through any lens
+        # a distant face looks much the same through any lens
         total += len(names) * 0.002 * (np.log(factor / PHONE_FOCAL_SHARE) / FOCAL_SIGMA_LOG) ** 2
         if best is None or total < best[0]:
             best = total, focal, poses

@@ -107,8 +107,8 @@ def detect(srgb: np.ndarray, last: Face | None = None) -> Face | None:
         face = _landmarks(image, _region_of_landmarks(last.landmarks))
         if face is not None and face.score > 0.6:
             return face
-    for margin in (0.0, 0.5):  # a face that fills the picture is found once it is made smaller
-        # the most prominent may be none: a print on a shirt
+    for margin in (0.0, 0.5):  # a face that fills the picture is found at a smaller size
+        # the most prominent may not be a face: a print on a shirt
         face = next(filter(None, (_landmarks(image, region) for region in _detect_regions(image, margin))), None)
         if face is not None:
             return _landmarks(image, _region_of_landmarks(face.landmarks)) or face
@@ -165,7 +165,7 @@ def _find_eye(image: np.ndarray, face: Face, corners: tuple[int, int], mirrored:
     from_, to = ends[::-1] if mirrored else ends
     side = EYE_CROP_EYE_WIDTHS * max(float(np.linalg.norm(to - from_)), 1.0)
     crop, to_crop = _crop(image, (*((from_ + to) / 2), side, np.arctan2(*(to - from_)[::-1])), 64)
-    # it knows right eyes
+    # the network knows right eyes only
     outputs = {points.size: points.reshape(-1, 3)[:, :2] for points in _run(_EYE, crop[:, ::-1] if mirrored else crop)}
     marks = np.concatenate([outputs[213][:16], outputs[15]])
     if mirrored:
@@ -270,7 +270,7 @@ def _crop(image: np.ndarray, region: tuple, size: int) -> tuple[np.ndarray, np.n
     c, s = np.cos(angle) * scale, np.sin(angle) * scale
     to_crop = np.array([[c, s, size / 2 - c * x - s * y], [-s, c, size / 2 + s * x - c * y]])
     source = image
-    if scale < 0.5:  # what warpAffine would alias
+    if scale < 0.5:  # warpAffine would alias
         blur = 0.5 / scale
         source = cv2.GaussianBlur(image, (0, 0), blur / 2) if blur < 4 else cv2.blur(image, (int(blur), int(blur)))
     return cv2.warpAffine(source, from_centres(to_crop), (size, size), flags=cv2.INTER_LINEAR), to_crop

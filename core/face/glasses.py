@@ -45,7 +45,7 @@ def band(srgb: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
         [turn, (np.array([WIDTH_PX / 2, HEIGHT_PX / 2 - BELOW_WIDTH_SHARE * WIDTH_PX]) - middle)[:, None]], 1
     )
     grey = np.ascontiguousarray(srgb @ np.float32([0.299, 0.587, 0.114]), np.float32)
-    if scale < 0.8:  # what the warp would alias
+    if scale < 0.8:  # the warp would alias
         grey = cv2.GaussianBlur(grey, (0, 0), 0.4 * float(np.sqrt(1 / scale**2 - 1)))
     return cv2.warpAffine(
         grey, from_centres(move), (WIDTH_PX, HEIGHT_PX), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
@@ -61,7 +61,7 @@ def describe(strip: np.ndarray) -> np.ndarray:
     turn = (np.arctan2(2 * askew, across - down) / 2 % np.pi) * DIRECTIONS / np.pi
     layers = []
     for sign, quarter in ((1, 0), (-1, DIRECTIONS / 2)):
-        # curved one way alone, as no step and no spot is
+        # curved in one direction only, unlike steps and spots
         line = np.maximum(sign * middle + apart - np.abs(sign * middle - apart), 0)
         for k in range(DIRECTIONS):
             off = np.abs((turn + quarter - k + DIRECTIONS / 2) % DIRECTIONS - DIRECTIONS / 2)

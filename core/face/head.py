@@ -17,10 +17,8 @@ from ..capture.eyes_record import read_eyes
 from ..capture.messages import Problem
 from ..capture.stages import advise_again
 from ..geometry import meshes, raster
-from ..geometry.meshes import Mesh
+from ..geometry.meshes import Mesh, unit
 from . import lids, template
-
-SHORTEST = 1e-9  # length under which an interpolated normal has no direction
 
 
 class Head:
@@ -63,7 +61,7 @@ class Head:
             raster.interpolate(attribute, self.mesh.faces, face[inside], bary[inside])
             for attribute in (self.mesh.vertices, self.normals)
         )
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), SHORTEST)
+        normals = unit(normals)
         return Unfolded(self, face, bary, _shared(points), _shared(normals))
 
 
@@ -131,7 +129,7 @@ def read_filmed_head(capture: Capture) -> Head:
     if not (capture.head_open.is_file() and capture.eyes.is_file()):
         return head
     opened = meshes.read_obj(capture.head_open)
-    if not lids.belongs_to(opened, head.mesh):  # another head.obj was put beside it
+    if not lids.belongs_to(opened, head.mesh):  # head.obj was replaced
         return head
     return FilmedHead(
         head.mesh,

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from ..geometry import meshes
+from ..geometry.meshes import unit
 from . import template
 
 SIGMA_M = 0.003  # typical distance of the network's landmark from the same point of a person's head
@@ -38,6 +39,6 @@ def template_landmarks() -> TemplateLandmarks:
     return TemplateLandmarks(
         at_landmarks(mesh.vertices),
         at_landmarks(template.identity()).astype(np.float64),
-        normals / np.linalg.norm(normals, axis=1, keepdims=True),
+        unit(normals),
         template.landmark_weights(),
     )

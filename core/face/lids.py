@@ -16,11 +16,11 @@ from . import eye_asset, template
 from .eye_asset import EyeAsset, turn_by, turn_towards
 
 CORNEA_BULGE_SHARE, CORNEA_ANGLE_RAD = 0.06, 0.52  # of the asset's eyeballs: share of the radius, radians
-CLEAR_M = 0.0004  # between ball and lid
-SAME_M = 1e-5  # what moved less stayed where it was
-DEEPEST_M = 0.003  # what lies deeper inside a ball is not before it
-FORWARD = np.array([0, -1.0, 0])  # where the face looks, in the head's axes
-REST_M = -0.003, 0.010  # how far an eyeball may lie behind the place that its surroundings give it
+CLEAR_M = 0.0004  # gap between ball and lid
+SAME_M = 1e-5  # maximum distance to count as unmoved
+DEEPEST_M = 0.003  # maximum depth of a point in a ball to push it out
+FORWARD = np.array([0, -1.0, 0])  # direction of the face in the head's axes
+REST_M = -0.003, 0.010  # range of an eyeball behind the place that its surroundings suggest
 
 
 @dataclass(frozen=True)

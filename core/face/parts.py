@@ -12,7 +12,7 @@ PARTS = ("skin", "lips", "brows", "beard", "hair", "eyes", "clothes", "backgroun
 """Classes of a pixel. Where hair grows, the skin between its roots counts as hair of that kind; lashes belong to the
 eyes, teeth to the lips, hands to the background."""
 GROWTHS = ("brows", "beard", "hair")  # parts that are hair; "hair" is the head's
-SIDE_PX = 192  # of the crop
+SIDE_PX = 192  # side of the crop
 MARGIN_FACE_HEIGHTS = 1.9  # side of the square in heights of the face's landmarks: hair and neck are in it
 BRIDGE, CHIN = 9, 152
 PRESENT_SHARE = 0.8
@@ -60,7 +60,7 @@ def cut(picture: np.ndarray, move: np.ndarray, side: int = SIDE_PX) -> np.ndarra
     """Cut the crop float32 [side, side(, C)] from a picture [H, W(, C)] by a map [2, 3]; 0 beyond the picture."""
     shrinks = 1 / np.hypot(*move[:, 0])
     source = np.ascontiguousarray(picture, np.float32)
-    if shrinks > 1.2:  # what the warp would alias
+    if shrinks > 1.2:  # the warp would alias
         source = cv2.GaussianBlur(source, (0, 0), 0.4 * float(np.sqrt(shrinks**2 - 1)))
     return cv2.warpAffine(source, from_centres(move), (side, side), flags=cv2.INTER_LINEAR)
 

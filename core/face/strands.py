@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.meshes import Mesh, unit, vertex_normals
 from ..geometry.noise import noise
 
 
@@ -63,8 +63,7 @@ class SkinSurface:
         distance, near = self.tree.query(points, 3)
         weight = 1 / (distance + 1e-4)
         weight /= weight.sum(1, keepdims=True)
-        normal = (weight[..., None] * self.normals[near]).sum(1)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        normal = unit((weight[..., None] * self.normals[near]).sum(1))
         foot = (weight[..., None] * self.vertices[near]).sum(1)
         return ((points - foot) * normal).sum(1), normal
 
@@ -89,7 +88,7 @@ def grow(
     points = [roots.position]
     for k in range(1, steps):
         way = way + np.broadcast_to(pull, way.shape) / (steps - 1)
-        way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+        way = unit(way)
         point = points[-1] + way * step
         height, normal = skin.height(point)
         short = np.maximum(clearance * min(1.0, 3 * k / (steps - 1)) - height, 0)[:, None]
@@ -150,10 +149,9 @@ def prisms(strands: Strands, sides: int = 3) -> Mesh:
     """
     points, radius = strands.points.astype(np.float64), strands.taper().astype(np.float64)
     count, knots = points.shape[:2]
-    way = np.gradient(points, axis=1)
-    way /= np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-12)
+    way = unit(np.gradient(points, axis=1))
     across = np.cross(way, np.where(np.abs(way[..., 2:]) < 0.9, [0, 0, 1.0], [1.0, 0, 0]))
-    across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-12)
+    across = unit(across)
     other = np.cross(way, across)
     turn = 2 * np.pi * np.arange(sides) / sides
     ring = np.cos(turn)[:, None] * across[:, :, None] + np.sin(turn)[:, None] * other[:, :, None]  # [M, K, sides, 3]

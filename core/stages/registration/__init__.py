@@ -101,7 +101,7 @@ def _subject(face_marks: landmarks.Landmarks, report: Reporter) -> Subject:
     if eyes.are_open(face_marks.opening):
         lids = _per_vertex(model.mesh, "eyes")
         report.log("The eyes are open: the lids follow the face around them, not the eyeballs.")
-        (follow, trust), shaped = eyes.spared(follow, trust, lids), eyes.spared(shaped, trust, lids)[0]
+        (follow, trust), shaped = eyes.spare_lids(follow, trust, lids), eyes.spare_lids(shaped, trust, lids)[0]
         trust = np.where(face_marks.by_artist, face_marks.trust, trust)
     return Subject(face_marks, model, follow, shaped, hold, trust)
 
@@ -110,7 +110,7 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     model, face_marks = subject.model, subject.landmarks
     evidence = _shown(capture, landmarks.spread(views, landmarks.MOST_VIEWS), subject, report)
     fitted = unscanned.fit(model, evidence, _progress(report, 10, 0.9 * STEPS))
-    head, aligned = _finished(model, fitted.pose, fitted.coefficients, fitted.vertices, report)
+    head, aligned = _complete(model, fitted.pose, fitted.coefficients, fitted.vertices, report)
     fit = quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0))
     quality.figures(report, model, fit, face_marks, subject.follow)
     quality.report_views(report, fitted, views, head)
@@ -171,7 +171,7 @@ def _by_scan(
     evidence = _shown(capture, [view for view in views if view.selected] or views, subject, report)
     vertices = unscanned.beyond_scan(model, vertices, on_scan, evidence, _progress(report, 0.6 * STEPS, 0.9 * STEPS))
 
-    head, aligned = _finished(model, pose, coefficients, vertices, report)
+    head, aligned = _complete(model, pose, coefficients, vertices, report)
     distances = scan.distances(head.vertices[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
     quality.figures(report, model, quality.HeadFit(head, aligned, coefficients, distances), face_marks, follow)
     quality.judge(report, head, scan, distances, follow, least_share)
@@ -184,7 +184,7 @@ def _progress(report: Reporter, first: float, end: float) -> Callable[[float, st
     return lambda share, text: report.progress(first + (end - first) * share, end, text)
 
 
-def _finished(
+def _complete(
     model: alignment.HeadModel,
     pose: alignment.Similarity,
     coefficients: np.ndarray,
@@ -200,12 +200,12 @@ def _finished(
         model.mesh.moved(bust.level_edge(model.mesh, pose.apply(shape)))
         for shape in (model.mesh.vertices, model.shape(coefficients))
     )
-    vertices = intersections.mended(
+    vertices = intersections.mend(
         placed, bust.level_edge(placed, vertices), lambda done: report.progress(90 + done, STEPS, "smoothing folds")
     )
     levelled = bust.level_edge(placed, vertices)
     turned = intersections.flipped(aligned, levelled).sum() > intersections.flipped(aligned, vertices).sum()
-    if not turned and not intersections.wrong(placed, levelled).any():
+    if not turned and not intersections.faulty_vertices(placed, levelled).any():
         vertices = levelled
     return model.mesh.moved(vertices), aligned
 

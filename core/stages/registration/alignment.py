@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry.meshes import Mesh, vertex_normals
-from .correspondence import Scan, trimmed
+from .correspondence import Scan, biweight
 
 LANDMARK_SIGMA_M = 0.002
 SCAN_SIGMA_M = 0.002  # distance of the identity space from a person; no scan is that bad
@@ -103,7 +103,7 @@ def fit_scan(
         # the identity space is no closer to a person than this
         reach = np.interp(step, [0, SCAN_ROUNDS - 1], [0.030, 0.010])
         signed, scan_normals = scan.match(vertices[index], normals, 1.5 * reach)
-        weight = trimmed(signed, reach) * shaped[index]
+        weight = biweight(signed, reach) * shaped[index]
         weight *= min(1.0, INDEPENDENT_COUNTS["scan"] / max(weight.sum(), 1)) / SCAN_SIGMA_M**2
         pose, coefficients = _step(
             model, pose, coefficients, points, trust, (index, np.nan_to_num(signed), scan_normals, weight)
@@ -134,10 +134,10 @@ def _step(model, pose, coefficients, points, trust, planes=None) -> tuple[Simila
         basis = model.identity[:, index] @ turn
         full = _jacobian(at, pose.translation, basis)  # [N, 3, P]
         rows.append(((full * normals[..., None]).sum(1), signed, weight))
-    return _solved(pose, coefficients, rows)
+    return _solve(pose, coefficients, rows)
 
 
-def stepped(pose: Similarity, coefficients: np.ndarray, constraints: list[tuple]) -> tuple[Similarity, np.ndarray]:
+def step_towards(pose: Similarity, coefficients: np.ndarray, constraints: list[tuple]) -> tuple[Similarity, np.ndarray]:
     """Take one such step for points that should move along directions.
 
     constraints holds for each kind of them the points [M, 3], their identity basis [K, M, 3] in the model's own frame,
@@ -147,10 +147,10 @@ def stepped(pose: Similarity, coefficients: np.ndarray, constraints: list[tuple]
     for at, basis, direction, distance, weight in constraints:
         full = _jacobian(at, pose.translation, basis @ (pose.scale * pose.rotation.T))
         rows.append(((full * direction[..., None]).sum(1), distance, weight))
-    return _solved(pose, coefficients, rows)
+    return _solve(pose, coefficients, rows)
 
 
-def _solved(pose: Similarity, coefficients: np.ndarray, rows: list[tuple]) -> tuple[Similarity, np.ndarray]:
+def _solve(pose: Similarity, coefficients: np.ndarray, rows: list[tuple]) -> tuple[Similarity, np.ndarray]:
     """Solve for rows (jacobian [M, 7 + K], residual [M], weight [M]) of each kind of data, and apply the step."""
     prior = np.concatenate([np.zeros(7), np.ones(len(coefficients))])
     normal_matrix, right = np.diag(prior + 1e-9), -prior * np.concatenate([np.zeros(7), coefficients])

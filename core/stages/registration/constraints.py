@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from .alignment import HeadModel
 from .landmarks import Landmarks
@@ -49,7 +49,7 @@ class Constraints:
         return (vertex_values[..., self.corners, :] * self.bary[..., None]).sum(-2)
 
 
-def joined(constraints: list[Constraints]) -> Constraints:
+def join(constraints: list[Constraints]) -> Constraints:
     return Constraints(*(np.concatenate([getattr(part, f.name) for part in constraints]) for f in fields(Constraints)))
 
 
@@ -63,8 +63,7 @@ def from_landmarks(
     little.
     """
     at = model.at_landmarks(vertices)
-    normals = model.at_landmarks(vertex_normals(model.mesh.moved(vertices)))
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    normals = unit(model.at_landmarks(vertex_normals(model.mesh.moved(vertices))))
     corners = model.mesh.faces[model.landmark_face]
     parts = [none()]
     for view in views:
@@ -72,15 +71,13 @@ def from_landmarks(
             continue
         pixels, used = landmarks.images[view.name]
         rays = view.rays(pixels)
-        towards = view.centre - at
-        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+        towards = unit(view.centre - at)
         facing = np.clip(((normals * towards).sum(1) - LEAST_COSINE) / (FULL_COSINE - LEAST_COSINE), 0, 1)
         weight = facing * used * trust * model.landmark_weight
         index = np.flatnonzero(weight > 0.01)
         along = ((at - view.centre) * rays).sum(1, keepdims=True)
         miss = (view.centre + along * rays - at)[index]
-        side = np.cross(rays[index], view.rotation[1])
-        side /= np.linalg.norm(side, axis=1, keepdims=True)
+        side = unit(np.cross(rays[index], view.rotation[1]))
         robust = weight[index] / (1 + (miss**2).sum(1) / reach**2) ** 2
         for direction in (side, np.cross(rays[index], side)):
             parts.append(
@@ -91,7 +88,7 @@ def from_landmarks(
             parts.append(
                 Constraints(corners[index], model.landmark_bary[index], rays[index], deeper, DEPTH_SHARE * robust)
             )
-    return joined(parts)
+    return join(parts)
 
 
 def from_points(mesh: Mesh, follow: np.ndarray, points: np.ndarray, towards: np.ndarray, reach: float) -> Constraints:

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Correspondence of template and scan: the nearest compatible patch, trimmed."""
+"""Correspondence of template and scan: the nearest compatible patch, with robust weights."""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 
-NEIGHBOURS = 8  # nearest samples of the scan that are looked at
-MOST_ANGLE_DEG = 45.0  # between the normals of partners
+NEIGHBOURS = 8  # samples of the scan in a patch
+MOST_ANGLE_DEG = 45.0  # maximum angle between the normals of partners
 
 
 class Scan:
@@ -34,8 +34,7 @@ class Scan:
         near = in_reach * np.exp(-0.5 * ((distance - distance[:, :1]) / (1.5 * self.spacing)) ** 2)
         total = np.maximum(near.sum(1, keepdims=True), 1e-12)
         centre = (self.points[index] * near[..., None]).sum(1) / total
-        normal = (self.normals[index] * near[..., None]).sum(1) / total
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        normal = unit((self.normals[index] * near[..., None]).sum(1) / total)
         compatible = in_reach[:, 0] & ((normal * normals).sum(1) > np.cos(np.radians(MOST_ANGLE_DEG)))
         sideways = np.linalg.norm(points - centre - ((points - centre) * normal).sum(1, keepdims=True) * normal, axis=1)
         compatible &= sideways < 3 * self.spacing  # beyond: past the rim of a hole
@@ -48,7 +47,7 @@ class Scan:
         return np.abs(signed[np.isfinite(signed)])
 
 
-def trimmed(signed: np.ndarray, least: float) -> np.ndarray:
+def biweight(signed: np.ndarray, least: float) -> np.ndarray:
     """Return Tukey's biweight [N] of signed distances, 0 for nan.
 
     Zero beyond three robust deviations, or `least` metres if that is more.

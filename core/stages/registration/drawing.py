@@ -55,7 +55,7 @@ def _eye(view: View, shares: EyeShares | None, opened: OpenHead, eye: int, side:
     srgb = view.read()
     scale = side / (2 * reach)
     full = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
-    # cv2 counts from pixel centres
+    # cv2's coordinates start at pixel centres
     move = np.column_stack([np.diag(scale / full), side / 2 - scale * middle + 0.5 * scale / full - 0.5])
     canvas = cv2.warpAffine(srgb.astype(np.float32), move, (side, side), flags=cv2.INTER_LINEAR)
 

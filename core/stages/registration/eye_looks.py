@@ -59,6 +59,6 @@ def _names_of(views: list[View], landmarks: Landmarks, side: int) -> set[str]:
         for view in views
         if view.name in landmarks.eyes and landmarks.images[view.name][1][list(CORNERS[side])].any()
     ]
-    # the right eye stands first there
+    # the right eye comes first there
     chosen = usable([(landmarks.eyes[name][0], landmarks.eyes[name][2 - side]) for name in names], side)
     return {names[i] for i in chosen}

@@ -88,7 +88,7 @@ def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: floa
 
     opening, height over width, is used for an eye without marks.
     """
-    head = _with_corners(head, rims)
+    head = _move_corners(head, rims)
     balls = tuple(_place(head, side, rims[side]) for side in (0, 1))
     clear = head.vertices
     for ball in balls:
@@ -111,7 +111,7 @@ def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: floa
     )
 
 
-def _with_corners(head: Mesh, rims: tuple) -> Mesh:
+def _move_corners(head: Mesh, rims: tuple) -> Mesh:
     """Move the corners of the eyes to their marks, and the face close around along with them."""
     vertices = head.vertices.copy()
     for rim, (outer, inner) in zip(rims, lids.corners(), strict=True):

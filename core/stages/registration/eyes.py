@@ -31,7 +31,7 @@ def are_open(usual: float) -> bool:
     return usual > OPEN_RATIO  # false for nan: closed is what the template is
 
 
-def spared(follow: np.ndarray, trust: np.ndarray, lids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def spare_lids(follow: np.ndarray, trust: np.ndarray, lids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return follow [V] and trust [468] for open eyes.
 
     The lids [V] (0 to 1) come along by stiffness, and the marks on their rims do not count.

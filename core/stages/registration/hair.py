@@ -14,7 +14,7 @@ from .landmarks import spread
 MOST_VIEWS = 12  # maximum number of views to parse, spread over all: the network is slow
 FACING_COSINE = 0.4  # minimum cosine between a surface and the direction to the camera
 HAIR_SHARE = 0.5  # share of the views facing a point that must show it as hair or cloth
-LEAST_LEFT_SHARE = 0.2  # minimum share of a scan to keep: less is a picture that the parser does not understand
+LEAST_SKIN_SHARE = 0.2  # minimum share of a scan to keep: less is a picture that the parser does not understand
 
 
 def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) -> Mesh:
@@ -34,7 +34,7 @@ def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) ->
     hidden = np.nan_to_num(share) > HAIR_SHARE
     skin = ~hidden[scan.faces].any(1)
     report.figure("hair_in_scan_percent", round(100 * float(1 - skin.mean()), 1))
-    return Mesh(scan.vertices, scan.faces[skin]) if LEAST_LEFT_SHARE < skin.mean() < 1 else scan
+    return Mesh(scan.vertices, scan.faces[skin]) if LEAST_SKIN_SHARE < skin.mean() < 1 else scan
 
 
 def hidden_share(

@@ -16,7 +16,7 @@ from ...geometry.meshes import Mesh, face_normals
 ROUNDS = 8  # maximum number of rounds, each of which smooths one more ring of neighbours
 
 
-def mended(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.ndarray:
+def mend(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.ndarray:
     """Return vertices [V, 3] without flipped or intersecting triangles, as far as ROUNDS go; all others stay.
 
     `placed` is the template at rest, brought over the head by a similarity: it must be clean itself.
@@ -27,7 +27,7 @@ def mended(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.nda
     vertices = vertices.copy()
     for rings in range(1, ROUNDS + 1):
         tick(rings)
-        folded = wrong(placed, vertices)
+        folded = faulty_vertices(placed, vertices)
         if not folded.any():
             break
         free = folded
@@ -67,7 +67,7 @@ def flipped(before: Mesh, vertices: np.ndarray) -> np.ndarray:
     return (face_normals(before) * face_normals(before.moved(vertices))).sum(1) < 0
 
 
-def wrong(placed: Mesh, vertices: np.ndarray) -> np.ndarray:
+def faulty_vertices(placed: Mesh, vertices: np.ndarray) -> np.ndarray:
     """Return the corners of triangles that are flipped or cut another, bool [V]."""
     corners = np.zeros(len(vertices), bool)
     corners[placed.faces[np.unique(intersecting(vertices, placed.faces))]] = True

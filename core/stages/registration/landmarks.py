@@ -9,7 +9,7 @@ import numpy as np
 
 from ...capture.messages import Problem, Reporter
 from ...face import faces, template
-from ...geometry.meshes import Mesh
+from ...geometry.meshes import Mesh, unit
 from ...geometry.raster import RayCaster
 from ...geometry.views import View
 from . import eyes
@@ -62,7 +62,7 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
     lifted = triangulate([view for view, _ in detections], np.stack([pixels for _, pixels in detections]))
     if not np.isfinite(lifted.points).any():  # a single view, or several from one side
         lifted = lift_alone(*min(detections, key=lambda pair: abs(eyes_of_frame[pair[0].name][0])))
-    # another person's eyes say nothing, nor does what the net guesses of a profile
+    # neither another person's eyes count nor the network's guess of a profile
     eyes_of_person = {name: eyes_of_frame[name] for name, (_, used) in lifted.images.items() if used.any()}
     return replace(
         lifted,
@@ -123,7 +123,7 @@ def lift_alone(view: View, pixels: np.ndarray) -> Landmarks:
     """
     mean, rays = template.landmark_points(template.load()), view.rays(pixels)
     across, size = np.eye(3) - np.outer(view.axis, view.axis), 1.0
-    for _ in range(3):  # what lies nearer or farther looks larger or smaller
+    for _ in range(3):  # depth changes the size in the picture
         points = view.centre + rays * ((size * mean - view.centre) * rays).sum(1, keepdims=True)
         size = float(
             np.linalg.norm((points - points.mean(0)) @ across) / np.linalg.norm((mean - mean.mean(0)) @ across)
@@ -154,7 +154,7 @@ def onto_surface(landmarks: Landmarks, views: list[View], mesh: Mesh, farthest: 
     points = np.where(
         (total > 0)[:, None], (hits * weights[..., None]).sum(1) / np.maximum(total, 1e-9)[:, None], landmarks.points
     )
-    for _ in range(8):  # towards the geometric median: one view's slip does not count
+    for _ in range(8):  # towards the geometric median: robust to one view's slip
         robust = weights / np.maximum(np.linalg.norm(hits - points[:, None], axis=-1), 5e-4)
         mean = (hits * robust[..., None]).sum(1) / np.maximum(robust.sum(1), 1e-9)[:, None]
         points = np.where((total > 0)[:, None], mean, landmarks.points)
@@ -208,16 +208,14 @@ def _facing(points: np.ndarray, origins: np.ndarray) -> np.ndarray:
     backwards[2] = 0
     middle = face + BEHIND_FACE_M * backwards / np.linalg.norm(backwards)
     outwards, towards = points - middle, origins - points[:, None]
-    outwards, towards = (x / np.linalg.norm(x, axis=-1, keepdims=True) for x in (outwards, towards))
+    outwards, towards = (unit(x) for x in (outwards, towards))
     least = np.cos(np.radians(70))
     return np.clip(((outwards[:, None] * towards).sum(-1) - least) / (1 - least), 0, 1)
 
 
 def _widest_angle(points: np.ndarray, origins: np.ndarray, used: np.ndarray) -> np.ndarray:
     """Return about the widest angle between two used rays [468], in radians: twice the largest from their mean."""
-    towards = origins - points[:, None]
-    towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
-    mean = (towards * used[..., None]).sum(1)
-    mean /= np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-12)
+    towards = unit(origins - points[:, None])
+    mean = unit((towards * used[..., None]).sum(1))
     cosines = np.where(used, (towards * mean[:, None]).sum(-1), 1)
     return 2 * np.arccos(np.clip(cosines.min(1), -1, 1))

@@ -5,6 +5,7 @@
 import cv2
 import numpy as np
 
+from ...geometry.meshes import unit
 from .eye_looks import EyeLook
 
 SMOOTH_M = 0.004  # length over which the curve's displacement is held together
@@ -80,7 +81,7 @@ def _borders(look: EyeLook, ball: np.ndarray, points: np.ndarray) -> tuple[np.nd
     following = np.roll(at, -1, 0)
     if (at[:, 0] * following[:, 1] - following[:, 0] * at[:, 1]).sum() < 0:
         normal = -normal
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+    normal = unit(normal)
     # to a pixel of the crop
     metres = depth / view.camera.mean_focal_length() / np.sqrt(abs(np.linalg.det(move[:, :2])))
     reach = REACH_M / np.median(metres)
@@ -93,8 +94,7 @@ def _borders(look: EyeLook, ball: np.ndarray, points: np.ndarray) -> tuple[np.nd
     nearest = ends[np.arange(len(at)), np.abs(ends).argmin(1)]
     across = normal @ np.linalg.inv(move[:, :2]).T
     direction = across[:, :1] * view.rotation[0] + across[:, 1:] * view.rotation[1]
-    ray = points - view.centre
-    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    ray = unit(points - view.centre)
     direction -= (direction * ray).sum(1, keepdims=True) * ray
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    direction = unit(direction)
     return direction, np.where(np.isfinite(nearest), nearest * metres, np.nan)

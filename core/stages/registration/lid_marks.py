@@ -17,9 +17,9 @@ from .irises import fit_iris
 from .lid_edges import SEEN_SIGMA_M, fit_edges
 
 MARKS_PER_EDGE = 9  # marks on each edge, from corner to corner
-LEAST_TOLD_SHARE = 0.5  # minimum share of the edges' points that a view must show
+LEAST_VISIBLE_SHARE = 0.5  # minimum share of the edges' points that a view must show
 RAYS_PER_SIDE = 2  # rays along the side of a pixel of the crop
-LEAST_SEEN_PX = 30  # minimum pixels of the crop that a ball must cover to locate its middle
+LEAST_BALL_PX = 30  # minimum pixels of the crop that a ball must cover to locate its middle
 OFFSET_SIGMA_M = np.array([0.004, 0.001, 0.004])
 """Deviation of a fitted head's eyes from the true ones, at most: sideways and in depth."""
 SLIP_M, ROUNDS = 0.0015, 8  # miss of one view that counts a quarter
@@ -50,11 +50,11 @@ def mark(looks: list[EyeLook], opened: lids.OpenHead, side: int, report: Reporte
     ball = opened.balls[side]
     offset = _offset(looks, _all_expected(looks, opened, side, np.zeros(3), report), ball.centre)
     iris, radius, shift = fit_iris(looks, replace(ball, centre=ball.centre + offset))
-    shift = offset + shift * [0, 1, 0]  # across the face the iris tells of the gaze as well
+    shift = offset + shift * [0, 1, 0]  # across the face the iris depends on the gaze as well
     edges = (edge + shift for edge in lids.edges(opened.skin.vertices, side))
     expected = _all_expected(looks, opened, side, shift, report)
     upper, lower, visible_share = fit_edges(looks, expected, *edges, ball.centre + shift)
-    if visible_share < LEAST_TOLD_SHARE:
+    if visible_share < LEAST_VISIBLE_SHARE:
         return None
     return LidMarks(_spread(upper), _spread(lower), iris, radius, len(looks))
 
@@ -86,7 +86,7 @@ def _offset(looks: list[EyeLook], expected: list[np.ndarray], centre: np.ndarray
     axes, misses = [], []
     for look, share in zip(looks, expected, strict=True):
         ball = look.shares.ball
-        if min(ball.sum(), share.sum()) < LEAST_SEEN_PX:
+        if min(ball.sum(), share.sum()) < LEAST_BALL_PX:
             continue
         middles = np.array([[(mask * x).sum() / mask.sum(), (mask * y).sum() / mask.sum()] for mask in (share, ball)])
         rays = look.view.rays(to_picture(middles, look.shares.move))

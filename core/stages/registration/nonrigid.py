@@ -14,9 +14,9 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from .alignment import HeadModel
-from .correspondence import Scan, trimmed
+from .correspondence import Scan, biweight
 
 STIFF_M, SOFT_M = 0.030, 0.0022  # length over which the displacement is held together, at the first and the last step
 BLIND_M = 0.020  # minimum of that length where the scan is not followed
@@ -70,15 +70,14 @@ def fit(
         normals = vertex_normals(model.mesh.moved(vertices))
         reach = FAR_M * (NEAR_M / FAR_M) ** ramp
         signed, scan_normals = scan.match(vertices, normals, 1.5 * reach)
-        data = trimmed(np.where(follow > 0.02, signed, np.nan), reach) * follow
+        data = biweight(np.where(follow > 0.02, signed, np.nan), reach) * follow
         aim = vertices + scan_normals * np.nan_to_num(signed)[:, None]
 
         at = marks @ vertices
         miss = np.nan_to_num(points - at)
-        surface = marks @ normals
-        surface /= np.linalg.norm(surface, axis=1, keepdims=True)
+        surface = unit(marks @ normals)
         scan_share = np.where(fixed, 0, marks @ data)[:, None]
-        miss -= scan_share * (miss * surface).sum(1, keepdims=True) * surface  # in depth the scan knows better
+        miss -= scan_share * (miss * surface).sum(1, keepdims=True) * surface  # in depth the scan is more precise
         robust = 1 / (1 + (np.linalg.norm(miss, axis=1) / 0.005) ** 2)
         pin = LANDMARK_AREA_M2[0] * (LANDMARK_AREA_M2[1] / LANDMARK_AREA_M2[0]) ** ramp * np.maximum(1, hold * ramp)
         pin = np.where(valid, pin * robust * trust * model.landmark_weight, 0)

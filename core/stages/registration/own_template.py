@@ -18,7 +18,7 @@ from ...capture.files import remove_file, write_json
 from ...capture.messages import Problem, Reporter
 from ...face import template
 from ...geometry import raster, surfaces
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...imaging import images
 from ...settings.settings import Settings
 from . import alignment, carried, nonrigid, own_mesh, render_landmarks
@@ -97,7 +97,7 @@ def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report:
     report.figure("own_flipped_triangles", fitted.flipped)
     images.write_srgb(
         capture.picture("registration", "own_template"),
-        _drawn(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]),
+        _draw(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]),
     )
 
 
@@ -108,13 +108,13 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     """
     whole, index = surfaces.welded(own.mesh)
     first = np.full(len(whole.vertices), -1)
-    first[index[::-1]] = np.arange(len(index))[::-1]  # an old vertex of each welded one
+    first[index[::-1]] = np.arange(len(index))[::-1]  # one original vertex of each welded one
     pose, landmarks, pictures = render_landmarks.find(_outwards(whole), report)
     whole = _outwards(whole.moved(render_landmarks.to_ours(whole.vertices, pose)))
     shapes = (own.shapes[:, first] @ pose.turn.T.astype(np.float32)) * np.float32(render_landmarks.FACE_M / pose.width)
 
     valid = np.flatnonzero(np.isfinite(landmarks.points).all(1))
-    points = landmarks.points[valid]  # any side of the surface will do
+    points = landmarks.points[valid]  # whichever way the surface faces
     at, bary = surfaces.Surface(whole, 0.004).find_nearest(
         points, np.tile([0.0, -1.0, 0.0], (len(points), 1)), 0.02, -1.0
     )
@@ -146,7 +146,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     follow = _follow(model, placed, coefficients, surface, eyes)
     if eyes:
         trust[LID_MARKS] = 0
-    start = _matched(model, placed.apply(model.shape(coefficients)), follow, head, ours, report)
+    start = _match_vertices(model, placed.apply(model.shape(coefficients)), follow, head, ours, report)
     vertices = nonrigid.fit(
         model,
         start,
@@ -192,7 +192,7 @@ def _require_laid(own: own_mesh.OwnMesh, distances: np.ndarray, drawn: int) -> N
         )
 
 
-def _matched(
+def _match_vertices(
     model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn, report: Reporter
 ) -> np.ndarray:
     """Return the placed skin [V, 3], each vertex moved to its place on the built-in head laid over it.
@@ -256,8 +256,7 @@ def _free_sky(mesh: Mesh, normals: np.ndarray, rays: int = 24) -> np.ndarray:
     directions = trimesh.sample.sample_surface(trimesh.creation.icosphere(3, 0.999), rays, seed=1)[0]
     caster, free = raster.RayCaster(mesh), np.zeros(len(normals))
     for direction in directions:
-        towards = normals + direction
-        towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
+        towards = unit(normals + direction)
         free += ~caster.blocked(mesh.vertices + 2e-4 * normals, towards)
     return free / rays
 
@@ -290,7 +289,7 @@ def _dense(head: Mesh) -> Mesh:
     return Mesh(vertices, faces)
 
 
-def _drawn(head: Mesh, own: Mesh, picture: np.ndarray, size: int = 480) -> np.ndarray:
+def _draw(head: Mesh, own: Mesh, picture: np.ndarray, size: int = 480) -> np.ndarray:
     """Draw the face as found, the built-in and the artist's head from the front, and the latter from the side."""
     shots = [images.resize(picture, size, size)]
     middle = np.nanmean(template.landmark_points(head), axis=0)

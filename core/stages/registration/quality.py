@@ -8,7 +8,7 @@ import numpy as np
 
 from ...capture.messages import Problem, Reporter
 from ...geometry import atlas
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from .alignment import HeadModel
 from .correspondence import Scan
@@ -138,11 +138,10 @@ def tell_draft(report: Reporter, views: list[View], head: Mesh) -> None:
 
 def views_apart(views: list[View], head: Mesh) -> int:
     """Return the number of views of which every two are at least APART_DEG apart as seen from the head."""
-    towards = np.stack([view.centre for view in views]) - head.vertices.mean(0)
-    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    towards = unit(np.stack([view.centre for view in views]) - head.vertices.mean(0))
     near = np.degrees(np.arccos(np.clip(towards @ towards.T, -1, 1))) < APART_DEG
     best = 0
-    for first in range(len(views)):  # the largest set is hard to find; greedy from every view is near enough
+    for first in range(len(views)):  # finding the largest set is hard; greedy from every view is close enough
         free, count = np.ones(len(views), bool), 0
         order = [first, *np.argsort(near.sum(1))]
         for i in order:

@@ -17,7 +17,7 @@ import pycolmap
 from ...capture.messages import Problem, Reporter
 from ...face import faces
 from ...geometry import raster
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from ...imaging import images
 from .landmarks import Landmarks, onto_surface, triangulate
@@ -75,7 +75,7 @@ def find(mesh: Mesh, report: Reporter) -> tuple[Pose, Landmarks, list[np.ndarray
         else:
             raise _no_face()
         landmarks = onto_surface(triangulate(views, np.stack(pixels)), views, posed)
-        colours = _painted(posed, landmarks.points)
+        colours = _paint(posed, landmarks.points)
     return pose, landmarks, pictures
 
 
@@ -104,7 +104,7 @@ def _find_pose(mesh: Mesh, report: Reporter) -> Pose:
                     lift, side = windows[window]
                     sighting = _look(caster, normals, turn, turn.T @ [0, 0, lift], side)
                     for portrait in PORTRAIT_SIDES_FACE_WIDTHS if sighting is not None else ():
-                        # looked at again in a picture of its own: what was no face is none any more
+                        # detect it again in a close-up, which rejects what is not a face
                         closer = _look(caster, normals, turn, sighting[1].face, portrait * sighting[1].width)
                         best = closer if closer is not None and closer[0] > best[0] else best
             if best[0] > SURE_SCORE:
@@ -148,8 +148,7 @@ def _look(
     points = view.centre + rays * np.where(hit >= 0, distance, np.nan)[:, None]
     posed = points @ turn.T
     width = np.nanmax(posed[:, 0]) - np.nanmin(posed[:, 0])
-    # a face is about as deep as it is wide: the back of a head, where nets see faces too, has no nose in front of its
-    # sides
+    # a face is about as deep as it is wide; the back of a head, where networks see faces too, has no nose
     bulge = np.nanmedian(posed[list(TEMPLES), 1]) - posed[faces.NOSE, 1]
     if not 0.2 < bulge / width < 1.4:
         return None
@@ -195,8 +194,7 @@ def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, v
     Surfaces are lit on the side that is seen; normals [V, 3] are unit, colours [V, 3] linear albedo.
     """
     face, bary, _ = raster.render_view(caster, view)
-    normal = raster.interpolate(normals, caster.mesh.faces, face, bary)
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+    normal = unit(raster.interpolate(normals, caster.mesh.faces, face, bary))
     normal *= np.where((normal @ view.axis) > 0, -1, 1)[..., None]
     key = -0.75 * view.axis - 0.55 * view.rotation[1] + 0.35 * view.rotation[0]
     key_light = np.clip(normal @ (key / np.linalg.norm(key)), 0, 1)
@@ -205,7 +203,7 @@ def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, v
     return images.linear_to_srgb(np.where((face >= 0)[..., None], colour * light[..., None], 0.2))
 
 
-def _painted(mesh: Mesh, points: np.ndarray) -> np.ndarray:
+def _paint(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     """Paint brows and lips inside the landmarks' outlines as seen from the front: linear vertex colours [V, 3]."""
     colours = np.tile(SKIN, (len(mesh.vertices), 1))
     front = mesh.vertices[:, 1] < np.nanmax(points[:, 1])

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from ...face import faces
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from ...imaging import images
 from .constraints import Constraints, none
@@ -69,10 +69,8 @@ def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray,
     vertices = vertices[(follow[vertices] > 0.3) & np.isfinite(pixels[vertices]).all(1)]
     if not len(vertices):
         return none()
-    towards = view.centre - mesh.vertices[vertices]
-    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-    direction = normals[vertices] - (normals[vertices] * towards).sum(1, keepdims=True) * towards
-    direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
+    towards = unit(view.centre - mesh.vertices[vertices])
+    direction = unit(normals[vertices] - (normals[vertices] * towards).sum(1, keepdims=True) * towards)
     outward = view.project(mesh.vertices[vertices] + 1e-3 * direction)[0] - pixels[vertices]
     length = np.linalg.norm(outward, axis=1, keepdims=True)
     per_px = 1e-3 / np.maximum(length[:, 0], 1e-9) / scale  # metres

@@ -15,8 +15,8 @@ import scipy.sparse as sparse
 from ...geometry.meshes import Mesh
 from ...geometry.views import View
 from . import nonrigid, silhouettes
-from .alignment import HeadModel, Similarity, fit_landmarks, stepped
-from .constraints import Constraints, from_landmarks, from_points, joined
+from .alignment import HeadModel, Similarity, fit_landmarks, step_towards
+from .constraints import Constraints, from_landmarks, from_points, join
 from .landmarks import Landmarks
 
 SIGMA_M = {"landmarks": 0.0025, "points": 0.0015, "outlines": 0.0015}
@@ -94,7 +94,7 @@ class _ViewConstraints:
                 self.model, mesh.vertices, evidence.views, evidence.landmarks, evidence.trust, max(reach, 0.006)
             ),
             "points": from_points(mesh, evidence.follow, evidence.points.places, evidence.points.towards, reach),
-            "outlines": joined(
+            "outlines": join(
                 [silhouettes.compare(outline, mesh, self.edges, evidence.follow, reach) for outline in self.outlines]
             ),
         }
@@ -113,8 +113,8 @@ def fit(model: HeadModel, evidence: ShownByViews, progress: Callable[[float, str
             basis = ties.at(model.identity)  # [K, M, 3]
             weight = ties.weight * min(1.0, INDEPENDENT_COUNTS[name] / max(ties.weight.sum(), 1)) / SIGMA_M[name] ** 2
             rows.append((ties.at(mesh.vertices), basis, ties.direction, ties.distance, weight))
-        pose, coefficients = stepped(pose, coefficients, rows)
-    vertices = _relaxed(
+        pose, coefficients = step_towards(pose, coefficients, rows)
+    vertices = _relax(
         model,
         pose.apply(model.shape(coefficients)),
         lambda mesh: constraints.of(mesh, REACH_M[1]),
@@ -146,7 +146,7 @@ def beyond_scan(
     def without_landmarks(mesh: Mesh) -> dict[str, Constraints]:
         return {name: ties for name, ties in constraints.of(mesh, REACH_M[0]).items() if name != "landmarks"}
 
-    return _relaxed(
+    return _relax(
         model,
         vertices,
         without_landmarks,
@@ -168,7 +168,7 @@ def _view_constraints(
     return _ViewConstraints(model, evidence, outlines, silhouettes.edges_of(model.mesh))
 
 
-def _relaxed(
+def _relax(
     model: HeadModel, start: np.ndarray, constraints, landmarks: Landmarks, progress, pull: np.ndarray | float = PULL
 ) -> np.ndarray:
     """Return thin-plate displacements of `start` [V, 3], stiff to soft; constraints(mesh) -> {kind: Constraints}."""

@@ -78,7 +78,7 @@ def fuse(
     certain = np.zeros(shape * BLOCK_VOXELS, bool)
     index = tuple(voxels.T)
     field[index], certain[index] = np.where(enough & agreeing, mean, 1), enough & agreeing
-    # a cube counts when all its corners are known: at an unknown one there is no crossing, but a curtain
+    # a cube counts only with all its corners known: an unknown one would add a false wall
     for axis in range(3):
         certain &= np.roll(certain, -1, axis)
     surface = _surface(field, certain, low, voxel)

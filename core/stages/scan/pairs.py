@@ -4,6 +4,8 @@
 
 import numpy as np
 
+from ...geometry.meshes import unit
+
 BASELINES_DEG = ((4.0, 9.0), (2.5, 14.0), (1.5, 30.0))
 """Angles between two cameras as seen from the head, from the best range to what a handful of photographs allows."""
 
@@ -20,11 +22,10 @@ def choose_pairs(
     centres [N, 3] are the cameras', the head lies at the origin. Sharper ones, and those side by side, are preferred.
     baselines are ranges of degrees, the best first: others are used only where it leaves a direction without a pair.
     """
-    directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
+    directions = unit(centres)
     first, second = np.triu_indices(len(centres), 1)
     angle = np.degrees(np.arccos(np.clip((directions[first] * directions[second]).sum(1), -1, 1)))
-    middle = directions[first] + directions[second]
-    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    middle = unit(directions[first] + directions[second])
     apart = centres[second] - centres[first]
     along = (apart * middle).sum(1) / np.maximum(np.linalg.norm(apart, axis=1), 1e-12)
     across = np.sqrt(np.clip(1 - along**2, 0, 1))
@@ -34,7 +35,7 @@ def choose_pairs(
     reach = np.full(len(first), np.inf)  # angle from each candidate to the nearest chosen pair, in degrees
     for low, high in baselines:
         candidates = np.flatnonzero((angle >= low) & (angle <= high) & (across > LEAST_ACROSS))
-        least = 0.0 if not chosen else 5.0  # a poorer baseline only where nothing better looks from
+        least = 0.0 if not chosen else 5.0  # poorer baselines only fill directions without a pair
         while len(chosen) < count and len(candidates):
             score = np.minimum(reach[candidates], 90.0) * quality[candidates]
             best = candidates[np.argmax(score)]

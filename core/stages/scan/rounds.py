@@ -22,7 +22,7 @@ from .stereo import DepthMap, match_pair
 
 HEAD_WIDTH_M, HEAD_WIDTH_PX = 0.15, 310
 """Width of a head, and its maximum in pixels to match at: finer pictures cost time without gain."""
-MARGIN_M = 0.005  # around a round's surface, in which the next one measures
+MARGIN_M = 0.005  # margin around a round's surface to measure in next
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def measure(
             report.progress(start + unit * share, steps, text)
 
         depth_maps = _match(views, plan, now.scale, box, guide, mask, tick)
-        if guide:  # the nearer pairs of the round before fill what the wide ones cannot match; they weigh little
+        if guide:  # nearer pairs of the last round fill what wide ones cannot match; their weight is low
             depth_maps = maps + depth_maps
 
         def fusing(k: int, plan=plan, tick=tick) -> None:
@@ -103,7 +103,7 @@ def _match(
     pictures, maps = {}, []
     for done, pair in enumerate(sorted(plan)):
         tick(done, f"matching pair {done + 1} of {len(plan)}")
-        for i in set(pictures) - set(pair):  # neighbours in order share pictures; more would fill the memory
+        for i in set(pictures) - set(pair):  # consecutive pairs share pictures; more would fill the memory
             del pictures[i]
         for i in pair:
             if i not in pictures:

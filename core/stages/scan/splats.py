@@ -18,7 +18,7 @@ from torch import Tensor
 
 from ...capture.messages import Problem, Reporter
 from ...face import faces
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from .fusion import Fused, fuse
 from .stereo import DepthMap, Pinhole, warp
@@ -33,7 +33,7 @@ WARM_UP_SHARE = 0.5  # share of the steps before normals and distortion count
 WIDTH_SPACINGS = 0.35
 """Initial deviation of a surfel, in spacings: wide ones overlap, the nearer hides the farther, and the surface is
 pushed away from all cameras."""
-LEAST_ALPHA = 0.5  # below, a pixel has no depth
+LEAST_ALPHA = 0.5  # minimum for a pixel to have a depth
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def _surfels(mesh: Mesh, photographs: list[UndistortedFrame], device: str) -> di
     scales = np.stack([WIDTH_SPACINGS * spacing, WIDTH_SPACINGS * spacing, np.full_like(spacing, 1e-5)], 1)
     start = {
         "means": mesh.vertices,
-        "quats": half / np.linalg.norm(half, axis=1, keepdims=True),
+        "quats": unit(half),
         "log_scales": np.log(np.maximum(scales, 1e-6)),
         "logits": np.full(len(normals), 3.0),
         "colours": torch.logit(torch.tensor(_colours(mesh, normals, photographs)), 0.02).numpy(),
@@ -185,7 +185,7 @@ def _loss(rendered: tuple, p: UndistortedFrame, device: str, geometry: bool) -> 
     colour, _, alpha, distortion, normals, depth_normals = rendered
     mask = torch.tensor(p.mask, dtype=torch.float32, device=device)[..., None]
     target = torch.tensor(p.picture, dtype=torch.float32, device=device) * mask
-    inside = colour * mask  # black behind; what surfels show outside the person is held down by their alpha
+    inside = colour * mask  # black behind; alpha penalises surfels outside the person
     loss = (1 - SSIM_WEIGHT) * (inside - target).abs().mean() + SSIM_WEIGHT * (1 - _ssim(inside, target))
     loss = loss + OUTSIDE_WEIGHT * (alpha * (1 - mask)).mean()
     if geometry:

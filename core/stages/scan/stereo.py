@@ -72,7 +72,7 @@ def match_pair(
     searched around the guide, a coarser surface.
     """
     baseline = second.centre - first.centre
-    if baseline @ first.rotation[0] < 0:  # so that the rectified pictures stay within 90 degrees of upright
+    if baseline @ first.rotation[0] < 0:  # keeps rectified pictures within 90 degrees of upright
         first, second, pictures, masks, baseline = second, first, pictures[::-1], masks[::-1], -baseline
     rotation = _rectify(baseline, first.axis + second.axis)
     focal = scale * first.camera.mean_focal_length()
@@ -92,7 +92,7 @@ def match_pair(
     else:
         expected = np.full((height, width), np.floor(farthest), np.float32)
         visible = np.ones((height, width), bool)
-    # a pixel of the second picture lies where the guide expects it, less the smallest disparity that is looked for
+    # the second picture is read where the guide expects it, shifted by the smallest disparity
     least = -count // 2 if guide else 0
     aside = np.float32([[1, 0, least], [0, 1, 0]])
     move = cv2.warpAffine(expected, aside, (width, height), borderMode=cv2.BORDER_REPLICATE) + least
@@ -178,7 +178,7 @@ def _match(
     a: np.ndarray, b: np.ndarray, mask_a: np.ndarray, mask_b: np.ndarray, count: int, stiffness: float
 ) -> tuple[np.ndarray, float]:
     """Match `a` into `b`: disparities float32 [H, W] (0: unknown) and the median disagreement of both directions."""
-    penalty = round(2 * 3 * BLOCK_PX**2 * stiffness)  # a quarter of what is usual: stronger ones flatten the nose
+    penalty = round(2 * 3 * BLOCK_PX**2 * stiffness)  # a quarter of the usual: more flattens the nose
     matcher = cv2.StereoSGBM_create(0, count, BLOCK_PX, P1=penalty, P2=4 * penalty, disp12MaxDiff=-1)
     matcher.setPreFilterCap(31)
     matcher.setMode(cv2.STEREO_SGBM_MODE_SGBM_3WAY)

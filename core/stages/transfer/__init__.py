@@ -103,7 +103,7 @@ def _scan(capture: Capture, folder: Path, solved: SolvedHead, full: Mesh, settin
     """Write scan.obj with a lit and an albedo texture, and the head's displacement."""
     size = settings.transfer.scan_size
     report.progress(0, 10, "unwrapping the scan")
-    mesh = scan.unwrapped(full, settings.transfer.scan_detail_mm / 1000, size)
+    mesh = scan.unwrap(full, settings.transfer.scan_detail_mm / 1000, size)
     meshes.write_obj(folder / "scan.obj", mesh)
     at = baking.places(
         mesh,
@@ -114,8 +114,10 @@ def _scan(capture: Capture, folder: Path, solved: SolvedHead, full: Mesh, settin
         lambda done: report.progress(1 + 3 * done, 10, "finding the head under the scan"),
     )
     views = [view for view in read_views(capture) if view.selected] or read_views(capture)
-    colours = scan.lit(mesh, at, views, lambda done: report.progress(4 + 3 * done, 10, "colouring the scan"))
-    albedo = scan.continued(baking.bake(images.read_linear(solved.maps / "diffuse_albedo.exr"), at), colours, at)
+    colours = scan.project_colours(
+        mesh, at, views, lambda done: report.progress(4 + 3 * done, 10, "colouring the scan")
+    )
+    albedo = scan.extend_albedo(baking.bake(images.read_linear(solved.maps / "diffuse_albedo.exr"), at), colours, at)
     lit = colours.max(2) > 0
     colours, albedo = baking.bled(colours, _known_at(at, lit)), baking.bled(albedo, _known_at(at, at.known | lit))
     images.write_srgb(folder / "scan_lit.png", images.linear_to_srgb(colours))
@@ -125,7 +127,7 @@ def _scan(capture: Capture, folder: Path, solved: SolvedHead, full: Mesh, settin
         solved.mesh, full, size, lambda done: report.progress(7 + 3 * done, 10, "measuring the displacement")
     )
     images.write_data(folder / "displacement.exr", height)
-    images.write_srgb(capture.picture("transfer", "scan"), drawing.drawn_scan(mesh, (colours, albedo), views))
+    images.write_srgb(capture.picture("transfer", "scan"), drawing.draw_scan(mesh, (colours, albedo), views))
     away = np.abs(height[height != 0])
     figures = {
         "triangles": len(mesh.faces),

@@ -10,7 +10,7 @@ from ...geometry.views import View
 from ...imaging import images
 
 
-def drawn_scan(mesh: Mesh, textures: tuple, views: list[View], height: int = 420) -> np.ndarray:
+def draw_scan(mesh: Mesh, textures: tuple, views: list[View], height: int = 420) -> np.ndarray:
     """Draw the most frontal frame, and the scan with each linear texture [S, S, 3] through the same camera."""
     view = min(views, key=lambda view: abs(np.arctan2(view.centre[0], -view.centre[1])))
     frame = view.read()

@@ -14,7 +14,7 @@ import trimesh
 
 from ...geometry import atlas, raster, surfaces
 from ...geometry.baking import STRIP_ROWS, TexelPartners
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from ...imaging import images
 
@@ -26,7 +26,7 @@ FAR_M = 0.010  # maximum distance between head and scan to transfer from one to 
 FADE_PX = 6  # width at 1024 over which the displacement ends where the scan ends
 
 
-def reduced(scan: Mesh, cell: float) -> Mesh:
+def reduce(scan: Mesh, cell: float) -> Mesh:
     """Cluster the scan's vertices in cubes of side `cell` (metres), and drop floaters.
 
     Rossignac and Borrel 1993: a vertex is the mean of those in its cube. The scan's own noise allows it, and it takes a
@@ -39,15 +39,15 @@ def reduced(scan: Mesh, cell: float) -> Mesh:
     faces = cluster[scan.faces]
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    faces = _two_sided(vertices, faces[np.sort(first)])
-    # across edges: what hangs by a corner is a floater
+    faces = _drop_fins(vertices, faces[np.sort(first)])
+    # connected across edges: a piece joined by a corner is a floater
     label = trimesh.graph.connected_component_labels(trimesh.graph.face_adjacency(faces), len(faces))
     faces = faces[np.bincount(label)[label] >= LEAST_PART_SHARE * len(faces)]
     used, index = np.unique(faces, return_inverse=True)
     return Mesh(vertices[used], index.reshape(-1, 3))
 
 
-def _two_sided(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def _drop_fins(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Drop triangles until no edge has more than two.
 
     Fins first, where sheets of the scan were pressed into one, then the smallest.
@@ -68,14 +68,14 @@ def _two_sided(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
             return faces
         order = np.lexsort((area, -(uses_of_edges == 1).sum(1)))
         order = order[crowded[order]]
-        # one triangle per edge and round
+        # drop one triangle per edge and round
         _, worst = np.unique(np.where(uses_of_edges > 2, edge.reshape(-1, 3), -1).max(1)[order], return_index=True)
         keep = np.ones(len(faces), bool)
         keep[order[worst]] = False
         faces, area = faces[keep], area[keep]
 
 
-def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float], None]) -> np.ndarray:
+def project_colours(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float], None]) -> np.ndarray:
     """Return the colours that the views show, linear [S, S, 3], at the covered texels of the unwrapped scan.
 
     Zero where no view shows the scan; tick receives the share done.
@@ -86,7 +86,7 @@ def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float]
     normals = raster.interpolate(vertex_normals(scan), scan.faces, face[at.covered], bary[at.covered])
     normals = normals.astype(np.float32)
     del face, bary
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    normals = unit(normals)
     caster = raster.RayCaster(scan)
     total, weights = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
     for i, view in enumerate(views):
@@ -113,7 +113,7 @@ def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float]
     return colours
 
 
-def continued(albedo: np.ndarray, lit_map: np.ndarray, at: TexelPartners) -> np.ndarray:
+def extend_albedo(albedo: np.ndarray, lit_map: np.ndarray, at: TexelPartners) -> np.ndarray:
     """Continue the albedo [S, S, 3] beyond the head's maps by the colours as filmed, scaled per channel to meet it."""
     filmed = lit_map.max(2) > 0
     both = at.known & filmed & (lit_map.min(2) > 0.01)
@@ -136,23 +136,22 @@ def displacement(head: Mesh, scan: Mesh, size: int, tick: Callable[[float], None
         face, bary = raster.rasterize_uv(head, size, (row, end))
         inside = face >= 0
         points = raster.interpolate(head.vertices, head.faces, face[inside], bary[inside].astype(np.float64))
-        n = raster.interpolate(normals, head.faces, face[inside], bary[inside].astype(np.float64))
-        n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-9)
+        n = unit(raster.interpolate(normals, head.faces, face[inside], bary[inside].astype(np.float64)))
         hit, _, distance = surface.cast_rays(points + FAR_M * n, -n, n)
         hit_near = (hit >= 0) & (distance < 2 * FAR_M)
         heights = np.where(hit_near, FAR_M - np.where(hit_near, distance, 0), 0)
         out[row:end][inside], covered[row:end][inside] = heights, hit_near
-    return _faded(out, covered)
+    return _fade(out, covered)
 
 
-def _faded(displacement: np.ndarray, valid: np.ndarray) -> np.ndarray:
+def _fade(displacement: np.ndarray, valid: np.ndarray) -> np.ndarray:
     inside = cv2.distanceTransform(np.pad(valid, 1, constant_values=True).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
     return displacement * np.clip(inside / (FADE_PX * len(displacement) / 1024), 0, 1)
 
 
-def unwrapped(scan: Mesh, cell: float, size: int) -> Mesh:
+def unwrap(scan: Mesh, cell: float, size: int) -> Mesh:
     """Reduce and unwrap the scan; triangles that the atlas could not lay out are dropped."""
-    mesh = atlas.unwrap(reduced(scan, cell), size)
+    mesh = atlas.unwrap(reduce(scan, cell), size)
     uvs = mesh.uvs[mesh.face_uvs]
     (ax, ay), (bx, by) = (uvs[:, 1] - uvs[:, 0]).T, (uvs[:, 2] - uvs[:, 0]).T
     laid_out = np.abs(ax * by - ay * bx) > 1e-14

@@ -46,7 +46,7 @@ def test_a_head_that_cuts_itself_is_mended(seed):
     theirs = blenders(head.vertices, head.faces)
     assert len(theirs) > 20 and len(ours & theirs) > 0.95 * len(theirs)
     pose = alignment.similarity(rest.vertices, head.vertices, np.ones(len(rest.vertices)))
-    mended = intersections.mended(rest.moved(pose.apply(rest.vertices)), head.vertices)
+    mended = intersections.mend(rest.moved(pose.apply(rest.vertices)), head.vertices)
     moved = np.linalg.norm(mended - head.vertices, axis=1)
     assert blenders(mended, head.faces) == set()
     assert not intersections.flipped(rest, mended).any()

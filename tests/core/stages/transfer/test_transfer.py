@@ -142,7 +142,7 @@ def test_the_reduced_scan_is_a_clean_surface_near_the_scan():
         np.concatenate([fine.vertices + rng.normal(0, 3e-4, fine.vertices.shape), speck.vertices]),
         np.concatenate([fine.faces, speck.faces + len(fine.vertices)]),
     )
-    mesh = scan.reduced(noisy, 0.005)
+    mesh = scan.reduce(noisy, 0.005)
     _, uses = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
     assert uses.max() <= 2 and len(mesh.faces) < len(fine.faces) / 4 and mesh.vertices[:, 0].max() < 0.1
     face, bary = surfaces.Surface(fine).find_nearest(mesh.vertices, vertex_normals(mesh), 0.01)
