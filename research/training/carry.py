@@ -26,7 +26,7 @@ from core.face import faces, template
 from core.geometry import baking
 from core.imaging import images
 from core.stages import registration
-from core.stages.registration import own_mesh, own_template, render_landmarks
+from core.stages.registration import own_mesh, own_template
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr")
 FAR_M = 0.010  # farther apart, two heads are not partners
