@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face nets, and the built-in head."""
+"""Face networks and the built-in head."""

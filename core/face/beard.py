@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a beard grows: told from bare skin by how many dark strokes a picture of it shows, where beards grow.
+"""Regions where a beard grows, told from bare skin by the density of dark strokes in a picture.
 
 Two rooms need it: what a beard darkens is no shadow (solve), and hair is groomed over clean skin (upscale).
 """
-
-from __future__ import annotations
 
 from functools import cache
 
@@ -23,30 +21,24 @@ PLACES_MM = (
     ((127, 234, 93, 356, 454, 323), 8.0),
     ((214, 434, 192, 416, 213, 433, 147, 376, 135, 364, 169, 394, 210, 430, 138, 367), 10.0),
 )
-"""MediaPipe landmarks about which a beard grows, and how far in mm: jaw, upper lip, chin, before the ears, lower
+"""MediaPipe landmarks around which a beard grows, and its reach in mm: jaw, upper lip, chin, sideburns, lower
 cheeks."""
-BELOW_JAW_MM = (0.0, 14.0, -22.0), 18.0
-"""mm from the jaw to where the beard goes on below it, and how far it reaches there."""
-ZONE_STEP_TEXELS = 4
-"""Every so many texels the beard's zone, which is soft, is worked out."""
-OUTSTANDING_DEVIATIONS = 2.5
-"""Deviations of the bare skin's grain above which a texel is a dark stroke."""
+BELOW_JAW_MM = (0.0, 14.0, -22.0), 18.0  # offset in mm from the jaw to the beard below it, and its reach there
+ZONE_STEP_TEXELS = 4  # texels between the samples of the beard's zone, which is soft
+OUTSTANDING_DEVIATIONS = 2.5  # deviations of the bare skin's grain beyond which a texel is a dark stroke
 AROUND_MM = 0.5
-"""mm about a stroke that count as stroked: many hairs tell a beard, not one long edge of a shadow."""
+"""Radius in mm around a stroke that counts as stroked: many hairs make a beard, the long edge of one shadow does
+not."""
 STROKED_SHARES = 0.10, 0.25
-"""Share of the skin that is stroked, beyond the bare skin's own, at which a beard begins, and from which on there is
-one."""
-MIN_BEARD_SHARE = 0.10
-"""Share of where a beard may grow that must have one: less is freckles, scars or the edges of shadows."""
-SIZE_TEXELS = 1024
-"""Texels of a map that shows single strokes: a hair is about half of one wide."""
+"""Shares of stroked skin, beyond that of bare skin, at which a beard begins and from which it is certain."""
+MIN_BEARD_SHARE = 0.10  # minimum share of the zone that must have a beard: less is freckles, scars or edges of shadows
+SIZE_TEXELS = 1024  # side of a map that resolves single strokes: a hair is about half a texel wide
 
 
 def seen_in(texture: np.ndarray, confidence: np.ndarray) -> np.ndarray:
-    """How sure it is that a beard grows here, float32 [SIZE_TEXELS, SIZE_TEXELS] in [0, 1], from a texture of the
-    built-in head.
+    """Return the certainty of a beard, float32 [SIZE_TEXELS, SIZE_TEXELS] in [0, 1], in a texture of the built-in head.
 
-    texture linear [S, S, 3]; confidence [S, S]: how well each texel was seen. Zero everywhere where the texture is too
+    texture [S, S, 3] is linear; confidence [S, S] says how well each texel was seen. Zero where the texture is too
     small to show strokes.
     """
     if len(texture) < SIZE_TEXELS:
@@ -64,7 +56,7 @@ def seen_in(texture: np.ndarray, confidence: np.ndarray) -> np.ndarray:
 
 
 def zone(landmarks: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Where a beard may grow, float32 [S, S] in [0, 1]. landmarks [468, 3], position [S, S, 3] in mm."""
+    """Return where a beard may grow, float32 [S, S] in [0, 1], for landmarks [468, 3] and position [S, S, 3] in mm."""
     near = [(landmarks[list(which)], radius) for which, radius in PLACES_MM]
     near.append((landmarks[list(PLACES_MM[0][0])] + BELOW_JAW_MM[0], BELOW_JAW_MM[1]))
     coarse = np.ascontiguousarray(
@@ -83,19 +75,10 @@ def zone(landmarks: np.ndarray, position: np.ndarray) -> np.ndarray:
 
 
 def presence(small: np.ndarray, usual: float, bare: np.ndarray, grows: np.ndarray, texel: np.ndarray) -> np.ndarray:
-    """How sure it is that a beard grows here, from the share of dark strokes around.
+    """Return the certainty of a beard, float32 [S, S] in [0, 1], from the share of dark strokes nearby.
 
-    Parameters
-    ----------
-    small : [S, S], `fine` of the log albedo
-    usual : its `deviation` on bare skin
-    bare : bool [S, S], skin without hair
-    grows : [S, S] in [0, 1], `zone`
-    texel : [S, S], width of each texel in mm
-
-    Returns
-    -------
-    float32 [S, S] in [0, 1].
+    small is `fine` of the log albedo and usual its `deviation` on bare skin, which bare [S, S] marks; grows is the
+    `zone`; texel is the width of each texel in mm.
     """
     width = float(np.median(texel))
     stroked = cv2.dilate((small < -OUTSTANDING_DEVIATIONS * usual).astype(np.float32), disc(AROUND_MM / width))
@@ -108,12 +91,12 @@ def presence(small: np.ndarray, usual: float, bare: np.ndarray, grows: np.ndarra
 
 
 def fine(light: np.ndarray, texel: float) -> np.ndarray:
-    """What of a picture [S, S] is finer than about 1.5 mm; a texel is `texel` mm wide."""
+    """Keep only details of a picture [S, S] finer than about 1.5 mm; a texel is `texel` mm wide."""
     return light - cv2.GaussianBlur(light, (0, 0), 0.8 / texel)
 
 
 def deviation(samples: np.ndarray) -> float:
-    """Of most samples [N]: what stands out does not count."""
+    """Return a robust standard deviation of samples [N]."""
     return float(1.4826 * np.median(np.abs(samples - np.median(samples)))) if len(samples) else 0.05
 
 
@@ -123,11 +106,12 @@ def disc(radius: float) -> np.ndarray:
 
 @cache
 def _on_template() -> tuple[np.ndarray, np.ndarray]:
-    """`zone` and the width of each texel in mm [SIZE_TEXELS, SIZE_TEXELS] on the built-in head before it is fitted:
-    near enough for what is soft by millimetres."""
+    """Return `zone` and the width in mm of each texel [SIZE_TEXELS, SIZE_TEXELS] on the unfitted built-in head.
+
+    It is near enough for what is soft by millimetres.
+    """
     mesh, (face, bary) = template.load(), raster.rasterize_uv(template.load(), SIZE_TEXELS)
-    at, weight = template.landmarks()
-    landmarks = 1000 * (mesh.vertices[mesh.faces[at]] * weight[..., None]).sum(1)
+    landmarks = 1000 * template.landmark_points(mesh)
     position = raster.bleed(
         raster.interpolate(1000 * mesh.vertices, mesh.faces, face, bary).astype(np.float32), face >= 0
     )

@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bundle adjustment of cameras over face landmarks and feature tracks at once, small enough for plain arrays.
+"""Bundle adjustment of cameras over face landmarks and feature tracks, small enough for plain arrays.
 
-The landmarks' places are free, with a prior towards the template's head of the person's own identity, itself free with
-prior N(0, 1): so a face unlike the template does not bend the cameras. Points are eliminated first. Triggs et al.,
-Bundle Adjustment: A Modern Synthesis (2000).
+Landmark positions are free, with a prior towards the template's head of the person's own identity, itself free with
+prior N(0, 1): a face unlike the template does not bend the cameras. Points are eliminated first. Triggs et al., Bundle
+Adjustment: A Modern Synthesis (2000).
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
@@ -16,29 +14,27 @@ import numpy as np
 
 from .landmark_model import INDEPENDENT_LANDMARKS, SIGMA_M, template_landmarks
 
-OFFSET_M = 0.002
-"""How far a landmark of a person strays from the nearest head of the identity space."""
+OFFSET_M = 0.002  # deviation of a person's landmark from the nearest head of the identity space
 FOCAL_SIGMA_LOG = 0.35
-"""Deviation of the logarithm of an unknown focal length from its prior: from a phone's wide to its portrait lens."""
+"""Deviation of the log of an unknown focal length from its prior: from a phone's wide to its portrait lens."""
 TOLD_SIGMA_LOG = 0.03
-"""The same of one that a file told: a whole number of millimetres, and focusing changes it."""
+"""Deviation of the log of a focal length that a file states: whole millimetres, and focusing changes it."""
 FOCAL_SHARES = np.geomspace(0.7, 3.0, 16)
-"""Focal lengths that are tried where no file tells one, as shares of a picture's longer side: 71 to 19 degrees of
-view."""
-PHONE_FOCAL_SHARE = 1.1
-"""A phone's, in the same unit."""
-FEATURE_PX = 1.5
-"""Deviation of a match in cameras that come from the face, where what agrees is little and may be wrong."""
+"""Focal lengths to try where no file states one, as shares of a picture's longer side: 71 to 19 degrees of view."""
+PHONE_FOCAL_SHARE = 1.1  # focal length of a phone in the same unit
+FEATURE_PX = 1.5  # deviation of a match in cameras placed by the face, where few matches agree and may be wrong
 LEAST_LANDMARK_COSINE = 0.15
 """Cosine between a landmark's normal and the camera below which the landmark has slid onto the silhouette."""
 
 
 @dataclass(frozen=True)
 class Bundle:
-    """State: rotations [N, 3, 3] and translations [N, 3] into the cameras; focal [G] px with prior [G] and
-    spread [G], the deviation of its logarithm from the prior's; lens [N], the camera's focal; centre [N, 2], principal
-    points px; coefficients [K]; points [P, 3] metres in the head's frame, the first 468 the landmarks; feature_px, the
-    deviation of a match."""
+    """Cameras, points and identity being adjusted.
+
+    rotations [N, 3, 3] and translations [N, 3] into the cameras; focal [G] px with prior [G] and spread [G], the
+    deviation of its log; lens [N], the index of each camera's focal; centre [N, 2], principal points px; coefficients
+    [K]; points [P, 3] metres in the head's frame, the first 468 the landmarks; feature_px, the deviation of a match.
+    """
 
     rotations: np.ndarray
     translations: np.ndarray
@@ -52,18 +48,18 @@ class Bundle:
     feature_px: float = FEATURE_PX
 
     def local(self, camera: np.ndarray, point: np.ndarray) -> np.ndarray:
-        """Points in the frames of cameras [M, 3]."""
+        """Return points in the frames of cameras [M, 3]."""
         return np.einsum("mij,mj->mi", self.rotations[camera], self.points[point]) + self.translations[camera]
 
     def project(self, camera: np.ndarray, point: np.ndarray) -> np.ndarray:
-        """Pixels [M, 2] of observations: camera [M], point [M]."""
+        """Return pixels [M, 2] of observations: camera [M], point [M]."""
         local = self.local(camera, point)
         return self.focal[self.lens[camera], None] * local[:, :2] / np.maximum(local[:, 2:], 1e-3) + self.centre[camera]
 
 
 @dataclass(frozen=True)
 class Observations:
-    """camera [M], point [M], pixel [M, 2]; a landmark where point < 468."""
+    """Observed pixel [M, 2] of point [M] in camera [M]; a landmark where point < 468."""
 
     camera: np.ndarray
     point: np.ndarray
@@ -71,16 +67,11 @@ class Observations:
 
 
 def place_by_landmarks(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -> Bundle:
-    """Cameras of the template's mean head by PnP at each focal length of FOCAL_SHARES, shared by all groups whose own
-    is unknown; those that fit best. Terzakis and Lourakis, A Consistently Fast and Globally Optimal Solution to the
-    Perspective-n-Point Problem (2020).
+    """Place cameras by PnP on the template's mean head, at the best of FOCAL_SHARES.
 
-    Parameters
-    ----------
-    groups : [{names, width, height, focal_px or null}], of one camera each
-    group_of : name -> the number of its group
-    names : of the frames that show a face
-    pixels : name -> its landmarks [468, 2], pixels
+    groups are [{names, width, height, focal_px or null}], each of one camera; those without a focal length share one.
+    pixels maps a name to its landmarks [468, 2]. Terzakis and Lourakis, A Consistently Fast and Globally Optimal
+    Solution to the Perspective-n-Point Problem (2020).
     """
     model = template_landmarks()
     trusted = model.trust > 0.2
@@ -100,10 +91,10 @@ def place_by_landmarks(groups: list[dict], group_of: dict, names: list[str], pix
             _, turn, shift = cv2.solvePnP(
                 model.mean[trusted], pixels[name][trusted], matrix, None, flags=cv2.SOLVEPNP_SQPNP
             )
-            there = cv2.projectPoints(model.mean[trusted], turn, shift, matrix, None)[0][:, 0]
-            total += np.median(np.linalg.norm(there - pixels[name][trusted], axis=1)) / np.ptp(pixels[name][:, 0])
+            projected = cv2.projectPoints(model.mean[trusted], turn, shift, matrix, None)[0][:, 0]
+            total += np.median(np.linalg.norm(projected - pixels[name][trusted], axis=1)) / np.ptp(pixels[name][:, 0])
             poses.append((cv2.Rodrigues(turn)[0], shift[:, 0]))
-        # a face far away looks much the same through any lens
+        # a distant face looks much the same through any lens
         total += len(names) * 0.002 * (np.log(factor / PHONE_FOCAL_SHARE) / FOCAL_SIGMA_LOG) ** 2
         if best is None or total < best[0]:
             best = total, focal, poses
@@ -125,7 +116,7 @@ def place_by_landmarks(groups: list[dict], group_of: dict, names: list[str], pix
 
 
 def adjust(bundle: Bundle, observations: Observations, rounds: int = 15) -> Bundle:
-    """Levenberg-Marquardt with the weights of the last residuals (Geman-McClure)."""
+    """Minimise by Levenberg-Marquardt with the weights of the last residuals (Geman-McClure)."""
     damping, cost = 1e-3, np.inf
     for _ in range(rounds):
         weights = _weights(bundle, observations)
@@ -144,7 +135,7 @@ def adjust(bundle: Bundle, observations: Observations, rounds: int = 15) -> Bund
 
 
 def _sigma_px(bundle: Bundle, observations: Observations) -> np.ndarray:
-    """Expected deviation of each observation [M] in pixels: a landmark's is a length on the head."""
+    """Return the expected deviation of each observation [M] in pixels: a landmark's is a length on the head."""
     depth = np.maximum(bundle.local(observations.camera, observations.point)[:, 2], 0.05)
     return np.where(
         observations.point < len(template_landmarks().mean),
@@ -154,7 +145,7 @@ def _sigma_px(bundle: Bundle, observations: Observations) -> np.ndarray:
 
 
 def _weights(bundle: Bundle, observations: Observations) -> np.ndarray:
-    """1 / px^2 [M]."""
+    """Return the weights [M] of observations, 1 / px^2."""
     model = template_landmarks()
     sigma = _sigma_px(bundle, observations)
     error = np.linalg.norm(bundle.project(observations.camera, observations.point) - observations.pixel, axis=1) / sigma
@@ -169,8 +160,10 @@ def _weights(bundle: Bundle, observations: Observations) -> np.ndarray:
 
 
 def _priors(bundle: Bundle) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals of the landmarks against the head of the identity space [468, 3], and of the logarithms of the focal
-    lengths [G], in deviations."""
+    """Return residuals of the priors in deviations.
+
+    Those of the landmarks [468, 3] against the head of the identity space, and of the logs of the focal lengths [G].
+    """
     model = template_landmarks()
     offsets = (bundle.points[: len(model.mean)] - model.shape(bundle.coefficients)) / OFFSET_M
     return offsets, np.log(bundle.focal / bundle.focal_prior) / bundle.focal_spread

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What assets/face_units.npz (see NOTICE.md there) says of the eyes: sockets, eyeballs and the edges of the lids on the
-built-in head; and how an eye of it turns."""
-
-from __future__ import annotations
+"""Sockets, eyeballs and lid edges of the built-in head from assets/face_units.npz (see NOTICE.md there)."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -14,15 +11,17 @@ from ..geometry.meshes import Mesh
 from . import template
 
 DATA_FILES = ("assets/face_units.npz",)
-SOFT = 0
-"""Kind of an inner vertex that goes with the rim before it; 1 and 2 are the left and the right eyeball."""
+SOFT = 0  # kind of an inner vertex that follows the rim before it; 1 and 2 are the left and the right eyeball
 
 
 @dataclass(frozen=True)
 class EyeAsset:
-    """Of the eyes only: copies [C] the vertex that each doubles; corners [n, 3] triangle, corner, copy; faces [G, 3]
-    and uvs [P, 2] of the sockets; parts [P, 3]; anchors, weights [P, 6]; opens: rows and moves for the left and the
-    right lids; soft_of: the rows of each socket; balls [2, 4]; ball meshes."""
+    """Eye parts of the asset.
+
+    copies [C], the vertex that each doubles; corners [n, 3] triangle, corner, copy; faces [G, 3] and uvs [P, 2] of the
+    sockets; parts [P, 3]; anchors, weights [P, 6]; opens: rows and moves of the left and the right lids; soft_of: the
+    rows of each socket; balls [2, 4]; ball meshes.
+    """
 
     copies: np.ndarray
     corners: np.ndarray
@@ -58,8 +57,8 @@ def load() -> EyeAsset:
     mirror = z["mirror"].astype(int)
     opens = []
     for r, m in ((rows, moves), (mirror[rows], moves * [-1, 1, 1])):
-        kept = number[r] >= 0
-        opens.append((number[r[kept]], m[kept]))
+        inside_eye = number[r] >= 0
+        opens.append((number[r[inside_eye]], m[inside_eye]))
     weights = z["weights"][socket].astype(np.float64)
     corners = z["corners"][number[z["corners"][:, 2]] >= count].copy()
     corners[:, 2] = number[corners[:, 2]]
@@ -81,8 +80,7 @@ def load() -> EyeAsset:
 
 
 def _ball_mesh(z: dict, first: int, vertices: np.ndarray, kind: int) -> Mesh:
-    """One eyeball as the asset has it, turned about its centre so that it looks straight ahead; the asset's look down
-    by two degrees."""
+    """Return an eyeball turned to look straight ahead; the asset's look down by two degrees."""
     rows = np.flatnonzero(z["kind"] == kind)
     number = np.full(len(z["kind"]), -1)
     number[rows] = np.arange(len(rows))
@@ -97,23 +95,25 @@ def _ball_mesh(z: dict, first: int, vertices: np.ndarray, kind: int) -> Mesh:
 
 
 def _rims(z: dict, doubled: np.ndarray, count: int) -> tuple:
-    """The edges of the lids, each from the nose outwards, without the corners."""
+    """Return the edges of the lids, each from the nose outwards, without the corners."""
     vertices, seam = template.load().vertices, z["seam"][z["seam"] > 0]
     result = []
     for side in (1, 2):
-        here = np.flatnonzero(seam == side)
-        here = here[np.argsort(np.abs(vertices[doubled[here], 0]))]
-        result.append((doubled[here], count + here))
+        on_side = np.flatnonzero(seam == side)
+        on_side = on_side[np.argsort(np.abs(vertices[doubled[on_side], 0]))]
+        result.append((doubled[on_side], count + on_side))
     return tuple(result)
 
 
 def turn_by(radians: np.ndarray) -> np.ndarray:
-    """The rotation [3, 3] of an eye that looks along -y to the person's left (+x) and up."""
+    """Return the rotation [3, 3] of an eye that looks along -y to the person's left (+x) and up."""
     (c, s), (d, t) = (np.cos(radians[0]), np.sin(radians[0])), (np.cos(radians[1]), np.sin(radians[1]))
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, d, t], [0, -t, d]])
 
 
 def turn_towards(gaze: np.ndarray) -> np.ndarray:
-    """The rotation [3, 3] that turns an eye from straight ahead to the unit vector gaze [3]: left or right first, then
-    up or down, without roll."""
+    """Return the rotation [3, 3] of an eye from straight ahead to the unit vector gaze [3].
+
+    It turns left or right first, then up or down, without roll.
+    """
     return turn_by(np.array([np.arctan2(gaze[0], -gaze[1]), np.arcsin(np.clip(gaze[2], -1, 1))]))

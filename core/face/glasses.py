@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a face wears glasses: how strong thin lines are around both eyes, by direction and place, and one plane
-through that.
+"""Glasses on a face: strength of thin lines around both eyes by direction and place, and one plane through it.
 
 Rims, bridge and temples are thin lines where a bare face has none, bright or dark; hard shadows are steps, creases are
 faint. `python -m research.training glasses` finds the plane, on synthetic people only.
 """
-
-from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
@@ -22,25 +19,20 @@ from .parts import from_centres
 
 DATA_FILES = ("weights/glasses.npz",)
 WEIGHTS = Path(__file__).resolve().parents[1] / DATA_FILES[0]
-WIDTH_PX, HEIGHT_PX, CELL_PX = 128, 64, 8
-"""Of the band in pixels, and of a cell in which lines are counted."""
-THIN_PX, DIRECTIONS = 1.1, 6
-"""Scale of the lines, 1.2 mm to a pixel, and how many directions are told apart."""
+WIDTH_PX, HEIGHT_PX, CELL_PX = 128, 64, 8  # size of the band, and of a cell in which lines are counted
+THIN_PX, DIRECTIONS = 1.1, 6  # scale of the lines, 1.2 mm to a pixel, and the number of directions
 GAMMA, DARK, FLAT = 2.2, 0.02, 0.15
-"""Of the logarithm of light that lines are looked for in: what an sRGB value is raised to, what is added so that black
-is no line, and to its deviation so that an even picture is none either."""
-SPAN_EYES = 1.75
-"""Width of the band in distances between the outer corners of the eyes: from ear to ear, nearly."""
+"""Logarithm of light: exponent of an sRGB value, offset so that black is no line, and offset of the deviation so that
+an even picture is none either."""
+SPAN_EYES = 1.75  # width of the band in distances between the outer corners of the eyes: nearly from ear to ear
 BELOW_WIDTH_SHARE = 0.08
-"""How far the middle of the band lies below the eyes, in its width: the lower rims lie on the cheeks."""
+"""Depth of the band's middle below the eyes, as a share of its width: the lower rims lie on the cheeks."""
 OUTER = (33, 263)
-MOST_YAW_DEG = 50.0
-"""A head that is turned further hides a rim behind the nose."""
+MOST_YAW_DEG = 50.0  # maximum turn of the head: beyond, the nose hides a rim
 
 
 def band(srgb: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
-    """The upright band around the eyes, linear in the picture's values, float32 [HEIGHT_PX, WIDTH_PX], of landmarks
-    [468, 3] as faces.Face has them."""
+    """Cut the upright band around the eyes, float32 [HEIGHT_PX, WIDTH_PX], by a Face's landmarks [468, 3]."""
     right, left = landmarks[list(OUTER)].astype(np.float64)
     across = left[:2] - right[:2]
     across /= max(np.linalg.norm(across), 1e-6)
@@ -53,7 +45,7 @@ def band(srgb: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
         [turn, (np.array([WIDTH_PX / 2, HEIGHT_PX / 2 - BELOW_WIDTH_SHARE * WIDTH_PX]) - middle)[:, None]], 1
     )
     grey = np.ascontiguousarray(srgb @ np.float32([0.299, 0.587, 0.114]), np.float32)
-    if scale < 0.8:  # what the warp would alias
+    if scale < 0.8:  # the warp would alias
         grey = cv2.GaussianBlur(grey, (0, 0), 0.4 * float(np.sqrt(1 / scale**2 - 1)))
     return cv2.warpAffine(
         grey, from_centres(move), (WIDTH_PX, HEIGHT_PX), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
@@ -61,8 +53,7 @@ def band(srgb: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
 
 
 def describe(strip: np.ndarray) -> np.ndarray:
-    """How strong thin bright and thin dark lines of each direction are in each cell of a band, as one vector,
-    float32."""
+    """Return the strength of thin bright and dark lines by direction and cell of a band, a float32 vector."""
     shade = np.log(np.clip(strip, 0, 1).astype(np.float64) ** GAMMA + DARK)
     shade = (shade - shade.mean()) / (shade.std() + FLAT)
     down, across, askew = (gaussian_filter(shade, THIN_PX, order=order) for order in ((2, 0), (0, 2), (1, 1)))
@@ -70,7 +61,7 @@ def describe(strip: np.ndarray) -> np.ndarray:
     turn = (np.arctan2(2 * askew, across - down) / 2 % np.pi) * DIRECTIONS / np.pi
     layers = []
     for sign, quarter in ((1, 0), (-1, DIRECTIONS / 2)):
-        # curved one way alone, as no step and no spot is
+        # curved in one direction only, unlike steps and spots
         line = np.maximum(sign * middle + apart - np.abs(sign * middle - apart), 0)
         for k in range(DIRECTIONS):
             off = np.abs((turn + quarter - k + DIRECTIONS / 2) % DIRECTIONS - DIRECTIONS / 2)
@@ -80,8 +71,7 @@ def describe(strip: np.ndarray) -> np.ndarray:
 
 
 def sureness(srgb: np.ndarray, face: faces.Face) -> float:
-    """The logarithm of the odds that the face in an sRGB picture [H, W, 3] wears glasses, nan where it is turned too
-    far to tell."""
+    """Return the log odds that the face in an sRGB picture [H, W, 3] wears glasses; nan if turned too far."""
     if abs(face.yaw_deg) > MOST_YAW_DEG:
         return float("nan")
     plane, offset = _plane()

@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built-in head cut open at the lids, with sockets and eyeballs behind them, from assets/face_units.npz (see
-NOTICE.md there).
+"""Built-in head cut open at the lids, with sockets and eyeballs from assets/face_units.npz (see NOTICE.md there).
 
 The lips stay closed. The head's triangles keep their numbers, so what is painted in its UVs stays where it was.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -19,17 +16,20 @@ from . import eye_asset, template
 from .eye_asset import EyeAsset, turn_by, turn_towards
 
 CORNEA_BULGE_SHARE, CORNEA_ANGLE_RAD = 0.06, 0.52  # of the asset's eyeballs: share of the radius, radians
-CLEAR_M = 0.0004  # between ball and lid
-SAME_M = 1e-5  # what moved less stayed where it was
-DEEPEST_M = 0.003  # what lies deeper inside a ball is not before it
-FORWARD = np.array([0, -1.0, 0])  # where the face looks, in the head's axes
-REST_M = -0.003, 0.010  # how far an eyeball may lie behind the place that its surroundings give it
+CLEAR_M = 0.0004  # gap between ball and lid
+SAME_M = 1e-5  # maximum distance to count as unmoved
+DEEPEST_M = 0.003  # maximum depth of a point in a ball to push it out
+FORWARD = np.array([0, -1.0, 0])  # direction of the face in the head's axes
+REST_M = -0.003, 0.010  # range of an eyeball behind the place that its surroundings suggest
 
 
 @dataclass(frozen=True)
 class PosedEyeball:
-    """centre [3] metres; radius in metres; gaze [3] unit; mesh: its vertices, with UVs whose distance from the middle
-    (0.5, 0.5) grows with the angle from the pupil: 0.5 (angle / pi)^0.6."""
+    """Eyeball in place.
+
+    centre [3] and radius in metres; gaze [3] unit; mesh with UVs whose distance from the middle (0.5, 0.5) grows with
+    the angle from the pupil: 0.5 (angle / pi)^0.6.
+    """
 
     centre: np.ndarray
     radius: float
@@ -39,9 +39,12 @@ class PosedEyeball:
 
 @dataclass(frozen=True)
 class OpenHead:
-    """skin: the head and its sockets in the template's UVs, the template's triangles first; balls: the left and the
-    right eye; rims: upper and lower edge of the left and the right lids as vertex numbers [N], from the inner corner
-    outwards."""
+    """Head with open lids.
+
+    skin: the head and its sockets in the template's UVs, the template's triangles first; balls: the left and the right
+    eye; rims: upper and lower edge of the left and the right lids as vertex numbers [N], from the inner corner
+    outwards.
+    """
 
     skin: Mesh
     balls: tuple[PosedEyeball, PosedEyeball]
@@ -49,8 +52,11 @@ class OpenHead:
 
 
 def open_lids(head: Mesh, openness: float, gaze: np.ndarray) -> OpenHead:
-    """head: a closed head in the template's topology; openness in [0, 1]: 0 shut, 1 as far as MakeHuman opens them;
-    gaze [2]: degrees that both eyes turn to the person's left and up."""
+    """Open the lids of a closed head of the template's topology.
+
+    openness in [0, 1]: 0 shut, 1 as far as MakeHuman opens them; gaze [2]: degrees that both eyes turn to the person's
+    left and up.
+    """
     turn = turn_by(np.radians(gaze))
     return open_around(
         head, tuple(place_ball(side, *carry_ball(head, side), turn @ FORWARD) for side in (0, 1)), (openness, openness)
@@ -60,14 +66,10 @@ def open_lids(head: Mesh, openness: float, gaze: np.ndarray) -> OpenHead:
 def open_around(
     head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: tuple[float, float], shift: np.ndarray | float = 0.0
 ) -> OpenHead:
-    """The closed head with its lids open around given eyeballs.
+    """Open the lids of a closed head around the left and the right eyeball.
 
-    Parameters
-    ----------
-    head : with closed lids, in metres
-    balls : the left and the right eyeball
-    openness : of the left and of the right eye, of MakeHuman's opening
-    shift : [V + C + P, 3], metres: what all vertices are moved by besides, before the lids are pushed out of the balls
+    openness is each eye's share of MakeHuman's opening; shift [V + C + P, 3], metres, moves all vertices besides,
+    before the lids are pushed out of the balls.
     """
     unit = eye_asset.load()
     rest = np.concatenate([head.vertices, head.vertices[unit.copies], _carried(unit, head)]) + shift
@@ -81,8 +83,10 @@ def open_around(
 
 
 def carry_ball(head: Mesh, side: int) -> tuple[np.ndarray, float]:
-    """Centre [3] and radius of an eyeball (0: the left one): moved from the template as the lids before it are, then
-    back until the closed lids clear it."""
+    """Return centre [3] and radius of the left (0) or right (1) eyeball of a head.
+
+    It moves from the template as the lids before it do, then back until the closed lids clear it.
+    """
     unit, rest = eye_asset.load(), template.load().vertices
     centre, radius = unit.balls[side, :3], unit.balls[side, 3]
     arm = rest - centre
@@ -103,15 +107,7 @@ def carry_ball(head: Mesh, side: int) -> tuple[np.ndarray, float]:
 
 
 def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -> PosedEyeball:
-    """The eyeball of a side at a place.
-
-    Parameters
-    ----------
-    side : 0 for the left one, 1 for the right one
-    centre : [3], in metres
-    radius : in metres
-    gaze : [3], unit, where it looks
-    """
+    """Place the left (0) or right (1) eyeball at centre [3] with a radius, metres, looking along the unit gaze [3]."""
     unit = eye_asset.load()
     mesh, (x, y, z, size) = unit.ball_meshes[side], unit.balls[side]
     vertices = centre + (mesh.vertices - [x, y, z]) @ turn_towards(gaze).T * (radius / size)
@@ -122,41 +118,33 @@ def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -
 
 @cache
 def corners() -> tuple[tuple[int, int], tuple[int, int]]:
-    """The vertices at the outer and the inner corner of the left and of the right eye: those that both lids' last edges
-    share."""
+    """Return the vertices at the outer and the inner corner of the left and of the right eye.
+
+    They are those that both lids' last edges share.
+    """
     unit, head = eye_asset.load(), template.load()
     faces = head.faces.copy()
     faces[unit.corners[:, 0], unit.corners[:, 1]] = unit.corners[:, 2]
-    return tuple(
-        tuple(_shared_neighbour(faces, upper[end], lower[end]) for end in (-1, 0)) for upper, lower in unit.rims
-    )
 
+    def corner(ends: tuple[int, int]) -> int:
+        (shared,) = set.intersection(*(set(faces[(faces == vertex).any(1)].ravel().tolist()) for vertex in ends))
+        return shared
 
-def _shared_neighbour(faces: np.ndarray, upper: int, lower: int) -> int:
-    around = [set(faces[(faces == vertex).any(1)].ravel().tolist()) for vertex in (upper, lower)]
-    (corner,) = around[0] & around[1]
-    return corner
+    return tuple(tuple(corner((upper[end], lower[end])) for end in (-1, 0)) for upper, lower in unit.rims)
 
 
 def edges(vertices: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """The upper and the lower edge of the left (0) or the right lids of an open head's vertices, from the outer corner
-    to the inner one [N, 3]."""
+    """Return both edges [N, 3] of the left (0) or right lids of an open head, from the outer corner to the inner.
+
+    The upper edge comes first.
+    """
     return _edge(vertices, side, 0), _edge(vertices, side, 1)
 
 
 def closed_edge(vertices: np.ndarray, side: int, lid: int, off: float) -> np.ndarray:
-    """Where the closed lids of an eye meet, moved onto one of them.
+    """Return the line [N, 3] where closed lids meet, moved by `off` metres onto the upper (0) or lower (1) lid.
 
-    Parameters
-    ----------
-    vertices : [V, 3], of the head, in metres
-    side : 0 for the left eye, 1 for the right
-    lid : 0 for the upper lid, 1 for the lower
-    off : metres by which the line is moved
-
-    Returns
-    -------
-    [N, 3], from the outer corner to the inner one.
+    vertices [V, 3] are the head's, side is 0 for the left eye; the line runs from the outer corner to the inner one.
     """
     edge = _edge(vertices, side, 0)  # its vertices are the head's own; the lower lid's are doubles of them
     rows = rows_of_lid(side, lid)
@@ -171,8 +159,7 @@ def _edge(vertices: np.ndarray, side: int, lid: int) -> np.ndarray:
 
 
 def rows_of_lid(side: int, lid: int) -> np.ndarray:
-    """The vertices of an open head [N] that move with the upper (0) or the lower (1) lid of the left (0) or the right
-    eye."""
+    """Return the vertices [N] of an open head that move with an upper (0) or lower (1) lid; side 0 is the left eye."""
     unit, head = eye_asset.load(), template.load()
     rows, upper = unit.opens[side][0], unit.rims[side][0]
     order = upper[np.argsort(head.vertices[upper, 0])]
@@ -190,7 +177,7 @@ def rows_of_lid(side: int, lid: int) -> np.ndarray:
 
 
 def belongs_to(opened: Mesh, head: Mesh) -> bool:
-    """Whether the skin of an open head is that closed one's: built alike, and equal where no lid moves."""
+    """Return True if the skin of an open head is that closed one's: built alike, and equal where no lid moves."""
     unit, moving = eye_asset.load(), np.zeros(len(head.vertices), bool)
     count = len(head.vertices) + len(unit.copies) + len(unit.parts)
     if len(opened.vertices) != count or len(opened.faces) != len(head.faces) + len(unit.faces):
@@ -201,7 +188,7 @@ def belongs_to(opened: Mesh, head: Mesh) -> bool:
 
 
 def push_out(points: np.ndarray, ball: PosedEyeball) -> np.ndarray:
-    """Points [N, 3] pushed out of the front of an eyeball, CLEAR_M away from it."""
+    """Push points [N, 3] out of the front of an eyeball, CLEAR_M away from it."""
     v = points - ball.centre
     length = np.linalg.norm(v, axis=1, keepdims=True)
     v = v / length
@@ -210,25 +197,25 @@ def push_out(points: np.ndarray, ball: PosedEyeball) -> np.ndarray:
 
 
 def _carried(unit: EyeAsset, head: Mesh) -> np.ndarray:
-    """The sockets' vertices [P, 3] on another head: moved as the rims before them are."""
+    """Return the sockets' vertices [P, 3] on another head, moved as the rims before them are."""
     shift = head.vertices - template.load().vertices
     return unit.parts + (unit.weights[..., None] * shift[unit.anchors]).sum(1)
 
 
 def _scale(unit: EyeAsset, head: Mesh) -> float:
-    """How much wider the head's eyes are than the template's."""
+    """Return the width of the head's eyes over the template's."""
     rim = np.concatenate([upper for upper, _ in unit.rims])
     return float(np.ptp(head.vertices[rim, 0]) / np.ptp(template.load().vertices[rim, 0]))
 
 
 def _surface(direction: np.ndarray, gaze: np.ndarray, radius: float) -> np.ndarray:
-    """Distance of an eyeball's surface, cornea and all, from its centre along unit directions [N, 3]."""
+    """Return the distance of an eyeball's surface, cornea included, from its centre along unit directions [N, 3]."""
     angle = np.arccos(np.clip(direction @ gaze, -1, 1))
     return radius * (1 + CORNEA_BULGE_SHARE * np.clip(1 - (angle / CORNEA_ANGLE_RAD) ** 2, 0, None))
 
 
 def _skin(unit: EyeAsset, head: Mesh, vertices: np.ndarray) -> Mesh:
-    """The head's triangles, parted at the lids, then those of the sockets with the UVs of the skin beside them."""
+    """Join the head's triangles, parted at the lids, and those of the sockets with the UVs of the skin beside them."""
     faces = head.faces.copy()
     faces[unit.corners[:, 0], unit.corners[:, 1]] = unit.corners[:, 2]
     uv_of = np.zeros((len(vertices), 2))

@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the networks that look at pictures of faces share: the levels of a U-Net, and how shipped weights are read."""
-
-from __future__ import annotations
+"""Common parts of the networks that look at pictures of faces: the levels of a U-Net, and reading shipped weights."""
 
 import json
 from pathlib import Path
@@ -16,13 +14,15 @@ from ..capture import shipped_files
 
 
 def has_files(weights: Path) -> bool:
-    """Whether a file of weights and the card beside it are there."""
+    """Return True if a file of weights and the card beside it exist."""
     return weights.is_file() and weights.with_suffix(".json").is_file()
 
 
 def read_network(kind: type[nn.Module], weights: Path, **options) -> nn.Module:
-    """A network of that class with its weights, ready to be asked; the card beside them says how large it is. Raises
-    Problem where a shipped file is damaged."""
+    """Build a network of that class, in evaluation mode, from its weights and the card beside them.
+
+    Raises Problem where a shipped file is damaged.
+    """
     shipped_files.require_whole(weights)
     network = kind(**json.loads(weights.with_suffix(".json").read_text(encoding="utf-8"))["model"], **options)
     network.load_state_dict({name: value.float() for name, value in load_file(weights).items()})
@@ -30,7 +30,7 @@ def read_network(kind: type[nn.Module], weights: Path, **options) -> nn.Module:
 
 
 class Ladder(nn.Module):
-    """A U-Net over levels of some `widths`, each of `depths` blocks and half as fine as the one before."""
+    """U-Net over levels of some `widths`, each of `depths` blocks and half as fine as the one before."""
 
     def add_levels(self, widths: list[int], depths: list[int]) -> None:
         self.down, self.up, self.halve, self.narrow = nn.ModuleList(), nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
@@ -42,29 +42,31 @@ class Ladder(nn.Module):
                 self.up.append(nn.Sequential(*(Block(width) for _ in range(depth))))
 
     def transform(self, x: torch.Tensor) -> torch.Tensor:
-        """[N, widths[0], H, W] down to the coarsest level and back."""
-        kept = []
+        """Run [N, widths[0], H, W] down to the coarsest level and back."""
+        skips = []
         for level, blocks in enumerate(self.down):
             x = blocks(x)
             if level < len(self.halve):
-                kept.append(x)
+                skips.append(x)
                 x = self.halve[level](x)
         x = self.look_at_all(x)
         for level in reversed(range(len(self.halve))):
-            x = kept[level] + functional.interpolate(
+            x = skips[level] + functional.interpolate(
                 self.narrow[level](x), scale_factor=2, mode="bilinear", align_corners=False
             )
             x = self.up[level](x)
         return x
 
     def look_at_all(self, x: torch.Tensor) -> torch.Tensor:
-        """What is done with the coarsest level beside its blocks."""
+        """Process the coarsest level beside its blocks."""
         return x
 
 
 class Block(nn.Module):
-    """x + conv(gelu(conv(norm(x)))), and a gate per channel from the whole map's mean: exposure and light are matters
-    of the whole picture."""
+    """Residual block with a gate per channel from the mean of the whole map.
+
+    x + conv(gelu(conv(norm(x)))); exposure and light concern the whole picture.
+    """
 
     def __init__(self, width: int):
         super().__init__()

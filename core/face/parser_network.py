@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parsing network: a small U-Net from the crop of a face to the parts' logits at the crop's resolution.
+"""Parsing network: a small U-Net from the crop of a face to the parts' logits at the crop's resolution.
 
 Its trunk begins at a quarter of the resolution; beside it runs one thin layer at half, from which the finest pixels are
 shuffled.
@@ -24,30 +24,32 @@ FINE = 16  # features at half the crop's resolution
 
 
 def network_input(srgb: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """[CHANNELS, S, S] of a crop sRGB [S, S, 3] and of where it shows the picture [S, S].
+    """Stack [CHANNELS, S, S] from a crop sRGB [S, S, 3] and the share of it that shows the picture [S, S].
 
-    Stretched to the contrast that most pictures have, so that dark ones are not another world.
+    It is stretched to the contrast of most pictures, so that dark ones look alike.
     """
-    there = inside > 0.5
-    level = srgb.mean(-1)[there]
+    in_picture = inside > 0.5
+    level = srgb.mean(-1)[in_picture]
     bright = float(np.quantile(level, 0.9)) if level.size else 1.0
     gain = np.clip(0.75 / max(bright, 1e-3), 0.8, 6.0)
     layers = np.zeros((CHANNELS, *inside.shape), np.float32)
-    layers[:3] = ((2 * np.clip(srgb * gain, 0, 1) - 1) * there[..., None]).transpose(2, 0, 1)
-    layers[3] = there
+    layers[:3] = ((2 * np.clip(srgb * gain, 0, 1) - 1) * in_picture[..., None]).transpose(2, 0, 1)
+    layers[3] = in_picture
     return layers
 
 
 def read_network(path: Path, reader: str, parts: int) -> ParseNet:
-    """The network of a file of weights and the card beside it, ready to be asked; reader: whose they are, in words.
-    Raises Problem where one of them is missing, or a shipped file damaged."""
+    """Read the network of a file of weights and the card beside it; `reader` names it to the user.
+
+    Raises Problem where one of them is missing, or a shipped file damaged.
+    """
     if not networks.has_files(path):
         raise Problem(f"The weights of the {reader} are missing.", "Install the extension again.")
     return networks.read_network(ParseNet, path, parts=parts)
 
 
 class ParseNet(networks.Ladder):
-    """[N, CHANNELS, S, S] -> logits [N, parts, S, S]. S is a multiple of 32, to be halved so often."""
+    """Network from [N, CHANNELS, S, S] to logits [N, parts, S, S]; S is a multiple of 32."""
 
     def __init__(self, widths: list[int], depths: list[int], parts: int = len(PARTS)):
         super().__init__()

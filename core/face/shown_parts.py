@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the face parser saw in the frames, in the head's UVs: texture_parts.png, which the stage texture writes where
-the frames are at hand."""
-
-from __future__ import annotations
+"""Face parser's result over all frames in the head's UVs: texture_parts.png, which the stage texture writes."""
 
 import numpy as np
 
@@ -15,26 +12,30 @@ from .parts import GROWTHS, keep_beard, keep_present
 
 
 def read_parts(capture: Capture, size: int) -> np.ndarray | None:
-    """What the face parser saw in the frames, float32 [size, size, len(GROWTHS)]; None where they were not asked.
-    Raises Problem for another picture."""
+    """Read the parts, float32 [size, size, len(GROWTHS)]; None where the frames were not parsed.
+
+    Raises Problem for a picture of other channels.
+    """
     if not capture.texture_parts.is_file():
         return None
     parts = images.read_data(capture.texture_parts)
     if parts.shape[2] != len(GROWTHS):
         raise Problem(
-            f"{capture.texture_parts} has {parts.shape[2]} channels, and the parts of a face that grow hair "
-            f"are {len(GROWTHS)}.",
+            f"{capture.texture_parts} has {parts.shape[2]} channels instead of {len(GROWTHS)}, one for each of the "
+            "parts of a face that grow hair.",
             advise_again("texture"),
         )
     return images.resize(parts, size, size).clip(0, 1)
 
 
 def read_hidden_skin(capture: Capture, size: int) -> np.ndarray:
-    """The share of beard and of the head's hair at each texel, float32 [size, size]: what is dark there is no shadow. 0
-    where the frames were not asked."""
+    """Return the share of beard and hair at each texel, float32 [size, size]: what is dark there is no shadow.
+
+    0 where the frames were not parsed.
+    """
     parts = read_parts(capture, size)
     if parts is None:
         return np.zeros((size, size), np.float32)
     beard, hair = (parts[..., GROWTHS.index(name)] for name in ("beard", "hair"))
-    seen = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size) > 0
-    return np.clip(keep_beard(beard, beard[:, ::-1], seen & seen[:, ::-1]) + keep_present(hair), 0, 1)
+    visible = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size) > 0
+    return np.clip(keep_beard(beard, beard[:, ::-1], visible & visible[:, ::-1]) + keep_present(hair), 0, 1)

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hairs as polylines: where they root, how they grow along and off the skin, how they clump; Cycles draws them as
-curves, the CPU as slim prisms."""
+"""Hairs as polylines: roots, growth along and off the skin, clumping.
+
+Cycles draws them as curves, the CPU as slim prisms.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.meshes import Mesh, unit, vertex_normals
 from ..geometry.noise import noise
 
 
 @dataclass(frozen=True)
 class Strands:
-    """One growth of hair. points float32 [M, K, 3] in metres from the root to the tip; radius float32 [M] in metres at
-    the root, a third of it at the tip; colour float32 [M, 3] linear albedo; part: its name among parts.PARTS."""
+    """Hairs of one part of the face.
+
+    points float32 [M, K, 3] in metres from the root to the tip; radius float32 [M] in metres at the root, a third of it
+    at the tip; colour float32 [M, 3] linear albedo; part: its name among parts.PARTS.
+    """
 
     points: np.ndarray
     radius: np.ndarray
@@ -25,14 +30,17 @@ class Strands:
     part: str
 
     def taper(self) -> np.ndarray:
-        """Radii [M, K] in metres."""
+        """Return radii [M, K] in metres."""
         return self.radius[:, None] * np.linspace(1, 1 / 3, self.points.shape[1], dtype=np.float32)
 
 
 @dataclass(frozen=True)
 class Roots:
-    """Where hairs begin: position [M, 3] in metres, normal and direction [M, 3] unit, at [M, 3] the same places on the
-    template in millimetres."""
+    """Roots of hairs.
+
+    position [M, 3] in metres, normal and direction [M, 3] unit, at [M, 3] the same places on the template in
+    millimetres.
+    """
 
     position: np.ndarray
     normal: np.ndarray
@@ -44,19 +52,18 @@ class Roots:
 
 
 class SkinSurface:
-    """What hairs may not enter: the nearest of a mesh's vertices stands for the skin."""
+    """Skin that hairs may not enter, represented by the nearest of a mesh's vertices."""
 
     def __init__(self, mesh: Mesh):
         self.vertices, self.normals = mesh.vertices, vertex_normals(mesh)
         self.tree = cKDTree(mesh.vertices)
 
     def height(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far points [N, 3] are above the skin, [N] in metres, and its normals there [N, 3]."""
+        """Return the height [N] in metres of points [N, 3] above the skin, and its normals there [N, 3]."""
         distance, near = self.tree.query(points, 3)
         weight = 1 / (distance + 1e-4)
         weight /= weight.sum(1, keepdims=True)
-        normal = (weight[..., None] * self.normals[near]).sum(1)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        normal = unit((weight[..., None] * self.normals[near]).sum(1))
         foot = (weight[..., None] * self.vertices[near]).sum(1)
         return ((points - foot) * normal).sum(1), normal
 
@@ -70,21 +77,10 @@ def grow(
     clearance: np.ndarray,
     steps: int,
 ) -> np.ndarray:
-    """Hairs that leave the skin along their roots' directions and bend on the way.
+    """Grow M hairs, float32 [M, steps, 3] in metres, along their roots' directions and bending on the way.
 
-    Parameters
-    ----------
-    roots : of M hairs
-    length : [M], metres
-    lift : [M], radians between the skin and the hair at its root
-    skin : from which they keep
-    pull : [M, 3] or [3], what bends a hair, per its length
-    clearance : [M], metres that a hair keeps from the skin, less near its root
-    steps : points of a hair
-
-    Returns
-    -------
-    Points float32 [M, steps, 3], in metres, from root to tip.
+    length [M] in metres; lift [M], radians between the skin and the hair at its root; pull [M, 3] or [3] bends a hair,
+    per its length; clearance [M], metres to keep from the skin, less near the root.
     """
     lift = lift[:, None]
     way = np.cos(lift) * roots.direction + np.sin(lift) * roots.normal
@@ -92,27 +88,19 @@ def grow(
     points = [roots.position]
     for k in range(1, steps):
         way = way + np.broadcast_to(pull, way.shape) / (steps - 1)
-        way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-        there = points[-1] + way * step
-        height, normal = skin.height(there)
+        way = unit(way)
+        point = points[-1] + way * step
+        height, normal = skin.height(point)
         short = np.maximum(clearance * min(1.0, 3 * k / (steps - 1)) - height, 0)[:, None]
-        there = there + short * normal
+        point = point + short * normal
         inward = np.minimum((way * normal).sum(1, keepdims=True), 0)
         way = np.where(short > 0, way - 0.9 * inward * normal, way)
-        points.append(there)
+        points.append(point)
     return np.stack(points, 1).astype(np.float32)
 
 
 def clumped(points: np.ndarray, group_size: int, strength: float, rng: np.random.Generator) -> np.ndarray:
-    """Hairs drawn towards one in `group_size` of them, more towards the tip.
-
-    Parameters
-    ----------
-    points : [M, K, 3], in metres, from root to tip
-    group_size : hairs that one leads
-    strength : in [0, 1]
-    rng : chooses the leaders
-    """
+    """Draw hairs [M, K, 3] towards one in `group_size` of them, more towards the tip; strength in [0, 1]."""
     if len(points) < 2 * group_size:
         return points
     leaders = rng.choice(len(points), len(points) // group_size, replace=False)
@@ -130,20 +118,10 @@ def waved(
     rng: np.random.Generator,
     alone: float = 0.35,
 ) -> np.ndarray:
-    """Hairs that bend aside, neighbours alike.
+    """Bend hairs [M, K, 3] aside, neighbours alike: float32, in metres.
 
-    Parameters
-    ----------
-    points : [M, K, 3], in metres, from root to tip
-    at : [M, 3], roots in mm
-    amplitude : metres aside at the tip
-    wavelength_mm : within which neighbours are alike
-    rng : of the noise
-    alone : share by which each goes its own way
-
-    Returns
-    -------
-    float32 [M, K, 3].
+    at [M, 3] are the roots in mm; amplitude is metres aside at the tip; neighbours within wavelength_mm are alike, but
+    for the share `alone` by which each goes its own way.
     """
     along = np.linspace(0, 1, points.shape[1], dtype=np.float32)[None, :, None]
     length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)[:, None, None]
@@ -158,38 +136,28 @@ def waved(
 
 
 def coloured(count: int, colour: np.ndarray, grey: float, rng: np.random.Generator) -> np.ndarray:
-    """Albedos of hairs about one colour.
-
-    Parameters
-    ----------
-    count : of hairs
-    colour : [3], linear
-    grey : share of the hairs without pigment, in [0, 1]
-    rng : draws them
-
-    Returns
-    -------
-    float32 [count, 3], linear.
-    """
+    """Draw linear albedos [count, 3] of hairs around one colour [3]; `grey` is the share without pigment."""
     shade = np.exp(rng.normal(0, 0.22, (count, 1)) + rng.normal(0, 0.05, (count, 3)))
     white = np.array([0.42, 0.40, 0.37]) * np.exp(rng.normal(0, 0.15, (count, 1)))
     return np.where(rng.random((count, 1)) < grey, white, np.clip(colour * shade, 0.003, 0.8)).astype(np.float32)
 
 
 def prisms(strands: Strands, sides: int = 3) -> Mesh:
-    """The hairs as prisms without caps: what a CPU's rays hit. Triangle t belongs to hair t // (2 sides (K - 1))."""
+    """Turn hairs into prisms without caps, for a CPU's rays.
+
+    Triangle t belongs to hair t // (2 sides (K - 1)).
+    """
     points, radius = strands.points.astype(np.float64), strands.taper().astype(np.float64)
     count, knots = points.shape[:2]
-    way = np.gradient(points, axis=1)
-    way /= np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-12)
+    way = unit(np.gradient(points, axis=1))
     across = np.cross(way, np.where(np.abs(way[..., 2:]) < 0.9, [0, 0, 1.0], [1.0, 0, 0]))
-    across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-12)
+    across = unit(across)
     other = np.cross(way, across)
     turn = 2 * np.pi * np.arange(sides) / sides
     ring = np.cos(turn)[:, None] * across[:, :, None] + np.sin(turn)[:, None] * other[:, :, None]  # [M, K, sides, 3]
     vertices = points[:, :, None] + radius[:, :, None, None] * ring
     k, s = np.meshgrid(np.arange(knots - 1), np.arange(sides), indexing="ij")
     a, b, c, d = k * sides + s, k * sides + (s + 1) % sides, (k + 1) * sides + s, (k + 1) * sides + (s + 1) % sides
-    one = np.stack([np.stack([a, c, b], -1), np.stack([b, c, d], -1)], 2).reshape(-1, 3)
-    faces = (np.arange(count)[:, None, None] * knots * sides + one).reshape(-1, 3)
+    first_hair = np.stack([np.stack([a, c, b], -1), np.stack([b, c, d], -1)], 2).reshape(-1, 3)
+    faces = (np.arange(count)[:, None, None] * knots * sides + first_hair).reshape(-1, 3)
     return Mesh(vertices.reshape(-1, 3), faces)

@@ -22,15 +22,15 @@ import numpy as np
 
 from core.capture.files import replacing_folder
 from core.capture.messages import Problem, Reporter
-from core.face import template
+from core.face import faces, template
 from core.geometry import baking
 from core.imaging import images
 from core.stages import registration
-from core.stages.registration import own_mesh, own_template, render_landmarks
+from core.stages.registration import own_mesh, own_template
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr")
 FAR_M = 0.010  # farther apart, two heads are not partners
-MOUTH = render_landmarks.LIP_LINE
+MOUTH = faces.LIP_LINE
 TILE = 256
 
 
@@ -110,7 +110,7 @@ def _marked(srgb: np.ndarray) -> np.ndarray:
     face, bary = template.landmarks()
     mesh = template.load()
     uv = (mesh.uvs[mesh.face_uvs[face]] * bary[..., None]).sum(1)
-    for line, colour in ((MOUTH, (0.1, 1.0, 0.3)), *((eye, (0.1, 0.8, 1.0)) for eye in render_landmarks.EYE_LINES)):
+    for line, colour in ((MOUTH, (0.1, 1.0, 0.3)), *((eye, (0.1, 0.8, 1.0)) for eye in faces.EYE_LINES)):
         points = np.stack([uv[list(line), 0], 1 - uv[list(line), 1]], 1) * TILE - 0.5
         cv2.polylines(small, [np.round(points * 2**shift).astype(np.int32)], True, colour, 1, cv2.LINE_AA, shift)
     return small

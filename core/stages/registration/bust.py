@@ -1,28 +1,27 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The neck ends as a bust does, in a plane and on a smooth outline: a fit leaves the template's open edge wavy, for no
-scan tells where a neck ends, and the template's own has two nicks."""
+"""Neck of a bust, ended in a plane and on a smooth outline.
 
-from __future__ import annotations
+A fit leaves the template's open edge wavy, for no scan shows where a neck ends, and the template's own edge has two
+nicks.
+"""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ...geometry.meshes import Mesh
 
-REACH_WIDTH_SHARE = 0.2
-"""Share of the edge's width over which the skin above it follows: 2 cm on a neck of 10."""
-NEIGHBOURS = 6
-"""Vertices of the edge whose shifts a vertex above it follows, the nearer the more."""
-HARMONICS = 4
-"""Of the outline's radius around the neck: it is an oval with a flat back."""
-LEAST_STEP_SHARE = 0.3
-"""Of the mean angle between neighbours on the edge, which keeps their order."""
+REACH_WIDTH_SHARE = 0.2  # share of the edge's width over which the skin above it follows: 2 cm on a neck of 10
+NEIGHBOURS = 6  # vertices of the edge that a vertex above it follows, the nearer the more
+HARMONICS = 4  # harmonics of the outline's radius around the neck: it is an oval with a flat back
+LEAST_STEP_SHARE = 0.3  # minimum angle between neighbours on the edge, as a share of the mean: it keeps their order
 
 
 def level_edge(mesh: Mesh, vertices: np.ndarray) -> np.ndarray:
-    """Vertices [V, 3] with the mesh's open edge in the plane that lies nearest to it and on a smooth outline; the skin
-    above gives way less and less, the rest stays."""
+    """Return vertices [V, 3] with the mesh's open edge in its nearest plane and on a smooth outline.
+
+    The skin above gives way less and less, the rest stays.
+    """
     edge = open_edge(mesh)
     if not len(edge):
         return vertices
@@ -40,7 +39,7 @@ def level_edge(mesh: Mesh, vertices: np.ndarray) -> np.ndarray:
 
 
 def open_edge(mesh: Mesh) -> np.ndarray:
-    """The vertices [N] along the mesh's open edge, one after the other: those of edges of one triangle only."""
+    """Return the vertices [N] along the mesh's open edge, one after the other."""
     edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     _, first, uses = np.unique(np.sort(edges, 1), axis=0, return_index=True, return_counts=True)
     following = dict(edges[first[uses == 1]].tolist())  # as their triangles are wound
@@ -51,7 +50,7 @@ def open_edge(mesh: Mesh) -> np.ndarray:
 
 
 def _smooth(border: np.ndarray) -> np.ndarray:
-    """A closed line [N, 3] in the plane nearest to it, its radius about the middle a few harmonics of the angle."""
+    """Return a closed line [N, 3] in its nearest plane, its radius a few harmonics of the angle."""
     middle = border.mean(0)
     axes = np.linalg.svd(border - middle)[2]
     x, y = axes[:2] @ (border - middle).T

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes, teeth, sockets, lashes: parts of the artist's mesh with no counterpart on the scan go where the skin around
-them goes.
+"""Parts of the artist's mesh without a counterpart on the scan (eyes, teeth, sockets, lashes) follow the skin.
 
 The displacement of the skin is interpolated by a biharmonic radial basis function, which is linear far away and exact
 at its centres (Carr et al. 2001); a ball stays a ball, so that an eye still turns in its socket.
 """
-
-from __future__ import annotations
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator
@@ -16,35 +13,25 @@ from scipy.spatial import cKDTree
 from ...capture.messages import Reporter
 from .alignment import similarity
 
-MOST_CENTRES = 2000
-"""Places that a field of shifts is interpolated from: its matrix of doubles is of that side, 32 MB."""
-ROUND_RADIUS_SHARE = 0.06
-"""Deviation from a sphere, as a share of its radius, below which a part is a ball."""
+MOST_CENTRES = 2000  # maximum number of centres to interpolate from: the matrix of doubles has that side, 32 MB
+ROUND_RADIUS_SHARE = 0.06  # deviation from a sphere, as a share of its radius, below which a part is a ball
+CARRYING = "moving eyes, teeth and other parts with the skin"
 
 
 def carry_along(
     start: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray, report: Reporter
 ) -> np.ndarray:
-    """The final vertices of a mesh whose skin was fitted: eyes, teeth and other parts go along.
+    """Return the vertices [V, 3] of a mesh whose skin [S] was fitted: all other parts follow.
 
-    Parameters
-    ----------
-    start : [V, 3], in metres, all as placed by the similarity
-    label : [V], the connected part that each belongs to
-    skin : [S], indices of the fitted ones
-    fitted : [S, 3], where they went
-    report : hears of progress
-
-    Returns
-    -------
-    [V, 3].
+    start [V, 3] is the mesh as placed by the similarity, label [V] its connected parts, skin the indices of the
+    vertices that went to fitted [S, 3].
     """
     final = start.copy()
     final[skin] = fitted
     others = np.setdiff1d(np.arange(len(start)), skin)
     if not len(others):
         return final
-    report.progress(0, 1, "carrying eyes, teeth and other parts along")
+    report.progress(0, 1, CARRYING)
     centres = _centres(start, skin, others)
     shift = np.zeros_like(start)
     shift[skin] = fitted - start[skin]
@@ -57,19 +44,7 @@ def carry_along(
 
 
 def field(places: np.ndarray, shift: np.ndarray, at: np.ndarray, report: Reporter) -> np.ndarray:
-    """A displacement, smoothly continued from the places where it is known.
-
-    Parameters
-    ----------
-    places : [N, 3]; of many an even choice counts
-    shift : [N, 3], the displacement there
-    at : [M, 3], where it is asked
-    report : hears of progress
-
-    Returns
-    -------
-    [M, 3].
-    """
+    """Continue displacements [N, 3] known at places [N, 3] smoothly to `at` [M, 3]."""
     chosen = np.linspace(0, len(places) - 1, min(len(places), MOST_CENTRES)).astype(int)
     # two centres at one place have no solution
     _, first = np.unique(np.round(places[chosen] * 1e5), axis=0, return_index=True)
@@ -77,13 +52,13 @@ def field(places: np.ndarray, shift: np.ndarray, at: np.ndarray, report: Reporte
     continued = RBFInterpolator(places[chosen], shift[chosen], kernel="linear", smoothing=1e-6)
     out = np.empty_like(at)
     for i in range(0, len(at), 4000):
-        report.progress(i, len(at), "carrying eyes, teeth and other parts along")
+        report.progress(i, len(at), CARRYING)
         out[i : i + 4000] = continued(at[i : i + 4000])
     return out
 
 
 def _centres(start: np.ndarray, skin: np.ndarray, other_parts: np.ndarray) -> np.ndarray:
-    """Vertices of the skin that carry the rest: those nearest to the other parts, and an even choice of all."""
+    """Choose vertices of the skin to carry the rest: those nearest to the other parts, and an even choice of all."""
     distance, _ = cKDTree(start[other_parts]).query(start[skin])
     near = skin[np.argsort(distance, kind="stable")[: MOST_CENTRES // 2]]
     even = skin[np.linspace(0, len(skin) - 1, MOST_CENTRES // 2).astype(int)]
@@ -91,7 +66,7 @@ def _centres(start: np.ndarray, skin: np.ndarray, other_parts: np.ndarray) -> np
 
 
 def _is_ball(points: np.ndarray) -> bool:
-    """Whether points lie on most of a sphere."""
+    """Return True if points lie on most of a sphere."""
     system = np.column_stack([2 * points, np.ones(len(points))])
     solution, *_ = np.linalg.lstsq(system, (points**2).sum(1), rcond=None)
     centre = solution[:3]

@@ -1,39 +1,39 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a few views tell of a head without a scan, as one kind of constraint: a point of the surface should move so far
-along a direction.
+"""Evidence of a few views as one kind of constraint: a point of the surface should move so far along a direction.
 
 A landmark in a picture constrains the two directions across its ray, a matched point the surface's normal, a silhouette
 the normal in the picture.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from .alignment import HeadModel
 from .landmarks import Landmarks
 
 LEAST_COSINE, FULL_COSINE = 0.15, 0.45
-"""Cosines between a landmark's normal and its view: below the first it has slid onto the outline and says nothing, from
-the second on it counts fully."""
+"""Cosines between a landmark's normal and its view: below the first it has slid onto the outline and counts for
+nothing, from the second on it counts fully."""
 DEPTH_SHARE = 0.06
-"""What a depth taken from the mean head counts for beside a landmark's place in the picture: people differ from it by a
-centimetre, and a net's mark errs by 2.5 mm."""
+"""Weight of a depth taken from the mean head beside a landmark's place in the picture: people differ from it by a
+centimetre, a network's mark errs by 2.5 mm."""
 MOST_ANGLE_DEG = 60.0
-"""Between a matched point's mean viewing direction and the surface's normal: beyond, the point lies on something
-behind."""
+"""Maximum angle between a matched point's mean viewing direction and the surface's normal: beyond, the point lies on
+something behind."""
 
 
 @dataclass(frozen=True)
 class Constraints:
-    """M points of a mesh, at corners int64 [M, 3] with bary [M, 3], that should move by distance [M] (metres) along
-    unit direction [M, 3] in the world; weight [M] in [0, 1]: how far each is believed beside its like."""
+    """Points of a mesh that should move.
+
+    M points at corners int64 [M, 3] with bary [M, 3] should move by distance [M] (metres) along unit direction [M, 3]
+    in the world; weight [M] in [0, 1] relates points of a kind.
+    """
 
     corners: np.ndarray
     bary: np.ndarray
@@ -45,32 +45,25 @@ class Constraints:
         return len(self.distance)
 
     def at(self, vertex_values: np.ndarray) -> np.ndarray:
-        """Values of the vertices [..., V, C] at the points [..., M, C]."""
+        """Interpolate values of the vertices [..., V, C] at the points [..., M, C]."""
         return (vertex_values[..., self.corners, :] * self.bary[..., None]).sum(-2)
 
 
-def joined(constraints: list[Constraints]) -> Constraints:
+def join(constraints: list[Constraints]) -> Constraints:
     return Constraints(*(np.concatenate([getattr(part, f.name) for part in constraints]) for f in fields(Constraints)))
 
 
 def from_landmarks(
     model: HeadModel, vertices: np.ndarray, views: list[View], landmarks: Landmarks, trust: np.ndarray, reach: float
 ) -> Constraints:
-    """Two constraints per view and landmark that is seen squarely enough. A single view does not tell depths, so there
-    each landmark is also held, loosely, to the depth that it was lifted to.
+    """Constrain landmarks that are seen squarely enough, in two directions per view.
 
-    Parameters
-    ----------
-    model : the template
-    vertices : [V, 3], in metres, as the head lies now
-    views : cameras, in the same world
-    landmarks : with their pixels in the views
-    trust : [468] in [0, 1]
-    reach : metres; what misses by much more counts for little
+    A single view does not show depth, so there each landmark is also held, loosely, to the depth it was lifted to.
+    vertices [V, 3] in metres are the head's now; a landmark that misses by much more than `reach` metres counts for
+    little.
     """
     at = model.at_landmarks(vertices)
-    normals = model.at_landmarks(vertex_normals(model.mesh.moved(vertices)))
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    normals = unit(model.at_landmarks(vertex_normals(model.mesh.moved(vertices))))
     corners = model.mesh.faces[model.landmark_face]
     parts = [none()]
     for view in views:
@@ -78,15 +71,13 @@ def from_landmarks(
             continue
         pixels, used = landmarks.images[view.name]
         rays = view.rays(pixels)
-        towards = view.centre - at
-        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+        towards = unit(view.centre - at)
         facing = np.clip(((normals * towards).sum(1) - LEAST_COSINE) / (FULL_COSINE - LEAST_COSINE), 0, 1)
         weight = facing * used * trust * model.landmark_weight
         index = np.flatnonzero(weight > 0.01)
         along = ((at - view.centre) * rays).sum(1, keepdims=True)
         miss = (view.centre + along * rays - at)[index]
-        side = np.cross(rays[index], view.rotation[1])
-        side /= np.linalg.norm(side, axis=1, keepdims=True)
+        side = unit(np.cross(rays[index], view.rotation[1]))
         robust = weight[index] / (1 + (miss**2).sum(1) / reach**2) ** 2
         for direction in (side, np.cross(rays[index], side)):
             parts.append(
@@ -97,20 +88,14 @@ def from_landmarks(
             parts.append(
                 Constraints(corners[index], model.landmark_bary[index], rays[index], deeper, DEPTH_SHARE * robust)
             )
-    return joined(parts)
+    return join(parts)
 
 
 def from_points(mesh: Mesh, follow: np.ndarray, points: np.ndarray, towards: np.ndarray, reach: float) -> Constraints:
-    """One constraint per matched point that lies near the part of the mesh that follows, on the side that the views it
-    was seen in look at.
+    """Constrain the mesh to matched points [N, 3] near its followed part, on the side that faces their views.
 
-    Parameters
-    ----------
-    mesh : in metres
-    follow : [V] in [0, 1], above 0.5 the part that follows
-    points : [N, 3], in metres
-    towards : [N, 3], unit, mean direction to the views that a point was seen in
-    reach : metres
+    follow [V] in [0, 1] weighs the vertices; towards [N, 3] is the unit mean direction to the views of a point;
+    distances beyond `reach` metres do not count.
     """
     if not len(points):
         return none()

@@ -1,20 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where on the scan a point of the template belongs: the nearest compatible patch, trimmed."""
-
-from __future__ import annotations
+"""Correspondence of template and scan: the nearest compatible patch, with robust weights."""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 
-NEIGHBOURS = 8  # nearest samples of the scan that are looked at
-MOST_ANGLE_DEG = 45.0  # between the normals of partners
+NEIGHBOURS = 8  # samples of the scan in a patch
+MOST_ANGLE_DEG = 45.0  # maximum angle between the normals of partners
 
 
 class Scan:
-    """The scan as points with normals, ready to be searched."""
+    """Scan as points with normals, ready to be searched."""
 
     def __init__(self, mesh: Mesh):
         used = np.unique(mesh.faces)
@@ -25,10 +23,10 @@ class Scan:
         self.spacing = float(np.median(spacing))
 
     def match(self, points: np.ndarray, normals: np.ndarray, farthest: float) -> tuple[np.ndarray, np.ndarray]:
-        """Signed distances [N] along the scan's local normals, and those normals [N, 3]; nan where nothing compatible
-        lies within `farthest` metres.
+        """Return signed distances [N] along the scan's local normals, and those normals [N, 3].
 
-        A local patch (the mean of the nearest scan points, nearer ones counting more) takes out the scan's noise.
+        nan where nothing compatible lies within `farthest` metres. A local patch (the mean of the nearest scan points,
+        nearer ones counting more) takes out the scan's noise.
         """
         distance, index = self._tree.query(points, NEIGHBOURS, distance_upper_bound=farthest, workers=-1)
         in_reach = np.isfinite(distance)
@@ -36,8 +34,7 @@ class Scan:
         near = in_reach * np.exp(-0.5 * ((distance - distance[:, :1]) / (1.5 * self.spacing)) ** 2)
         total = np.maximum(near.sum(1, keepdims=True), 1e-12)
         centre = (self.points[index] * near[..., None]).sum(1) / total
-        normal = (self.normals[index] * near[..., None]).sum(1) / total
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        normal = unit((self.normals[index] * near[..., None]).sum(1) / total)
         compatible = in_reach[:, 0] & ((normal * normals).sum(1) > np.cos(np.radians(MOST_ANGLE_DEG)))
         sideways = np.linalg.norm(points - centre - ((points - centre) * normal).sum(1, keepdims=True) * normal, axis=1)
         compatible &= sideways < 3 * self.spacing  # beyond: past the rim of a hole
@@ -45,16 +42,18 @@ class Scan:
         return np.where(compatible, signed, np.nan), normal
 
     def distances(self, points: np.ndarray, normals: np.ndarray, farthest: float = 0.02) -> np.ndarray:
-        """Unsigned point-to-plane distances [M] in metres of the points that find a partner."""
+        """Return unsigned point-to-plane distances [M] in metres of the points that find a partner."""
         signed, _ = self.match(points, normals, farthest)
         return np.abs(signed[np.isfinite(signed)])
 
 
-def trimmed(signed: np.ndarray, least: float) -> np.ndarray:
-    """Weights [N] in [0, 1] of signed distances with nan: zero beyond three robust deviations (at least `least`
-    metres), Tukey's biweight within."""
-    known = np.isfinite(signed)
-    if not known.any():
+def biweight(signed: np.ndarray, least: float) -> np.ndarray:
+    """Return Tukey's biweight [N] of signed distances, 0 for nan.
+
+    Zero beyond three robust deviations, or `least` metres if that is more.
+    """
+    valid = np.isfinite(signed)
+    if not valid.any():
         return np.zeros(len(signed))
-    width = max(3 * 1.4826 * np.median(np.abs(signed[known])), least)
-    return np.where(known, np.clip(1 - (np.nan_to_num(signed) / width) ** 2, 0, 1) ** 2, 0)
+    width = max(3 * 1.4826 * np.median(np.abs(signed[valid])), least)
+    return np.where(valid, np.clip(1 - (np.nan_to_num(signed) / width) ** 2, 0, 1) ** 2, 0)

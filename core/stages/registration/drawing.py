@@ -1,14 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The registered head over the frames, for the eye: its visible edges, and the landmarks it was lifted from."""
-
-from __future__ import annotations
+"""Registered head drawn over the frames: its visible edges, and the landmarks it was lifted from."""
 
 import cv2
 import numpy as np
 
 from ...face.eye_reader import EyeShares
 from ...face.lids import OpenHead
+from ...face.parts import to_picture
 from ...geometry import raster
 from ...geometry.meshes import Mesh, vertex_normals
 from ...geometry.views import View
@@ -17,26 +16,12 @@ from .eye_looks import EyeLook
 from .landmarks import Landmarks
 
 RIM_UV = (0.4 / np.pi) ** 0.6
-"""Distance from the middle of an eyeball's UVs of the ring at 0.4 radians, near the iris' edge, over the half of their
-width."""
-PX_PER_CROP_PX = 4
-"""Pixels of an outline for one of the reader's crop."""
+"""Radius in an eyeball's UVs, over half their width, of the ring at 0.4 radians, near the iris' edge."""
+PX_PER_CROP_PX = 4  # pixels of an outline for one of the reader's crop
 
 
 def overlay(views: list[View], mesh: Mesh, landmarks: Landmarks, height: int = 640) -> np.ndarray:
-    """Per view the frame with the wireframe and, in yellow, the landmarks that were used.
-
-    Parameters
-    ----------
-    views : with their pictures
-    mesh : the head
-    landmarks : with their pixels
-    height : of the picture, in pixels
-
-    Returns
-    -------
-    [height, W, 3], sRGB.
-    """
+    """Draw views with the wireframe and, in yellow, the used landmarks: sRGB [height, W, 3]."""
     caster, normals = raster.RayCaster(mesh), vertex_normals(mesh)
     edges = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     return np.hstack([_one(view, mesh, caster, normals, edges, landmarks, height) for view in views])
@@ -49,22 +34,12 @@ def eyes_overlay(
     opened: OpenHead,
     side: int = 300,
 ) -> np.ndarray:
-    """Both eyes in three frames, with the edges of the head's lids (green), a ring near the iris' edge (blue) and where
-    the reader saw ball and iris end (red).
+    """Draw both eyes in three frames, right then left: sRGB [3 side, 2 side, 3].
 
-    Parameters
-    ----------
-    views : with their pictures
-    landmarks : with their pixels
-    looks : at the left and at the right eye
-    opened : the head with open lids
-    side : of each square, in pixels
-
-    Returns
-    -------
-    [3 side, 2 side, 3], sRGB: the right eye, then the left one.
+    With the edges of the head's lids (green), a ring near the iris' edge (blue) and the ends of ball and iris as read
+    (red).
     """
-    shares = [{one.view.name: one.shares for one in seen} for seen in looks]
+    shares = [{look.view.name: look.shares for look in looks_at_eye} for looks_at_eye in looks]
     return np.vstack(
         [
             np.hstack([_eye(view, shares[which].get(view.name), opened, which, side) for which in (1, 0)])
@@ -80,7 +55,7 @@ def _eye(view: View, shares: EyeShares | None, opened: OpenHead, eye: int, side:
     srgb = view.read()
     scale = side / (2 * reach)
     full = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
-    # cv2 counts from pixel centres
+    # cv2's coordinates start at pixel centres
     move = np.column_stack([np.diag(scale / full), side / 2 - scale * middle + 0.5 * scale / full - 0.5])
     canvas = cv2.warpAffine(srgb.astype(np.float32), move, (side, side), flags=cv2.INTER_LINEAR)
 
@@ -94,18 +69,19 @@ def _eye(view: View, shares: EyeShares | None, opened: OpenHead, eye: int, side:
     for x, y in (view.project(iris)[0] - middle) * scale + side / 2 - 0.5:
         cv2.circle(canvas, (round(x), round(y)), 1, (0.2, 0.6, 1.0), -1, cv2.LINE_AA)
     for share in () if shares is None else (shares.ball, shares.iris):
-        there = cv2.resize(share, None, fx=PX_PER_CROP_PX, fy=PX_PER_CROP_PX, interpolation=cv2.INTER_LINEAR) > 0.5
-        for line in cv2.findContours(there.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]:
-            at = (line[:, 0] + 0.5) / PX_PER_CROP_PX - shares.move[:, 2]
-            drawn(at @ np.linalg.inv(shares.move[:, :2]).T, (1.0, 0.2, 0.1), closed=True)
+        mask = cv2.resize(share, None, fx=PX_PER_CROP_PX, fy=PX_PER_CROP_PX, interpolation=cv2.INTER_LINEAR) > 0.5
+        for line in cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]:
+            drawn(to_picture((line[:, 0] + 0.5) / PX_PER_CROP_PX, shares.move), (1.0, 0.2, 0.1), closed=True)
     return canvas
 
 
 def three_views(views: list[View], landmarks: Landmarks) -> list[View]:
-    """The leftmost, the middle and the rightmost of the views whose landmarks were used."""
-    seen = [view for view in views if view.name in landmarks.images and landmarks.images[view.name][1].any()] or views
+    """Return the leftmost, the middle and the rightmost of the views whose landmarks were used."""
+    with_marks = [
+        view for view in views if view.name in landmarks.images and landmarks.images[view.name][1].any()
+    ] or views
     middle = np.nanmean(landmarks.points, axis=0)
-    ordered = sorted(seen, key=lambda view: np.arctan2(view.centre[0] - middle[0], middle[1] - view.centre[1]))
+    ordered = sorted(with_marks, key=lambda view: np.arctan2(view.centre[0] - middle[0], middle[1] - view.centre[1]))
     return [ordered[0], ordered[len(ordered) // 2], ordered[-1]]
 
 
@@ -114,10 +90,10 @@ def _one(view, mesh, caster, normals, edges, landmarks, height):
     scale = height / view.height
     canvas = np.ascontiguousarray(images.resize(srgb, round(view.width * scale), height))
     pixels, _ = view.project(mesh.vertices)
-    seen = raster.visible_from(caster, mesh.vertices, normals, view.centre)
-    shown = edges[seen[edges].all(1)]
+    visible = raster.visible_from(caster, mesh.vertices, normals, view.centre)
+    visible_edges = edges[visible[edges].all(1)]
     shift = 4  # cv2 draws with fractional pixels as fixed-point integers
-    lines = np.round((pixels[shown] * scale - 0.5) * 2**shift).astype(np.int32)
+    lines = np.round((pixels[visible_edges] * scale - 0.5) * 2**shift).astype(np.int32)
     layer = canvas.copy()
     cv2.polylines(layer, list(lines), False, (0.2, 0.9, 1.0), 1, cv2.LINE_AA, shift)
     canvas = 0.55 * canvas + 0.45 * layer

@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames see an eye well, and what the eye reader sees in them."""
-
-from __future__ import annotations
+"""Frames that show an eye well, and the eye reader's result in them."""
 
 from dataclasses import dataclass
 
@@ -20,24 +18,24 @@ CORNERS = (LEFT_EYE[::-1], RIGHT_EYE)
 
 @dataclass(frozen=True)
 class EyeLook:
-    """A view that shows one eye, and what the eye reader saw in it; shares.move takes the view's own pixels to the
-    crop."""
+    """View of one eye and the eye reader's result in it; shares.move takes the view's own pixels to the crop."""
 
     view: View
     shares: EyeShares
 
 
 def usable(sights: list[tuple[float, Eye]], side: int) -> list[int]:
-    """Which sights (yaw of the head in degrees, eye) of the left (0) or right (1) eye hold: it is not beyond the nose,
-    and as open as it usually is."""
-    there = [i for i, (yaw, _) in enumerate(sights) if shows_eye(yaw, side)]
-    usual = float(np.median([sights[i][1].opening for i in there])) if there else 0.0
-    return [i for i in there if sights[i][1].is_open_as(usual)]
+    """Return the indices of usable sights (yaw in degrees, eye) of the left (0) or right (1) eye.
+
+    The eye is not beyond the nose, and as open as it usually is.
+    """
+    facing = [i for i, (yaw, _) in enumerate(sights) if shows_eye(yaw, side)]
+    usual = float(np.median([sights[i][1].opening for i in facing])) if facing else 0.0
+    return [i for i in facing if sights[i][1].is_open_as(usual)]
 
 
 def look(views: list[View], landmarks: Landmarks, report: Reporter) -> tuple[list[EyeLook], list[EyeLook]]:
-    """The left and the right eye as the reader sees them in the views that show them well, and in which the eye's
-    landmarks were not thrown out."""
+    """Read the left and the right eye in the views that show them well and whose landmarks hold."""
     use = [_names_of(views, landmarks, side) for side in (0, 1)]
     looks: tuple[list[EyeLook], list[EyeLook]] = [], []
     for view in views:
@@ -54,11 +52,13 @@ def look(views: list[View], landmarks: Landmarks, report: Reporter) -> tuple[lis
     return looks
 
 
-def _names_of(views: list[View], found: Landmarks, side: int) -> set[str]:
-    """The views whose look at one eye is usable."""
+def _names_of(views: list[View], landmarks: Landmarks, side: int) -> set[str]:
+    """Return the names of the views that show an eye well."""
     names = [
-        view.name for view in views if view.name in found.eyes and found.images[view.name][1][list(CORNERS[side])].any()
+        view.name
+        for view in views
+        if view.name in landmarks.eyes and landmarks.images[view.name][1][list(CORNERS[side])].any()
     ]
-    # the right eye stands first there
-    chosen = usable([(found.eyes[name][0], found.eyes[name][2 - side]) for name in names], side)
+    # the right eye comes first there
+    chosen = usable([(landmarks.eyes[name][0], landmarks.eyes[name][2 - side]) for name in names], side)
     return {names[i] for i in chosen}

@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes that were open while filming: eyeballs placed and sized by the edges of the lids and by the iris, and the head's
-lids opened to meet those edges.
+"""Eyes that were open while filming: eyeballs fitted to the edges of the lids and to the iris, and the lids opened.
 
 The closed head stays the head; open, its triangles and UVs are the same but parted between the lids.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
@@ -22,22 +19,23 @@ from .irises import CENTRE_SIGMA_M, GAZE_SIGMA_RAD
 from .lid_marks import LidMarks, mark
 
 RIM_SIGMA_M, IRIS_SIGMA_M = 0.0006, 0.0010
-"""How well an edge's mark tells where the eyeball ends, and the iris where it lies before it."""
+"""Deviation of the eyeball's surface from a mark of a lid's edge, and from the iris where it lies before it."""
 RADIUS_SIGMA_SHARE = 0.06
-"""How well the head around tells how large an eyeball is, as a share: MakeHuman's eyes over its own heads."""
+"""Deviation of an eyeball's size from the head's around it, as a share: MakeHuman's eyes over its own heads."""
 ROUNDS = 12
 CORNER_REACH_M, RIM_REACH_M = 0.008, 0.006
-"""How far around the eye's corners the face follows them, and around a lid's edge the lid: some centimetre, and half of
-one."""
-USUAL_OPENING, WIDEST_OPENING = 0.8, 1.4
-"""Of MakeHuman's own opening."""
+"""Reach of the eye's corners on the face, about a centimetre, and of a lid's edge on the lid, about half of one."""
+USUAL_OPENING, WIDEST_OPENING = 0.8, 1.4  # shares of MakeHuman's own opening
 
 
 @dataclass(frozen=True)
 class OpenEyes:
-    """head: the closed head, its lids before the balls; opened: the same as filmed; openness: of the left and of the
-    right eye, 1 being MakeHuman's; iris_radius [2] in metres, nan where unseen; measured: how many views told of the
-    left and the right eye (0: by the other one, or by the head)."""
+    """Fitted eyes.
+
+    head: the closed head, its lids before the balls; opened: the same as filmed; openness: of the left and of the right
+    eye, 1 being MakeHuman's; iris_radius [2] in metres, nan where unseen; measured: the number of views of the left and
+    the right eye (0: by the other one, or by the head).
+    """
 
     head: Mesh
     opened: lids.OpenHead
@@ -46,7 +44,7 @@ class OpenEyes:
     measured: tuple[int, int]
 
     def records(self) -> tuple[Eyeball, Eyeball]:
-        """The left and the right eye as eyes.json keeps them."""
+        """Return the left and the right eye as eyes.json keeps them."""
 
         def rounded(vector):
             return tuple(round(float(x), 6) for x in vector)
@@ -68,33 +66,29 @@ class OpenEyes:
 def mark_rims(
     looks: tuple[list[EyeLook], list[EyeLook]], head: Mesh, opening: float, report: Reporter
 ) -> tuple[LidMarks | None, LidMarks | None]:
-    """The edges of the left and the right lids, as far as the views tell of them.
+    """Mark the edges of the left and the right lids of a closed head as far as the views show them.
 
-    Parameters
-    ----------
-    looks : at the left and at the right eye
-    head : with closed lids, in metres
-    opening : height over width between the lids, as seen
-    report : hears whether it is cancelled
+    opening is height over width between the lids, as seen.
     """
-    begun = fit(head, (None, None), opening).opened
-    return mark(looks[0], begun, 0, report), mark(looks[1], begun, 1, report)
+    start = fit(head, (None, None), opening).opened
+    return mark(looks[0], start, 0, report), mark(looks[1], start, 1, report)
 
 
 def figures(report: Reporter, eyes: OpenEyes) -> None:
-    for name, ball, radius, views, openness in zip(
-        SIDES, eyes.opened.balls, eyes.iris_radius, eyes.measured, eyes.openness, strict=True
-    ):
-        report.figure(f"{name}_eye_views", views)
-        report.figure(f"{name}_eye_openness", round(openness, 2))
-        report.figure(f"{name}_eyeball_radius_mm", round(1e3 * ball.radius, 2))
-        report.figure(f"{name}_iris_radius_mm", round(1e3 * float(radius), 2) if np.isfinite(radius) else None)
+    for side, name in enumerate(SIDES):
+        radius = float(eyes.iris_radius[side])
+        report.figure(f"{name}_eye_views", eyes.measured[side])
+        report.figure(f"{name}_eye_openness", round(eyes.openness[side], 2))
+        report.figure(f"{name}_eyeball_radius_mm", round(1e3 * eyes.opened.balls[side].radius, 2))
+        report.figure(f"{name}_iris_radius_mm", round(1e3 * radius, 2) if np.isfinite(radius) else None)
 
 
 def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: float) -> OpenEyes:
-    """head: closed, in the template's topology; rims of the left and the right eye, where they were seen;
-    opening: height over width of the eyes, for one that was not."""
-    head = _with_corners(head, rims)
+    """Fit eyeballs and lids of a closed head to the marks of the left and the right eye.
+
+    opening, height over width, is used for an eye without marks.
+    """
+    head = _move_corners(head, rims)
     balls = tuple(_place(head, side, rims[side]) for side in (0, 1))
     clear = head.vertices
     for ball in balls:
@@ -117,8 +111,8 @@ def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: floa
     )
 
 
-def _with_corners(head: Mesh, rims: tuple) -> Mesh:
-    """The head with the corners of its eyes where they are seen, and the face close around along with them."""
+def _move_corners(head: Mesh, rims: tuple) -> Mesh:
+    """Move the corners of the eyes to their marks, and the face close around along with them."""
     vertices = head.vertices.copy()
     for rim, (outer, inner) in zip(rims, lids.corners(), strict=True):
         if rim is not None:
@@ -131,13 +125,12 @@ def _with_corners(head: Mesh, rims: tuple) -> Mesh:
 
 
 def _place(head: Mesh, side: int, lid_marks: LidMarks | None) -> lids.PosedEyeball:
-    """The eyeball whose surface the edges of the lids and of the iris lie on; by least squares, under what the head
-    around tells."""
+    """Fit an eyeball by least squares to the edges of the lids and of the iris, with the head around as the prior."""
     centre, radius = lids.carry_ball(head, side)
     if lid_marks is None:
         return lids.place_ball(side, centre, radius, lids.FORWARD)
     edge = np.concatenate([lid_marks.upper[2:-2], lid_marks.lower[2:-2]])  # near the corners the lids leave the ball
-    off = _clearance(head, side, lids.place_ball(side, centre, radius, lids.FORWARD), lid_marks)
+    clearance = _clearance(head, side, lids.place_ball(side, centre, radius, lids.FORWARD), lid_marks)
     start, size = centre, radius
     for _ in range(ROUNDS):
         out, ahead = edge - centre, lid_marks.iris - centre
@@ -153,44 +146,45 @@ def _place(head: Mesh, side: int, lid_marks: LidMarks | None) -> lids.PosedEyeba
                 np.array([[0, 0, 0, 1 / (RADIUS_SIGMA_SHARE * size)]]),
             ]
         )
-        left = np.concatenate(
+        residuals = np.concatenate(
             [
-                (radius + off - far) / RIM_SIGMA_M,
+                (radius + clearance - far) / RIM_SIGMA_M,
                 [(front - front_far) / IRIS_SIGMA_M],
                 -ahead[[0, 2]] / front_far / GAZE_SIGMA_RAD,
                 (start - centre) / CENTRE_SIGMA_M,
                 [(size - radius) / (RADIUS_SIGMA_SHARE * size)],
             ]
         )
-        step = np.linalg.lstsq(rows, left, rcond=None)[0]
+        step = np.linalg.lstsq(rows, residuals, rcond=None)[0]
         centre, radius = centre + step[:3], radius + step[3]
     ahead = lid_marks.iris - centre
     return lids.place_ball(side, centre, float(radius), ahead / np.linalg.norm(ahead))
 
 
 def _clearance(head: Mesh, side: int, ball: lids.PosedEyeball, lid_marks: LidMarks) -> np.ndarray:
-    """How far the lids' edges lie before the eyeball of this head, metres, where `lid_marks` are, but for two at
-    either end."""
+    """Return how far before this head's eyeball the lids' edges lie, metres, at the marks but two at either end."""
     opened = lids.open_around(
         head, (ball, ball), (USUAL_OPENING, USUAL_OPENING)
     )  # the other side's lids are not looked at
     outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
-    off = []
+    clearances = []
     for rim, marks in zip(opened.rims[side], (lid_marks.upper, lid_marks.lower), strict=True):
         points = opened.skin.vertices[rim][::-1]  # as the marks: from the outer corner on
         clear = np.linalg.norm(points - ball.centre, axis=1) - ball.radius
-        off.append(np.interp(_along(marks[2:-2], marks[0], marks[-1]), _along(points, outer, inner), clear))
-    return np.concatenate(off)
+        clearances.append(np.interp(_along(marks[2:-2], marks[0], marks[-1]), _along(points, outer, inner), clear))
+    return np.concatenate(clearances)
 
 
 def _along(points: np.ndarray, outer: np.ndarray, inner: np.ndarray) -> np.ndarray:
-    """How far from the outer corner to the inner one points [N, 3] lie, 0 to 1."""
+    """Return how far from the outer corner to the inner one points [N, 3] lie, 0 to 1."""
     return (points - outer) @ (inner - outer) / ((inner - outer) ** 2).sum()
 
 
 def _openness(head: Mesh, balls: tuple, side: int, lid_marks: LidMarks | None, opening: float) -> float:
-    """How far an eye is open, of MakeHuman's opening: that which brings the upper lid's edge nearest to the one seen,
-    or the height between the lids to `opening` times the width."""
+    """Return the opening of an eye as a share of MakeHuman's.
+
+    It brings the upper lid's edge nearest to its marks, or the height between the lids to `opening` times the width.
+    """
     steps = np.linspace(0.0, WIDEST_OPENING, 29)
     miss = []
     for step in steps:
@@ -206,8 +200,7 @@ def _openness(head: Mesh, balls: tuple, side: int, lid_marks: LidMarks | None, o
 
 
 def _aims(opened: lids.OpenHead, side: int, lid: int, lid_marks: LidMarks) -> np.ndarray:
-    """Where the vertices of an edge belong [N, 3]: on the curve through its marks, as far between the corners as they
-    are on the head."""
+    """Return targets [N, 3] of an edge's vertices on the curve through its marks, as far along as on the head."""
     outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
     share = np.clip(_along(opened.skin.vertices[opened.rims[side][lid]], outer, inner), 0, 1)
     marks = (lid_marks.upper, lid_marks.lower)[lid]
@@ -216,15 +209,14 @@ def _aims(opened: lids.OpenHead, side: int, lid: int, lid_marks: LidMarks) -> np
 
 
 def _towards_rims(opened: lids.OpenHead, side: int, lid_marks: LidMarks) -> np.ndarray:
-    """What is left to the edges seen, on the edges and, fading, on the lids beside them [V + C + P, 3]; each lid
-    follows its own edge."""
+    """Return the shift [V + C + P, 3] that brings the edges to their marks and, fading, the lids beside them."""
     vertices = opened.skin.vertices
     shift = np.zeros_like(vertices)
     for lid, rim in enumerate(opened.rims[side]):
-        off = _aims(opened, side, lid, lid_marks) - vertices[rim]
+        gaps = _aims(opened, side, lid, lid_marks) - vertices[rim]
         members = lids.rows_of_lid(side, lid)
         gap = np.linalg.norm(vertices[members, None] - vertices[rim][None], axis=2)
         weight = np.exp(-0.5 * (gap / RIM_REACH_M) ** 2)
         near = np.exp(-0.5 * (gap / 0.0015) ** 2) + 1e-12  # which of the edge's vertices a lid's vertex goes with
-        shift[members] += weight.max(1, keepdims=True) * (near @ off) / near.sum(1, keepdims=True)
+        shift[members] += weight.max(1, keepdims=True) * (near @ gaps) / near.sum(1, keepdims=True)
     return shift

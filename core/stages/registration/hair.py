@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair of the head and clothes, told from skin by the face parser: no skull is fitted to them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...capture.messages import Reporter
@@ -13,25 +11,16 @@ from ...geometry.meshes import Mesh, vertex_normals
 from ...geometry.views import View
 from .landmarks import spread
 
-MOST_VIEWS = 12
-"""That are parsed, spread over all: the network takes its time over each."""
-FACING_COSINE = 0.4
-"""Least cosine between a surface and the way to the camera."""
-HAIR_SHARE = 0.5
-"""Share of the views that face a point and show it as hair or cloth, from which it is."""
-LEAST_LEFT_SHARE = 0.2
-"""Share of a scan that must be left: less is a picture that the parser does not understand."""
+MOST_VIEWS = 12  # maximum number of views to parse, spread over all: the network is slow
+FACING_COSINE = 0.4  # minimum cosine between a surface and the direction to the camera
+HAIR_SHARE = 0.5  # share of the views facing a point that must show it as hair or cloth
+LEAST_SKIN_SHARE = 0.2  # minimum share of a scan to keep: less is a picture that the parser does not understand
 
 
 def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) -> Mesh:
-    """The scan without the triangles of hair and cloth.
+    """Return the scan without triangles of hair and cloth.
 
-    Parameters
-    ----------
-    scan : in metres
-    views : with their pictures
-    head : the template, placed roughly, by which the pictures are cut
-    report : takes the share that goes
+    head is the template, placed roughly: its landmarks frame the parser's crops.
     """
     normals, caster = vertex_normals(scan), raster.RayCaster(scan)
     share = hidden_share(
@@ -43,28 +32,18 @@ def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) ->
         lambda view: raster.visible_from(caster, scan.vertices, normals, view.centre, offset=0.002),
     )
     hidden = np.nan_to_num(share) > HAIR_SHARE
-    kept = ~hidden[scan.faces].any(1)
-    report.figure("hair_in_scan_percent", round(100 * float(1 - kept.mean()), 1))
-    return Mesh(scan.vertices, scan.faces[kept]) if LEAST_LEFT_SHARE < kept.mean() < 1 else scan
+    skin = ~hidden[scan.faces].any(1)
+    report.figure("hair_in_scan_percent", round(100 * float(1 - skin.mean()), 1))
+    return Mesh(scan.vertices, scan.faces[skin]) if LEAST_SKIN_SHARE < skin.mean() < 1 else scan
 
 
 def hidden_share(
     points: np.ndarray, normals: np.ndarray, views: list[View], head: Mesh, report: Reporter, visible=None
 ) -> np.ndarray:
-    """The mean share of hair and cloth before points, over the views that face them.
+    """Return the mean share [N] in [0, 1] of hair and cloth before points [N, 3], over the views that face them.
 
-    Parameters
-    ----------
-    points : [N, 3], in metres
-    normals : [N, 3], unit
-    views : with their pictures
-    head : whose landmarks frame the parser's crop
-    report : hears whether it is cancelled
-    visible : view -> bool [N], whether it sees the points; None: all that face it
-
-    Returns
-    -------
-    [N] in [0, 1]; nan where no view tells.
+    nan where no view shows a point. normals [N, 3] are unit, head's landmarks frame the parser's crop, and
+    visible(view) gives bool [N], which points a view sees; None: all that face it.
     """
     marks = template.landmark_points(head)
     total, votes = np.zeros(len(points)), np.zeros(len(points))
@@ -79,10 +58,12 @@ def hidden_share(
         at, depth = view.project(points)
         towards = view.centre - points
         facing = (towards * normals).sum(1) > FACING_COSINE * np.linalg.norm(towards, axis=1)
-        there = facing & (depth > 0) & (at > 0).all(1) & (at < [view.width, view.height]).all(1)
+        in_view = facing & (depth > 0) & (at > 0).all(1) & (at < [view.width, view.height]).all(1)
         if visible is not None:
-            there &= visible(view)
-        known, share = (raster.sample(mask, at[there] * scale) for mask in (parts.known(), parts.of("hair", "clothes")))
-        total[there] += known
-        votes[there] += known * share
+            in_view &= visible(view)
+        parsed, share = (
+            raster.sample(mask, at[in_view] * scale) for mask in (parts.known(), parts.of("hair", "clothes"))
+        )
+        total[in_view] += parsed
+        votes[in_view] += parsed * share
     return np.where(total > 0.5, votes / np.maximum(total, 1e-9), np.nan)

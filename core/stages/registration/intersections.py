@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a fitted head cuts or folds through itself, and the mending of it: the spot's displacement from the clean
-template is smoothed.
+"""Cuts and folds of a fitted head, and their mending: the spot's displacement from the clean template is smoothed.
 
 Two triangles cut where an edge of one pierces the other (Moeller and Trumbore 1997); neighbours along an edge are left
 out.
 """
-
-from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sparse
@@ -16,12 +13,11 @@ from scipy.spatial import cKDTree
 
 from ...geometry.meshes import Mesh, face_normals
 
-ROUNDS = 8
-"""Each round smooths one ring of neighbours more."""
+ROUNDS = 8  # maximum number of rounds, each of which smooths one more ring of neighbours
 
 
-def mended(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.ndarray:
-    """Vertices [V, 3] without flipped or intersecting triangles, as far as ROUNDS go; all others stay where they are.
+def mend(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.ndarray:
+    """Return vertices [V, 3] without flipped or intersecting triangles, as far as ROUNDS go; all others stay.
 
     `placed` is the template at rest, brought over the head by a similarity: it must be clean itself.
     """
@@ -31,7 +27,7 @@ def mended(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.nda
     vertices = vertices.copy()
     for rings in range(1, ROUNDS + 1):
         tick(rings)
-        folded = wrong(placed, vertices)
+        folded = faulty_vertices(placed, vertices)
         if not folded.any():
             break
         free = folded
@@ -48,7 +44,7 @@ def mended(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.nda
 
 
 def intersecting(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Pairs of triangles int64 [N, 2] that cut each other, the smaller index first."""
+    """Return pairs of triangles int64 [N, 2] that cut each other, the smaller index first."""
     corners = vertices[faces]
     centre = corners.mean(1)
     radius = np.linalg.norm(corners - centre[:, None], axis=-1).max(1)
@@ -67,12 +63,12 @@ def intersecting(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def flipped(before: Mesh, vertices: np.ndarray) -> np.ndarray:
-    """bool [F]: triangles that turned over between two shapes of one topology."""
+    """Return the triangles that turned over between two shapes of one topology, bool [F]."""
     return (face_normals(before) * face_normals(before.moved(vertices))).sum(1) < 0
 
 
-def wrong(placed: Mesh, vertices: np.ndarray) -> np.ndarray:
-    """bool [V]: corners of triangles that are flipped or cut another."""
+def faulty_vertices(placed: Mesh, vertices: np.ndarray) -> np.ndarray:
+    """Return the corners of triangles that are flipped or cut another, bool [V]."""
     corners = np.zeros(len(vertices), bool)
     corners[placed.faces[np.unique(intersecting(vertices, placed.faces))]] = True
     corners[placed.faces[flipped(placed, vertices)]] = True
@@ -80,7 +76,7 @@ def wrong(placed: Mesh, vertices: np.ndarray) -> np.ndarray:
 
 
 def _pierced(vertices: np.ndarray, faces: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """bool [N]: whether an edge of triangle a[i] that shares no vertex with triangle b[i] passes through it."""
+    """Return True where an edge of triangle a[i], sharing no vertex with triangle b[i], pierces it, bool [N]."""
     p, q, r = (vertices[faces[b, k]] for k in range(3))
     along, down = q - p, r - p
     cut = np.zeros(len(a), bool)
@@ -99,7 +95,7 @@ def _pierced(vertices: np.ndarray, faces: np.ndarray, a: np.ndarray, b: np.ndarr
 
 
 def _graph(mesh: Mesh) -> sparse.csr_matrix:
-    """[V, V] with 1 along edges."""
+    """Return the adjacency matrix [V, V] of the vertices."""
     a, b = mesh.faces[:, [0, 1, 2]].ravel(), mesh.faces[:, [1, 2, 0]].ravel()
     count = len(mesh.vertices)
     return (sparse.coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (count, count)).tocsr() > 0).astype(

@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The last millimetres: a smooth displacement of every vertex onto the scan, stiff to soft.
+"""Non-rigid fit of the last millimetres: a smooth displacement of every vertex onto the scan, stiff to soft.
 
 Minimises data + thin-plate bending of the displacement by sparse least squares, as optimal-step non-rigid ICP does
-(Amberg, Romdhani, Vetter 2007). A vertex is drawn to its scan patch along the patch's normal only, so the mesh
-slides along the surface; where there is no data (ears, scalp, neck, holes) stiffness stays high and the shape follows.
+(Amberg, Romdhani, Vetter 2007). A vertex is drawn to its scan patch along the patch's normal only, so the mesh slides
+along the surface; where there is no data (ears, scalp, neck, holes) stiffness stays high and the shape follows.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,32 +14,28 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from .alignment import HeadModel
-from .correspondence import Scan, trimmed
-from .intersections import flipped
+from .correspondence import Scan, biweight
 
-STIFF_M, SOFT_M = 0.030, 0.0022
-"""Length over which the displacement is held together, at the first and the last step, metres."""
-BLIND_M = 0.020
-"""The same where the scan is not followed; it never softens below this."""
-FAR_M, NEAR_M = 0.030, 0.002
-"""Distance beyond which a scan patch is no partner: at the first and the last step."""
+STIFF_M, SOFT_M = 0.030, 0.0022  # length over which the displacement is held together, at the first and the last step
+BLIND_M = 0.020  # minimum of that length where the scan is not followed
+FAR_M, NEAR_M = 0.030, 0.002  # distance beyond which a scan patch is no partner, at the first and the last step
 PULL, BLIND_PULL = 1e-3, 2e-2
-"""Weight of staying where the identity fit is, against data of weight one; and where the scan is not followed, lest the
-crown overshoot."""
-LANDMARK_AREA_M2 = (3e-4, 3e-6)
-"""Surface area that one landmark counts for, at the first and the last step."""
+"""Weight of staying at the identity fit, against data of weight one; and where the scan is not followed, lest the crown
+overshoot."""
+LANDMARK_AREA_M2 = (3e-4, 3e-6)  # surface area that one landmark counts for, at the first and the last step
 
-PUT_AREA_M2 = 1e-3
-"""The same for one that the artist has put, from the first step to the last."""
+PUT_AREA_M2 = 1e-3  # area of a landmark that the artist has put, at all steps
 
 
 @dataclass(frozen=True)
 class LandmarkTargets:
-    """Where landmarks should come to lie: points [468, 3] and trust [468] as in Landmarks; hold [468]: how much longer
-    one counts than the others (lips and lids); fixed bool [468]: those that are where they are said to be, whatever the
-    scan says (None: none)."""
+    """Targets of the landmarks.
+
+    points [468, 3] and trust [468] as in Landmarks; hold [468]: how much longer one counts than the others (lips and
+    lids); fixed bool [468]: those to hold whatever the scan says (None: none).
+    """
 
     points: np.ndarray
     trust: np.ndarray
@@ -58,27 +52,16 @@ def fit(
     iterations: int,
     progress: Callable[[float], None] = lambda share: None,
 ) -> np.ndarray:
-    """A head drawn onto a scan. Nothing is known of what the mesh is but these arrays.
+    """Draw an aligned head, vertices [V, 3] in metres, onto a scan.
 
-    Parameters
-    ----------
-    model : the topology, and where the landmarks are on it
-    start : [V, 3] in metres, the aligned head
-    scan : in the same world
-    follow : [V] in [0, 1], how far the scan is believed
-    targets : of the landmarks
-    iterations : from stiff to soft
-    progress : hears the share that is done, in [0, 1)
-
-    Returns
-    -------
-    Vertices [V, 3] in metres.
+    follow [V] in [0, 1] is the weight of the scan; iterations go from stiff to soft; progress hears the share that is
+    done. Only these arrays are known of the mesh.
     """
-    points, trust, hold, put = targets.points, targets.trust, targets.hold, targets.fixed
+    points, trust, hold, fixed = targets.points, targets.trust, targets.hold, targets.fixed
     area, laplacian = operators(model.mesh.moved(start))
     marks = anchors(model)
-    known = np.isfinite(points).all(1) & (trust * model.landmark_weight > 0)
-    put = np.zeros(len(points), bool) if put is None else put & known
+    valid = np.isfinite(points).all(1) & (trust * model.landmark_weight > 0)
+    fixed = np.zeros(len(points), bool) if fixed is None else fixed & valid
     vertices = start.copy()
     for step in range(iterations):
         progress(step / iterations)
@@ -87,20 +70,19 @@ def fit(
         normals = vertex_normals(model.mesh.moved(vertices))
         reach = FAR_M * (NEAR_M / FAR_M) ** ramp
         signed, scan_normals = scan.match(vertices, normals, 1.5 * reach)
-        data = trimmed(np.where(follow > 0.02, signed, np.nan), reach) * follow
+        data = biweight(np.where(follow > 0.02, signed, np.nan), reach) * follow
         aim = vertices + scan_normals * np.nan_to_num(signed)[:, None]
 
         at = marks @ vertices
         miss = np.nan_to_num(points - at)
-        surface = marks @ normals
-        surface /= np.linalg.norm(surface, axis=1, keepdims=True)
-        seen = np.where(put, 0, marks @ data)[:, None]
-        miss -= seen * (miss * surface).sum(1, keepdims=True) * surface  # in depth the scan knows better
+        surface = unit(marks @ normals)
+        scan_share = np.where(fixed, 0, marks @ data)[:, None]
+        miss -= scan_share * (miss * surface).sum(1, keepdims=True) * surface  # in depth the scan is more precise
         robust = 1 / (1 + (np.linalg.norm(miss, axis=1) / 0.005) ** 2)
         pin = LANDMARK_AREA_M2[0] * (LANDMARK_AREA_M2[1] / LANDMARK_AREA_M2[0]) ** ramp * np.maximum(1, hold * ramp)
-        pin = np.where(known, pin * robust * trust * model.landmark_weight, 0)
+        pin = np.where(valid, pin * robust * trust * model.landmark_weight, 0)
 
-        pin[put] = PUT_AREA_M2
+        pin[fixed] = PUT_AREA_M2
         blind = 1 - follow * np.isfinite(signed)
         bending = np.maximum(length, BLIND_M * blind) ** 4
         pull = PULL + (BLIND_PULL - PULL) * (1 - follow)
@@ -110,21 +92,24 @@ def fit(
             + laplacian.T @ sparse.diags(bending / area) @ laplacian
         )
         right = (area * data)[:, None] * (aim - start) + marks.T @ (pin[:, None] * (at + miss - marks @ start))
-        # positive definite, so no pivoting: with it the factors fill up and take fifty times as long
-        vertices = start + splu(
-            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        ).solve(right)
+        vertices = start + solve_definite(matrix, right)
     return vertices
 
 
-def flipped_triangles(before: Mesh, after: Mesh) -> int:
-    """How many triangles turned over between two shapes of one topology."""
-    return int(flipped(before, after.vertices).sum())
+def solve_definite(matrix: sparse.spmatrix, right: np.ndarray) -> np.ndarray:
+    """Solve a positive definite sparse system.
+
+    There is no need to pivot: with it the factors fill up and take fifty times as long.
+    """
+    options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    return splu(matrix.tocsc(), **options).solve(right)
 
 
 def operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
-    """Area of each vertex [V] in square metres, and the cotangent Laplacian [V, V] (integrated: divide by the area for
-    a mean)."""
+    """Return the area of each vertex [V] in square metres, and the cotangent Laplacian [V, V].
+
+    It is integrated: divide by the area for a mean.
+    """
     count = len(mesh.vertices)
     area, rows, columns, cotangents = np.zeros(count), [], [], []
     for i in range(3):
@@ -144,9 +129,11 @@ def operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
 
 
 def anchors(model: HeadModel) -> sparse.csr_matrix:
-    """[468, V]: takes vertices to landmarks."""
-    corners = model.mesh.faces[model.landmark_face]
+    """Return the matrix [468, V] that takes vertices to landmarks."""
+    return interpolation(model.mesh.faces[model.landmark_face], model.landmark_bary, len(model.mesh.vertices))
+
+
+def interpolation(corners: np.ndarray, bary: np.ndarray, vertices: int) -> sparse.csr_matrix:
+    """Return the matrix [M, V] that takes vertices to the places at corners [M, 3] with barycentric bary [M, 3]."""
     rows = np.repeat(np.arange(len(corners)), 3)
-    return sparse.coo_matrix(
-        (model.landmark_bary.ravel(), (rows, corners.ravel())), (len(corners), len(model.mesh.vertices))
-    ).tocsr()
+    return sparse.coo_matrix((bary.ravel(), (rows, corners.ravel())), (len(corners), vertices)).tocsr()

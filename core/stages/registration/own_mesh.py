@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The artist's own head mesh: an OBJ, or a folder of one neutral OBJ with identity and expression shapes beside it, as
-ICT-FaceKit (Li et al. 2020) is laid out. Read as it is, and written back with nothing changed but its positions.
-"""
+"""Artist's own head mesh: an OBJ, or a folder of one neutral OBJ with identity and expression shapes beside it.
 
-from __future__ import annotations
+The folder is laid out as ICT-FaceKit (Li et al. 2020). The mesh is written back with nothing changed but its positions.
+"""
 
 import re
 from dataclasses import dataclass, replace
@@ -20,28 +19,37 @@ from ...geometry.meshes import Mesh
 LEAST_VERTICES = 300
 MOST_VERTICES = 400_000
 MOST_SHAPES = 60
-"""Shapes beyond these say little about a face, and each costs memory; an identity space begins with its strongest."""
+"""Maximum number of shapes: more say little about a face, and each costs memory; an identity space begins with its
+strongest."""
 EXPRESSION_SIGMA = 0.4
 """Prior deviation of an expression's coefficient: shapes go from 0 to 1, and the head is fitted at rest."""
 
 
 @dataclass(frozen=True)
 class OwnMesh:
-    """mesh: the file's vertices, in its order, units and axes, its polygons cut into triangles; shapes float32 [K, V,
-    3] displacements per standard deviation of their coefficients, in the same units; path of the OBJ."""
+    """Artist's mesh.
+
+    mesh: the file's vertices, in its order, units and axes, its polygons cut into triangles; shapes float32 [K, V, 3]
+    displacements per standard deviation of their coefficients, in the same units; path of the OBJ; new_atlas: the UVs
+    are not the file's.
+    """
 
     mesh: Mesh
     shapes: np.ndarray
     path: Path
+    new_atlas: bool = False
 
 
 def read(chosen: str, report: Reporter) -> OwnMesh:
-    """Reads an OBJ or a folder. Raises Problem for what is no head mesh."""
+    """Read an OBJ or a folder.
+
+    Raises Problem for a file that is not a head mesh.
+    """
     path = Path(chosen)
     if not path.exists():
         raise Problem(
             f"There is no head mesh at {path}.",
-            "Choose an OBJ file or a folder of shapes under Head Mesh, or the built-in head alone.",
+            "Choose an OBJ file or a folder of shapes under Head Mesh, or use only the built-in head.",
         )
     neutral, others = _folder(path) if path.is_dir() else (path, [])
     mesh = meshes.read_obj(neutral)
@@ -62,19 +70,10 @@ def read(chosen: str, report: Reporter) -> OwnMesh:
 
 
 def with_usable_uvs(own: OwnMesh, skin: np.ndarray, allowed: bool, size: int) -> tuple[OwnMesh, str]:
-    """The mesh with UVs that a map can be painted in, and what was done to it.
+    """Return the mesh with UVs that a map can be painted in, and their origin in words.
 
-    Parameters
-    ----------
-    own : the artist's mesh
-    skin : bool [F], the triangles that will be painted
-    allowed : whether it may get a new atlas
-    size : of the map, in texels along a side
-
-    Raises
-    ------
-    Problem
-        Saying what is wrong with its UVs, unless a new atlas is allowed.
+    skin bool [F] marks the triangles to paint; size is the map's in texels. Raises Problem for unusable UVs unless a
+    new atlas is allowed.
     """
     skin_mesh = replace(
         own.mesh, faces=own.mesh.faces[skin], face_uvs=None if own.mesh.face_uvs is None else own.mesh.face_uvs[skin]
@@ -88,27 +87,25 @@ def with_usable_uvs(own: OwnMesh, skin: np.ndarray, allowed: bool, size: int) ->
             "Unwrap the mesh in your modelling program, or switch on New Atlas under Reconstruction, Head "
             "Mesh (--new-atlas).",
         )
-    return replace(own, mesh=atlas.unwrap(own.mesh, size)), "a new atlas"
+    return replace(own, mesh=atlas.unwrap(own.mesh, size), new_atlas=True), "a new atlas"
 
 
 def write(path: Path, own: OwnMesh, vertices: np.ndarray) -> None:
-    """The artist's file with vertices [V, 3] in metres in place of its own: same order, polygons, groups and UVs; a UV
-    line is copied, not rewritten.
+    """Write the artist's file with vertices [V, 3] in metres: same order, polygons, groups and UVs.
 
-    With a new atlas (OwnMesh.mesh has other UVs than the file), polygons that a seam crosses are cut into triangles.
-    Normals and the material library are left out: the first no longer hold, the second lies elsewhere.
+    A UV line is copied, not rewritten. With a new atlas, polygons that a seam crosses are cut into triangles. Normals
+    and the material library are left out: the first no longer hold, the second lies elsewhere.
     """
     text = own.path.read_text(encoding="utf-8", errors="replace").replace("\\\n", " ")
-    kept = _same_uvs(own.mesh, meshes.read_obj(own.path))
     lines, vertex, triangle = [], 0, 0
-    uv_lines = [] if kept else [f"vt {u:.6f} {v:.6f}" for u, v in own.mesh.uvs]
+    uv_lines = [f"vt {u:.6f} {v:.6f}" for u, v in own.mesh.uvs] if own.new_atlas else []
     for line in text.splitlines():
         words = line.split()
         key = words[0] if words else ""
         if key == "v":
             lines.append("v " + " ".join([*(f"{x:.6f}" for x in vertices[vertex]), *words[4:]]))
             vertex += 1
-        elif key == "f" and kept:
+        elif key == "f" and not own.new_atlas:
             lines.append("f " + " ".join("/".join(corner.split("/")[:2]).rstrip("/") for corner in words[1:]))
         elif key == "f":
             if uv_lines:
@@ -118,14 +115,14 @@ def write(path: Path, own: OwnMesh, vertices: np.ndarray) -> None:
                 own.mesh.faces[triangle : triangle + count] + 1, own.mesh.face_uvs[triangle : triangle + count] + 1
             )
             triangle += count
-        elif key not in ("vn", "mtllib") and (kept or key != "vt"):
+        elif key not in ("vn", "mtllib") and not (own.new_atlas and key == "vt"):
             lines.append(line)
     with replacing(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _polygons(faces: np.ndarray, uvs: np.ndarray) -> list[str]:
-    """Face lines of one polygon's triangles: one line where its corners have one UV each, else the triangles."""
+    """Return face lines of one polygon's triangles: one line if its corners have one UV each, else the triangles."""
     corner = {}
     for v, t in zip(faces.ravel(), uvs.ravel(), strict=True):
         if corner.setdefault(int(v), int(t)) != t:
@@ -135,7 +132,7 @@ def _polygons(faces: np.ndarray, uvs: np.ndarray) -> list[str]:
 
 
 def _folder(folder: Path) -> tuple[Path, list[Path]]:
-    """The neutral mesh of a folder (or of the one folder of OBJs within it), and its shapes, identity first."""
+    """Return the neutral mesh of a folder (or of the one folder of OBJs within it) and its shapes, identity first."""
     inside = [folder, *sorted(p for p in folder.iterdir() if p.is_dir())]
     for place in inside:
         objs = sorted(p for p in place.glob("*") if p.suffix.lower() == ".obj")
@@ -160,7 +157,7 @@ def _numbers(path: Path) -> list:
 
 
 def _positions(path: Path) -> np.ndarray:
-    """The vertices [V, 3] of an OBJ, without its faces."""
+    """Read the vertices [V, 3] of an OBJ, without its faces."""
     try:
         return meshes.read_obj_vertices(path)
     except Problem as problem:
@@ -170,7 +167,10 @@ def _positions(path: Path) -> np.ndarray:
 
 
 def _check(mesh: Mesh, path: Path) -> None:
-    """Raises Problem for a mesh that cannot be a head."""
+    """Refuse a mesh that cannot be a head.
+
+    Raises Problem.
+    """
     count = len(mesh.vertices)
     if np.ptp(mesh.vertices, axis=0).min() <= 0:
         raise Problem(f"{path.name} is flat.", "Export it again as OBJ.")
@@ -180,12 +180,3 @@ def _check(mesh: Mesh, path: Path) -> None:
             f"Choose a head with {LEAST_VERTICES} to {MOST_VERTICES} vertices, neither a primitive nor a "
             "sculpt at its highest level.",
         )
-
-
-def _same_uvs(a: Mesh, b: Mesh) -> bool:
-    return (
-        a.uvs is not None
-        and b.uvs is not None
-        and np.array_equal(a.uvs, b.uvs)
-        and np.array_equal(a.face_uvs, b.face_uvs)
-    )

@@ -1,59 +1,59 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Face landmarks on any mesh, whatever its units and axes: it is rendered from several sides, the face found in the
-pictures as in frames of a video, and the marks cast back onto its surface.
+"""Face landmarks on any mesh, whatever its units and axes, by rendering it from several sides.
 
-Which way is up and where the face looks is found by trying the 24 ways a mesh can stand along the axes.
+The face is found in the pictures as in frames of a video, and the marks are cast back onto the surface. Which way is up
+and where the face looks is found by trying the 24 ways a mesh can stand along the axes.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pycolmap
 
 from ...capture.messages import Problem, Reporter
 from ...face import faces
 from ...geometry import raster
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from ...imaging import images
 from .landmarks import Landmarks, onto_surface, triangulate
 
 FIRST_SIDE_PX, SIDE_PX = 192, 460
-"""Sides of the pictures in which the face is looked for, and in which its marks are found, pixels."""
-FOCAL_SIDES = 2.2
-"""Focal length in picture sides: an angle of view of 26 degrees, as a portrait's."""
+"""Sides of the pictures in which the face is detected, and in which its marks are found."""
+FOCAL_SIDES = 2.2  # focal length in picture sides: an angle of view of 26 degrees, as a portrait's
 VIEWS_DEG = ((0, 0), (-18, 0), (18, 0), (-35, 0), (35, 0), (0, 12), (0, -12), (-18, 10), (18, 10))
-"""Yaw and pitch of the views, degrees."""
+"""Yaw and pitch of the views."""
 SKIN, LIPS, BROWS = (0.55, 0.36, 0.28), (0.42, 0.14, 0.13), (0.08, 0.05, 0.04)
 """Linear colours: plain heads are found, painted ones are marked better."""
-LIP_LINE, EYE_LINES = faces.LIP_LINE, faces.EYE_LINES
-EYE_LIDS = ((386, 374), (159, 145))
-"""Middle of the upper and the lower lid of the person's left and right eye."""
+EYE_LIDS = ((386, 374), (159, 145))  # middle of the upper and the lower lid of the person's left and right eye
 TEMPLES = (127, 162, 234, 356, 389, 454)
 SURE_SCORE, PORTRAIT_SIDES_FACE_WIDTHS = 0.85, (2.6, 3.4)
-"""Score with which a face is taken without looking further, and the sides of pictures of it, in widths of the face."""
-FACE_M = 0.11
-"""How far apart the outermost marks at the temples lie on a person, metres: the first guess of the scale."""
+"""Score at which a face is accepted without looking further, and sides of pictures of it, in widths of the face."""
+FACE_M = 0.11  # distance of the outermost marks at the temples on a person: the first guess of the scale
 
 
 @dataclass(frozen=True)
 class Pose:
-    """turn [3, 3] takes the mesh's axes to ours (+Z up, face towards -Y); face [3] is the middle of the face in the
-    mesh's own coordinates; width is that of the face, in the mesh's units."""
+    """Pose of the face on a mesh.
+
+    turn [3, 3] takes the mesh's axes to ours (+Z up, face towards -Y); face [3] is the middle of the face in the mesh's
+    own coordinates; width is that of the face, in the mesh's units.
+    """
 
     turn: np.ndarray
     face: np.ndarray
     width: float
 
 
-def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, list[np.ndarray]]:
-    """The pose of the face, its landmarks in metres and our axes around the middle of the face (`to_ours`), and the
-    pictures they were found in, sRGB. Raises Problem where no face is found."""
+def find(mesh: Mesh, report: Reporter) -> tuple[Pose, Landmarks, list[np.ndarray]]:
+    """Find the pose of the face, its landmarks as `to_ours` places them, and the sRGB pictures they were found in.
+
+    Raises Problem where no face is found.
+    """
     pose = _find_pose(mesh, report)
     posed = mesh.moved(to_ours(mesh.vertices, pose))
     colours, landmarks, pictures = np.tile(SKIN, (len(mesh.vertices), 1)), None, []
@@ -62,8 +62,7 @@ def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, l
         for portrait in PORTRAIT_SIDES_FACE_WIDTHS:
             views, pixels, pictures = [], [], []
             for yaw, pitch in sides:
-                if report is not None:
-                    report.progress(0, 1, "finding the face on the artist's mesh")
+                report.progress(0, 1, "finding the face on the artist's mesh")
                 view = view_from(yaw, pitch, SIDE_PX, FACE_M * portrait)
                 picture = shaded(caster, normals, colours, view)
                 face = faces.detect(picture)
@@ -76,45 +75,51 @@ def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, l
         else:
             raise _no_face()
         landmarks = onto_surface(triangulate(views, np.stack(pixels)), views, posed)
-        colours = _painted(posed, landmarks.points)
+        colours = _paint(posed, landmarks.points)
     return pose, landmarks, pictures
 
 
 def to_ours(points: np.ndarray, pose: Pose) -> np.ndarray:
-    """Points of the mesh [N, 3] in our axes, in metres, around the middle of its face."""
+    """Transform points of the mesh [N, 3] to our axes, in metres, around the middle of its face."""
     return (points - pose.face) @ pose.turn.T * (FACE_M / pose.width)
 
 
-def _find_pose(mesh: Mesh, report: Reporter | None) -> Pose:
-    """The way to hold the mesh in which it shows the surest upright face from the front."""
+def _find_pose(mesh: Mesh, report: Reporter) -> Pose:
+    """Find the pose in which the mesh shows the most certain upright face from the front."""
     used = mesh.vertices[np.unique(mesh.faces)]
     middle, size = (used.min(0) + used.max(0)) / 2, np.ptp(used, axis=0).max()
     unit = mesh.moved((mesh.vertices - middle) / size)
     caster, normals, extents = raster.RayCaster(unit), vertex_normals(unit), np.ptp(used, axis=0) / size
     best, turns = (0.0, None), _turns()
+
+    def placed(pose: Pose) -> Pose:
+        return Pose(pose.turn, middle + size * pose.face, size * pose.width)
+
     for first in range(0, len(turns), 4):  # the four ways to face, with one way up
         for window in range(len(_windows(extents))):
             for turn in turns[first : first + 4]:
-                if report is not None:
-                    report.progress(first, len(turns), "finding out which way the artist's mesh looks")
+                report.progress(first, len(turns), "finding the orientation of the artist's mesh")
                 windows = _windows(np.abs(turn @ extents))
                 if window < len(windows):
                     lift, side = windows[window]
-                    seen = _look(caster, normals, turn, turn.T @ [0, 0, lift], side)
-                    for portrait in PORTRAIT_SIDES_FACE_WIDTHS if seen is not None else ():
-                        # looked at again in a picture of its own: what was no face is none any more
-                        closer = _look(caster, normals, turn, seen[1].face, portrait * seen[1].width)
+                    sighting = _look(caster, normals, turn, turn.T @ [0, 0, lift], side)
+                    for portrait in PORTRAIT_SIDES_FACE_WIDTHS if sighting is not None else ():
+                        # detect it again in a close-up, which rejects what is not a face
+                        closer = _look(caster, normals, turn, sighting[1].face, portrait * sighting[1].width)
                         best = closer if closer is not None and closer[0] > best[0] else best
             if best[0] > SURE_SCORE:
-                return Pose(best[1].turn, middle + size * best[1].face, size * best[1].width)
+                return placed(best[1])
     if best[1] is None:
         raise _no_face()
-    return Pose(best[1].turn, middle + size * best[1].face, size * best[1].width)
+    return placed(best[1])
 
 
 def _windows(sides: np.ndarray) -> list[tuple[float, float]]:
-    """Heights over the middle, and sides, of the squares in which a face may lie: all of the mesh, its upper half, or,
-    in a figure with a body or arms, what is round the top of its middle. sides [3]: the mesh's extents in our axes."""
+    """Return height over the middle and side of the squares in which a face may lie.
+
+    All of the mesh, its upper half, or, in a figure with a body or arms, what is round the top of its middle. sides [3]
+    are the mesh's extents in our axes.
+    """
     whole = 1.05 * max(sides[0], sides[2])
     windows = [(0.0, whole), (0.2 * sides[2], 0.75 * whole)]
     smaller = [side for side in (1.2 * sides[2], 0.35 * sides[2], 0.2 * sides[2]) if side < 0.7 * whole]
@@ -124,7 +129,7 @@ def _windows(sides: np.ndarray) -> list[tuple[float, float]]:
 def _look(
     caster: raster.RayCaster, normals: np.ndarray, turn: np.ndarray, centre: np.ndarray, extent: float
 ) -> tuple[float, Pose] | None:
-    """How sure an upright face is seen in a square of side `extent` around `centre` [3], and where it is."""
+    """Return the score and pose of an upright face in a square of side `extent` around `centre` [3], or None."""
     front = view_from(0, 0, FIRST_SIDE_PX, extent)
     rotation = front.rotation @ turn
     view = replace(front, rotation=rotation, translation=front.translation - rotation @ centre)
@@ -143,8 +148,7 @@ def _look(
     points = view.centre + rays * np.where(hit >= 0, distance, np.nan)[:, None]
     posed = points @ turn.T
     width = np.nanmax(posed[:, 0]) - np.nanmin(posed[:, 0])
-    # a face is about as deep as it is wide: the back of a head, where nets see faces too, has no nose in front of its
-    # sides
+    # a face is about as deep as it is wide; the back of a head, where networks see faces too, has no nose
     bulge = np.nanmedian(posed[list(TEMPLES), 1]) - posed[faces.NOSE, 1]
     if not 0.2 < bulge / width < 1.4:
         return None
@@ -153,7 +157,7 @@ def _look(
 
 
 def _turns() -> list[np.ndarray]:
-    """The 24 rotations along the axes, those with +Z up first, then +Y up, then the odd ones."""
+    """Return the 24 rotations along the axes, those with +Z up first, then +Y up, then the odd ones."""
     turns = []
     for order in permutations(range(3)):
         for signs in product((1, -1), repeat=3):
@@ -170,13 +174,9 @@ def _turns() -> list[np.ndarray]:
 
 
 def view_from(yaw: float, pitch: float, size: int, extent: float) -> View:
-    """A camera that sees a square around the origin.
+    """Return a camera, yaw and pitch degrees off the front, that sees a square around the origin.
 
-    Parameters
-    ----------
-    yaw, pitch : degrees off the front
-    size : of its picture, in pixels
-    extent : side of the square, in the mesh's units
+    size is its picture's in pixels, extent the square's side in the mesh's units.
     """
     yaw, pitch = np.radians(yaw), np.radians(pitch)
     towards = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
@@ -189,22 +189,12 @@ def view_from(yaw: float, pitch: float, size: int, extent: float) -> View:
 
 
 def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, view: View) -> np.ndarray:
-    """A Lambert picture, lit from above the camera; surfaces are lit on the side that is seen.
+    """Render a Lambert picture, sRGB [S, S, 3], lit from above the camera.
 
-    Parameters
-    ----------
-    caster : of the mesh
-    normals : [V, 3], unit
-    colours : [V, 3], linear albedo
-    view : the camera
-
-    Returns
-    -------
-    [S, S, 3], sRGB.
+    Surfaces are lit on the side that is seen; normals [V, 3] are unit, colours [V, 3] linear albedo.
     """
     face, bary, _ = raster.render_view(caster, view)
-    normal = raster.interpolate(normals, caster.mesh.faces, face, bary)
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+    normal = unit(raster.interpolate(normals, caster.mesh.faces, face, bary))
     normal *= np.where((normal @ view.axis) > 0, -1, 1)[..., None]
     key = -0.75 * view.axis - 0.55 * view.rotation[1] + 0.35 * view.rotation[0]
     key_light = np.clip(normal @ (key / np.linalg.norm(key)), 0, 1)
@@ -213,13 +203,11 @@ def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, v
     return images.linear_to_srgb(np.where((face >= 0)[..., None], colour * light[..., None], 0.2))
 
 
-def _painted(mesh: Mesh, points: np.ndarray) -> np.ndarray:
-    """Vertex colours [V, 3] (linear) with brows and lips inside the landmarks' outlines as seen from the front."""
-    import cv2
-
+def _paint(mesh: Mesh, points: np.ndarray) -> np.ndarray:
+    """Paint brows and lips inside the landmarks' outlines as seen from the front: linear vertex colours [V, 3]."""
     colours = np.tile(SKIN, (len(mesh.vertices), 1))
     front = mesh.vertices[:, 1] < np.nanmax(points[:, 1])
-    for outline, colour in ((LIP_LINE, LIPS), *((line, BROWS) for line in faces.BROW_LINES)):
+    for outline, colour in ((faces.LIP_LINE, LIPS), *((line, BROWS) for line in faces.BROW_LINES)):
         polygon = points[list(outline)][:, [0, 2]].astype(np.float32)
         if np.isfinite(polygon).all():
             near = np.flatnonzero(
@@ -237,7 +225,6 @@ def _painted(mesh: Mesh, points: np.ndarray) -> np.ndarray:
 
 def _no_face() -> Problem:
     return Problem(
-        "No face was found on your head mesh, seen from any side.",
-        "Choose an OBJ of a head in a neutral pose, without hair or glasses over the face, or use the "
-        "built-in head alone.",
+        "No face was found on your head mesh from any side.",
+        "Choose an OBJ of a head in a neutral pose, without hair or glasses, or use only the built-in head.",
     )

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where skin meets the background: the outline of the face in each picture, against that of a mesh.
+"""Outline of the face in each picture, where skin meets the background, against that of a mesh.
 
-Only what borders on the background counts: hair over a cheek, or a jaw before a neck, is no outline of the face. Where
-the border lies is read from colours, for the person's mask is too coarse: each picture's own skin against its own
-background.
+Only what borders on the background counts: hair over a cheek, or a jaw before a neck, is no outline of the face. The
+border is found by colours, for the person's mask is too coarse: each picture's own skin against its own background.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -15,26 +12,21 @@ import cv2
 import numpy as np
 
 from ...face import faces
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from ...imaging import images
 from .constraints import Constraints, none
 
-HISTOGRAM_BINS = 12
-"""Of the colour histograms, per channel."""
-LEAST_CERTAINTY_STEP = 0.5
-"""How much surer of skin the inside must be than the outside, in shares of certainty."""
+HISTOGRAM_BINS = 12  # bins of the colour histograms, per channel
+LEAST_CERTAINTY_STEP = 0.5  # minimum difference in certainty of skin between the inside and the outside
 COARSE_PX = 5.0
-"""The person's mask is this uncertain in a picture of 960 pixels: a border of colours further from it is another
-one."""
-RIM_PX = 3.0
-"""How far inside of the mesh's outline a vertex on it may come to lie, in pixels: triangles are that coarse."""
+"""Uncertainty of the person's mask in a picture of 960 pixels: a border of colours further from it is another one."""
+RIM_PX = 3.0  # maximum distance of a vertex inside the mesh's outline, in pixels: triangles are that coarse
 
 
 @dataclass(frozen=True)
 class Outline:
-    """A picture made ready: skin [H, W] and person [H, W], certainties in [0, 1], of the picture at `scale` times its
-    size."""
+    """Picture prepared at `scale` times its size: certainties in [0, 1] of skin [H, W] and person [H, W]."""
 
     view: View
     skin: np.ndarray
@@ -43,15 +35,9 @@ class Outline:
 
 
 def prepare(view: View, mesh: Mesh, follow: np.ndarray, scale: float = 1.0) -> Outline:
-    """Skin and person in a view's picture; skin is what looks like the pixels that the followed part of the mesh
-    covers.
+    """Find skin and person in a view's picture; skin looks like the pixels that the followed part of the mesh covers.
 
-    Parameters
-    ----------
-    view : with its picture
-    mesh : in metres, about where it lies
-    follow : [V] in [0, 1], above 0.5 the followed part
-    scale : of the picture that is worked on
+    follow [V] above 0.5 is that part of a mesh that lies about right, in metres.
     """
     picture = view.read()
     height, width = round(view.height * scale), round(view.width * scale)
@@ -71,15 +57,10 @@ def prepare(view: View, mesh: Mesh, follow: np.ndarray, scale: float = 1.0) -> O
 
 
 def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray, reach_m: float) -> Constraints:
-    """One constraint per vertex of the mesh's outline in this view, where skin meets background.
+    """Constrain the vertices of the mesh's outline in a view to the border of skin and background.
 
-    Parameters
-    ----------
-    outline : of the view's picture
-    mesh : in metres
-    edges : `edges_of` the mesh
-    follow : [V] in [0, 1], the part whose outline counts
-    reach_m : metres within which the border is looked for
+    edges are `edges_of` the mesh, follow [V] in [0, 1] weighs the vertices, and the border is searched within reach_m
+    metres.
     """
     view, scale = outline.view, outline.scale
     pixels, depth = view.project(mesh.vertices)
@@ -88,10 +69,8 @@ def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray,
     vertices = vertices[(follow[vertices] > 0.3) & np.isfinite(pixels[vertices]).all(1)]
     if not len(vertices):
         return none()
-    towards = view.centre - mesh.vertices[vertices]
-    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-    direction = normals[vertices] - (normals[vertices] * towards).sum(1, keepdims=True) * towards
-    direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
+    towards = unit(view.centre - mesh.vertices[vertices])
+    direction = unit(normals[vertices] - (normals[vertices] * towards).sum(1, keepdims=True) * towards)
     outward = view.project(mesh.vertices[vertices] + 1e-3 * direction)[0] - pixels[vertices]
     length = np.linalg.norm(outward, axis=1, keepdims=True)
     per_px = 1e-3 / np.maximum(length[:, 0], 1e-9) / scale  # metres
@@ -109,7 +88,7 @@ def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray,
 
 
 def edges_of(mesh: Mesh) -> np.ndarray:
-    """The edges between two triangles: int64 [E, 4], their vertices and triangles."""
+    """Return the edges between two triangles: int64 [E, 4], their vertices and triangles."""
     ends = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     face = np.repeat(np.arange(len(mesh.faces)), 3)
     order = np.lexsort((ends[:, 1], ends[:, 0]))
@@ -119,23 +98,24 @@ def edges_of(mesh: Mesh) -> np.ndarray:
 
 
 def _on_outline(outline: Outline, mesh: Mesh, edges: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Vertices [N] between triangles that are seen and others that are not, where no other part of the mesh lies
-    behind; pixels [V, 2]."""
+    """Return vertices [N] on the outline of the mesh, with no other part of it behind; pixels is [V, 2]."""
     a, b, c = (pixels[mesh.faces[:, i]] for i in range(3))
     # counter-clockwise, and rows go down
     front = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]) < 0
-    there = np.zeros(outline.skin.shape, np.uint8)
+    covered = np.zeros(outline.skin.shape, np.uint8)
     for triangle in np.round(np.stack([a, b, c], 1)[front] * 16 - 8).astype(np.int32):
-        cv2.fillConvexPoly(there, triangle, 1, cv2.LINE_8, 4)
-    inside = cv2.distanceTransform(there, cv2.DIST_L2, 3)
+        cv2.fillConvexPoly(covered, triangle, 1, cv2.LINE_8, 4)
+    inside = cv2.distanceTransform(covered, cv2.DIST_L2, 3)
     vertices = np.unique(edges[front[edges[:, 2]] != front[edges[:, 3]], :2])
-    x, y = np.clip(np.floor(pixels[vertices]).astype(int), 0, np.array(there.shape[::-1]) - 1).T
+    x, y = np.clip(np.floor(pixels[vertices]).astype(int), 0, np.array(covered.shape[::-1]) - 1).T
     return vertices[inside[y, x] <= RIM_PX]
 
 
 def _borders(outline: Outline, at: np.ndarray, outward: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """How far along `outward` [N, 2] from pixels `at` [N, 2] skin gives way to background, nan where it does not, and
-    how clearly [N] in [0, 1]."""
+    """Return how far along `outward` [N, 2] from pixels `at` [N, 2] skin gives way to background, and how clearly.
+
+    nan where it does not; the clarity [N] is in [0, 1].
+    """
     width = 4
     steps = np.arange(-np.ceil(reach) - width, np.ceil(reach) + width + 1)
     where = at[:, None] - 0.5 + outward[:, None] * steps[:, None]
@@ -166,7 +146,7 @@ def _borders(outline: Outline, at: np.ndarray, outward: np.ndarray, reach: float
 
 
 def _histogram(code: np.ndarray) -> np.ndarray:
-    """Smoothed shares [HISTOGRAM_BINS**3] of the colours with these codes."""
+    """Return smoothed shares [HISTOGRAM_BINS**3] of the colours with these codes."""
     counts = np.bincount(code, minlength=HISTOGRAM_BINS**3).astype(np.float64).reshape((HISTOGRAM_BINS,) * 3)
     for axis in range(3):
         counts = counts + 0.5 * (np.roll(counts, 1, axis) + np.roll(counts, -1, axis))

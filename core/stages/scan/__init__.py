@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage scan: frames and cameras become scan.ply, the dense surface of the head as far as it was seen.
+"""Scan: frames and cameras become scan.ply, the dense surface of the head as far as it was seen.
 
 Pairs of frames are matched by semi-global stereo, coarse to fine, and their depth maps fused in a truncated signed
-distance field; where there is an NVIDIA GPU and gsplat, Gaussian surfels trained on the frames refine that surface, and
-their depth is fused the same way.
+distance field; with an NVIDIA GPU and gsplat, Gaussian surfels trained on the frames refine that surface, and their
+depth is fused the same way.
 """
-
-from __future__ import annotations
 
 import time
 
@@ -24,14 +22,12 @@ from ...settings.settings import Settings
 from . import rounds, splats
 
 HEAD_BOX_M = np.array([[-0.13, -0.08, -0.21], [0.13, 0.21, 0.19]])
-"""Where a head lies in its world, in metres: the origin is midway between the eyes, the face looks along -Y."""
-MOST_DISAGREEING_SHARE = 0.03
-"""Share of the surface that hair and highlights may take; more is a subject that moved."""
+"""Box of a head in its world: the origin is midway between the eyes, the face looks along -Y."""
+MOST_DISAGREEING_SHARE = 0.03  # maximum share of the surface for hair and highlights; more is a subject that moved
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.scan: a surface, or, where no pair of frames gives one, the points that match between the
-    frames."""
+    """Write capture.scan: a surface, or the points that match between frames if no pair of them gives one."""
     started = time.monotonic()
     views = read_views(capture)
     frames = read_frames(capture).by_name
@@ -57,7 +53,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("disagreeing_percent", round(100 * fused.disagreeing, 2))
     report.figure("floating_percent", round(100 * fused.floating, 2))
     if not by_splats:
-        report.figure("left_right_disagreement_px", round(float(np.nanmedian([seen.disagreement for seen in maps])), 3))
+        disagreement = np.nanmedian([depth_map.disagreement for depth_map in maps])
+        report.figure("left_right_disagreement_px", round(float(disagreement), 3))
     report.figure("seconds", round(time.monotonic() - started, 1))
     if fused.disagreeing > MOST_DISAGREEING_SHARE:
         report.finding(
@@ -75,15 +72,14 @@ def _without_surface(capture: Capture, report: Reporter) -> None:
     report.figure("method", "none")
     report.figure("points", len(points))
     report.finding(
-        "No surface of the head could be measured from these frames. The head is fitted to the face's "
-        "features, outlines and what matches alone.",
-        "For a closer likeness take sharper pictures that lie closer together, every ten degrees around the "
-        "face, in good light.",
+        "No surface of the head could be measured from these frames. "
+        "The head is fitted to facial features, outlines and matched points only.",
+        "For a closer likeness, take sharper pictures every ten degrees around the face, in good light.",
     )
 
 
 def _draw(mesh: meshes.Mesh, views: list[View], height: int = 480) -> np.ndarray:
-    """The shaded scan from the first, the middle and the last camera around the head, side by side."""
+    """Draw the shaded scan from the first, the middle and the last camera around the head, side by side."""
     caster, normals = raster.RayCaster(mesh), meshes.vertex_normals(mesh)
     around = sorted(views, key=lambda view: np.arctan2(view.centre[0], -view.centre[1]))
     shots = []

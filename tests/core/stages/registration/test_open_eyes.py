@@ -5,23 +5,22 @@ them, and what that hides."""
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pycolmap
 import pytest
 
-pytest.importorskip("OpenImageIO")
-
-from core.capture.capture import Capture  # noqa: E402
-from core.capture.eyes_record import Eyeball, read_eyes, write_eyes  # noqa: E402
-from core.capture.messages import Problem, Reporter  # noqa: E402
-from core.face import eye_reader, faces, lids, template  # noqa: E402
-from core.face.faces import Eye  # noqa: E402
-from core.face.head import read_filmed_head, read_head  # noqa: E402
-from core.geometry import meshes, raster  # noqa: E402
-from core.geometry.views import View  # noqa: E402
-from core.stages.registration import eye_looks, eyeballs, landmarks, lid_marks  # noqa: E402
-from research.people.lifelike import shape  # noqa: E402
+from core.capture.capture import Capture
+from core.capture.eyes_record import Eyeball, read_eyes, write_eyes
+from core.capture.messages import Problem, Reporter
+from core.face import eye_reader, faces, lids, template
+from core.face.faces import Eye
+from core.face.head import read_filmed_head, read_head
+from core.geometry import meshes, raster
+from core.geometry.views import View
+from core.stages.registration import eye_looks, eyeballs, landmarks, lid_marks
+from research.people.lifelike import shape
 
 SEED, IRIS_M = 4, 0.0059
 QUIET = Reporter("registration", emit=lambda message: None)
@@ -44,11 +43,9 @@ def fitted(person):
 
 def rims_of(opened: lids.OpenHead, side: int) -> lid_marks.LidMarks:
     """Nine marks on each edge, from the outer corner to the inner one, and the disc within the iris' edge."""
-    outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
-    edges = [np.concatenate([[inner], opened.skin.vertices[rim], [outer]])[::-1] for rim in opened.rims[side]]
+    edges = lids.edges(opened.skin.vertices, side)
     chosen = [edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)] for edge in edges]
-    ball = opened.balls[side]
-    return lid_marks.LidMarks(*chosen, disc_of(ball), IRIS_M, 9)
+    return lid_marks.LidMarks(*chosen, disc_of(opened.balls[side]), IRIS_M, 9)
 
 
 def disc_of(ball: lids.PosedEyeball) -> np.ndarray:
@@ -92,9 +89,7 @@ def seen_eye(rims: lid_marks.LidMarks, view: View) -> Eye:
 
 
 def off_curve(points: np.ndarray, curve: np.ndarray) -> np.ndarray:
-    fine = np.concatenate(
-        [a + (b - a) * np.linspace(0, 1, 20)[:, None] for a, b in zip(curve, curve[1:], strict=False)]
-    )
+    fine = np.concatenate([a + (b - a) * np.linspace(0, 1, 20)[:, None] for a, b in pairwise(curve)])
     return np.linalg.norm(points[:, None] - fine[None], axis=2).min(1)
 
 
@@ -111,12 +106,8 @@ def begun_beside(head) -> lids.OpenHead:
 
 
 def off_edges(found: lid_marks.LidMarks, opened: lids.OpenHead) -> np.ndarray:
-    return np.concatenate(
-        [
-            off_curve(marks[1:-1], edge)
-            for marks, edge in zip((found.upper, found.lower), lids.edges(opened.skin.vertices, 0), strict=True)
-        ]
-    )
+    pairs = zip((found.upper, found.lower), lids.edges(opened.skin.vertices, 0), strict=True)
+    return np.concatenate([off_curve(marks[1:-1], edge) for marks, edge in pairs])
 
 
 def test_the_edges_and_the_iris_that_all_views_show_are_found(person, marked):
@@ -134,19 +125,17 @@ def test_the_edges_and_the_iris_that_all_views_show_are_found(person, marked):
 def test_a_blink_that_slips_through_and_one_frame_that_is_off_hardly_count(person, marked):
     head, opened = person
     looks = [seen_share(opened, 0, view_from(degrees), 0.003 * (degrees == 0)) for degrees in (-20, -10, 0, 10, 25)]
-    off = off_edges(lid_marks.mark(looks, begun_beside(head), 0, QUIET), opened)
-    assert off.mean() < 0.0008
-    shut = replace(looks[2].shares, ball=np.zeros_like(looks[2].shares.ball))
-    without = lid_marks.mark([*looks[:2], replace(looks[2], shares=shut), *looks[3:]], begun_beside(head), 0, QUIET)
-    assert off_edges(without, opened).mean() < 0.0007
+    assert off_edges(lid_marks.mark(looks, begun_beside(head), 0, QUIET), opened).mean() < 0.0008
+    looks[2] = replace(looks[2], shares=replace(looks[2].shares, ball=np.zeros_like(looks[2].shares.ball)))
+    assert off_edges(lid_marks.mark(looks, begun_beside(head), 0, QUIET), opened).mean() < 0.0007
 
 
 def test_an_eye_that_no_view_shows_is_not_marked(person):
     head, opened = person
     assert lid_marks.mark([], begun_beside(head), 0, QUIET) is None
-    seen = seen_share(opened, 0, view_from(0))
-    nothing = eye_reader.EyeShares(np.zeros_like(seen.shares.ball), seen.shares.iris, seen.shares.move)
-    assert lid_marks.mark([replace(seen, shares=nothing)], begun_beside(head), 0, QUIET) is None
+    look = seen_share(opened, 0, view_from(0))
+    nothing = replace(look.shares, ball=np.zeros_like(look.shares.ball))
+    assert lid_marks.mark([replace(look, shares=nothing)], begun_beside(head), 0, QUIET) is None
 
 
 def test_an_eye_is_not_read_beyond_the_nose_nor_in_a_blink(person):
@@ -190,9 +179,7 @@ def test_the_eyes_of_another_face_are_not_read(person, monkeypatch):
 def test_what_a_single_view_shows_is_lifted_as_deep_as_it_is_large(person, degrees):
     """The same picture in a world of 50 mm between the pupils and in one of 63."""
     pixels = view_from(degrees).project(template.landmark_points(person[0]))[0]
-    usual, small = (
-        landmarks.lift_alone(view_from(degrees, distance), pixels).points for distance in (0.5, 0.5 * 50 / 63)
-    )
+    usual, small = (landmarks.lift_alone(view_from(degrees, d), pixels).points for d in (0.5, 0.5 * 50 / 63))
     assert np.abs(63 / 50 * small - usual).max() < 0.0005
     assert np.linalg.norm(usual - template.landmark_points(person[0]), axis=1).mean() < 0.005
 
@@ -206,21 +193,11 @@ def test_lids_meet_the_edges_that_were_seen_and_balls_lie_behind_them(person, fi
         assert np.linalg.norm(ball.centre - true.centre) < min(0.0015, before)
         assert abs(ball.radius - true.radius) < 0.001
         assert np.degrees(np.arccos(np.clip(ball.gaze @ true.gaze, -1, 1))) < 5
-        for rim in (0, 1):
-            points = found.opened.skin.vertices[found.opened.rims[side][rim]]
-            off = off_curve(
-                points,
-                np.concatenate(
-                    [
-                        opened.skin.vertices[lids.corners()[side][1]][None],
-                        opened.skin.vertices[opened.rims[side][rim]],
-                        opened.skin.vertices[lids.corners()[side][0]][None],
-                    ]
-                ),
-            )
+        for rim, edge in zip(found.opened.rims[side], lids.edges(opened.skin.vertices, side), strict=True):
+            points = found.opened.skin.vertices[rim]
+            off = off_curve(points, edge)
             assert off.mean() < 0.0003 and off.max() < 0.001
-            clear = np.linalg.norm(points - ball.centre, axis=1) - ball.radius
-            assert clear.min() > 0.9 * lids.CLEAR_M
+            assert (np.linalg.norm(points - ball.centre, axis=1) - ball.radius).min() > 0.9 * lids.CLEAR_M
 
 
 def test_closed_lids_clear_the_balls_and_the_rest_of_the_head_stays(fitted):
@@ -281,17 +258,14 @@ def test_the_record_of_the_eyes_comes_back_and_a_damaged_one_is_refused(capture)
     left = Eyeball((0.03, 0.01, 0.0), 0.0155, (0.0, -1.0, 0.0), 0.9, 0.0058, 7)
     write_eyes(capture, left, replace(left, centre=(-0.03, 0.01, 0.0), views=0))
     assert read_eyes(capture) == (left, replace(left, centre=(-0.03, 0.01, 0.0), views=0))
-    told = json.loads(capture.eyes.read_text())
-    damage = (
-        ("left", "radius", 0),
-        ("right", "gaze", [0, 0, 0]),
-        ("left", "centre", [0, 0]),
-        ("left", "centre", [0, "a", 0]),
-        ("right", "views", None),
-    )
-    for side, name, value in damage:
-        broken = {**told, side: {**told[side], name: value}}
-        capture.eyes.write_text(json.dumps(broken))
-        with pytest.raises(Problem, match="eyes.json cannot be read") as problem:
+    record = json.loads(capture.eyes.read_text())
+    for name, value in (
+        ("radius", 0),
+        ("gaze", [0, 0, 0]),
+        ("centre", [0, 0]),
+        ("centre", [0, "a", 0]),
+        ("views", None),
+    ):
+        capture.eyes.write_text(json.dumps({**record, "left": {**record["left"], name: value}}))
+        with pytest.raises(Problem, match="eyes.json"):
             read_eyes(capture)
-        assert problem.value.remedy.startswith("Run the stage Head again")

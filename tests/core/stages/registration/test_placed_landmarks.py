@@ -12,14 +12,14 @@ from core.capture.messages import Problem, Reporter
 from core.geometry import meshes
 from core.settings.settings import Settings, from_json
 from core.stages import registration
-from tests.core.stages.registration.test_registration import _capture, known  # noqa: F401
+from tests.fixtures.scanned_head import known, scanned
 
 MOUTH_CORNER = 61
 
 
-def test_a_moved_landmark_takes_the_surface_along(tmp_path, monkeypatch, known):  # noqa: F811
-    model, truth, points, _ = known
-    capture, report = _capture(tmp_path / "c", truth, model, points, monkeypatch), Reporter("registration")
+def test_a_moved_landmark_takes_the_surface_along(tmp_path, monkeypatch):
+    model, _, points, _ = known()
+    capture, report = scanned(tmp_path / "c", monkeypatch), Reporter("registration")
     capture.json.write_text('{"format": 2, "source": "", "stages": {}}')
     wish = points[MOUTH_CORNER] + [-0.005, 0, 0.003]
     artist_landmarks.put(capture, {MOUTH_CORNER: wish})

@@ -76,13 +76,8 @@ def photograph(capture: Capture, centres: np.ndarray, radial: float = 0.0) -> No
 
 def around(yaws, heights=(0.0,)) -> np.ndarray:
     """Cameras 0.45 m from the egg, at angles in degrees from straight ahead."""
-    return np.array(
-        [
-            CENTRE + 0.45 * np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
-            for e in np.radians(heights)
-            for a in np.radians(yaws)
-        ]
-    )
+    e, a = (angle.ravel() for angle in np.meshgrid(np.radians(heights), np.radians(yaws), indexing="ij"))
+    return CENTRE + 0.45 * np.stack([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)], 1)
 
 
 def off_the_egg_mm(points: np.ndarray) -> np.ndarray:
@@ -103,20 +98,19 @@ def capture(tmp_path, monkeypatch) -> Capture:
 
 @pytest.mark.parametrize(
     ("centres", "radial"),
-    [(around(np.arange(-32, 33, 8)), -0.08), (around([0], np.arange(-24, 25, 8)), 0.0)],
+    [(around(np.arange(-24, 25, 8)), -0.08), (around([0], np.arange(-24, 25, 8)), 0.0)],
     ids=["horizontal path, bent lens", "vertical path"],
 )
 def test_known_surface_comes_back(capture, centres, radial):
     photograph(capture, centres, radial)
     report = Reporter("scan")
-    scan.run(capture, from_json({"scan": {"pairs": 6}}), report)
+    scan.run(capture, from_json({"scan": {"pairs": 5}}), report)
     mesh = meshes.read_ply(capture.scan)
     off = off_the_egg_mm(mesh.vertices)
     assert np.median(np.abs(off)) < 0.4 and np.percentile(np.abs(off), 95) < 1.5
     assert abs(np.median(off)) < 0.25  # neither swollen nor shrunk
-    front = raster.RayCaster(mesh).blocked(
-        np.repeat(centres[len(centres) // 2][None], 200, 0), _towards_front(centres[len(centres) // 2])
-    )
+    middle = centres[len(centres) // 2]
+    front = raster.RayCaster(mesh).blocked(np.repeat(middle[None], 200, 0), _towards_front(middle))
     assert front.mean() > 0.97  # hardly a hole where all cameras look
     outward = (meshes.face_normals(mesh) * (mesh.vertices[mesh.faces].mean(1) - CENTRE)).sum(1) > 0
     assert outward.mean() > 0.98
@@ -135,19 +129,25 @@ def _towards_front(centre: np.ndarray) -> np.ndarray:
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
+def depth_map(depth: np.ndarray, at: float = 0.0, focal: float = 250.0, baseline: float = 0.05) -> DepthMap:
+    """A camera `at` metres along +Z that looks that way, its principal point in the middle."""
+    origin = -np.array(depth.shape[::-1]) / 2
+    return DepthMap(np.eye(3), np.array([0, 0, at]), focal, origin, depth.astype(np.float32), baseline, 0.0)
+
+
+BOX = np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]])
+
+
 def test_what_floats_and_what_the_maps_disagree_about_is_left_out():
     rng, maps = np.random.default_rng(0), []
     for _ in range(8):
         depth = np.full((100, 100), 0.40, np.float32)
         depth[10:14, 10:14] = 0.34  # a hair in front of everything
         depth[50:80, 50:80] += rng.choice([-0.008, 0.009], (30, 30))  # a curl that no two frames show alike
-        maps.append(
-            DepthMap(np.eye(3), np.zeros(3), 250.0, np.array([-50.0, -50.0]), cv2.blur(depth, (3, 3)), 0.05, 0.0)
-        )
-    fused = fuse(maps, np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]]), 0.002)
+        maps.append(depth_map(cv2.blur(depth, (3, 3))))
+    fused = fuse(maps, BOX, 0.002)
     assert fused.floating > 0 and abs(fused.mesh.vertices[:, 2] - 0.40).max() < 0.012
-    still = fuse(maps[:1] * 8, np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]]), 0.002)
-    assert still.disagreeing == 0
+    assert fuse(maps[:1] * 8, BOX, 0.002).disagreeing == 0
 
 
 def test_pairs_keep_their_baseline_and_go_all_around():
@@ -163,41 +163,27 @@ def test_pairs_keep_their_baseline_and_go_all_around():
     assert np.mean([sharpness[a] + sharpness[b] for a, b in pairs]) > 1.8
 
 
-@pytest.mark.parametrize("farther", [1.3, 1.5, 2.0])
+@pytest.mark.parametrize("farther", [1.3, 2.0])
 def test_pairs_of_two_passes_lie_across_the_view(farther):
     """A second pass a little higher and farther away: of neighbours in direction, one is behind the other."""
     angles = np.radians(np.linspace(-75, 75, 48))
-    near = 0.5 * np.stack([np.sin(angles), -np.cos(angles), 0 * angles], 1)
-    far = farther * 0.5 * np.stack([np.sin(angles + 0.02), -np.cos(angles + 0.02), 0 * angles + 0.15], 1)
-    centres = np.concatenate([near, far])
+    near = np.stack([np.sin(angles), -np.cos(angles), 0 * angles], 1)
+    far = np.stack([np.sin(angles + 0.02), -np.cos(angles + 0.02), 0 * angles + 0.15], 1)
+    centres = 0.5 * np.concatenate([near, farther * far])
     for baselines in (BASELINES_DEG, NEAR_DEG, WIDE_DEG):
         pairs = np.array(choose_pairs(centres, np.ones(96), 24, baselines))
-        apart, middle = centres[pairs[:, 1]] - centres[pairs[:, 0]], directions(centres)[pairs].sum(1)
+        apart, middle = centres[pairs[:, 1]] - centres[pairs[:, 0]], meshes.unit(centres)[pairs].sum(1)
         assert len(pairs) > 12
-        assert (np.abs((directions(apart) * directions(middle)).sum(1)) < np.sin(np.radians(46))).all()
-
-
-def directions(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+        assert (np.abs((meshes.unit(apart) * meshes.unit(middle)).sum(1)) < np.sin(np.radians(46))).all()
 
 
 def test_a_map_counts_by_the_angle_it_measures_under():
     """Three maps from 0.4 m that say 0.400, three from twice as far, with twice the baseline, that say 0.404."""
-    maps = []
-    for depth, off in [(0.40, 0.0), (0.80, 0.004)] * 3:
-        seen = np.full((200, 200), depth + off, np.float32)
-        maps.append(
-            DepthMap(
-                np.eye(3),
-                np.array([0, 0, 0.40 - depth]),
-                500.0 * depth,
-                np.array([-100.0, -100.0]),
-                seen,
-                0.05 * depth / 0.40,
-                0.0,
-            )
-        )
-    fused = fuse(maps, np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]]), 0.002)
+    maps = [
+        depth_map(np.full((100, 100), depth + off), 0.40 - depth, 500 * depth, 0.05 * depth / 0.40)
+        for depth, off in [(0.40, 0.0), (0.80, 0.004)] * 3
+    ]
+    fused = fuse(maps, BOX, 0.002)
     assert np.median(fused.mesh.vertices[:, 2]) == pytest.approx(0.402, abs=0.0003)
 
 

@@ -56,15 +56,11 @@ def target() -> Mesh:
     """The same egg with half as many triangles, seams elsewhere, half of it in tile 1002, and the chart of that half
     mirrored."""
     mesh = egg(70, 46)
-    other = atlas.unwrap(Mesh(*_sewn(mesh)), SIZE)
+    whole = surfaces.welded(mesh)[0]
+    other = atlas.unwrap(Mesh(whole.vertices, whole.faces), SIZE)
     left = other.vertices[other.faces].mean(1)[:, 0] > 0
     uvs = np.concatenate([other.uvs, [2, 0] + other.uvs * [-1, 1]])
     return replace(other, uvs=uvs, face_uvs=np.where(left[:, None], other.face_uvs + len(other.uvs), other.face_uvs))
-
-
-def _sewn(mesh):
-    whole = surfaces.welded(mesh)[0]
-    return whole.vertices, whole.faces
 
 
 def places_of(target, tile, source, size=SIZE):
@@ -146,7 +142,7 @@ def test_the_reduced_scan_is_a_clean_surface_near_the_scan():
         np.concatenate([fine.vertices + rng.normal(0, 3e-4, fine.vertices.shape), speck.vertices]),
         np.concatenate([fine.faces, speck.faces + len(fine.vertices)]),
     )
-    mesh = scan.reduced(noisy, 0.005)
+    mesh = scan.reduce(noisy, 0.005)
     _, uses = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
     assert uses.max() <= 2 and len(mesh.faces) < len(fine.faces) / 4 and mesh.vertices[:, 0].max() < 0.1
     face, bary = surfaces.Surface(fine).find_nearest(mesh.vertices, vertex_normals(mesh), 0.01)
@@ -158,30 +154,21 @@ def test_the_displacement_is_the_known_one_in_metres():
     mesh = egg(48, 32)
     half = mesh.moved(mesh.vertices + 0.002 * vertex_normals(surfaces.welded(mesh)[0])[surfaces.welded(mesh)[1]])
     front = replace(half, faces=half.faces[half.vertices[half.faces].mean(1)[:, 1] < 0], uvs=None, face_uvs=None)
-    height = scan.displacement(mesh, front, 128, lambda done: None)
-    assert np.isclose(np.median(height[40:90, 48:80]), 0.002, atol=1e-4)
-    assert (height[:, :20] == 0).all() and height.max() < 0.003
+    height = scan.displacement(mesh, front, 64, lambda done: None)
+    assert np.isclose(np.median(height[20:45, 24:40]), 0.002, atol=1e-4)
+    assert (height[:, :10] == 0).all() and height.max() < 0.003
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory) -> Capture:
     """A head that is its own scan, photographed with its own skin, and its maps solved."""
     texture = skin(256)
-    capture = capture_of(tmp_path_factory.mktemp("finished") / "é.wildcap", texture, (-30, 0, 30))
-    for frame in json.loads(capture.frames_json.read_text())["frames"]:
-        images.write_srgb(
-            capture.frames / frame["name"], images.read_srgb((capture.delit / frame["name"]).with_suffix(".png"))
-        )
+    capture = capture_of(tmp_path_factory.mktemp("finished") / "é.wildcap", texture, (-30, 0, 30), light=1.0)
     meshes.write_ply(capture.scan, head())
-    images.write_linear(capture.maps / "diffuse_albedo.exr", texture * 1.2)
     for name in stages.MAPS:
-        if not (capture.maps / name).is_file():
-            images.write_data(
-                capture.maps / name,
-                np.full((256, 256, 3), 0.5, np.float32)
-                if name not in ("specular_albedo.png", "confidence.png")
-                else np.full((256, 256), 0.6, np.float32),
-            )
+        grey = name in ("specular_albedo.png", "confidence.png")
+        images.write_data(capture.maps / name, np.full((256, 256) if grey else (256, 256, 3), 0.5, np.float32))
+    images.write_linear(capture.maps / "diffuse_albedo.exr", texture * 1.2)
     return capture
 
 
@@ -197,23 +184,15 @@ def settings_of(**values):
 def test_the_scan_is_delivered_with_its_colours(capture):
     report = Reporter("transfer")
     transfer.run(capture, settings_of(), report)
-    assert {path.name for path in capture.delivery.iterdir()} == {
-        "delivery.json",
-        "scan.obj",
-        "scan_lit.png",
-        "scan_albedo.png",
-        "scan_albedo_known.png",
-        "displacement.exr",
-    }
+    names = "delivery.json scan.obj scan_lit.png scan_albedo.png scan_albedo_known.png displacement.exr"
+    assert {path.name for path in capture.delivery.iterdir()} == set(names.split())
     mesh = meshes.read_obj(capture.delivery / "scan.obj")
     assert atlas.overlap_share(mesh, 256) < 0.01
     lit, albedo = (images.read_linear(capture.delivery / f"scan_{name}.png") for name in ("lit", "albedo"))
     face, bary = raster.rasterize_uv(mesh, 256)
     points = raster.interpolate(mesh.vertices, mesh.faces, face, bary)
     front = (face >= 0) & (points[..., 1] < -0.06)
-    assert np.median(np.abs(albedo / lit - 1.2)[front]) < 0.06, (
-        "the texture of the frames, and the maps, which were made a fifth brighter"
-    )
+    assert np.median(np.abs(albedo / lit - 1.2)[front]) < 0.06, "the maps are a fifth brighter than the frames"
     assert report.figures["scan_albedo_known_percent"] > 95 and report.figures["displacement_p95_mm"] < 0.5
     assert capture.picture("transfer", "scan").is_file()
     assert "metres" in json.loads((capture.delivery / "delivery.json").read_text())["scan"]["displacement"]
@@ -240,9 +219,6 @@ def test_nothing_half_done_stays(capture):
 
 
 def test_without_a_scan_there_is_still_a_delivery(capture):
-    capture.scan.unlink()
-    transfer.run(capture, settings_of(), Reporter("transfer"))
-    assert [path.name for path in capture.delivery.iterdir()] == ["delivery.json"]
     meshes.write_points(capture.scan, np.eye(3))  # where no surface was measured
     transfer.run(capture, settings_of(), Reporter("transfer"))
     assert [path.name for path in capture.delivery.iterdir()] == ["delivery.json"]
