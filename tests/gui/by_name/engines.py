@@ -8,15 +8,14 @@ and the pictures beside it. What: `surface` has no subsurface; `random_walk_skin
 `random_walk` the same with Cycles's other random walk, as it was in 0.1.0."""
 
 import json
-import sys
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
+LIMIT_S = 900
 
 LIGHTS = ("three_point", "sun", "overcast")
 SIDE, SAMPLES = 640, 32  # pixels of the whole picture; Cycles takes scattering that is shorter than a pixel for none
@@ -87,6 +86,3 @@ def cheek(path: Path) -> np.ndarray:
     bpy.data.images.remove(image)
     edge = round((RENDERED - MEASURED) * SIDE)
     return pixels[edge : height - edge, edge : width - edge].mean((0, 1))
-
-
-d.play(flow(), limit_s=900)

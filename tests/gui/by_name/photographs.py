@@ -4,15 +4,14 @@
 back. The photographs are of a synthetic person with open eyes; photographed.py made them."""
 
 import shutil
-import sys
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
+import own_head
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import own_head  # noqa: E402
+LIMIT_S = 1700
 
 PHOTOGRAPHS = Path(__file__).resolve().parents[1] / "photographs"
 
@@ -63,6 +62,3 @@ def looks_back() -> None:
     assert min(keys[f"eyesOpen{side}"].value for side in ("Left", "Right")) > 0.9, "the lids are closed"
     materials = [material.name for material in head.data.materials if material]
     assert any("Eyes" in name for name in materials), "there are no eyes behind the lids"
-
-
-d.play(flow(), limit_s=1700)

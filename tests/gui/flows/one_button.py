@@ -4,13 +4,11 @@
 painted; clicks and minutes are counted. by_name/button_by_button.py goes there by the single buttons.
 """
 
-import sys
-from pathlib import Path
+import addon
+import driver as d
+import own_head
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import own_head  # noqa: E402
+LIMIT_S = 1700
 
 
 def flow():
@@ -30,6 +28,3 @@ def flow():
     assert "wildcap_skin" in own_head.head().data.materials[0], "the material came in by itself"
     assert not (root / "shadow_mask.png").is_file(), "nobody painted"
     assert addon.problem(root).startswith("Your head is ready."), addon.problem(root)
-
-
-d.play(flow(), limit_s=1700)

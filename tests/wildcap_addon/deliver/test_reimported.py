@@ -9,83 +9,66 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
+from core.capture import sample_head  # noqa: E402
 from research.benchmarks import reimported  # noqa: E402
 
-KEPT = {"blender_glb": (54, 3), "blender_usd": (54, 4), "unreal_fbx": (54, 4), "character_creator_obj": (0, 5)}
-"""Shape keys, and pictures in the materials (the skin's and the eyes')."""
+PICTURES = {"blender_glb": 3, "blender_usd": 4, "unreal_fbx": 4, "character_creator_obj": 5}
+"""In the materials: the skin's and the eyes'."""
 EYE_OPENING_M = 0.005
 """A lid's gap that shows the white of an eye; in people it is 8 to 11 mm high."""
 
 
-def test_a_file_that_blender_imports_looks_as_the_head_did(addon, tmp_path):
-    """The same light and noise: 29 dB in so small a picture, 30 in a larger one (docs/results/reimported.md);
+def test_a_file_that_blender_imports_looks_as_the_head_did(addon, tmp_path, few_units):
+    """The same light and noise: 27 dB in so small and noisy a picture, 30 in a larger one (docs/results/reimported.md);
     scattering is what is lost."""
-    deliveries = tuple(
-        tuple(name.rsplit("_", 1)) for name in KEPT if name != "blender_usd" or bpy.app.build_options.usd
-    )
-    _, _, returned = reimported.compare_deliveries(tmp_path, deliveries, resolution=128, samples=32)
+    names = [name for name in PICTURES if name != "blender_usd" or bpy.app.build_options.usd]
+    deliveries = tuple(tuple(name.rsplit("_", 1)) for name in names)
+    _, _, returned = reimported.compare_deliveries(tmp_path, deliveries, resolution=96, samples=12)
+    units = len(addon("acting.asset").load().units)
     for key, back in returned.items():
-        assert back.psnr_db > 29 and back.flat_psnr_db > 33, key
-        assert back.off_mm < 0.01 and (back.shape_keys, back.maps) == KEPT["_".join(key)], key
+        name = "_".join(key)
+        assert back.psnr_db > 27 and back.flat_psnr_db > 31, (name, back.psnr_db, back.flat_psnr_db)
+        keys = 0 if key[1] == "obj" else units
+        assert back.off_mm < 0.01 and (back.shape_keys, back.maps) == (keys, PICTURES[name]), name
 
 
-def test_a_metahuman_gets_what_its_documentation_asks_for(addon, tmp_path):
+def test_a_metahuman_gets_what_its_documentation_asks_for(addon, tmp_path, few_units):
     """One check for each requirement of "From Mesh": FBX or OBJ; the skin's albedo as its texture; eyes that are open
     and no empty sockets, with white that another material or its texture tells from the skin; besides, as the hint
     says, a static mesh in a neutral pose."""
-    from core.capture import sample_head
-
-    headless = addon("relight.headless")
-    capture = sample_head.copy_to(tmp_path)
-    _, item = headless.open_head(capture.root)
+    _, item = addon("relight.headless").open_head(sample_head.copy_to(tmp_path).root)
     bpy.ops.wildcap.add_face_units()
     folder = reimported.deliver(item, "metahuman", "fbx")
     assert {path.suffix for path in folder.iterdir()} == {".fbx", ".json", ""}
     (head,) = reimported.bring_back(folder)
-    assert (
-        head.data.shape_keys is None
-        and not head.vertex_groups
-        and not any(m.type == 'ARMATURE' for m in head.modifiers)
-    ), "static, no pose but the neutral"
+    assert head.data.shape_keys is None and not head.vertex_groups, "static, no pose but the neutral"
+    assert not any(modifier.type == 'ARMATURE' for modifier in head.modifiers)
 
-    skin = head.material_slots[0].material
-    shader = next(node for node in skin.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
+    materials = [slot.material for slot in head.material_slots]
+    shader = next(node for node in materials[0].node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
     assert shader.inputs["Base Color"].links[0].from_node.image.name.startswith("T_sample_head_Color")
-
-    eyes = [i for i, slot in enumerate(head.material_slots) if "Eyes" in slot.material.name]
-    assert len(eyes) == 1, [slot.material.name for slot in head.material_slots]
-    gaps, whites = [], []
+    (eyes,) = [i for i, material in enumerate(materials) if "Eyes" in material.name]
     for side in (1, -1):
-        rows = seen_eye(head, eyes[0], side)
-        gaps.append(max(rows.values(), default=0.0))
-        whites.append(len(rows))
-    assert min(gaps) > EYE_OPENING_M and min(whites) > 10, (
-        "both eyes are open, and an eyeball is behind every lid's gap"
-    )
-    picture = next(
-        node for node in head.material_slots[eyes[0]].material.node_tree.nodes if node.type == 'TEX_IMAGE'
-    ).image
+        gaps = open_columns(head, eyes, side)
+        assert max(gaps) > EYE_OPENING_M and len(gaps) > 10, "an eyeball is behind every lid's gap"
+    picture = next(node.image for node in materials[eyes].node_tree.nodes if node.type == 'TEX_IMAGE')
     colours = np.array(picture.pixels[:]).reshape(-1, 4)[:, :3]
     assert (colours.min(1) > 0.6).mean() > 0.2, "the white of the eye is in its texture"
 
 
-def seen_eye(head, material: int, side: int) -> dict[float, float]:
-    """Of columns 0.5 mm apart across the eye on a side, by their place: over what height a look from the front meets
-    the eye and nothing else before it, metres."""
-    place = np.array(head.matrix_world)
-    points = reimported.points_of(head)
-    eye = np.unique(
-        [v for polygon in head.data.polygons if polygon.material_index == material for v in polygon.vertices]
-    )
-    middle = points[eye][np.sign(points[eye][:, 0]) == side].mean(0)
-    back, seen = np.linalg.inv(place), {}
-    along = back[:3, :3] @ np.array([0.0, 1.0, 0.0])
+def open_columns(head, material: int, side: int) -> list[float]:
+    """Return, for columns 0.5 mm apart across the eye on a side, over what height a look from the front meets the eye
+    and nothing else before it, metres, without those where it meets none."""
+    points, back = reimported.points_of(head), np.linalg.inv(np.array(head.matrix_world))
+    faces = [polygon.vertices for polygon in head.data.polygons if polygon.material_index == material]
+    eye = points[np.unique([v for vertices in faces for v in vertices])]
+    middle, along = eye[np.sign(eye[:, 0]) == side].mean(0), back[:3, :3] @ [0.0, 1.0, 0.0]
+    gaps = []
     for x in np.arange(-0.016, 0.016, 0.0005):
         hits = 0
         for z in np.arange(-0.01, 0.01, 0.0005):
-            start = back @ np.array([middle[0] + x, middle[1] - 0.2, middle[2] + z, 1.0])
+            start = back @ [*(middle + [x, -0.2, z]), 1.0]
             met, _, _, face = head.ray_cast(tuple(start[:3]), tuple(along))
             hits += met and head.data.polygons[face].material_index == material
-        if hits:
-            seen[x] = 0.0005 * hits
-    return seen
+        gaps.append(0.0005 * hits)
+    return [gap for gap in gaps if gap]
