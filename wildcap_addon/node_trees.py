@@ -16,6 +16,11 @@ def of(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
     return block.node_tree
 
 
+def principled(material: bpy.types.Material) -> bpy.types.Node:
+    """Return the Principled BSDF of a material that has one."""
+    return next(node for node in of(material).nodes if node.type == 'BSDF_PRINCIPLED')
+
+
 def fingerprint(material: bpy.types.Material, without: str) -> str:
     """Stands for a material's nodes, their values and links; the pictures that they show, what stands where, and the
     node `without` count for nothing."""

@@ -119,12 +119,10 @@ def test_the_eyes_of_another_shape_look_at_it_too(head, empty, addon):
 def test_eyes_turn_as_far_as_the_guide_says(head, addon):
     """Outwards, inwards, up and down: in degrees from straight ahead, at the most that the units are driven to."""
     gaze = addon("acting.gaze")
-    eye = gaze._eye(head, 0)
-    most = {
-        way: angle(eye.ahead, 1) + gaze.MOST_LOOK * (angle(eye.turned[way], 1) - angle(eye.ahead, 1))
-        for way, angle in (("Out", gaze._yaw), ("In", gaze._yaw), ("Up", gaze._pitch), ("Down", gaze._pitch))
-    }
-    assert [round(abs(float(np.degrees(most[way])))) for way in ("Out", "In", "Up", "Down")] == [19, 17, 10, 15]
+    eye = gaze.whole_ball(head, 0)
+    most = {way: np.add((eye.pitch, eye.yaw), np.multiply(gaze.MOST_LOOK, turn)) for way, turn in eye.turns.items()}
+    angles = most["Out"][1], most["In"][1], most["Up"][0], most["Down"][0]
+    assert np.abs(np.degrees(angles)).round().tolist() == [19, 17, 10, 15]
 
 
 def test_a_driver_of_the_artists_is_not_taken_away(head, addon):
