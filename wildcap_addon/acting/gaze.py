@@ -11,7 +11,8 @@ import bpy
 
 from ...core.capture.messages import Problem
 from .. import local_view
-from . import drivers, mesh
+from ..data_blocks import add_driver, new_child
+from . import mesh
 from .asset import SIDES
 from .close_up import ball
 
@@ -33,12 +34,9 @@ def add(context, obj) -> None:
     Raises Problem if a look unit has a driver of the artist's.
     """
     _refuse_own(obj.data.shape_keys)
-    empty = bpy.data.objects.new(f"{obj.name} Gaze", None)
+    empty = new_child(obj, f"{obj.name} Gaze")
     empty.empty_display_type, empty.empty_display_size = 'SPHERE', 0.015
     empty[KEY] = True
-    for collection in obj.users_collection:
-        collection.objects.link(empty)
-    empty.parent = obj
     eyes = [whole_ball(obj, number) for number in range(2)]
     empty.location = sum(eye.centre + AHEAD_M * eye.ahead() for eye in eyes) / 2
     drive(obj, empty)
@@ -74,7 +72,7 @@ def drive(obj, empty) -> None:
             key = obj.data.shape_keys.key_blocks[f"eyeLook{way}{side}"]
             key.driver_remove("value")
             key.slider_max = MOST_LOOK
-            driver = drivers.add(key, "value", f"max(0, min({MOST_LOOK}, ({angle} - {rest:.6f}) / {turn:.6f}))")
+            driver = add_driver(key, "value", f"max(0, min({MOST_LOOK}, ({angle} - {rest:.6f}) / {turn:.6f}))")
             for axis in "XYZ":
                 variable = driver.variables.new()
                 variable.name, variable.type = axis.lower(), 'TRANSFORMS'

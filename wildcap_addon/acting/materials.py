@@ -89,31 +89,26 @@ def make(name: str, kind: str, colour: tuple, roughness: float) -> tuple[bpy.typ
     material[KEY] = kind
     material.diffuse_color = rgba(colour)
     shader = node_trees.principled(material)
-    shader.inputs["Base Color"].default_value = rgba(colour)
-    shader.inputs["Roughness"].default_value = roughness
-    shader.inputs["IOR"].default_value = CORNEA_IOR  # saliva's is nearly the same
+    # saliva refracts nearly as the cornea does
+    node_trees.feed(shader, {"Base Color": rgba(colour), "Roughness": roughness, "IOR": CORNEA_IOR})
     return material, shader
 
 
 def _material(name: str, kind: str, colour: tuple, roughness: float, coat: float) -> bpy.types.Material:
     material, shader = make(name, kind, colour, roughness)
     if shader is not None:
-        for field, value in (("Weight", coat), ("Roughness", 0.04), ("IOR", CORNEA_IOR)):
-            shader.inputs[f"Coat {field}"].default_value = value
+        node_trees.feed(shader, {"Coat Weight": coat, "Coat Roughness": 0.04, "Coat IOR": CORNEA_IOR})
     return material
 
 
 def _paint(material, name: str, iris: str | tuple) -> None:
     """Put the packed picture of the eye in front of the shader, or give an existing one its new iris."""
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    node = nodes.get(EYE_NODE)
+    tree = material.node_tree
+    node = tree.nodes.get(EYE_NODE)
     if node is None:
-        node = nodes.new('ShaderNodeTexImage')
-        node.name = node.label = EYE_NODE
-        node.location = (-320, 280)
-        shader = next(n for n in nodes if n.type == 'BSDF_PRINCIPLED')
-        links.new(node.outputs["Color"], shader.inputs["Base Color"])
-        node.image = _draw(f"{name} Eye", iris)
+        named = {"name": EYE_NODE, "label": EYE_NODE, "location": (-320, 280)}
+        node = node_trees.add(tree, 'ShaderNodeTexImage', image=_draw(f"{name} Eye", iris), **named)
+        node_trees.feed(node_trees.principled(material), {"Base Color": node.outputs["Color"]})
     elif node.image is not None and node.image.get(CHOSEN) != _name(iris):
         before = node.image
         before.user_remap(_draw(before.name, iris))
@@ -124,12 +119,19 @@ def _paint(material, name: str, iris: str | tuple) -> None:
 
 def _draw(name: str, iris: str | tuple) -> bpy.types.Image:
     """Return a new, packed picture of the eye: undo does not cover pixels that change within one."""
-    image = bpy.data.images.new(name, SIZE_PX, SIZE_PX)
-    colours.as_srgb(image)
-    image.pixels.foreach_set(picture(IRISES.get(iris, iris)).ravel())
+    image = pack_image(name, picture(IRISES.get(iris, iris)))
+    image[CHOSEN] = _name(iris)
+    return image
+
+
+def pack_image(name: str, pixels: np.ndarray, is_data: bool = False) -> bpy.types.Image:
+    """Return a new, packed image of 8 bits; pixels: [H, W, 4], sRGB or data, rows from the bottom."""
+    rows, columns = pixels.shape[:2]
+    image = bpy.data.images.new(name, columns, rows, is_data=is_data)
+    (colours.as_data if is_data else colours.as_srgb)(image)
+    image.pixels.foreach_set(pixels.astype(np.float32).ravel())
     image.update()
     image.pack()
-    image[CHOSEN] = _name(iris)
     return image
 
 
@@ -138,7 +140,7 @@ def _name(iris: str | tuple) -> str:
 
 
 def picture(iris: tuple[float, float, float]) -> np.ndarray:
-    """Return an eye as its UVs lay it out, sRGB float32 [SIZE_PX, SIZE_PX, 4].
+    """Return an eye as its UVs lay it out, sRGB [SIZE_PX, SIZE_PX, 4].
 
     Rings around the pupil; the angle from it grows outwards (research/people/base_head/acting.py).
     """
@@ -158,7 +160,7 @@ def picture(iris: tuple[float, float, float]) -> np.ndarray:
     white = np.array([0.62, 0.56, 0.52]) * (1 - veins * [0.15, 0.42, 0.45])
     linear = coloured * rim[..., None] + white * (1 - rim[..., None])
     srgb = colours.linear_to_srgb(linear)
-    return np.concatenate([srgb, np.ones((SIZE_PX, SIZE_PX, 1))], 2).clip(0, 1).astype(np.float32)
+    return np.concatenate([srgb, np.ones((SIZE_PX, SIZE_PX, 1))], 2).clip(0, 1)
 
 
 def _step(angle: np.ndarray, edge: float, soft: float) -> np.ndarray:

@@ -16,9 +16,9 @@ import numpy as np
 from ...core.capture.capture import Capture
 from ...core.capture.messages import Problem
 from .. import captures
-from ..data_blocks import read_field
+from ..data_blocks import add_driver, add_variable, read_field, value_path
 from ..head import OUTER
-from . import carrying, drivers, filmed, going_over, materials
+from . import carrying, filmed, going_over, materials
 from .asset import GAZE, HALF, SIDES, FaceUnits, load
 
 MARK = "wildcap_face_units"
@@ -236,8 +236,8 @@ def _drive(keys, filmed_open: bool) -> None:
     for side in SIDES:
         driver = keys.key_blocks[f"{OPEN}{side}"].driver_add("value").driver
         driver.type = 'MAX'
-        for path in (f'["{OPEN}"]', *(drivers.value_of(f"{unit}{side}") for unit in GAZE)):
-            drivers.lead(driver, keys, path)
-        half = drivers.add(keys.key_blocks[f"{HALF}{side}"], "value", HALF_WAY)
+        for path in (f'["{OPEN}"]', *(value_path(f"{unit}{side}") for unit in GAZE)):
+            add_variable(driver, keys, path)
+        half = add_driver(keys.key_blocks[f"{HALF}{side}"], "value", HALF_WAY)
         for name, unit in (("opened", OPEN), ("shut", "eyeBlink")):
-            drivers.lead(half, keys, drivers.value_of(f"{unit}{side}"), name)
+            add_variable(half, keys, value_path(f"{unit}{side}"), name)

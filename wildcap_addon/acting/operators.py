@@ -11,25 +11,21 @@ from . import gaze, materials, mesh
 from .close_up import building
 
 FILMED = ("filmed", "As Filmed", "What the frames show, where the eyes were open; brown otherwise")
+IRIS = {
+    "name": "Iris",
+    "description": "Colour of the eyes",
+    "items": [FILMED, *((name, name.title(), "") for name in materials.IRISES)],
+}
 
 
-class _IrisOperator(HeadOperator):
-    """Mixin: asks for the colour of the eyes."""
-
-    bl_options = {'REGISTER', 'UNDO'}
-
-    iris: bpy.props.EnumProperty(
-        name="Iris",
-        description="Colour of the eyes",
-        items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)],
-    )
-
-
-class WILDCAP_OT_add_face_units(_IrisOperator, bpy.types.Operator):
+class WILDCAP_OT_add_face_units(HeadOperator, bpy.types.Operator):
     """Open the head's lips and lids, put eyes and a mouth behind them, and give it ARKit's face units as shape keys"""
 
     bl_idname = "wildcap.add_face_units"
     bl_label = "Add Face Units"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    iris: bpy.props.EnumProperty(**IRIS)
 
     def work(self, context):
         item = captures.require(context)
@@ -43,11 +39,14 @@ class WILDCAP_OT_add_face_units(_IrisOperator, bpy.types.Operator):
         head.complete(obj, captures.folder(item))
 
 
-class WILDCAP_OT_iris(_IrisOperator, bpy.types.Operator):
+class WILDCAP_OT_iris(HeadOperator, bpy.types.Operator):
     """Colour of the eyes"""
 
     bl_idname = "wildcap.iris"
     bl_label = "Iris"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    iris: bpy.props.EnumProperty(**IRIS)
 
     def work(self, context):
         obj = _acting(context)

@@ -20,6 +20,7 @@ from ...core.capture.messages import Problem
 from ...core.capture.ownership import free_place
 from .. import captures, colours, head, node_trees
 from ..data_blocks import read_field
+from ..node_trees import add, feed
 
 SCENE = "WildCap Delivery"
 HEAD_TILE = 1001
@@ -123,7 +124,7 @@ def _hairs(plan: DeliveryPlan, source: bpy.types.Object, obj) -> list[bpy.types.
         copy.data.name, copy.parent, copy.data.surface = copy.name, obj, None
         copy.data.materials.clear()
         material, shader = _new(copy.name)
-        shader.inputs["Base Color"].default_value = _exported((*_mean_colour(copy.data), 1), plan)
+        feed(shader, {"Base Color": _exported((*_mean_colour(copy.data), 1), plan)})
         copy.data.materials.append(material)
         copies.append(copy)
     return copies
@@ -200,14 +201,11 @@ def _materials(mesh, plan: DeliveryPlan, packing: dict) -> None:
 
 def _skin(name: str, plan: DeliveryPlan, maps: list[dict], roughness: float, uv_map: str) -> bpy.types.Material:
     material, shader = _new(name)
-    shader.inputs["Roughness"].default_value = roughness
-    shader.inputs["IOR"].default_value = 1.4
-    tree = material.node_tree
+    feed(shader, {"Roughness": roughness, "IOR": 1.4})
     for entry in maps:
         if entry["slot"] not in LINKED[plan.format.suffix]:
             continue
-        node = tree.nodes.new('ShaderNodeTexImage')
-        node.image = bpy.data.images.load(str(plan.staged / entry["file"]))
+        node = _picture_node(material, plan.staged / entry["file"])
         if plan.what == "head":  # its skin is within the picture, whose borders are crown and neck
             node.extension = 'EXTEND'
         if entry["kind"] != "colour":
@@ -215,12 +213,10 @@ def _skin(name: str, plan: DeliveryPlan, maps: list[dict], roughness: float, uv_
         elif plan.colour == "srgb":
             colours.as_srgb(node.image)
         if entry["slot"] == "normal":
-            normal = tree.nodes.new('ShaderNodeNormalMap')
-            normal.uv_map = uv_map
-            tree.links.new(node.outputs["Color"], normal.inputs["Color"])
-            tree.links.new(normal.outputs["Normal"], shader.inputs["Normal"])
+            normal = add(material.node_tree, 'ShaderNodeNormalMap', {"Color": node.outputs["Color"]}, uv_map=uv_map)
+            feed(shader, {"Normal": normal.outputs["Normal"]})
         else:
-            tree.links.new(node.outputs["Color"], shader.inputs[SOCKETS[entry["slot"]]])
+            feed(shader, {SOCKETS[entry["slot"]]: node.outputs["Color"]})
     return material
 
 
@@ -229,14 +225,15 @@ def _plain(original, plan: DeliveryPlan) -> bpy.types.Material:
     material, shader = _new(f"{original.name} Delivered" if original is not None else "Plain")
     if original is None:
         return material
-    shader.inputs["Base Color"].default_value = _exported(original.diffuse_color, plan)
-    shader.inputs["Roughness"].default_value = original.roughness
+    feed(shader, {"Base Color": _exported(original.diffuse_color, plan), "Roughness": original.roughness})
     packed = _packed(original)
     if packed is not None:
-        node = material.node_tree.nodes.new('ShaderNodeTexImage')
-        node.image = bpy.data.images.load(str(_unpacked(packed, original, plan)))
-        material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+        feed(shader, {"Base Color": _picture_node(material, _unpacked(packed, original, plan)).outputs["Color"]})
     return material
+
+
+def _picture_node(material, path: Path) -> bpy.types.Node:
+    return add(material.node_tree, 'ShaderNodeTexImage', image=bpy.data.images.load(str(path)))
 
 
 def _packed(original) -> bpy.types.Image | None:

@@ -15,7 +15,7 @@ from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
 from .. import captures, colours, head, local_view, node_trees
-from ..data_blocks import find, read_field, replace_data
+from ..data_blocks import find, new_child, read_field, replace_data
 
 TITLES = {"brows": "Brows", "lashes": "Lashes", "beard": "Beard"}
 GROWN, MATERIAL = "wildcap_grown", "wildcap_hair_material"
@@ -49,10 +49,8 @@ def grow_part(context, obj, part: str, points: np.ndarray, radius: np.ndarray, c
     colour = colours.to_working(colour)
     data = _make(f"{obj.name} {TITLES[part]}", points, radius, colour)
     if hair is None:
-        hair = bpy.data.objects.new(data.name, data)
-        for collection in obj.users_collection:
-            collection.objects.link(hair)
-        hair.parent, hair[captures.HAIR_KEY] = obj, part
+        hair = new_child(obj, data.name, data)
+        hair[captures.HAIR_KEY] = part
     else:
         replace_data(hair, data, bpy.data.hair_curves)
     if not data.materials:
@@ -175,11 +173,9 @@ def _deform_group() -> bpy.types.NodeTree:
         group.is_modifier = True
         for side in ('INPUT', 'OUTPUT'):
             group.interface.new_socket("Geometry", in_out=side, socket_type='NodeSocketGeometry')
-        kinds = 'NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface', 'NodeGroupOutput'
-        source, deform, target = (group.nodes.new(kind) for kind in kinds)
-        deform.location, target.location = (200, 0), (420, 0)
-        group.links.new(source.outputs[0], deform.inputs["Curves"])
-        group.links.new(deform.outputs["Curves"], target.inputs[0])
+        curves = node_trees.add(group, 'NodeGroupInput').outputs[0]
+        deform = node_trees.add(group, 'GeometryNodeDeformCurvesOnSurface', {"Curves": curves}, location=(200, 0))
+        node_trees.add(group, 'NodeGroupOutput', (deform.outputs["Curves"],), location=(420, 0))
     return group
 
 
@@ -195,11 +191,12 @@ def _material(name: str, mean: np.ndarray) -> bpy.types.Material:
     material = bpy.data.materials.new(name)
     material[MATERIAL] = True
     material.diffuse_color = (*mean.tolist(), 1)
-    shader, tree = node_trees.principled(material), material.node_tree
-    shader.inputs["Roughness"].default_value, shader.inputs["IOR"].default_value = ROUGHNESS, IOR
-    colour = tree.nodes.new('ShaderNodeAttribute')
-    colour.attribute_name, colour.location = captures.HAIR_COLOUR, (-260, 280)
-    tree.links.new(colour.outputs["Color"], shader.inputs["Base Color"])
+    shader, settings = (
+        node_trees.principled(material),
+        {"attribute_name": captures.HAIR_COLOUR, "location": (-260, 280)},
+    )
+    colour = node_trees.add(material.node_tree, 'ShaderNodeAttribute', **settings).outputs["Color"]
+    node_trees.feed(shader, {"Base Color": colour, "Roughness": ROUGHNESS, "IOR": IOR})
     return material
 
 

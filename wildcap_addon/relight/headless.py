@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Relit pictures without a window, in a bpy process in which the extension is enabled.
 
-A light is a preset's name, the name of one of Blender's worlds, or a picture of surroundings (Hdri).
+A light's name is a preset's, or that of one of Blender's worlds.
 """
 
 from collections.abc import Iterable
@@ -31,7 +31,7 @@ class Turn:
 
 
 def render_relit(
-    capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolution: int = 640, samples: int = 32
+    capture_folder: Path, names: Iterable[str] = ALL, resolution: int = 640, samples: int = 32
 ) -> list[Path]:
     """Render a capture's head under each light to renders/NAME.png and the linear NAME.exr; return the PNGs.
 
@@ -52,7 +52,7 @@ def render_contact_sheet(
 
 def render_turntable(
     capture_folder: Path,
-    name: str | Hdri = ALL[0],
+    name: str = ALL[0],
     turns: str = 'HEAD',
     frames: int = 48,
     film: bool = False,
@@ -88,9 +88,9 @@ def turntable(obj, renders: Path, light: str | Hdri, turn: Turn, settings: Rende
     return folder
 
 
-def light_of(name: str | Hdri) -> str | Hdri:
-    """Return a preset's name or a picture as it is, otherwise Blender's world of that name."""
-    return name if isinstance(name, Hdri) or name in lights.PRESETS or name in lights.NAMED_BEFORE else hdri.named(name)
+def light_of(name: str) -> str | Hdri:
+    """Return a preset's name as it is, otherwise Blender's world of that name."""
+    return name if name in lights.PRESETS or name in lights.NAMED_BEFORE else hdri.named(name)
 
 
 def open_head(capture_folder: Path):

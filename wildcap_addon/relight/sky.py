@@ -14,11 +14,14 @@ from mathutils import Matrix
 from .. import node_trees
 from ..colours import to_working
 from ..data_blocks import find, stop_animation
+from ..node_trees import add, feed
 
 WORLD = "WildCap Relight"
 HORIZON_BLEND = 0.04
 """Sine of the elevation above and below the horizon over which ground and sky meet."""
-COLOURS = ("WildCap Sky", "A"), ("WildCap Sky", "B"), ("WildCap Ground", "A")
+MIX_A, MIX_B, MIX_RESULT = 6, 7, 2
+"""Indices of a Mix node's sockets for colours: its names occur for every data type."""
+COLOURS = ("WildCap Sky", MIX_A), ("WildCap Sky", MIX_B), ("WildCap Ground", MIX_A)
 """Node and socket of a sky's horizon, zenith and ground."""
 
 
@@ -43,33 +46,24 @@ def world() -> bpy.types.World:
     stop_animation(tree)
     for node in [n for n in tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:
         tree.nodes.remove(node)
-    background = next(n for n in tree.nodes if n.type == 'BACKGROUND')
-    background.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
-    background.inputs["Strength"].default_value = 1.0
+    feed(_background(tree), {"Color": (0.0, 0.0, 0.0, 1.0), "Strength": 1.0})
     sky_world.cycles.sampling_method = 'AUTOMATIC'
     return sky_world
 
 
 def show(world: bpy.types.World, sky: Sky, frame: Matrix) -> None:
     """Make the sky the world's background, upright with the head at `frame` [4, 4]."""
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    background = next(n for n in nodes if n.type == 'BACKGROUND')
-    coordinates = _node(nodes, 'ShaderNodeTexCoord', -1100)
-    upright = _node(nodes, 'ShaderNodeMapping', -920)
-    split = _node(nodes, 'ShaderNodeSeparateXYZ', -740)
-    rise = _node(nodes, 'ShaderNodeClamp', -560)
-    edge = _node(nodes, 'ShaderNodeMapRange', -560, -160)
-    above, below = _mix(nodes, "WildCap Sky", -380), _mix(nodes, "WildCap Ground", -200)
-    upright.inputs["Rotation"].default_value = frame.to_quaternion().inverted().to_euler()
-    edge.inputs["From Min"].default_value, edge.inputs["From Max"].default_value = -HORIZON_BLEND, HORIZON_BLEND
-    links.new(coordinates.outputs["Generated"], upright.inputs["Vector"])
-    links.new(upright.outputs["Vector"], split.inputs["Vector"])
-    links.new(split.outputs["Z"], rise.inputs["Value"])
-    links.new(split.outputs["Z"], edge.inputs["Value"])
-    links.new(rise.outputs["Result"], above.inputs[0])
-    links.new(edge.outputs["Result"], below.inputs[0])
-    links.new(_colour(above, "Result", 'outputs'), _colour(below, "B"))
-    links.new(_colour(below, "Result", 'outputs'), background.inputs["Color"])
+    tree = world.node_tree
+    direction = add(tree, 'ShaderNodeTexCoord', location=(-1100, 0)).outputs["Generated"]
+    turned = {"Vector": direction, "Rotation": frame.to_quaternion().inverted().to_euler()}
+    upright = add(tree, 'ShaderNodeMapping', turned, location=(-920, 0)).outputs["Vector"]
+    z = add(tree, 'ShaderNodeSeparateXYZ', (upright,), location=(-740, 0)).outputs["Z"]
+    rise = add(tree, 'ShaderNodeClamp', {"Value": z}, location=(-560, 0))
+    blend = {"Value": z, "From Min": -HORIZON_BLEND, "From Max": HORIZON_BLEND}
+    edge = add(tree, 'ShaderNodeMapRange', blend, location=(-560, -160))
+    above = _mix(tree, "WildCap Sky", {0: rise.outputs["Result"]}, -380)
+    below = _mix(tree, "WildCap Ground", {0: edge.outputs["Result"], MIX_B: above.outputs[MIX_RESULT]}, -200)
+    feed(_background(tree), {"Color": below.outputs[MIX_RESULT]})
     # it is smooth, and a fine importance map would take a second to compute
     world.cycles.sampling_method, world.cycles.sample_map_resolution = 'MANUAL', 128
     for socket, colour in zip(sockets(world), colours(sky), strict=True):
@@ -78,7 +72,7 @@ def show(world: bpy.types.World, sky: Sky, frame: Matrix) -> None:
 
 def sockets(world: bpy.types.World) -> list[bpy.types.NodeSocket]:
     """Return the sockets of the horizon's, the zenith's and the ground's colour."""
-    return [_colour(world.node_tree.nodes[node], name) for node, name in COLOURS]
+    return [world.node_tree.nodes[node].inputs[socket] for node, socket in COLOURS]
 
 
 def colours(sky: Sky) -> list[tuple]:
@@ -87,19 +81,9 @@ def colours(sky: Sky) -> list[tuple]:
     return [(*to_working(colour), 1.0) for colour in (horizon, zenith, ground)]
 
 
-def _node(nodes, kind: str, x: float, y: float = 0) -> bpy.types.Node:
-    node = nodes.new(kind)
-    node.location = (x, y)
-    return node
+def _background(tree) -> bpy.types.Node:
+    return next(node for node in tree.nodes if node.type == 'BACKGROUND')
 
 
-def _mix(nodes, name: str, x: float) -> bpy.types.Node:
-    node = _node(nodes, 'ShaderNodeMix', x)
-    node.name = node.label = name
-    node.data_type = 'RGBA'
-    return node
-
-
-def _colour(node, name: str, side: str = 'inputs') -> bpy.types.NodeSocket:
-    """Return a mix node's socket for colours: each name occurs for every data type."""
-    return next(s for s in getattr(node, side) if s.name == name and s.type == 'RGBA')
+def _mix(tree, name: str, inputs: dict, x: float) -> bpy.types.Node:
+    return add(tree, 'ShaderNodeMix', inputs, data_type='RGBA', name=name, label=name, location=(x, 0))

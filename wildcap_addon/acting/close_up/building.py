@@ -35,10 +35,8 @@ def add(context, obj) -> list[str]:
             modelled.append(thing.name)
             return thing
         if thing is None:
-            thing = bpy.data.objects.new(f"{obj.name} {kind}", data)
-            for collection in obj.users_collection:
-                collection.objects.link(thing)
-            thing.parent, thing[KEY] = obj, kind
+            thing = data_blocks.new_child(obj, f"{obj.name} {kind}", data)
+            thing[KEY] = kind
             new.append(thing)
         else:
             data_blocks.replace_data(thing, data, bpy.data.meshes)

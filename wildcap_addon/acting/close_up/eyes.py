@@ -11,8 +11,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...data_blocks import read_field
-from .. import drivers
+from ...data_blocks import add_driver, add_variable, read_field, value_path
 from .. import materials as head_materials
 from ..asset import LEFT_EYE, SIDES, FaceUnits, lining, load, sockets
 from . import ball, keeping, materials, nodes, shapes
@@ -164,9 +163,9 @@ def _place(eye_object, obj, eye: ball.RiggedEyeball, side: str) -> None:
     for axis, rest, share, sign in ((0, -eye.pitch, 0, -1), (2, eye.yaw, 1, 1)):
         eye_object.driver_remove("rotation_euler", axis)
         terms = [f"{turn[share] * sign:.6f} * look_{way.lower()}" for way, turn in eye.turns.items()]
-        driver = drivers.add(eye_object, "rotation_euler", " + ".join([f"{rest:.6f}", *terms]), axis)
+        driver = add_driver(eye_object, "rotation_euler", " + ".join([f"{rest:.6f}", *terms]), axis)
         for way in eye.turns:
-            drivers.lead(driver, obj.data.shape_keys, drivers.value_of(f"eyeLook{way}{side}"), f"look_{way.lower()}")
+            add_variable(driver, obj.data.shape_keys, value_path(f"eyeLook{way}{side}"), f"look_{way.lower()}")
 
 
 def _let_light_in(obj) -> None:

@@ -8,10 +8,11 @@ gets the same highlights over a clear pane: each engine has an output of its own
 
 import bpy
 
+from ...node_trees import add, feed
 from .. import materials
 from ..materials import CORNEA_IOR, make, rgba
 from . import pictures
-from .nodes import add, math
+from .nodes import math
 
 TEARS_IOR = 1.336
 WHITE_COLOUR = (0.63, 0.555, 0.51)
@@ -37,7 +38,7 @@ def white(name: str) -> bpy.types.Material:
         pinkish = rgba(tuple(a * b for a, b in zip(WHITE_COLOUR, PINK, strict=True)))
         pink = _mix(tree, channels["Green"], rgba(WHITE_COLOUR), pinkish)
         vessels = math(tree, 'MULTIPLY', channels["Red"], 0.75)
-        tree.links.new(_mix(tree, vessels, pink, rgba(VESSEL_COLOUR)), shader.inputs["Base Color"])
+        feed(shader, {"Base Color": _mix(tree, vessels, pink, rgba(VESSEL_COLOUR))})
         _moisten(shader, 0.35, (1.0, 0.45, 0.3), 0.0012, 0.0)  # its wet layer is the shell
         _bump(tree, shader, channels["Blue"], 0.25, 0.0001)
         v = add(tree, 'ShaderNodeSeparateXYZ', (add(tree, 'ShaderNodeUVMap').outputs[0],)).outputs[1]
@@ -45,7 +46,7 @@ def white(name: str) -> bpy.types.Material:
         opaque = add(tree, 'ShaderNodeMapRange', fade, interpolation_type='SMOOTHSTEP').outputs[0]
         clear = add(tree, 'ShaderNodeBsdfTransparent').outputs[0]
         mixed = add(tree, 'ShaderNodeMixShader', (opaque, clear, shader.outputs[0])).outputs[0]
-        tree.links.new(mixed, _output(tree).inputs["Surface"])
+        feed(_output(tree), {"Surface": mixed})
     return material
 
 
@@ -59,8 +60,8 @@ def iris(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
         hue = _mix(tree, channels["Blue"], own, _mix(tree, 1.0, own, (*WARM, 1), 'MULTIPLY'))
         bright = math(tree, 'MULTIPLY', channels["Red"], 2.4)  # the picture's mean is half of what it paints over
         grey = add(tree, 'ShaderNodeCombineColor', {"Red": bright, "Green": bright, "Blue": bright}).outputs[0]
-        tree.links.new(_mix(tree, 1.0, hue, grey, 'MULTIPLY'), shader.inputs["Base Color"])
-        shader.inputs["Specular IOR Level"].default_value = 0.15  # the chamber's fluid leaves little reflection
+        # the chamber's fluid leaves little reflection
+        feed(shader, {"Base Color": _mix(tree, 1.0, hue, grey, 'MULTIPLY'), "Specular IOR Level": 0.15})
         _bump(tree, shader, channels["Green"], 0.6, 0.0003)
         materials.tint(material, colour)
     return material
@@ -69,7 +70,7 @@ def iris(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
 def pupil(name: str) -> bpy.types.Material:
     material, shader = make(f"{name} Pupil", "pupil", (0.002, 0.002, 0.002), 1.0)
     if shader is not None:
-        shader.inputs["Specular IOR Level"].default_value = 0.0
+        feed(shader, {"Specular IOR Level": 0.0})
     return material
 
 
@@ -79,7 +80,7 @@ def flesh(name: str) -> bpy.types.Material:
     if shader is not None:
         tree = material.node_tree
         on_ball = add(tree, 'ShaderNodeAttribute', attribute_name="onto").outputs["Fac"]
-        tree.links.new(_mix(tree, on_ball, rgba(FLESH), rgba(FOLD)), shader.inputs["Base Color"])
+        feed(shader, {"Base Color": _mix(tree, on_ball, rgba(FLESH), rgba(FOLD))})
         _roughen(tree, shader, 900.0, 0.3, 0.00015)
         _moisten(shader, 0.4, (1.0, 0.4, 0.3), 0.0015, 0.8)
     return material
@@ -92,7 +93,7 @@ def cornea(name: str) -> bpy.types.Material:
         cycles = _output(tree)
         cycles.target = 'CYCLES'
         glass = {"IOR": CORNEA_IOR, "Roughness": 0.0, "Color": (1, 1, 1, 1)}
-        tree.links.new(add(tree, 'ShaderNodeBsdfGlass', glass).outputs[0], cycles.inputs["Surface"])
+        feed(cycles, {"Surface": add(tree, 'ShaderNodeBsdfGlass', glass).outputs[0]})
         _show_in_eevee(tree, _pane(tree, CORNEA_IOR))
         _clear(material, shader)
     return material
@@ -103,7 +104,7 @@ def tears(name: str) -> bpy.types.Material:
     material, shader = make(f"{name} Tears", "tears", (1, 1, 1), 0.0)
     if shader is not None:
         tree = material.node_tree
-        tree.links.new(_pane(tree, TEARS_IOR), _output(tree).inputs["Surface"])
+        feed(_output(tree), {"Surface": _pane(tree, TEARS_IOR)})
         _clear(material, shader)
     return material
 
@@ -161,10 +162,8 @@ def resize(things, scale: float) -> None:
 
 def _moisten(shader, inside: float, radius: tuple[float, float, float], scale_m: float, coat: float) -> None:
     """Let light scatter within, under a film of saliva."""
-    shader.inputs["Subsurface Weight"].default_value, shader.inputs["Subsurface Scale"].default_value = inside, scale_m
-    shader.inputs["Subsurface Radius"].default_value = radius
-    shader.inputs["Coat Weight"].default_value, shader.inputs["Coat Roughness"].default_value = coat, 0.08
-    shader.inputs["Coat IOR"].default_value = TEARS_IOR
+    feed(shader, {"Subsurface Weight": inside, "Subsurface Scale": scale_m, "Subsurface Radius": radius})
+    feed(shader, {"Coat Weight": coat, "Coat Roughness": 0.08, "Coat IOR": TEARS_IOR})
 
 
 def _shade_by_lips(tree, shader, front: float) -> None:
@@ -178,7 +177,7 @@ def _shade_by_lips(tree, shader, front: float) -> None:
 
 
 def _show_in_eevee(tree, surface) -> None:
-    add(tree, 'ShaderNodeOutputMaterial', {"Surface": surface}, target='EEVEE').location = (300, -200)
+    add(tree, 'ShaderNodeOutputMaterial', {"Surface": surface}, target='EEVEE', location=(300, -200))
 
 
 def _roughen(tree, shader, scale: float, strength: float, distance_m: float) -> None:
@@ -201,7 +200,7 @@ def _mix(tree, share, a, b, blend: str = 'MIX'):
 
 def _bump(tree, shader, height, strength: float, distance_m: float) -> None:
     bump = add(tree, 'ShaderNodeBump', {"Strength": strength, "Distance": distance_m, "Height": height})
-    tree.links.new(bump.outputs[0], shader.inputs["Normal"])
+    feed(shader, {"Normal": bump.outputs[0]})
 
 
 def _output(tree):

@@ -9,7 +9,7 @@ import re
 import bpy
 import numpy as np
 
-from .. import drivers
+from ...data_blocks import add_driver, add_variable, value_path
 from ..asset import load
 from . import materials, mouth_shapes, nodes, tongue
 from .jaws import LEAST_M, find_jaws
@@ -61,6 +61,6 @@ def _add_keys(thing, obj, rest_points: np.ndarray, moves: dict[str, np.ndarray],
         key = thing.shape_key_add(name=name, from_mix=False)
         key.slider_min, key.slider_max = -10, 10  # the head's own sliders are the limit
         key.data.foreach_set("co", (rest_points + moved).astype(np.float32).ravel())
-        driver = drivers.add(key, "value", led_by.get(name, name))
+        driver = add_driver(key, "value", led_by.get(name, name))
         for unit in sorted(set(re.findall(r"[a-z]+[A-Z]\w*", driver.expression))):
-            drivers.lead(driver, obj.data.shape_keys, drivers.value_of(unit), unit)
+            add_variable(driver, obj.data.shape_keys, value_path(unit), unit)

@@ -69,7 +69,7 @@ class Arch:
         return self.point(along), out / np.linalg.norm(out, axis=-1, keepdims=True)
 
     def beside(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return where points [N, 3] lie along the arch, within it and behind its ends [N], and outward vectors [N, 3]."""
+        """Return where points [N, 3] lie along the arch, within it and behind its ends [N], and outward vectors."""
         nearest = np.linalg.norm((points[:, None] - self.places)[..., :2], axis=2).argmin(1)
         along = self.along[nearest]
         place, out = self.at(along)

@@ -5,6 +5,7 @@
 import bpy
 
 from ...data_blocks import find
+from ...node_trees import add
 from ..asset import MOUTH_SLOT
 
 LIDS, MARGIN, WET, CARUNCLE = "WildCap Lids on Eyes", "WildCap Lid Margin", "WildCap Wet Line", "WildCap Caruncle"
@@ -23,24 +24,6 @@ EDGE_M = 0.00003
 SOCKET = "wildcap_socket"
 """Attribute of the head's vertices that line the sockets."""
 ON_EYE = {"Head": 'NodeSocketObject', "Shell": 'NodeSocketObject'}
-
-
-def add(tree, kind: str, inputs: dict | tuple = (), **settings):
-    """Add a node with its settings; inputs, by index or name, are sockets to link or values."""
-    node = tree.nodes.new(kind)
-    for name, value in settings.items():
-        setattr(node, name, value)
-    for name, value in inputs.items() if isinstance(inputs, dict) else enumerate(inputs):
-        put(tree, value, node.inputs[name])
-    return node
-
-
-def put(tree, value, socket) -> None:
-    """Link a socket to an input, or set its value."""
-    if isinstance(value, bpy.types.NodeSocket):
-        tree.links.new(value, socket)
-    else:
-        socket.default_value = value
 
 
 def math(tree, operation: str, *inputs):

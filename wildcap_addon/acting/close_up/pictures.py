@@ -8,8 +8,8 @@ Packed into the file, one pair for all heads in it.
 import bpy
 import numpy as np
 
-from ... import colours
 from ...data_blocks import find
+from ..materials import pack_image
 
 IRIS, WHITE = "WildCap Iris", "WildCap White"
 IRIS_SIZE, WHITE_SIZE = (384, 1536), (640, 2048)  # rows from the pupil, or from the limbus, outwards; columns around
@@ -145,10 +145,4 @@ def _image(name: str, pattern) -> bpy.types.Image:
     if image is not None and image.packed_file is not None:
         return image
     pixels = pattern()
-    rows, columns = pixels.shape[:2]
-    image = bpy.data.images.new(name, columns, rows, is_data=True)
-    colours.as_data(image)
-    image.pixels.foreach_set(np.concatenate([pixels, np.ones((rows, columns, 1))], 2).astype(np.float32).ravel())
-    image.update()
-    image.pack()
-    return image
+    return pack_image(name, np.concatenate([pixels, np.ones_like(pixels[..., :1])], 2), is_data=True)
