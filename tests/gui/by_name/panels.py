@@ -24,7 +24,6 @@ def flow():
     shutil.copytree(addon.CHECKOUT / ".demo" / "sample.wildcap", capture)
     addon.unfold(*(f"WILDCAP_PT_{name}" for name in PANELS))
     yield from d.open_tab("WildCap")
-    yield from d.park()
     addon.use_solver()
     bpy.ops.wildcap.open_capture(directory=str(capture))
     bpy.ops.wildcap.bring_in_head()

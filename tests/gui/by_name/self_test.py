@@ -14,7 +14,6 @@ def flow():
     addon.unfold("WILDCAP_PT_setup")
     addon.use_solver()
     yield from d.open_tab("WildCap")
-    yield from d.park()
     yield 1.0
     d.screenshot("self_test_1_offered")
     yield from d.press("wildcap.self_test")

@@ -23,7 +23,6 @@ def flow():
     preferences.environment, preferences.packages, preferences.compute = str(folder), 'pip', 'cpu'
     bpy.context.preferences.system.use_online_access = True
     yield from d.open_tab("WildCap")
-    yield from d.park()
     yield from d.lead("wildcap.install_solver")
     yield from d.until(lambda: addon.job("") is None, "the index's answer", 300)
     assert addon.problem() == "", addon.problem()

@@ -23,7 +23,6 @@ def flow():
     draw_card(capture / "frames")
     addon.unfold("WILDCAP_PT_solve")
     yield from d.open_tab("WildCap")
-    yield from d.park()
     addon.use_solver()
     bpy.ops.wildcap.open_capture(directory=str(capture))
     bpy.ops.wildcap.bring_in_head()

@@ -137,7 +137,6 @@ def disable(root: Path):
     yield 1.0
     addon.use_solver()  # the preferences of an add-on go when it is disabled
     yield from d.open_tab("WildCap")
-    yield from d.park()
     d.screenshot("jobs_7_enabled_again")
     while True:
         yield from addon.continued(root)

@@ -53,7 +53,6 @@ def flow():
 def open_sample_head():
     """From an empty profile to a head that can be relit, within ten seconds."""
     yield from d.open_tab("WildCap")
-    yield from d.park()
     d.screenshot("1_new")
     position = yield from d.find("wildcap.open_sample_head")
     started = time.monotonic()

@@ -4,7 +4,6 @@
 painted; clicks and minutes are counted. by_name/button_by_button.py goes there by the single buttons.
 """
 
-import addon
 import driver as d
 import own_head
 
@@ -15,16 +14,9 @@ def flow():
     started = yield from own_head.drag_in_zip()
     yield from own_head.choose_python()
     root = yield from own_head.choose_video()
-    yield from own_head.begin("wildcap.make_my_head", root)
-    yield 12.0
-    d.screenshot("walk_3_making")
-    yield from d.until(lambda: own_head.head() is not None or addon.job(root) is None, "the head in the scene", 1200)
-    assert addon.job(root) is not None, addon.problem(root)
-    d.say("the head comes in while it is solved")
-    yield from own_head.ended("wildcap.make_my_head", root)
+    yield from own_head.make(root, "walk_3_making")
     yield from own_head.lit_face(root)
     own_head.count("one_button", started)
     d.screenshot("walk_4_rendered")
     assert "wildcap_skin" in own_head.head().data.materials[0], "the material came in by itself"
     assert not (root / "shadow_mask.png").is_file(), "nobody painted"
-    assert addon.problem(root).startswith("Your head is ready."), addon.problem(root)

@@ -29,7 +29,6 @@ def artist(server: Service):
     addon.unfold("WILDCAP_PT_reconstruct", "WILDCAP_PT_delighter")
     bpy.context.preferences.system.use_online_access = True
     yield from d.open_tab("WildCap")
-    yield from d.park()
     addon.use_solver()
     root = Path.home() / "WildCap" / "Zoë.wildcap"
     make(root)
