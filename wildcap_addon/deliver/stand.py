@@ -51,7 +51,7 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
     packing = json.loads((plan.staged / PACKING).read_text(encoding="utf-8"))
     kinds = ("scenes", "objects", "meshes", "hair_curves", "materials", "images")
     before = {kind: set(getattr(bpy.data, kind)) for kind in kinds}
-    window, shown, view = context.window, context.window.scene, _save_view(context)
+    window, own_scene, view = context.window, context.window.scene, _save_view(context)
     try:
         scene = bpy.data.scenes.new(SCENE)
         scene.unit_settings.scale_length = 1 / FACTORS[plan.unit]
@@ -74,7 +74,7 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
         scene.view_layers[0].objects.active = obj
         yield
     finally:
-        window.scene = shown
+        window.scene = own_scene
         for kind in kinds:
             blocks = getattr(bpy.data, kind)
             for thing in set(blocks) - before[kind]:

@@ -55,12 +55,14 @@ class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
         obj, capture = captures.require_head(context, item), captures.folder(item)
         combed = []
         for part, (points, radius, colour) in read_strands(capture).items():
-            kept = np.random.default_rng(0).permutation(len(points)) < round(self.share * len(points))
+            chosen = np.random.default_rng(0).permutation(len(points)) < round(self.share * len(points))
             factor = self.length
             if part == "beard":
                 factor = self.beard_mm / mean_length_mm(points) if self.beard_mm else 1.0
             points = points[:, :1] + factor * (points - points[:, :1])
-            if not curves.grow_part(context, obj, part, points[kept], self.thickness * radius[kept], colour[kept]):
+            if not curves.grow_part(
+                context, obj, part, points[chosen], self.thickness * radius[chosen], colour[chosen]
+            ):
                 combed.append(curves.TITLES[part])
         show_skin_below(capture)
         if combed:

@@ -85,10 +85,8 @@ def preset(name: str) -> LightingPreset:
     return PRESETS[NAMED_BEFORE.get(name, name)]
 
 
-def build_light(
-    scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float, turn: float = 0.0
-) -> None:
-    """Replace the lamps and the world of a scene; None is dark.
+def build_light(scene: bpy.types.Scene, light: str | Hdri, frame: Matrix, radius: float, turn: float) -> None:
+    """Replace the lamps and the world of a scene by a preset, or by a picture of surroundings.
 
     frame, radius: the head's place without scale and its size in scene units (picture.frame_of); turn: of the light
     about the head, in radians, counter-clockwise from above.
@@ -98,7 +96,7 @@ def build_light(
     scene.world = sky.world()
     if isinstance(light, Hdri):
         light_with(scene.world, light, frame.to_euler().z)
-    elif light is not None:
+    else:
         add_lamps(scene, preset(light).lamps, frame, radius)
         sky.show(scene.world, preset(light).sky, frame)
 
@@ -125,11 +123,11 @@ def add_lamps(scene: bpy.types.Scene, lamps: tuple[Lamp, ...], frame: Matrix, ra
         carrier = bpy.data.objects.new(RIG, None)
         carrier.matrix_world = frame
         scene.collection.objects.link(carrier)
-    made = [_lamp(lamp, radius) for lamp in lamps]
-    for obj in made:
+    objects = [_lamp(lamp, radius) for lamp in lamps]
+    for obj in objects:
         scene.collection.objects.link(obj)
         obj.parent = carrier
-    return made
+    return objects
 
 
 def _lamp(lamp: Lamp, radius: float) -> bpy.types.Object:

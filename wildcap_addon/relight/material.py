@@ -67,8 +67,8 @@ def is_edited(obj) -> bool:
 
 def _is_preview(material) -> bool:
     """Return whether a material is the unchanged one by which Bring In Head shows the texture."""
-    made = material.get(head.TEXTURE_KEY)
-    return KEY not in material and bool(made) and made == node_trees.fingerprint(material, head.PREVIEW)
+    digest = material.get(head.TEXTURE_KEY)
+    return KEY not in material and bool(digest) and digest == node_trees.fingerprint(material, head.PREVIEW)
 
 
 def _material(obj) -> bpy.types.Material:

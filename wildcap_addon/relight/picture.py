@@ -37,13 +37,13 @@ class RenderSettings:
 
 def set_up_scene(
     obj: bpy.types.Object,
-    light: str | Hdri | None,
+    light: str | Hdri,
     resolution: int,
     samples: int,
     turn: float = 0.0,
     view: str = colours.VIEWS[0],
 ) -> bpy.types.Scene:
-    """Return the relight scene with only this head and what it wears, framed and lit; None is dark.
+    """Return the relight scene with only this head and what it wears, framed and lit by a preset or a picture.
 
     turn: of the light about the head, in radians, counter-clockwise from above; view: the view transform, which the
     picture's file names.

@@ -134,13 +134,13 @@ def _lids(tree, inputs):
         moved = {"Geometry": geometry, "Selection": lid, "Offset": scaled(tree, out, short)}
         geometry = add(tree, 'GeometryNodeSetPosition', moved).outputs[0]
     beyond = math(tree, 'GREATER_THAN', index, math(tree, 'SUBTRACT', inputs["First"], 0.5))
-    gone = add(tree, 'FunctionNodeBooleanMath', (beyond, _attribute(tree, SOCKET, 'BOOLEAN')), operation='OR').outputs[
-        0
-    ]
-    kept = add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": gone}, domain='POINT').outputs[0]
+    hidden = (beyond, _attribute(tree, SOCKET, 'BOOLEAN'))
+    hidden = add(tree, 'FunctionNodeBooleanMath', hidden, operation='OR').outputs[0]
+    rest = {"Geometry": geometry, "Selection": hidden}
+    rest = add(tree, 'GeometryNodeDeleteGeometry', rest, domain='POINT').outputs[0]
     mouth = math(tree, 'COMPARE', add(tree, 'GeometryNodeInputMaterialIndex').outputs[0], float(MOUTH_SLOT), 0.5)
-    lined = {"Geometry": kept, "Selection": mouth, "Material": inputs["Lining"]}
-    return add(tree, 'GeometryNodeSetMaterial', lined).outputs[0]
+    cheeks = {"Geometry": rest, "Selection": mouth, "Material": inputs["Lining"]}
+    return add(tree, 'GeometryNodeSetMaterial', cheeks).outputs[0]
 
 
 def _margin(tree, inputs):
