@@ -15,7 +15,7 @@ import numpy as np
 
 ASSETS = Path(__file__).resolve().parents[2] / "core" / "assets"
 SOFT, LEFT_EYE, RIGHT_EYE, JAWS = range(4)
-"""What an inner vertex moves with: the rim in front of it, an eyeball, the jaws."""
+"""Carrier of an inner vertex: the rim in front of it, an eyeball, the jaws."""
 SIDES = ("Left", "Right")
 HALF = "eyesHalf"
 """With a side, a driven shape key that bends the lids' path around the eyeball; not a unit."""
@@ -30,7 +30,7 @@ GAZE = tuple(f"eye{kind}" for kind in ("Blink", "LookDown", "LookIn", "LookOut",
 
 @dataclass(frozen=True)
 class FaceUnits:
-    """The mesh at the template's shape, in metres and the head's axes.
+    """Mesh and units at the template's shape, in metres and the head's axes.
 
     V vertices of the head are followed by C copies on the lower side of lips and lids and P inner vertices.
     """

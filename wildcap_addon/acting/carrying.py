@@ -17,7 +17,7 @@ from .asset import HALF, JAWS, LEFT_EYE, RIGHT_EYE, SIDES, SOFT, FaceUnits, lini
 from .filmed import FilmedEyes
 
 STEPS = 80
-"""Of averaging: a neighbourhood reaches about 7 mm (lids) to 20 mm (cheeks)."""
+"""Rounds of averaging: a neighbourhood reaches about 7 mm (lids) to 20 mm (cheeks)."""
 CORNEA = (0.06, 0.52)
 """Height as a share of the eyeball's radius, and half width in radians."""
 CLEAR_M = 0.0005

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An empty in front of the face that both eyes look at, by drivers on the eight look units.
+"""Have both eyes look at an empty in front of the face, by drivers on the eight look units.
 
 Simple expressions, which Blender evaluates without Python.
 """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head's mesh cut open, with eyes and mouth in it, and its shape keys.
+"""Cut a head's mesh open, with eyes and mouth in it, and give it shape keys.
 
 Made once, then only moved, so that values and animation stay. For exporters: the keys have ARKit's names (`jawOpen`,
 `eyeBlinkLeft`), their basis is the solved head with closed lids. `eyesOpenLeft` and `eyesOpenRight`, which open the

@@ -34,9 +34,9 @@ LINKED = {
 }
 """Maps that each format's exporter writes unchanged. glTF's would make new pictures of roughness and specular."""
 HAIR_IN = ".usdc"
-"""The format that holds hair curves."""
+"""Format that holds hair curves."""
 NAMES_ITS_SPACE = (5, 2, 0)
-"""The first Blender whose USD names the space of its colours."""
+"""First Blender whose USD names the space of its colours."""
 LIDS = ("eyesOpenLeft", "eyesOpenRight")
 DRIVEN = ("eyesHalfLeft", "eyesHalfRight")
 SOCKETS = {"base_color": "Base Color", "roughness": "Roughness", "specular": "Specular IOR Level"}

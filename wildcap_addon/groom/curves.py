@@ -25,7 +25,7 @@ ROOTED_M = 0.01
 """Farther than this from its first point, no place is a hair's root."""
 UVS = "surface_uv_coordinate"
 ROUGHNESS, IOR = 0.4, 1.55
-"""Of keratin, whose scales spread the highlight."""
+"""Surface of keratin, whose scales spread the highlight."""
 INNER_TILE = 10
 """Offset of the UVs of what is no skin."""
 DEFORM = "WildCap Hair on Head"

@@ -17,7 +17,7 @@ from ..base_operator import HeadOperator
 from . import curves
 
 MOST_BYTES = 256 << 20
-"""A million hairs; more is no beard, and would fill the memory before it is known to be damaged."""
+"""Size of a million hairs: more is no beard, and would fill the memory before it is known to be damaged."""
 AGAIN = advise_again("upscale")
 
 Strands = tuple[np.ndarray, np.ndarray, np.ndarray]

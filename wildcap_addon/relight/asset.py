@@ -16,7 +16,7 @@ LINE = f"{CATALOGUE}:WildCap/Skin:WildCap-Skin"
 FILE = "blender_assets.cats.txt"
 HEADER = "# This is an Asset Catalog Definition file for Blender.\n\nVERSION 1\n\n"
 SIDE_PX = 128
-"""Of the preview."""
+"""Side of the preview."""
 DESCRIPTION = "Skin for solved heads: albedo, specular and normal in, a Principled BSDF with subsurface scattering out"
 
 

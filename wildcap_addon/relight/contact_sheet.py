@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The contact sheet: a head under all light presets in one picture, with their names and how it was rendered.
+"""Contact sheet: a head under all light presets in one picture, with their names and how it was rendered.
 
 Writes renders/contact_sheet.png, and the pictures it consists of as renders/PRESET.png and .exr.
 """

@@ -20,12 +20,12 @@ from . import sky
 REFERENCE_RADIUS_M = 0.15
 SUN_ANGLE_RAD = radians(0.5)
 RIG = "WildCap Lights"
-"""The empty at the head's centre that carries the lamps: turning it turns the light."""
+"""Name of the empty at the head's centre that carries the lamps: turning it turns the light."""
 
 
 @dataclass(frozen=True)
 class Lamp:
-    """An area lamp (power in watts at the reference radius) or, without a size, a sun (power in W/m2)."""
+    """Area lamp (power in watts at the reference radius) or, without a size, a sun (power in W/m2)."""
 
     name: str
     direction: tuple[float, float, float]
@@ -76,7 +76,7 @@ PRESETS = {
         sky.even((0.008, 0.007, 0.012)),
     ),
 }
-"""By the identifiers of properties.LIGHTS, which has their names and tooltips."""
+"""Presets by the identifiers of properties.LIGHTS, which has their names and tooltips."""
 NAMED_BEFORE = {"studio": "three_point"}
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The node group WildCap Skin: a Principled BSDF set up as skin, with the few sockets that an artist adjusts.
+"""Node group WildCap Skin: a Principled BSDF set up as skin, with the few sockets that an artist adjusts.
 
     Albedo, compensated for what scattering loses -> Base Color
     Specular x Specular Amount, clamped -> Specular IOR Level        Roughness x (1 + Region) -> Roughness
@@ -32,7 +32,7 @@ skin's 2.8 percent."""
 OILY = skin_regions.ROUGHNESS["nose"]
 """Region of the nose, which gets a full coat of Oil; the forehead gets about two thirds, the cheeks none."""
 SEBUM_IOR, SEBUM_ROUGHNESS = 1.47, 0.3
-"""Of what skin secretes (squalene 1.49, triglycerides 1.46); smoother than the skin below, by eye."""
+"""Index of what skin secretes (squalene 1.49, triglycerides 1.46); smoother than the skin below, by eye."""
 
 FLOAT = 'NodeSocketFloat'
 INPUTS = (

@@ -28,7 +28,7 @@ SCENE = "WildCap Relight"
 
 @dataclass
 class Running:
-    """A render under way: stills by the hidden EXR that each is rendered to, or a folder of frames."""
+    """Render under way: stills by the hidden EXR that each is rendered to, or a folder of frames."""
 
     stills: dict[Path, Path] = field(default_factory=dict)
     folder: Path | None = None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The relight scene: the head in a scene of its own with a camera and a light, for Cycles.
+"""Relight scene: the head in a scene of its own with a camera and a light, for Cycles.
 
 The artist's scene (camera, world, lights, render settings) stays as it is.
 """
@@ -18,9 +18,9 @@ from . import lights, output
 from .output import SCENE, view_label
 
 CAMERA_DIRECTION = (-0.28, -1.0, 0.05)
-"""From the head, in its axes."""
+"""Direction from the head, in its axes."""
 FOCAL_LENGTH_MM = 85.0
-"""Of a portrait lens."""
+"""Focal length of a portrait lens."""
 
 
 @dataclass(frozen=True)

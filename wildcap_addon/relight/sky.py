@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world of the relight scene: a gradient from horizon to zenith, over a ground.
+"""World of the relight scene: a gradient from horizon to zenith, over a ground.
 
 Radiance is linear in the sine of the elevation: with a zenith three times as bright as the horizon that is the overcast
 sky of Moon and Spencer (1942), the CIE's traditional one.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head's eyeballs, how its look units turn them, and the rims of its lids."""
+"""Find a head's eyeballs, their turns by its look units, and the rims of its lids."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WHITE_RAD = 0.6
 
 @dataclass(frozen=True)
 class RiggedEyeball:
-    """An eyeball in the head's axes, metres and radians.
+    """Eyeball in the head's axes, metres and radians.
 
     pitch (upwards) and yaw (to the person's left): direction at rest; turns: what each look unit at 1 adds to both.
     """

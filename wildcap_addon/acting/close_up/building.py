@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The close-up of a head as a whole: added, renewed for another shape, and removed."""
+"""Add the close-up of a head, renew it for another shape, and remove it."""
 
 from __future__ import annotations
 

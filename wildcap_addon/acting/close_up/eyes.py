@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The close-up's objects of both eyes, children of the head.
+"""Build the close-up's objects of both eyes, children of the head.
 
 The head's look units turn the eyes, and geometry nodes put what lies on the lids in its place. No object is parented to
 the head's vertices: the head's lids follow these eyes, which cannot wait for the head's shape.
@@ -17,15 +17,15 @@ from ..asset import LEFT_EYE, SIDES, FaceUnits, lining, load, sockets
 from . import ball, keeping, materials, nodes, shapes
 
 REACH_M = 0.00042
-"""How far tears climb onto the ball and up the margin of a lid."""
+"""Reach of tears onto the ball and up the margin of a lid."""
 ACROSS, CARUNCLE_ACROSS = 5, 7
 """Vertices from the lid to the ball, of margin and wet line, and from lid to lid, of the caruncle."""
 CARUNCLE_M = 0.0054
 """Length over which the caruncle comes down to the ball: life's is about 5 mm wide, and its fold follows."""
 BOWED = 0.5
-"""How much sooner it comes down in its middle than at the lids: its edge is a crescent."""
+"""Lead of its middle over the lids in coming down: its edge is a crescent."""
 LIFT_SHARE = 0.10
-"""How far the caruncle stands out in its middle, as a share of the lids' opening there."""
+"""Height of the caruncle's middle, as a share of the lids' opening there."""
 
 
 def build(obj, keep, iris_m: tuple[float, float]) -> None:

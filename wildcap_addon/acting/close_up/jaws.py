@@ -15,17 +15,17 @@ from ..asset import FaceUnits, load
 from . import ball, mouth_shapes
 
 SHOWN_M, FARTHEST_M = 0.001, 0.006
-"""How far the upper teeth end below where the lips meet, as most people's do, and the most that they are moved for it:
+"""Length of the upper teeth below the line of the lips, as most people show, and the most that they are moved for it:
 the face carries the bands without regard to where the lips end."""
 WIDE_M = 0.009
 """Half the width of the front teeth whose edges are measured."""
 LEAST_M = 3e-4
-"""A unit that moves jaw and tongue by less moves only the lips."""
+"""Least motion of jaw and tongue: a unit below it moves only the lips."""
 
 
 @dataclass(frozen=True)
 class Jaws:
-    """The bands of a head; upper, lower and tongue are their rows within the P inner vertices."""
+    """Bands of a head; upper, lower and tongue are their rows within the P inner vertices."""
 
     asset: FaceUnits
     upper: np.ndarray

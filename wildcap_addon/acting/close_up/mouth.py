@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The close-up's mouth: teeth in gums, and a tongue, with shape keys that the head's units drive."""
+"""Build the close-up's mouth: teeth in gums, and a tongue, with shape keys that the head's units drive."""
 
 from __future__ import annotations
 

@@ -16,9 +16,9 @@ from ..asset import JAWS, FaceUnits
 WIDTHS_MM = {"upper": (8.5, 6.6, 7.7, 7.0, 6.8, 10.2), "lower": (5.4, 5.9, 6.9, 7.0, 7.1, 11.0)}
 """Widths of permanent teeth from the middle outwards, up to the first molar: no picture shows those behind."""
 DEPTHS_MM = {"upper": (6.2, 5.6, 7.2, 8.6, 8.6, 10.4), "lower": (5.2, 5.4, 6.9, 7.6, 8.0, 10.0)}
-"""From lip or cheek to tongue, at the neck."""
+"""Depths at the neck, from lip or cheek to tongue."""
 LENGTHS_MM = {"upper": (10.4, 9.2, 10.2, 8.6, 8.0, 7.4), "lower": (8.8, 9.2, 10.4, 8.8, 8.0, 7.2)}
-"""From the gum to the edge."""
+"""Lengths from the gum to the edge."""
 CANINE = 2
 """Number of the canine; those before it are incisors."""
 INSET_M = {"upper": 0.0006, "lower": 0.0018}
@@ -32,7 +32,7 @@ ROOT_M = 0.0065
 TEETH, GUMS = range(2)
 
 HEIGHTS = np.concatenate([np.linspace(-0.45, 0.9, 10), [0.965, 1.0]])
-"""Of a tooth's rings: 0 at the gum, 1 at the edge."""
+"""Heights of a tooth's rings: 0 at the gum, 1 at the edge."""
 SWELL_AT, DEEP_AT = [-0.45, 0, 0.35, 0.75, 0.93, 1.0], [-0.45, 0, 0.3, 0.7, 0.95, 1.0]
 FRONT_SWELL, MOLAR_SWELL = [0.62, 0.86, 0.98, 1.0, 0.93, 0.72], [0.66, 0.90, 1.0, 1.0, 0.86, 0.55]
 INCISOR_DEEP, CANINE_DEEP = [0.7, 1.0, 0.92, 0.5, 0.26, 0.14], [0.7, 1.0, 0.98, 0.66, 0.36, 0.16]
@@ -53,7 +53,7 @@ class Mouth:
 
 @dataclass(frozen=True)
 class Arch:
-    """The band's outer edge from the right end to the left: places, and signed distances from the middle, metres."""
+    """Outer edge of a band from right to left: places, and signed distances from the middle, metres."""
 
     places: np.ndarray  # [N, 3]
     along: np.ndarray  # [N]

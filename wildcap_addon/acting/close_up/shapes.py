@@ -35,7 +35,7 @@ WHITE, IRIS, PUPIL_SLOT = range(3)
 
 @dataclass(frozen=True)
 class Turned:
-    """A mesh of revolution about the gaze."""
+    """Mesh of revolution about the gaze."""
 
     vertices: np.ndarray  # [V, 3]
     faces: np.ndarray  # [F, 4]

@@ -20,7 +20,7 @@ OPEN, OUT = "jawOpen", "tongueOut"
 OVER, DOWN = "tongueOver", "tongueDown"
 """Keys that are no units: the rise of the tip on its way out, and the descent as the jaw opens."""
 OUT_BY = f"min({OUT}, {OPEN})"
-"""A tongue does not pass closed lips: it comes as far as the jaw is open."""
+"""Share by which the tongue comes out: closed lips stop it."""
 LED_BY = {
     OUT: OUT_BY,
     OVER: f"4 * {OUT_BY} * (1 - {OUT_BY})",
@@ -29,13 +29,13 @@ LED_BY = {
 """Expressions of units that drive these keys. Three quarters of the descent are done when the jaw is half open; a
 tongue that is put out rises first, over the lower teeth."""
 RISE_M, OVER_M = 0.004, 0.006
-"""How much the tip lies above the unit's when the tongue is out, and rises on its way, over lower teeth and lip."""
+"""Height of the tip above the unit's when the tongue is out, and on its way over lower teeth and lip."""
 SHARE = 0.5
 """Height of the tongue's back with the jaw fully open, between the edges of the lower and the upper front teeth."""
 CLEAR_M = 0.0007
 """Gap between the tongue and lower teeth, gums and floor."""
 DEEPEST = 0.85
-"""The most of the way to the floor that a vertex goes, so that the tongue keeps some thickness."""
+"""Largest share of the way to the floor that a vertex goes, so that the tongue keeps some thickness."""
 WIDTHS = np.linspace(1, 0.6, 9)
 """Shares of its width that the tongue may take where the floor's sides are high."""
 NEAR_M = 0.003
