@@ -101,8 +101,9 @@ def _carry_ball(asset: FaceUnits, head: np.ndarray, kind: int, filmed: FilmedEye
         eye = filmed.eyes[kind - LEFT_EYE]
         rows = np.flatnonzero(asset.kind == kind)
         pupil = asset.parts[rows[np.linalg.norm(asset.uvs[rows] - 0.5, axis=1).argmin()]] - ball[:3]
-        turn = _towards(np.array(eye.gaze)) @ _towards(pupil / np.linalg.norm(pupil)).T
-        return CarriedBall(eye.radius / ball[3] * turn, ball[:3], np.array(eye.centre), eye.radius)
+        turn = _towards(pupil / np.linalg.norm(pupil)).T
+        matrix = eye.radius / ball[3] * _towards(np.array(eye.gaze)) @ turn
+        return CarriedBall(matrix, ball[:3], np.array(eye.centre), eye.radius)
     fitted = _fit_around(asset, head, ball[:3], 2 * ball[3])
     radius = ball[3] * np.cbrt(np.linalg.det(fitted.matrix))
     return _behind_lids(asset, head, CarriedBall(fitted.matrix, ball[:3], fitted.target, radius), ball[3])
