@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, batch, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks, doctor,
-self-test, install, wheels, report-problem.
+"""Command line: python -m core COMMAND.
 
-The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
-what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
+Like the add-on, it writes a job, starts the worker with this same Python and prints its messages. A failure is two
+lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from . import __version__
 from .batch import command_line as batch_commands
 from .capture import consent, delivery_plan, stages, unforeseen
 from .capture.capture import Capture
-from .capture.messages import Problem
+from .capture.messages import Problem, Reporter
 from .settings import delighter_cards, delivery_presets, settings
 from .worker import capture_commands, command_settings, read_only, self_test, setup_commands, terminal
 from .worker.commands import add_command
@@ -30,28 +29,26 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs one command line; returns its exit code: 0, 2 for a problem, 130 after Ctrl-C."""
+    """Run one command line; return its exit code: 0, 2 for a problem, 130 after Ctrl-C."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    for stream in (sys.stdout, sys.stderr):  # a log on Windows does not take every name
+    for stream in (sys.stdout, sys.stderr):  # a log on Windows does not take every character
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
         options = _parser().parse_args(arguments)
-        return options.command(options)
-    except Problem as problem:
-        print(problem.problem, problem.remedy, sep="\n", file=sys.stderr)
-        return 2
+        return options.command(options) or 0
     except KeyboardInterrupt:
         return 130
-    except Exception as error:  # the one place that catches everything: nobody reads a traceback
-        problem = unforeseen.explain(error, "the command", _log_of(arguments))
-        print(problem.problem, problem.remedy, sep="\n", file=sys.stderr)
+    except Exception as error:  # a traceback would not help the user
+        if not isinstance(error, Problem):
+            error = unforeseen.explain(error, "the command", _log_of(arguments))
+        print(error.problem, error.remedy, sep="\n", file=sys.stderr)
         return 2
 
 
 def _log_of(arguments: list[str]) -> Path | None:
-    """The log of the capture that a command line names, if it names one."""
-    with contextlib.suppress(OSError, ValueError):  # words that no path can be
+    """Return the log of the capture that a command line names, if any."""
+    with contextlib.suppress(OSError, ValueError):  # no path can have such characters
         return next((Capture(word).logs / unforeseen.LOG for word in arguments if Capture(word).json.is_file()), None)
     return None
 
@@ -62,30 +59,33 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"WildCap {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    _add_chain(commands)
+    _add_run(commands)
+    deliver = add_command(
+        commands,
+        "deliver",
+        _deliver,
+        "the maps as another program wants them, with the mesh as OBJ; other files and shape keys need the add-on",
+        "CAPTURE",
+    )
+    command_settings.add_options(deliver, "deliver")
+    _add_lists(commands)
     capture_commands.add_commands(commands)
     _add_white(commands)
     add_command(commands, "doctor", _doctor, "say what is installed, what is missing and what to do")
-    test = add_command(
-        commands,
-        "self-test",
-        _self_test,
-        "solve the sample head again on this machine, and compare it with what it should be",
-    )
+    test = add_command(commands, "self-test", _self_test, "solve the sample head again on this machine, and compare it")
     test.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto")
     batch_commands.add_commands(commands)
     setup_commands.add_commands(commands)
     return parser
 
 
-def _add_chain(commands) -> None:
-    """The chain, what it delivers, and what there is to choose from."""
+def _add_run(commands) -> None:
     run = add_command(commands, "run", _run, "run the chain; a second run continues where the first stopped")
     run.add_argument(
         "source", metavar="SOURCE", help="a video, or a folder of photographs; - for the one the capture was made from"
     )
     run.add_argument(
-        "capture", metavar="CAPTURE", type=Path, help="the face's folder, usually NAME.wildcap; made if it is not there"
+        "capture", metavar="CAPTURE", type=Path, help="the face's folder, usually NAME.wildcap; created if missing"
     )
     run.add_argument(
         "--from", dest="first", metavar="STAGE", help="begin with this stage and run it even if nothing has changed"
@@ -99,29 +99,14 @@ def _add_chain(commands) -> None:
         "without it, the run stops before",
     )
     command_settings.add_options(run, "run")
-    deliver = add_command(
-        commands,
-        "deliver",
-        _deliver,
-        "the maps as another program wants them, with the mesh as OBJ; other files and shape keys need the add-on",
-        "CAPTURE",
-    )
-    command_settings.add_options(deliver, "deliver")
-    add_command(
-        commands, "settings", _settings, "list every setting: its default, what it may be, its flag, what it does"
-    )
-    add_command(
-        commands,
-        "presets",
-        _presets,
-        "say how each program gets its maps, and what each format drops: the tables of docs/guide/deliver.md",
-    )
+
+
+def _add_lists(commands) -> None:
+    add_command(commands, "settings", _settings, "list every setting: its default, values, flag and meaning")
+    add_command(commands, "presets", _presets, "list how each program gets its maps, and what each format drops")
     add_command(commands, "stages", _stages, "list the stages of the chain")
     cards = add_command(
-        commands,
-        "delighters",
-        _delighters,
-        "say of each way to take the light out where it runs, what leaves the machine and what it costs",
+        commands, "delighters", _delighters, "list each way to remove light: where it runs, what it sends and costs"
     )
     cards.add_argument("--markdown", action="store_true", help="as docs/delighters.md has it")
 
@@ -135,9 +120,7 @@ def _add_white(commands) -> None:
         "CAPTURE",
     )
     white.add_argument(
-        "--frame",
-        metavar="NAME",
-        help="the frame with the card, as in the capture's frames folder; without it a ColorChecker is looked for",
+        "--frame", metavar="NAME", help="the frame with the card; without it a ColorChecker is looked for"
     )
     white.add_argument(
         "--at", metavar=("X", "Y"), nargs=2, type=float, help="a pixel of the card, from the frame's upper left"
@@ -148,8 +131,7 @@ def _add_white(commands) -> None:
 def _run(options: argparse.Namespace) -> int:
     run_settings = command_settings.read_options(options, "run")
     command_settings.refuse_lone_flags(options, run_settings)
-    # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever
-    # sends it.
+    # a shell has its background jobs ignore this signal, which means cancel here
     signal.signal(signal.SIGINT, signal.default_int_handler)
     capture = Capture(options.capture)
     wait_until_free(capture, lambda text: print(text, flush=True))
@@ -171,68 +153,63 @@ def _deliver(options: argparse.Namespace) -> int:
         raise Problem(
             f"There is no capture at {capture.root}.", "Check the name; `python -m core run SOURCE CAPTURE` makes one."
         )
-    wanted = {"format": "obj", "whole": True, **command_settings.read_options(options, "deliver").get("deliver", {})}
-    if not wanted["whole"]:
+    delivery = {"format": "obj", "whole": True, **command_settings.read_options(options, "deliver").get("deliver", {})}
+    if not delivery["whole"]:
         raise Problem(
-            "A delivery without its mesh (deliver.whole off) is ended by Blender.",
+            "Only Blender can finish a delivery without its mesh (deliver.whole off).",
             "Leave deliver.whole on, or deliver from the add-on's panel.",
         )
-    chosen = {**settings.to_json(last_settings(capture)), "deliver": wanted}
-    with read_only.stand_in(capture, wanted.get("folder", "")) as writable:
-        plan = delivery_plan.plan(writable, settings.from_json(chosen).deliver)
+    job_settings = {**settings.to_json(last_settings(capture)), "deliver": delivery}
+    with read_only.stand_in(capture, delivery.get("folder", "")) as writable:
+        plan = delivery_plan.plan(writable, settings.from_json(job_settings).deliver)
         delivery_plan.check_target(plan)
-        code = terminal.follow(ROOT, writable, write_job(writable, tool="deliver", settings=chosen), {})
+        code = terminal.follow(ROOT, writable, write_job(writable, tool="deliver", settings=job_settings), {})
     if code == 0:
         print(plan.target)
     return code
 
 
-def _settings(options: argparse.Namespace) -> int:
+def _settings(options: argparse.Namespace) -> None:
     print(command_settings.list_settings())
-    return 0
 
 
-def _presets(options: argparse.Namespace) -> int:
+def _presets(options: argparse.Namespace) -> None:
     print(delivery_presets.markdown())
-    return 0
 
 
-def _stages(options: argparse.Namespace) -> int:
+def _stages(options: argparse.Namespace) -> None:
     for stage in stages.STAGES:
         print(f"{stage.name:13} {' '.join(stage.reads) or 'the video or photographs'} -> {' '.join(stage.writes)}")
-    return 0
 
 
-def _delighters(options: argparse.Namespace) -> int:
-    print(
-        delighter_cards.markdown() if options.markdown else delighter_cards.text(), end="" if options.markdown else "\n"
-    )
-    return 0
+def _delighters(options: argparse.Namespace) -> None:
+    print(delighter_cards.markdown().rstrip() if options.markdown else delighter_cards.text())
 
 
-def _white(options: argparse.Namespace) -> int:
-    from .capture.messages import Reporter
-    from .imaging.images import read_srgb  # these need OpenImageIO, OpenCV and torch
-    from .stages.solve import white_point
-
+def _white(options: argparse.Namespace) -> None:
     capture = Capture(options.capture)
     if bool(options.frame) != bool(options.at):
         raise Problem(
             "--frame and --at go together.",
             "Name a frame and a pixel of the card in it, or neither to look for a ColorChecker.",
         )
+    if options.frame and not (capture.frames / options.frame).is_file():
+        raise Problem(
+            f"There is no frame {capture.frames / options.frame}.",
+            "Name one of the pictures in the capture's frames folder.",
+        )
+    from .imaging.images import read_srgb  # these need OpenImageIO, OpenCV and torch
+    from .stages.solve import white_point
+
     if options.frame:
-        path = capture.frames / options.frame
-        if not path.is_file():
-            raise Problem(f"There is no frame {path}.", "Name one of the pictures in the capture's frames folder.")
-        white = white_point.measure_card_white(read_srgb(path), *options.at, options.card).tolist()
+        pixels = read_srgb(capture.frames / options.frame)
+        white = white_point.measure_card_white(pixels, *options.at, options.card).tolist()
     else:
         report = Reporter("white_point")
         white_point.run(capture, settings.Settings(), report)
         white = report.figures["white_point"]
         print(f"ColorChecker in {report.figures['white_point_frame']}")
     print(f"--white-point {','.join(f'{v:.4f}' for v in white)}")
-    return 0
 
 
 def _doctor(options: argparse.Namespace) -> int:

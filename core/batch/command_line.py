@@ -210,7 +210,7 @@ def _held(batch: Batch) -> Iterator[None]:
     """Holds the batch's lease. Raises Problem, also where its folder cannot be written."""
     with contextlib.ExitStack() as stack:
         try:
-            stack.enter_context(lease.hold(batch.root, _tell, "batch"))
+            stack.enter_context(lease.hold_file(batch.root / "lock", _tell, "batch"))
         except OSError as error:
             raise storage_problem(error, batch.root) from error
         yield

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..capture.files import write_json
-from ..capture.hashes import take_known, tell_known
+from ..capture.hashes import add_hashes, list_hashes
 from ..capture.json_files import read_json
 from ..capture.messages import Problem
 
@@ -26,15 +26,15 @@ def known_hashes(root: Path) -> Iterator[None]:
     """Takes in what is known of the files in a batch's folder that have kept their size and time, and keeps what is
     learnt meanwhile. A file that is damaged, or cannot be written, costs time and nothing else."""
     with contextlib.suppress(OSError, ValueError, TypeError):
-        take_known(root, read_json(root / NAME))
-    before = len(tell_known(root))
+        add_hashes(root, read_json(root / NAME))
+    before = len(list_hashes(root))
     try:
         yield
     finally:
         known = {
             (kind, path): [kind, path, size, when, digest]
-            for kind, path, size, when, digest in sorted(tell_known(root), key=lambda each: each[3])
+            for kind, path, size, when, digest in sorted(list_hashes(root), key=lambda each: each[3])
         }
-        if len(tell_known(root)) > before:
+        if len(list_hashes(root)) > before:
             with contextlib.suppress(Problem):
                 write_json(root / NAME, list(known.values()))

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Landmarks the artist has put: landmarks_artist.json, {"points": {INDEX: [x, y, z]}} in metres of the capture's world.
+"""Landmarks placed by the artist: landmarks_artist.json, {"points": {INDEX: [x, y, z]}}.
 
-An index is one of the 468 of MediaPipe's face mesh, as in landmarks.json. Written only by the add-on and `core
-landmarks`; the stage registration reads it when it is there, and a point in it wins over what was found in the frames.
-Ground floor: standard library only.
+Positions are in metres of the capture's world. An index is one of the 468 of MediaPipe's face mesh.
+Only the add-on and `core landmarks` write the file; in the stage registration its points win over those of the frames.
 """
 
 from __future__ import annotations
@@ -15,16 +14,16 @@ from pathlib import Path
 
 from .capture import Capture
 from .files import remove_file, write_json
-from .json_files import read_json
+from .json_files import is_number, read_json
 from .messages import Problem
 
 COUNT = 468
 FARTHEST_M = 0.5
-"""A head's world has its origin between the eyes; what lies farther away was given in other units."""
+"""The world's origin lies between the eyes; a point farther away was given in other units."""
 
 
 def read(path: Path) -> dict[int, tuple[float, float, float]]:
-    """The points by index; empty where there is no file. Raises Problem for a file that is not of this form."""
+    """Return the points by index, {} if there is no file. Raises Problem if it is not of this form."""
     try:
         record = read_json(path)
     except FileNotFoundError:
@@ -37,46 +36,33 @@ def read(path: Path) -> dict[int, tuple[float, float, float]]:
     points = record.get("points") if isinstance(record, dict) else None
     if not isinstance(points, dict):
         raise Problem(
-            f"{path} holds no landmarks.",
+            f"{path} contains no landmarks.",
             'Write them as {"points": {"152": [0.0, -0.01, -0.11]}}: index, and position in metres.',
         )
-    return _checked(points, str(path))
+    return _check(points, str(path))
 
 
 def put(capture: Capture, points: Mapping) -> dict[int, tuple[float, float, float]]:
-    """Lays points {index: (x, y, z)} over those in the capture's file, an index with None taken out; the file goes with
-    its last point.
+    """Add points {index: (x, y, z)} to the capture's file, or remove those that are None, and return all.
 
-    Returns all that are now in it. Raises Problem, and changes nothing, for an index or a position that cannot be.
+    The file is removed with its last point. Raises Problem, and changes nothing, for an impossible index or position.
     """
     if not capture.json.is_file():
         raise Problem(f"There is no capture at {capture.root}.", "Choose a folder that ends in .wildcap.")
-    known = read(capture.landmarks_artist)
-    known.update(_checked({k: p for k, p in points.items() if p is not None}, "What was given"))
-    for index in [_index(k, "What was given") for k, p in points.items() if p is None]:
-        known.pop(index, None)
-    if known:
-        write_json(capture.landmarks_artist, {"points": {str(k): list(p) for k, p in sorted(known.items())}})
+    placed = {key: point for key, point in points.items() if point is not None}
+    landmarks = {**read(capture.landmarks_artist), **_check(placed, "The new landmarks")}
+    for key in points.keys() - placed.keys():
+        landmarks.pop(_index(key, "The new landmarks"), None)
+    if landmarks:
+        write_json(capture.landmarks_artist, {"points": {str(k): list(p) for k, p in sorted(landmarks.items())}})
     else:
         remove_file(capture.landmarks_artist)
-    return known
-
-
-def _checked(points: Mapping, owner: str) -> dict[int, tuple[float, float, float]]:
-    landmarks = {}
-    for key, point in points.items():
-        index = _index(key, owner)
-        try:
-            x, y, z = (float(v) for v in point)
-        except (TypeError, ValueError, OverflowError):
-            x = y = z = math.nan
-        if not all(abs(v) <= FARTHEST_M for v in (x, y, z)):  # false for nan, too
-            raise Problem(
-                f"{owner}: landmark {index} is at {point!r:.60}, which is not on the head.",
-                "Give x, y and z in metres; the origin lies between the eyes.",
-            )
-        landmarks[index] = (x, y, z)
     return landmarks
+
+
+def _check(points: Mapping, owner: str) -> dict[int, tuple[float, float, float]]:
+    indices = {_index(key, owner): key for key in points}
+    return {index: _position(points[key], f"{owner}: landmark {index}") for index, key in indices.items()}
 
 
 def _index(key, owner: str) -> int:
@@ -87,3 +73,16 @@ def _index(key, owner: str) -> int:
             f"Landmarks are counted from 0 to {COUNT - 1}, as in landmarks.json.",
         )
     return int(text)
+
+
+def _position(point, owner: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(v) for v in point)
+    except (TypeError, ValueError, OverflowError):
+        x = y = z = math.nan
+    if not all(is_number(v, -FARTHEST_M, FARTHEST_M) for v in (x, y, z)):
+        raise Problem(
+            f"{owner} is at {point!r:.60}, which is not on the head.",
+            "Give x, y and z in metres; the origin lies between the eyes.",
+        )
+    return x, y, z

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What capture.json may hold: a damaged or edited record is refused when it is read, and not somewhere inside a stage.
-
-Ground floor: standard library only.
-"""
+"""Validate capture.json: a damaged or edited record is refused when it is read, not somewhere inside a stage."""
 
 from __future__ import annotations
 
@@ -20,62 +17,49 @@ ENTRY = {
     "inputs": dict,
     "code": str,
 }
-"""What is told of every finished stage, beside its seconds: freshness.py and the report count on it."""
+"""Fields of every finished stage, beside its seconds."""
 
 
 def find_fault(record) -> str:
-    """What makes it no record of a capture, as "its stages.scan makes no sense"; '' where nothing does. `record` is any
-    JSON value."""
+    """Return the fault of a JSON value as a capture record, such as "its stages.scan makes no sense", or ''."""
     if not isinstance(record, dict) or not isinstance(record.get("stages"), dict):
         return "it has no stages"
-    source = record.get("source", "")
-    right = {
+    source, stopped = record.get("source", ""), record.get("stopped")
+    sound = {
         "format": type(record.get("format")) is int,
         "source": isinstance(source, str) and "\0" not in source,
-        "source_stamp": _is_stamp(record.get("source_stamp", [])),
+        "source_stamp": _is_list(record.get("source_stamp", []), _is_file),
         **{f"stages.{name}": _is_entry(entry) for name, entry in record["stages"].items()},
-        "stopped": _is_stop(record.get("stopped")),
+        "stopped": stopped is None or _is_stop(stopped),
     }
-    return next((f"its {field} makes no sense" for field, sound in right.items() if not sound), "")
+    return next((f"its {field} makes no sense" for field in sound if not sound[field]), "")
 
 
 def _is_entry(entry) -> bool:
-    if not isinstance(entry, dict) or not is_number(entry.get("seconds"), 0):
-        return False
-    complete = all(isinstance(entry.get(field), kind) for field, kind in ENTRY.items())
-    return complete and _are_findings(entry["findings"])
+    return _has(entry, ENTRY) and is_number(entry.get("seconds"), 0) and _is_list(entry["findings"], _is_finding)
 
 
 def _is_stop(stopped) -> bool:
-    told = isinstance(stopped, dict) and all(
-        isinstance(stopped.get(field), str) for field in ("stage", "problem", "remedy")
-    )
-    return stopped is None or told and _are_findings(stopped.get("findings"))
+    texts = _has(stopped, {"stage": str, "problem": str, "remedy": str})
+    return texts and _is_list(stopped.get("findings"), _is_finding)
 
 
-def _is_stamp(stamp) -> bool:
-    """Whether it is a source's stamp: [name, size, content hash] of each file."""
-    return isinstance(stamp, list) and all(
-        isinstance(file, list)
-        and len(file) == 3
-        and _names_file(file[0])
-        and is_number(file[1], 0)
-        and isinstance(file[2], str)
-        for file in stamp
-    )
+def _is_finding(finding) -> bool:
+    return _has(finding, {"problem": str, "remedy": str, "frames": list})
 
 
-def _names_file(name) -> bool:
-    """Whether it may be a file's name on some system: none has a slash in it, and what else one takes, as a colon or a
-    backslash, another does not."""
-    return isinstance(name, str) and "/" not in name and name not in ("", ".", "..")
+def _is_file(stamp) -> bool:
+    """Return whether a value is [name, size, content hash]. No system allows a slash in a name; other rules differ."""
+    if not isinstance(stamp, list) or len(stamp) != 3:
+        return False
+    name, size, digest = stamp
+    named = isinstance(name, str) and "/" not in name and name not in ("", ".", "..")
+    return named and is_number(size, 0) and isinstance(digest, str)
 
 
-def _are_findings(findings) -> bool:
-    return isinstance(findings, list) and all(
-        isinstance(finding, dict)
-        and isinstance(finding.get("problem"), str)
-        and isinstance(finding.get("remedy"), str)
-        and isinstance(finding.get("frames"), list)
-        for finding in findings
-    )
+def _is_list(value, is_sound) -> bool:
+    return isinstance(value, list) and all(is_sound(each) for each in value)
+
+
+def _has(value, kinds: dict[str, type]) -> bool:
+    return isinstance(value, dict) and all(isinstance(value.get(field), kind) for field, kind in kinds.items())

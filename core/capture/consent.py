@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a paid service would get of a capture, and whether the artist agreed to it: consent.json holds for these very
-pictures, here, and no others.
+"""The artist's consent to send frames to a paid service: consent.json, valid for these pictures in this place only.
 
-Ground floor: standard library only. The record names the capture's place, the receiving machine, the credits and every
-picture by its content, so that a copy in another capture, a moved one or changed frames are not agreed to. Answers that
-have come lie in switchlight/, named by what was sent.
+The record names the capture's place, the receiving machine, the credits and every picture by its content, so a copied
+or moved capture, or changed frames, need a new consent. Answers are kept in switchlight/, named by what was sent.
 """
 
 from __future__ import annotations
@@ -18,30 +16,27 @@ from pathlib import Path
 
 from . import switchlight_api as service
 from .capture import Capture
-from .files import storage_problem, write_json
+from .files import storage_problems, write_json
 from .frame_records import read_frames
 from .hashes import hash_file, hash_value
 from .json_files import read_json
 from .messages import Problem
 
 GIVEN_VARIABLE = "WILDCAP_SWITCHLIGHT_CONSENT"
-"""Environment variable by which the terminal's --send-frames reaches the worker: the place of the one capture that it
-is for."""
-TOLD = (
+"""Environment variable by which the terminal's --send-frames reaches the worker: the place of the capture."""
+NOTICE = (
     "{pictures} of this capture leave your machine: they show a person's face. Ask that person first.",
-    "They go to {company}, a company, at {host}, with your key and nothing else. What it does with them is told at "
-    "{website}.",
+    "They are sent to {company}, a company, at {host}, with your key and nothing else. Its terms are at {website}.",
     "{company} charges your account with {credits}.",
-    "What comes back may not be used to train a model, as its terms say.",
+    "Its terms forbid training a model on what comes back.",
 )
-"""Said before anything is sent; `lines` fills it in."""
-TOLD_AGAIN = "{kept} more have their answer already and are not paid again."
+"""Shown before anything is sent."""
+NOTICE_KEPT = "{kept} more have their answer already and are not paid again."
 
 
 @dataclass(frozen=True)
 class Sending:
-    """What a run would send: `frames` are name -> content hash of those without an answer yet, `kept` the number of
-    those with one."""
+    """Frames to send, name -> content hash, and the number of those `kept` that have an answer already."""
 
     host: str
     frames: dict[str, str]
@@ -54,8 +49,10 @@ class Sending:
 
 
 def sending(capture: Capture, preview: bool, names: Collection[str] | None = None) -> Sending:
-    """What of the frames `names` (None: the selected ones) has no answer yet. Raises Problem where there are no
-    frames."""
+    """Plan to send those of the frames `names` (None: the selected ones) that have no answer yet.
+
+    Raises Problem if there are no frames.
+    """
     names = selected(capture) if names is None else names
     hashes = {name: hash_file(capture.frames / name) for name in sorted(names) if (capture.frames / name).is_file()}
     missing = {name: content for name, content in hashes.items() if not answer(capture, content, preview).is_file()}
@@ -63,25 +60,23 @@ def sending(capture: Capture, preview: bool, names: Collection[str] | None = Non
 
 
 def selected(capture: Capture) -> list[str]:
-    """The frames that the texture is made from. Raises Problem where there are none yet."""
+    """Return the frames that the texture is made from. Raises Problem if there are none yet."""
     try:
         names = [frame.name for frame in read_frames(capture).records if frame.selected]
     except Problem:
         names = []
     if not names:
-        raise Problem(
-            "This capture has no frames yet that could be sent.", "Reconstruct first: it stops before anything is sent."
-        )
+        raise Problem("This capture has no frames to send yet.", "Reconstruct first: it stops before anything is sent.")
     return names
 
 
 def answer(capture: Capture, content: str, preview: bool) -> Path:
-    """Where the answer to a picture of that content hash is kept: named by the hash of all that was sent."""
+    """Return the path of the answer to a picture of that content hash, named by the hash of all that was sent."""
     return capture.switchlight / f"{hash_value([content, service.form(preview)])}.png"
 
 
 def lines(plan: Sending, translated=str) -> list[str]:
-    """What the artist is told, whole sentences; `translated` looks a template up."""
+    """Return the sentences to show before sending; `translated` translates a template."""
     fields = {
         "pictures": f"{len(plan.frames)} frame{'' if len(plan.frames) == 1 else 's'}",
         "company": service.COMPANY,
@@ -90,11 +85,11 @@ def lines(plan: Sending, translated=str) -> list[str]:
         "credits": service.amount(plan.credits),
         "kept": plan.kept,
     }
-    return [translated(line).format(**fields) for line in (*TOLD, *([TOLD_AGAIN] if plan.kept else []))]
+    return [translated(line).format(**fields) for line in (*NOTICE, *([NOTICE_KEPT] if plan.kept else []))]
 
 
 def give(capture: Capture, plan: Sending) -> None:
-    """Records that the artist agrees to it."""
+    """Record the artist's consent."""
     write_json(
         capture.consent,
         {
@@ -110,16 +105,13 @@ def give(capture: Capture, plan: Sending) -> None:
 
 
 def withdraw(capture: Capture) -> None:
-    """Takes the consent back: nothing more is sent. What has come stays."""
-    try:
+    """Withdraw the consent: nothing more is sent. Answers stay."""
+    with storage_problems(capture.consent):
         capture.consent.unlink(missing_ok=True)
-    except OSError as error:
-        raise storage_problem(error, capture.consent) from error
 
 
 def is_given(capture: Capture, plan: Sending) -> bool:
-    """Whether all that would be sent was agreed to: these pictures, from this place, to this machine, for no more
-    credits. Damaged records count as none."""
+    """Return whether the consent covers a plan: these pictures, this place and machine, and no more credits."""
     try:
         record = read_json(capture.consent)
         return (
@@ -134,7 +126,7 @@ def is_given(capture: Capture, plan: Sending) -> bool:
 
 
 def require(capture: Capture, plan: Sending) -> None:
-    """Raises Problem unless it was agreed to, here or by the terminal's flag, which this records."""
+    """Raise Problem without a consent, recorded or by the terminal's flag, which this records."""
     if os.environ.get(GIVEN_VARIABLE) == _place(capture):
         give(capture, plan)
     if not is_given(capture, plan):
@@ -148,7 +140,7 @@ def require(capture: Capture, plan: Sending) -> None:
 
 
 def by_flag(capture: Capture) -> dict[str, str]:
-    """The environment of a worker that the terminal's flag allows to send this capture's frames."""
+    """Return the environment of a worker that the terminal's flag allows to send this capture's frames."""
     return {GIVEN_VARIABLE: _place(capture)}
 
 

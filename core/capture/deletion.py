@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face is deleted: first a list of all that would go and all that stays, then exactly that.
+"""Delete a face: list all that would go and all that stays, then delete exactly that.
 
-What goes is what WildCap wrote and nobody changed (ownership.py), the capture's own books, its logs and what killed
-stages left. The video and deliveries elsewhere are never touched. Standard library only.
+What goes: files that WildCap wrote and nobody changed (ownership.py), the capture's own records, its logs and the
+leftovers of killed stages. The video and deliveries elsewhere are never touched.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from . import ownership, stages, unforeseen
 from .capture import Capture
 from .delivery_plan import PROVENANCE, is_as_delivered, read_delivered
-from .files import storage_problem
+from .files import storage_problems
 from .messages import Problem
 
 LOGS = frozenset(
@@ -49,17 +49,19 @@ GROUPS = {
     "report": "Report",
     "report.html": "Report",
 }
-"""What the first part of a file's path in the capture is called in the list."""
+"""First part of a file's path in the capture -> its label in the list."""
 REST = "Other working files"
 FOLDERS = tuple(
     f"{name}/-" for name in (*GROUPS, "checkpoints", "comparison", "preview", ownership.KEPT) if "." not in name
 )
-"""Our own folders, which go where they are empty, as a file in each."""
+"""A file in each of our folders, which go if they are empty."""
+SHOWN_FILES = 5
+"""Number of files that stay and are listed by name."""
 
 
 @dataclass(frozen=True)
 class FileGroup:
-    """Files of one kind that go: how many, and their size together."""
+    """Files of one kind that go: their number and size together."""
 
     label: str
     files: int
@@ -68,7 +70,7 @@ class FileGroup:
 
 @dataclass(frozen=True)
 class Deletion:
-    """What deleting a capture does: the files that go (paths in the capture), also by kind; and the files that stay."""
+    """Files that go (paths in the capture), also by kind, and files that stay."""
 
     going: tuple[str, ...]
     groups: tuple[FileGroup, ...]
@@ -76,55 +78,48 @@ class Deletion:
 
     @property
     def size(self) -> int:
+        """Bytes that are freed."""
         return sum(group.size for group in self.groups)
 
 
 def plan(capture: Capture) -> Deletion:
-    """Looks at every file of a capture. Raises Problem where it is none, or cannot be read."""
+    """List the files of a capture. Raises Problem if it is none, or cannot be read."""
     _require(capture)
-    going: dict[str, int] = {}
-    staying = []
-    try:
+    going, staying = [], []
+    kinds: dict[str, list[int]] = {}
+    with storage_problems(capture.root):
         for path in ownership.files_in(capture.root):
             inside = ownership.path_inside(capture.root, path)
             if _is_ours(capture, path, inside):
-                going[inside] = path.lstat().st_size
+                going.append(inside)
+                kinds.setdefault(GROUPS.get(inside.partition("/")[0], REST), []).append(path.lstat().st_size)
             else:
                 staying.append(inside)
-    except OSError as error:
-        raise storage_problem(error, capture.root) from error
-    kinds: dict[str, list[int]] = {}
-    for inside, size in going.items():
-        kinds.setdefault(GROUPS.get(inside.partition("/")[0], REST), []).append(size)
-    groups = sorted(
-        (FileGroup(label, len(sizes), sum(sizes)) for label, sizes in kinds.items()), key=lambda group: -group.size
-    )
-    return Deletion(tuple(going), tuple(groups), tuple(staying))
+    groups = [FileGroup(label, len(sizes), sum(sizes)) for label, sizes in kinds.items()]
+    return Deletion(tuple(going), tuple(sorted(groups, key=lambda group: -group.size)), tuple(staying))
 
 
 def delete(capture: Capture) -> Deletion:
-    """Deletes what is WildCap's, looking at each file once more, and returns what went and what stayed. Killed in the
-    middle, it can be asked for again: the books go last. Raises Problem where a worker is at the capture, or a file
-    cannot be deleted."""
+    """Delete what is WildCap's, checking each file once more, and return what went and what stayed.
+
+    It can be repeated after a kill, because the records go last. Raises Problem if a worker holds the capture, or a
+    file cannot be deleted.
+    """
     _require(capture)
-    with capture.locked():
+    with capture.locked(), storage_problems(capture.root):
         deletion = plan(capture)
-        try:
-            # which says whose the others are
-            for inside in sorted(deletion.going, key=lambda inside: PurePosixPath(inside).name == PROVENANCE):
-                if inside not in ownership.BOOKS:
-                    (capture.root / inside).unlink(missing_ok=True)
-            for folder in sorted(
-                {folder for inside in (*deletion.going, *FOLDERS) for folder in _folders(inside)}, reverse=True
-            ):
-                with contextlib.suppress(OSError):  # it is not there, or somebody's files are in it
-                    (capture.root / folder).rmdir()
-            # last what tells that the folder is a capture, and whose its files are
-            for name in (capture.job.name, capture.json.name, ownership.RECORD):
-                (capture.root / name).unlink(missing_ok=True)
-        except OSError as error:
-            raise storage_problem(error, capture.root) from error
-    with contextlib.suppress(OSError):  # somebody's files are in it
+        # a delivery's provenance last: it tells whose the other files are
+        for inside in sorted(deletion.going, key=lambda inside: PurePosixPath(inside).name == PROVENANCE):
+            if inside not in ownership.BOOKS:
+                (capture.root / inside).unlink(missing_ok=True)
+        parents = (PurePosixPath(inside).parents for inside in (*deletion.going, *FOLDERS))
+        folders = {folder.as_posix() for each in parents for folder in each if folder.name}
+        for folder in sorted(folders, reverse=True):
+            with contextlib.suppress(OSError):  # missing, or not empty
+                (capture.root / folder).rmdir()
+        for name in (capture.job.name, capture.json.name, ownership.RECORD):
+            (capture.root / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):  # not empty
         capture.root.rmdir()
     return deletion
 
@@ -139,43 +134,30 @@ def _is_ours(capture: Capture, path: Path, inside: str) -> bool:
     return inside in LOGS or ownership.is_ours(capture.root, path) or ownership.is_leftover(capture.root, path)
 
 
-def _folders(inside: str) -> list[str]:
-    """The folders of the capture that a file lies in."""
-    return [parent.as_posix() for parent in PurePosixPath(inside).parents if parent.name]
-
-
 def _require(capture: Capture) -> None:
     if not capture.json.is_file() and not (capture.root / ownership.RECORD).is_file():
         raise Problem(
-            f"There is no capture at {capture.root}.", "Check the name: a capture's folder holds capture.json."
+            f"There is no capture at {capture.root}.", "Check the name: a capture's folder contains capture.json."
         )
 
 
 def lines(deletion: Deletion, translated=lambda text: text) -> list[str]:
-    """The list as sentences; `translated` gives a sentence in the reader's language."""
-    words = translated("{} files of this face are deleted for good, {} in all:")
-    said = [words.format(len(deletion.going), megabytes(deletion.size))]
-    said += [
+    """Return the list as sentences; `translated` translates a template."""
+    summary = translated("{} files of this face are deleted for good, {} in all:")
+    sentences = [summary.format(len(deletion.going), megabytes(deletion.size))]
+    sentences += [
         translated("{}: {} files, {}").format(translated(group.label), group.files, megabytes(group.size))
         for group in deletion.groups
     ]
     if deletion.staying:
-        more = (
-            translated(" and {} more").format(len(deletion.staying) - SHOWN_FILES)
-            if len(deletion.staying) > SHOWN_FILES
-            else ""
-        )
-        said.append(
-            translated("{} files stay, which WildCap did not write or somebody changed: {}").format(
-                len(deletion.staying), ", ".join(deletion.staying[:SHOWN_FILES]) + more
-            )
-        )
-    return [*said, translated("The video and what was delivered elsewhere stay.")]
-
-
-SHOWN_FILES = 5
-"""Files that stay and are named; the others are counted."""
+        names, more = ", ".join(deletion.staying[:SHOWN_FILES]), len(deletion.staying) - SHOWN_FILES
+        if more > 0:
+            names += translated(" and {} more").format(more)
+        staying = translated("{} files stay, which WildCap did not write or somebody changed: {}")
+        sentences.append(staying.format(len(deletion.staying), names))
+    return [*sentences, translated("The video and what was delivered elsewhere stay.")]
 
 
 def megabytes(size: int) -> str:
+    """Format a number of bytes."""
     return f"{size / 1e6:.1f} MB"

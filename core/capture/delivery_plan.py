@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What one delivery comes to: the settings with the preset's own choices filled in, its folder, and how that is put in
-place as a whole.
+"""Plan a delivery, with the preset's choices filled in, and put its folder in place as a whole.
 
-Ground floor: standard library only. The worker makes the maps in a folder beside the target, Blender adds the mesh, and
-then the folder gets its name.
+The worker makes the maps in a folder beside the target, Blender adds the mesh, then the folder is renamed.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ from pathlib import Path
 from ..settings.delivery_presets import FORMATS, PICTURES, PRESETS, DeliveryPreset, Format
 from ..settings.settings import DeliverSettings
 from .capture import Capture
-from .files import storage_problem
+from .files import storage_problems
 from .messages import Problem, name_some
 from .ownership import free_place, remove_empty_folders
 
@@ -33,10 +31,12 @@ MADE_BY = "WildCap for Blender"
 
 @dataclass(frozen=True)
 class DeliveryPlan:
-    """`name` begins every file's name, `capture` is that of the capture's folder; `pictures` is 'png8', 'png16' or
-    'exr'; `colour` 'srgb' or 'linear'; `normals` 'opengl' or 'directx'; `unit` 'm' or 'cm'; `target` is the folder,
-    `staged` what it is until it is whole; `replace`: another delivery there, and files of it that were changed since,
-    are given up."""
+    """Delivery to be made. `name` begins the name of every file; `capture` is the name of the capture's folder.
+
+    `pictures`: 'png8', 'png16' or 'exr'. `colour`: 'srgb' or 'linear'. `normals`: 'opengl' or 'directx'. `unit`: 'm' or
+    'cm'. `staged` becomes the folder `target` when it is complete. `replace`: replace a delivery of another capture,
+    and files that were changed since.
+    """
 
     name: str
     capture: str
@@ -54,20 +54,21 @@ class DeliveryPlan:
 
     @property
     def suffix(self) -> str:
+        """Suffix of the maps."""
         return ".exr" if self.pictures == "exr" else ".png"
 
     @property
     def mesh(self) -> str:
-        """The mesh file's name."""
+        """Name of the mesh file."""
         return self.name + self.format.suffix
 
     def material(self, tile: int, several: bool) -> str:
-        """Name of the material of a UV tile."""
+        """Return the name of the material of a UV tile."""
         return f"{self.name}_{tile}" if several else self.name
 
 
 def plan(capture: Capture, settings: DeliverSettings) -> DeliveryPlan:
-    """Raises Problem for choices that do not go together. What lies at the target is judged by `check_target`."""
+    """Plan a delivery; `check_target` checks its target. Raises Problem for choices that do not go together."""
     preset = PRESETS[settings.preset]
     format_name = preset.format if settings.format == "preset" else settings.format
     format = FORMATS[format_name]
@@ -91,54 +92,58 @@ def plan(capture: Capture, settings: DeliverSettings) -> DeliveryPlan:
     name = safe_name(capture.root.stem)
     base = Path(settings.folder).expanduser() if settings.folder else capture.exports
     target = base / f"{name}_{settings.what}_{settings.preset}_{format_name}"
-    if target.is_symlink():  # what is exchanged is the folder that it leads to, on whose disk that is one renaming
+    if target.is_symlink():  # replace the folder it leads to, by a rename on that disk
         target = target.resolve()
-    numbered = preset.numbered if settings.udim == "preset" else settings.udim == "numbered"
     return DeliveryPlan(
-        name,
-        capture.root.name,
-        settings.what,
-        preset,
-        format,
-        pictures,
-        colour,
-        format.normals or preset.normals,
-        format.unit or preset.unit,
-        numbered,
-        target,
-        target.with_name(f".{target.name}.staged"),
-        settings.replace,
+        name=name,
+        capture=capture.root.name,
+        what=settings.what,
+        preset=preset,
+        format=format,
+        pictures=pictures,
+        colour=colour,
+        normals=format.normals or preset.normals,
+        unit=format.unit or preset.unit,
+        numbered=preset.numbered if settings.udim == "preset" else settings.udim == "numbered",
+        target=target,
+        staged=target.with_name(f".{target.name}.staged"),
+        replace=settings.replace,
     )
 
 
 def safe_name(text: str) -> str:
-    """Letters, digits, hyphens and underscores, which every program takes in a file's name; accents are dropped. 'head'
-    where nothing is left."""
+    """Return a file name that every program takes: ASCII without accents, 'head' if nothing is left."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9_-]+", "_", plain).strip("_") or "head"
 
 
 def needs(capture: Capture, kind: str) -> Path:
-    """The mesh that is delivered. Raises Problem where the capture does not have it."""
-    mesh = {"head": capture.head, "own_mesh": capture.delivery / "own_head.obj", "scan": capture.delivery / "scan.obj"}[
-        kind
-    ]
+    """Return the mesh to deliver. Raises Problem if the capture does not have it."""
+    mesh, words, remedy = {
+        "head": (capture.head, "head", "Click Reconstruct first."),
+        "own_mesh": (
+            capture.delivery / "own_head.obj",
+            "fitted mesh of yours",
+            "Choose your mesh under Reconstruction, Head Mesh, and run the stages to the end.",
+        ),
+        "scan": (
+            capture.delivery / "scan.obj",
+            "scan with textures",
+            "Run the stage Delivery with its scan switched on.",
+        ),
+    }[kind]
     if not mesh.is_file():
-        remedy = {
-            "head": "Click Reconstruct first.",
-            "own_mesh": "Choose your mesh under Reconstruction, Head Mesh, and run the stages to the end.",
-            "scan": "Run the stage Delivery with its scan switched on.",
-        }[kind]
-        words = {"head": "head", "own_mesh": "fitted mesh of yours", "scan": "scan with textures"}[kind]
         raise Problem(f"This capture has no {words} to deliver.", remedy)
     return mesh
 
 
 def put_in_place(plan: DeliveryPlan) -> None:
-    """The staged folder gets its name; an older delivery there goes only then, but for files that others put there:
-    those stay. Raises Problem where that cannot be, and then everything is as it was."""
+    """Rename the staged folder, and only then remove an older delivery, without foreign files, which stay.
+
+    Raises Problem if that fails; then everything is as before.
+    """
     old = plan.target.with_name(f".{plan.target.name}.old")
-    try:
+    with storage_problems(plan.target):
         _recover(plan.target, old)
         check_target(plan)
         if plan.target.exists():
@@ -150,34 +155,36 @@ def put_in_place(plan: DeliveryPlan) -> None:
                 os.replace(old, plan.target)
             raise
         _recover(plan.target, old)
-    except OSError as error:
-        raise storage_problem(error, plan.target) from error
 
 
 def discard(plan: DeliveryPlan) -> None:
-    """Removes what a delivery that did not end has left."""
-    for left in [plan.staged, *plan.target.parent.glob(f".{plan.staged.name}.*.tmp")]:
-        shutil.rmtree(left, ignore_errors=True)
+    """Remove the leftovers of an unfinished delivery."""
+    for path in [plan.staged, *plan.target.parent.glob(f".{plan.staged.name}.*.tmp")]:
+        shutil.rmtree(path, ignore_errors=True)
 
 
 def check_target(plan: DeliveryPlan) -> None:
-    """Raises Problem for a folder that no delivery has made, for a delivery of another capture and files of an older
-    one that somebody changed since, unless the plan replaces those, and for files of others that are in the way."""
+    """Raise Problem if the target must not be replaced.
+
+    Files that no delivery wrote are always kept; another capture's delivery, and delivered files that were changed
+    since, unless the plan replaces them.
+    """
     target = plan.target
     if not target.exists() or target.is_dir() and not any(target.iterdir()):
         return
     delivered = read_delivered(target)
     if delivered is None:
         raise Problem(
-            f"{target} holds files that no delivery has put there.",
+            f"{target} contains files that no delivery has put there.",
             "Move them away, or choose another folder to deliver to.",
         )
-    other = _delivered_capture(target)
-    if other not in ("", plan.capture) and not plan.replace:
+    capture = _read_provenance(target).get("capture")
+    other = capture.get("name") if isinstance(capture, dict) else None
+    if isinstance(other, str) and other not in ("", plan.capture) and not plan.replace:
         raise Problem(
-            f"{target} holds the delivery of another capture, {other}.",
+            f"{target} contains the delivery of another capture, {other}.",
             "Deliver to another folder, rename the capture, or deliver again with Replace Changed Files "
-            "(--replace) to give the other delivery up.",
+            "(--replace) to overwrite it.",
         )
     changed = [
         name
@@ -186,67 +193,57 @@ def check_target(plan: DeliveryPlan) -> None:
     ]
     if changed and not plan.replace:
         raise Problem(
-            f"{name_some(changed)} in {target} changed since the last delivery, which would be replaced.",
-            "Move what you want to keep to another folder, or deliver again with Replace Changed Files "
-            "(--replace) to give it up.",
+            f"Files in {target} were changed since the last delivery: {name_some(changed)}.",
+            "Move them to another folder, or deliver again with Replace Changed Files (--replace) to overwrite them.",
         )
-    new = (
-        {path.relative_to(plan.staged).as_posix() for path in plan.staged.rglob("*") if path.is_file()}
-        if plan.staged.is_dir()
-        else set()
-    )
+    new = {path.relative_to(plan.staged).as_posix() for path in plan.staged.rglob("*") if path.is_file()}
     blocked = sorted(name for name in new - delivered.keys() if (target / name).exists())
     if blocked:
         raise Problem(
-            f"{name_some(blocked)} in {target} is in the way: no delivery has put it there.",
-            "Move it to another folder, or deliver to another one.",
+            f"Files in {target} are in the way, which no delivery has put there: {name_some(blocked)}.",
+            "Move them to another folder, or deliver to another one.",
         )
 
 
-def _recover(target: Path, set_aside: Path) -> None:
-    """Ends what was begun when `set_aside`, an older delivery, was put aside: what a delivery wrote goes, what others
-    put there moves back to where it was."""
-    if not set_aside.exists():
+def _recover(target: Path, old: Path) -> None:
+    """Finish replacing `old`, a delivery put aside: delete its files, and move foreign ones back."""
+    if not old.exists():
         return
     if not target.exists():
-        os.replace(set_aside, target)
+        os.replace(old, target)
         return
-    delivered = read_delivered(set_aside) or {}
-    for file in sorted(path for path in set_aside.rglob("*") if path.is_file() or path.is_symlink()):
-        name = file.relative_to(set_aside).as_posix()
+    delivered = read_delivered(old) or {}
+    for file in sorted(path for path in old.rglob("*") if path.is_file() or path.is_symlink()):
+        name = file.relative_to(old).as_posix()
         if name == PROVENANCE:
             continue
         if name in delivered:
             file.unlink()
             continue
-        place = target / name  # taken where somebody put another of that name into the new one since
-        free = free_place(place)
-        free.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(file, free)
-    (set_aside / PROVENANCE).unlink(missing_ok=True)  # last: it says which files are whose
-    remove_empty_folders(set_aside)
+        place = free_place(target / name)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(file, place)
+    (old / PROVENANCE).unlink(missing_ok=True)  # last: it tells whose the files are
+    remove_empty_folders(old)
 
 
 def read_delivered(target: Path) -> dict[str, str] | None:
-    """What the delivery in a folder wrote: file -> SHA-256; None for a folder that no delivery has made."""
-    try:
-        told = json.loads((target / PROVENANCE).read_text(encoding="utf-8"))
-        return {PROVENANCE: "", **told.get("files", {})} if told.get("made_by") == MADE_BY else None
-    except (OSError, ValueError, AttributeError, TypeError):
-        return None
+    """Return the files of the delivery in a folder, name -> SHA-256, or None if there is none."""
+    record = _read_provenance(target)
+    files = record.get("files", {})
+    return {PROVENANCE: "", **files} if record.get("made_by") == MADE_BY and isinstance(files, dict) else None
 
 
-def _delivered_capture(target: Path) -> str:
-    """The name of the capture that a folder was delivered from; '' where its provenance tells none."""
+def _read_provenance(target: Path) -> dict:
     try:
-        name = json.loads((target / PROVENANCE).read_text(encoding="utf-8"))["capture"]["name"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return ""
-    return name if isinstance(name, str) else ""
+        record = json.loads((target / PROVENANCE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}
 
 
 def is_as_delivered(path: Path, digest: str) -> bool:
-    """Whether a delivered file is as it was; the provenance itself may be."""
+    """Return whether a delivered file is unchanged; the provenance, which has no digest, may change."""
     if not digest:
         return True
     with open(path, "rb") as file:

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Content hashes of files and folders, and what identifies the pictures that a capture is made from.
-
-Standard library only.
-"""
+"""Content hashes of files and folders, and the identity of a capture's source."""
 
 from __future__ import annotations
 
@@ -17,49 +14,48 @@ from typing import BinaryIO
 from .regular_files import require_regular
 
 WHOLE_BYTES = 64 << 20
-"""Size up to which a source's file is read whole: every photograph, and a phone's video of half a minute."""
+"""Size up to which `sample_file` reads all: every photograph, and half a minute of a phone's video."""
 BLOCKS, BLOCK_BYTES = 64, 1 << 20
-"""What is read of a longer one, spread evenly from its first byte to its last."""
+"""Blocks read of a larger file, spread evenly from its first byte to its last."""
 PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif")
-"""Suffixes of the files in a folder of photographs that are read; others may lie beside them."""
+"""Suffixes read from a folder of photographs."""
 LITTER = frozenset({"thumbs.db", "desktop.ini"})
-"""What Windows leaves in a folder, above all on a share, where somebody has looked at its pictures."""
+"""Files that Windows leaves in a folder of pictures."""
+DIGEST_BYTES = 16
 _hashes: dict[tuple, str] = {}
 
 
 def hash_file(path: Path) -> str:
-    """The content hash of a file; one that has kept its size and time is not read again by this process."""
+    """Return the content hash of a file, cached in this process by its size and time."""
     return _remember(path, _hash_whole)
 
 
 def read_hash(path: Path) -> str:
-    """As `hash_file`, but always read: where being wrong would cost somebody a file. Two files within one tick of the
-    disk's clock have the same time."""
+    """Return the content hash of a file, never cached: where an error would cost somebody a file.
+
+    Two writes within one tick of the disk's clock have the same time.
+    """
     with open(require_regular(path), "rb") as file:
         return _hash_whole(file, 0)
 
 
 def hash_bytes(content: bytes) -> str:
-    """What `read_hash` gives for a file that holds them."""
-    digest = _hasher()
-    digest.update(content)
-    return digest.hexdigest()
+    """Return what `read_hash` returns for a file with this content."""
+    return hashlib.blake2b(content, digest_size=DIGEST_BYTES).hexdigest()
 
 
 def hash_value(value) -> str:
-    """Of what can be written as JSON, whatever the order of its keys."""
+    """Return the hash of a JSON value, whatever the order of its keys."""
     return hash_bytes(json.dumps(value, sort_keys=True).encode())
 
 
 def sample_file(path: Path) -> str:
-    """As `hash_file`, but a file of more than WHOLE_BYTES is known by its size and BLOCKS blocks of it: a film, or
-    another program's network."""
+    """Return the content hash of a file, or, above WHOLE_BYTES, the hash of its size and BLOCKS blocks, cached."""
     return _remember(path, _hash_sampled)
 
 
 def hash_tree(path: Path, hash_one: Callable[[Path], str] = hash_file) -> str | dict:
-    """The content hash of a file, {relative name: hash} of a folder, or '' for what is not there. What a system leaves
-    in folders by itself, hidden files and LITTER, is not of it."""
+    """Return the hash of a file, {relative name: hash} of a folder, or ''. Hidden files and LITTER do not count."""
     if path.is_dir():
         return {
             p.relative_to(path).as_posix(): hash_one(p)
@@ -70,37 +66,30 @@ def hash_tree(path: Path, hash_one: Callable[[Path], str] = hash_file) -> str | 
 
 
 def hash_source(source: Path | None) -> list:
-    """[name, size, content hash by `sample_file`] of each file of a source, which is a video or a folder of
-    photographs; [] where it is gone."""
+    """Return [name, size, `sample_file`] of the video, or of each photograph in the folder; [] if it is gone."""
     if source is None:
         return []
-    files = (
-        [path for path in sorted(source.iterdir()) if path.is_file() and _is_photograph(path.name)]
-        if source.is_dir()
-        else [source]
-        if source.is_file()
-        else []
-    )
-    return [[path.name, path.stat().st_size, sample_file(path)] for path in files]
-
-
-def _is_photograph(name: str) -> bool:
-    return name.lower().endswith(PHOTOGRAPHS) and not name.startswith(".")
+    files = [source]
+    if source.is_dir():
+        files = [p for p in sorted(source.iterdir()) if p.name.lower().endswith(PHOTOGRAPHS) and p.name[0] != "."]
+    return [[path.name, path.stat().st_size, sample_file(path)] for path in files if path.is_file()]
 
 
 def same_source(recorded: list, present: list) -> bool:
-    """Whether two answers of `hash_source` mean the same pictures. A video may be renamed; the names of photographs
-    count, for they tell their order."""
+    """Return whether two results of `hash_source` mean the same pictures.
 
-    def told(stamp: list) -> list:
-        return [[name if len(stamp) > 1 else "", size, digest] for name, size, digest in stamp]
+    A video may be renamed; the names of photographs count, because they give the order.
+    """
+    if len(recorded) == len(present) == 1:
+        return recorded[0][1:] == present[0][1:]
+    return recorded == present
 
-    return told(recorded) == told(present)
 
+def list_hashes(root: Path) -> list:
+    """List the cached hashes below a folder for `add_hashes` of another process.
 
-def tell_known(root: Path) -> list:
-    """What this process knows of the files below a folder: [[kind, path in the folder, size, time in nanoseconds,
-    hash]], for `take_known` of another one."""
+    An entry is [kind, path in the folder, size, time in nanoseconds, hash].
+    """
     inside = str(root) + os.sep
     return [
         [kind, path.removeprefix(inside), size, when, digest]
@@ -109,12 +98,12 @@ def tell_known(root: Path) -> list:
     ]
 
 
-def take_known(root: Path, entries: list) -> None:
-    """Takes in what `tell_known` told. Raises ValueError or TypeError for what it did not tell."""
-    told = [((kind, os.path.join(root, path), size, when), digest) for kind, path, size, when, digest in entries]
-    if not all(isinstance(digest, str) for _, digest in told):
-        raise ValueError("a hash is no text")
-    for key, digest in told:
+def add_hashes(root: Path, entries: list) -> None:
+    """Add the hashes that `list_hashes` listed to the cache. Raises ValueError or TypeError for anything else."""
+    hashes = {(kind, os.path.join(root, path), size, when): digest for kind, path, size, when, digest in entries}
+    if not all(isinstance(digest, str) for digest in hashes.values()):
+        raise ValueError("a hash is not a text")
+    for key, digest in hashes.items():
         _hashes.setdefault(key, digest)
 
 
@@ -143,4 +132,4 @@ def _hash_sampled(file: BinaryIO, size: int) -> str:
 
 
 def _hasher():
-    return hashlib.blake2b(digest_size=16)
+    return hashlib.blake2b(digest_size=DIGEST_BYTES)

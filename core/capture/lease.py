@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lock of a capture: a lease, which its holder refreshes and which another may take once it has seen no refresh for
-a whole term.
+"""The lock of a capture: a lease that another worker may take over after a term without a refresh.
 
-The file `lock` is made with O_EXCL, which every file system has; hard links some have not. It names the process that
-holds it and a token of its own, and its time of change is the refresh: who waits only looks whether that changes, by a
-clock of their own, for clocks of two machines differ. A holder that was asleep and has been replaced finds another
-token in the file, and every write into the capture asks for that first. Standard library only.
+The file `lock` is made with O_EXCL, which every file system has. It names the holding process and a token; its time of
+change is the refresh. Whoever waits only watches whether that changes, by its own clock, because clocks of two machines
+differ. A holder that slept and was replaced finds another token, and every write into the capture checks that first.
 """
 
 from __future__ import annotations
@@ -27,26 +25,25 @@ from .processes import identify_process, is_at_work, is_gone
 from .regular_files import require_regular
 
 TERM_S = 30.0
-"""How long a lease lasts without a refresh. A refresh that is held up for longer costs its holder the lease, and nobody
-a file; a shorter term would make that more frequent, a longer one has an artist wait longer for a machine that has
-gone."""
+"""Duration of a lease without a refresh. A shorter term replaces slow holders more often, a longer one has an artist
+wait longer for a machine that has gone."""
 REFRESHES = 5
-"""How often it is refreshed in one term."""
+"""Refreshes per term."""
 LOOK_S = 0.1
 SUCCESSION = ".succeeding"
-"""Ending of the file that keeps two who found the same lease expired from both taking it."""
-_held: dict[str, Lease] = {}  # lock -> the lease that this process holds
+"""Suffix of the file that keeps two processes from both taking over one expired lease."""
+_held: dict[str, Lease] = {}  # lock -> lease of this process
 
 
 @dataclass(frozen=True)
 class Lease:
-    """One holder's claim on a capture: the file and the token that must stand in it."""
+    """One holder's claim: the lock file, and the token that it must contain."""
 
     path: Path
     token: str
 
     def holds(self) -> bool:
-        """Whether nobody has taken it over. Raises OSError where the disk does not tell just now."""
+        """Return whether nobody has taken it over. Raises OSError if the disk does not answer."""
         try:
             return _parse(self.path).get("token") == self.token
         except FileNotFoundError:
@@ -54,27 +51,33 @@ class Lease:
 
 
 def check_lease(root: Path) -> None:
-    """Raises Problem where this process had the capture and another one took it over while this one was asleep: it may
-    write nothing more."""
-    lease = _held.get(_key(root / "lock"))
+    """Raise Problem if another process took over a capture that this one held."""
+    lease = _held.get(os.path.abspath(root / "lock"))
     if lease is not None and not lease.holds():
         raise Problem(
             "Another worker has taken this capture over while this one was asleep; nothing more was written here.",
-            "Look at what the other one does, and run again when it has ended: finished stages are kept.",
+            "Wait until the other one has ended, then run again: finished stages are kept.",
         )
 
 
 def holder(path: Path) -> dict | None:
-    """Who holds the lease in the file `path`, as far as can be told at once: None where nobody does, or a process that
-    has ended."""
+    """Return the holder that a lock file names, or None for nobody or an ended process."""
     _refuse_stranger(path)
-    lease_holder = _read(path)
-    return None if lease_holder is None or lease_holder and is_gone(lease_holder) else lease_holder
+    content = _read(path)
+    return None if content and is_gone(content) else content
 
 
-def seems_expired(holder: dict, path: Path) -> bool:
-    """Whether the lease that `holder` has in the file `path` was not refreshed for a term, by the clock that the disk
-    gives a new file beside it. That may not be the clock of its holder: who takes it over still waits (hold)."""
+def present_holder(path: Path) -> dict | None:
+    """Return the `holder`, or None if its lease seems to have expired: a machine that has gone is no obstacle."""
+    content = holder(path)
+    return None if content is None or _seems_expired(content, path) else content
+
+
+def _seems_expired(holder: dict, path: Path) -> bool:
+    """Return whether a lease was not refreshed for a term by the disk's clock, as a new file beside it shows.
+
+    That may not be the holder's clock: whoever takes it over still waits (hold_file).
+    """
     if holder and is_at_work(holder):
         return False
     with contextlib.suppress(OSError), tempfile.TemporaryFile(dir=path.parent) as new:
@@ -82,14 +85,8 @@ def seems_expired(holder: dict, path: Path) -> bool:
     return False
 
 
-def present_holder(path: Path) -> dict | None:
-    """As `holder`, and None where its lease seems expired: what a machine that has gone left is no obstacle."""
-    lease_holder = holder(path)
-    return None if lease_holder is None or seems_expired(lease_holder, path) else lease_holder
-
-
 def refuse(holder: dict, path: Path, folder_kind: str = "capture") -> Problem:
-    """The Problem of a capture, or a batch, that is worked on."""
+    """Return the Problem of a capture or batch that another worker holds."""
     if not holder:
         return Problem(
             f"Another worker is just beginning to work on this {folder_kind}.",
@@ -103,20 +100,9 @@ def refuse(holder: dict, path: Path, folder_kind: str = "capture") -> Problem:
 
 
 def _refuse_stranger(path: Path) -> None:
-    """Raises Problem for a link, a folder or a pipe under the lock's name, which no worker has put there and none can
-    give back."""
+    """Raise Problem for a link, a folder or a pipe in place of the lock."""
     if path.is_symlink() or path.exists() and not path.is_file():
         raise Problem(f"{path} is in the way: it is not one of WildCap's locks.", "Move it away, or delete it.")
-
-
-def hold(
-    root: Path,
-    tell: Callable[[str], None] = lambda text: None,
-    folder_kind: str = "capture",
-    cancelled: Callable[[], bool] = lambda: False,
-) -> contextlib.AbstractContextManager[Lease]:
-    """Holds the lease of a capture's folder, or a batch's, which must be there: `hold_file` of its lock."""
-    return hold_file(root / "lock", tell, folder_kind, cancelled)
 
 
 @contextlib.contextmanager
@@ -126,32 +112,20 @@ def hold_file(
     folder_kind: str = "capture",
     cancelled: Callable[[], bool] = lambda: False,
 ) -> Iterator[Lease]:
-    """Holds the lease whose file is `path`, in a folder that must be there.
+    """Hold the lease of a lock file, in a folder that must exist.
 
-    A process of this machine that is at work is refused at once, and one that has ended is replaced at once. For one
-    that was stopped, or that lives on another machine, a term is waited for a refresh.
-
-    Parameters
-    ----------
-    path : of the lock
-    tell : hears of the wait
-    folder_kind : "capture", "batch" or another word for what is worked on, for the Problem
-    cancelled : whether the wait is to end
-
-    Raises
-    ------
-    Problem
-        Naming who works there.
-    CancelledError
-        Where `cancelled` says so.
+    A holder at work on this machine is refused at once, an ended one is replaced at once; for a stopped one, or one on
+    another machine, this waits a term for a refresh and calls `tell`. `folder_kind`, such as "capture" or "batch", is
+    for the Problem that names the holder. Raises CancelledError if `cancelled` ends the wait.
     """
     lease = Lease(path, secrets.token_hex(8))
     while not _make(lease):
-        expired = _wait_out(lease.path, tell, folder_kind, cancelled)
+        expired = _wait_out(path, tell, folder_kind, cancelled)
         if expired is not None:
             _take_over(lease, *expired)
-    _held[_key(path)] = lease
-    _clear_asides(lease.path)
+    key = os.path.abspath(path)
+    _held[key] = lease
+    _clear_asides(path)
     ended = threading.Event()
     keeper = threading.Thread(target=_refresh, args=(lease, ended), name="wildcap-lease", daemon=True)
     keeper.start()
@@ -160,15 +134,14 @@ def hold_file(
     finally:
         ended.set()
         keeper.join()
-        del _held[_key(path)]
-        with contextlib.suppress(OSError):  # a server that has gone: the lease runs out
+        del _held[key]
+        with contextlib.suppress(OSError):  # the server has gone: the lease runs out
             if lease.holds():
-                lease.path.unlink(missing_ok=True)
+                path.unlink(missing_ok=True)
 
 
 def _make(lease: Lease) -> bool:
-    """Makes the file, in one step with its content but for the moment in between, in which it is empty and counts as
-    being made."""
+    """Create the lock file; return False if it exists. Empty for a moment, it counts as being made."""
     content = {**identify_process(), "since": time.strftime("%Y-%m-%dT%H:%M:%S"), "token": lease.token}
     try:
         descriptor = os.open(lease.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
@@ -177,7 +150,7 @@ def _make(lease: Lease) -> bool:
     try:
         with open(descriptor, "wb") as file:
             file.write(json.dumps(content).encode())
-    except OSError:  # an empty one on a full disk would be taken for somebody who is just beginning
+    except OSError:  # left empty on a full disk, it would look like somebody who is just beginning
         with contextlib.suppress(OSError):
             lease.path.unlink()
         raise
@@ -187,30 +160,33 @@ def _make(lease: Lease) -> bool:
 def _wait_out(
     path: Path, tell: Callable[[str], None], folder_kind: str, cancelled: Callable[[], bool]
 ) -> tuple[dict, tuple | None] | None:
-    """What the lease says that can be taken over, and its stamp: its holder has ended, or a term went by without a
-    refresh. None where it was given back. Raises Problem when it is held, and CancelledError."""
+    """Wait until a lease can be taken over, and return its content and stamp; None if it was given back.
+
+    Raises Problem if it is held, and CancelledError.
+    """
     _refuse_stranger(path)
-    first, began, told = _stamp(path), time.monotonic(), False
+    first, began, waits = _stamp(path), time.monotonic(), False
     while True:
-        lease_holder = _read(path)
-        if lease_holder is None or lease_holder and is_gone(lease_holder):
-            return None if lease_holder is None else (lease_holder, first)
-        if _stamp(path) != first or lease_holder and is_at_work(lease_holder):
-            raise refuse(_read(path) or lease_holder, path, folder_kind)
+        content = _read(path)
+        if content is None:
+            return None
+        if content and is_gone(content):
+            return content, first
+        if _stamp(path) != first or content and is_at_work(content):
+            raise refuse(_read(path) or content, path, folder_kind)
         waited = time.monotonic() - began
         if waited > TERM_S:
-            return lease_holder, first
-        if waited > 1 and not told:
-            tell(f"Looking whether the worker that holds this {folder_kind} is still at work ...")
-            told = True
+            return content, first
+        if waited > 1 and not waits:
+            tell(f"Checking whether the worker that holds this {folder_kind} is still running ...")
+            waits = True
         if cancelled():
             raise CancelledError(str(path))
         time.sleep(LOOK_S)
 
 
 def _take_over(lease: Lease, expired: dict, stamp: tuple | None) -> None:
-    """Removes the lease that said `expired`, unless somebody was faster. Only one at a time may: the file beside it
-    keeps the others out."""
+    """Remove an expired lease, unless somebody was faster; a file beside it admits one process at a time."""
     path = lease.path
     succession = Lease(path.with_name(path.name + SUCCESSION), lease.token)
     if not _make(succession):
@@ -221,7 +197,7 @@ def _take_over(lease: Lease, expired: dict, stamp: tuple | None) -> None:
             aside = path.with_name(f"{path.name}.{lease.token}")
             with contextlib.suppress(FileNotFoundError):
                 os.rename(path, aside)
-                # the old holder awoke, gave it back, and somebody else has it since
+                # the old holder awoke and gave it back, and somebody else has it since
                 if _read(aside) != expired and not path.exists():
                     os.rename(aside, path)
                 aside.unlink(missing_ok=True)
@@ -230,22 +206,21 @@ def _take_over(lease: Lease, expired: dict, stamp: tuple | None) -> None:
 
 
 def _clear(succession: Path) -> None:
-    """Waits a moment for whoever is taking the lease over; removes what one that was killed in the middle of it has
-    left."""
-    lease_holder, stamp, began = _read(succession), _stamp(succession), time.monotonic()
+    """Wait for another process that takes the lease over; remove the file of one that was killed meanwhile."""
+    content, stamp, began = _read(succession), _stamp(succession), time.monotonic()
     while _stamp(succession) == stamp and stamp is not None:
-        if lease_holder and is_gone(lease_holder) or time.monotonic() - began > TERM_S:
+        if content and is_gone(content) or time.monotonic() - began > TERM_S:
             succession.unlink(missing_ok=True)
             return
         time.sleep(LOOK_S / 10)
 
 
 def _clear_asides(path: Path) -> None:
-    """Removes what one that was killed while it took a lease over has left beside it, of processes that have ended."""
-    for left in path.parent.glob(f"{path.name}.*"):
-        lease_holder = _read(left)
-        if lease_holder and is_gone(lease_holder):
-            left.unlink(missing_ok=True)
+    """Remove leftovers of processes that were killed while they took a lease over."""
+    for aside in path.parent.glob(f"{path.name}.*"):
+        content = _read(aside)
+        if content and is_gone(content):
+            aside.unlink(missing_ok=True)
 
 
 def _refresh(lease: Lease, ended: threading.Event) -> None:
@@ -257,7 +232,7 @@ def _refresh(lease: Lease, ended: threading.Event) -> None:
 
 
 def _read(path: Path) -> dict | None:
-    """What the file says; {} where it is empty, half written or cannot be read, None where it is not there."""
+    """Return the content of a lock file, {} if it cannot be read, None if it is missing."""
     try:
         return _parse(path)
     except FileNotFoundError:
@@ -267,7 +242,7 @@ def _read(path: Path) -> dict | None:
 
 
 def _parse(path: Path) -> dict:
-    """What the file says; {} where it is empty or half written. Raises OSError where it cannot be read."""
+    """Return the content of a lock file, {} if it is empty or half written. Raises OSError if it cannot be read."""
     try:
         content = json.loads(require_regular(path).read_bytes())
     except (ValueError, RecursionError):
@@ -281,7 +256,3 @@ def _stamp(path: Path) -> tuple | None:
     except FileNotFoundError:
         return None
     return info.st_mtime_ns, info.st_size, info.st_ino
-
-
-def _key(path: Path) -> str:
-    return os.path.abspath(path)

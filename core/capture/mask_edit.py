@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether only the part of the maps that a mask edit touched can be solved again: when all but the artist's masks is as
-it was at the last solve. The proposal has to be, too: what the artist added to it, the light is held back less.
+"""Decide whether only the part of the maps that a mask edit touched can be solved again.
 
-Ground floor: standard library only. What the last solve found stands in maps/solved.safetensors, with the conditions it
-was found under.
+It can if all but the artist's masks is as it was at the last solve: maps/solved.safetensors has the state of that
+solve, with its conditions. The proposal counts too: the light is held back less in what the artist added to it.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ PAINTED = ("shadow_mask.png", "protect_mask.png")
 
 
 def obstacle(capture: Capture, settings: Settings) -> str:
-    """Why the edited part cannot be solved alone, as a sentence; '' where it can."""
+    """Return why the edited part cannot be solved alone, as a sentence, or ''."""
     if settings.solve.prior:
         return "The authors' prior works in the UVs of another mesh."
     before = _stored(capture.solved)
@@ -38,13 +37,13 @@ def obstacle(capture: Capture, settings: Settings) -> str:
 
 
 def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
-    """All that a solve depends on beside the painted masks: name -> hash."""
+    """Return all that a solve depends on beside the painted masks: name -> hash."""
     stage = stages.by_name("solve")
-    chosen = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
+    own = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
     files = {
         name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.optional_reads) if name not in PAINTED
     }
-    inputs = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
+    inputs = {**files, "the solver's settings": own, "the solver's code": code_key(stage.module)}
     return {
         name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest()
         for name, value in inputs.items()
@@ -52,7 +51,7 @@ def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
 
 
 def _stored(path: Path) -> dict | None:
-    """The conditions in a safetensors file's header: 8 bytes of length, then JSON; None where there are none."""
+    """Read the conditions from a safetensors file's header: 8 bytes of length, then JSON; None without any."""
     try:
         with open(require_regular(path), "rb") as file:
             (length,) = struct.unpack("<Q", file.read(8))

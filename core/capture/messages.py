@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a worker says: one JSON line per message, a closed set of kinds, and how a stage reports.
+"""The worker's protocol, one JSON line per message, and the Reporter by which a stage sends it.
 
-Ground floor: standard library only. A job ends with exactly one of Done, Cancelled or Failed.
+A job ends with exactly one of Done, Cancelled or Failed.
 """
 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 
@@ -20,10 +21,11 @@ NO_MEMORY = (
     "bad_alloc",
     "unable to allocate",
 )
+"""Words of Python, torch, OpenCV and NumPy."""
 
 
 class Problem(Exception):
-    """A failure the user can act on: what is wrong, and what to do about it. Never shown as a traceback."""
+    """Failure the user can act on: a problem and its remedy, both whole sentences."""
 
     def __init__(self, problem: str, remedy: str):
         super().__init__(f"{problem} {remedy}")
@@ -32,22 +34,22 @@ class Problem(Exception):
 
 
 def out_of_memory(error: BaseException) -> bool:
-    """Whether Python, torch, OpenCV or NumPy say with it that memory did not suffice."""
+    """Return whether an error of any library means that memory ran out."""
     return isinstance(error, MemoryError) or any(words in str(error).lower() for words in NO_MEMORY)
 
 
 def name_some(names: list[str], most: int = 4) -> str:
-    """The first of the names, and how many more there are."""
+    """Join the first names, and count the others."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 class CancelledError(Exception):
-    """Raised by `Reporter` inside a stage once the user has asked to stop."""
+    """Raised by `Reporter` inside a stage after the user cancelled."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """A stage has done `done` of `of` units of work; `eta_s` seconds remain for the stage (None: unknown)."""
+    """`done` of `of` units of a stage are finished; `eta_s` seconds remain (None: unknown)."""
 
     stage: str
     done: float
@@ -58,14 +60,14 @@ class Progress:
 
 @dataclass(frozen=True)
 class Log:
-    """One line for whoever reads along."""
+    """One line for the log."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Preview:
-    """A picture of the capture folder has new content; `path` is relative to the capture."""
+    """New content of a picture in the capture; `path` is relative to the capture folder."""
 
     stage: str
     path: str
@@ -73,7 +75,7 @@ class Preview:
 
 @dataclass(frozen=True)
 class StageDone:
-    """A stage ended; `skipped` when it was fresh. `figures` are its quality figures."""
+    """End of a stage; `skipped` if it was fresh. `figures` are its quality figures."""
 
     stage: str
     seconds: float
@@ -83,21 +85,21 @@ class StageDone:
 
 @dataclass(frozen=True)
 class Done:
-    """The job ended well."""
+    """Success of the job."""
 
     seconds: float
 
 
 @dataclass(frozen=True)
 class Cancelled:
-    """The job ended because the user asked; what was finished is kept."""
+    """End of a job that the user cancelled; finished stages are kept."""
 
     stage: str
 
 
 @dataclass(frozen=True)
 class Failed:
-    """The job ended with a problem and its remedy, both whole sentences."""
+    """Failure of the job by a Problem."""
 
     stage: str
     problem: str
@@ -110,12 +112,12 @@ Message = Progress | Log | Preview | StageDone | Done | Cancelled | Failed
 
 
 def to_line(message: Message) -> str:
-    """One JSON line without its newline; non-ASCII escaped, so that any pipe encoding carries it."""
+    """Write a message as one line of ASCII JSON, without its newline."""
     return json.dumps({"kind": type(message).__name__, **asdict(message)})
 
 
 def from_line(line: str) -> Message:
-    """The message of one line. Raises ValueError for anything that is not one."""
+    """Parse the message of one line. Raises ValueError for anything else."""
     fields = json.loads(line)
     if not isinstance(fields, dict) or fields.get("kind") not in KINDS:
         raise ValueError(f"not a worker message: {line[:80]!r}")
@@ -127,10 +129,10 @@ def from_line(line: str) -> Message:
 
 
 class Reporter:
-    """How a stage speaks: progress, log lines, previews and quality figures; and where it hears of a cancel.
+    """Progress, log, previews, quality figures and findings of a stage.
 
-    Every call but `figure` raises CancelledError once `cancelled()` is true, so a stage that reports often
-    (several times a second) can be stopped at any report without code of its own.
+    Every call but `figure` raises CancelledError once `cancelled()` is true, so a stage that reports several times a
+    second needs no code of its own for a cancel.
     """
 
     def __init__(
@@ -138,28 +140,27 @@ class Reporter:
         stage: str,
         emit: Callable[[Message], None] = lambda message: None,
         cancelled: Callable[[], bool] = lambda: False,
-        clock: Callable[[], float] | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ):
-        import time
-
         self.stage = stage
         self.figures: dict = {}
         self.findings: list[dict] = []
         self._emit = emit
         self._cancelled = cancelled
-        self._clock = clock or time.monotonic
-        self._first: tuple[float, float] | None = None  # the first units that were reported as done, and when
-        self._last = (0.0, 0.0)  # what was reported as done before, and of how many
+        self._clock = clock
+        self._first: tuple[float, float] | None = None  # first units reported as done, and when
+        self._last = (0.0, 0.0)  # previous units, and of how many
 
     def check(self) -> None:
-        """Raises CancelledError if the user asked to stop."""
+        """Raise CancelledError if the user cancelled."""
         if self._cancelled():
             raise CancelledError(self.stage)
 
     def progress(self, done: float, of: float, text: str = "") -> None:
-        """`done` of `of` equal units are finished. The ETA is what is left at the pace since the first finished unit
-        was reported: what comes before it (reading, or going on from a checkpoint) says nothing about the pace. A stage
-        begins another count by another `of`, or from less than was done."""
+        """Report `done` of `of` equal units. A new `of`, or a smaller `done`, begins another count.
+
+        The ETA follows the pace since the first finished unit: reading files, or units of a checkpoint, do not count.
+        """
         self.check()
         now = self._clock()
         if of != self._last[1] or done < self._last[0]:
@@ -172,24 +173,23 @@ class Reporter:
         self._emit(Progress(self.stage, float(done), float(of), text, eta))
 
     def log(self, text: str) -> None:
+        """Log one line."""
         self.check()
         self._emit(Log(text))
 
     def preview(self, path: str) -> None:
-        """`path` is relative to the capture folder."""
+        """Announce a picture; `path` is relative to the capture folder."""
         self.check()
         self._emit(Preview(self.stage, path))
 
     def figure(self, name: str, value) -> None:
-        """A quality figure (JSON value) for capture.json and the report; a name of lower_case words with its unit
-        last."""
+        """Record a quality figure, a JSON value, for capture.json and the report. The unit ends its name."""
         self.figures[name] = value
 
     def finding(self, problem: str, remedy: str, frames: Collection[str] = ()) -> None:
-        """What is wrong with this capture though it can be used, how to shoot it better (both whole sentences), and the
-        frames it is seen in.
+        """Record a flaw of a usable capture, how to film it better, and the frames that show it.
 
-        Kept in capture.json, listed at the top of the report, and logged.
+        It is logged, kept in capture.json and listed at the top of the report.
         """
         self.findings.append({"problem": problem, "remedy": remedy, "frames": list(frames)})
         self.log(f"{problem} {remedy}")

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which maps a head wears: those at 4K where they were made of the solved ones, else the solved ones.
+"""Select the maps for the material: those at 4K if they were made of the solved ones, else the solved ones.
 
-Ground floor: standard library only. A module of its own, which no stage imports, so that a change of it makes nobody's
-maps older.
+No stage imports this module, so changing it makes no stage older.
 """
 
 from __future__ import annotations
@@ -18,12 +17,11 @@ WORN = "diffuse_albedo.png", "specular_albedo.png", "normal.png"
 
 
 def find_newest_maps(capture: Capture) -> list[Path]:
-    """The capture's WORN maps, all of one folder, whether or not they are there: of maps_4k/ if it is complete and was
-    made of those in maps/, else of maps/.
+    """Return the WORN maps of maps_4k/ if it is complete and was made of those in maps/, else of maps/.
 
-    What it was made of tells capture.json by content, for a copy of a capture has files of any times. Only where that
-    does not say (maps from elsewhere) must the times do. Solved maps that are gone contradict
-    nothing. Raises Problem for a damaged capture.json, OSError for files that cannot be read.
+    capture.json tells by content what maps_4k/ was made of; times decide only for maps from elsewhere, because a copy
+    of a capture may have any. Missing solved maps contradict nothing. Raises Problem for a damaged capture.json,
+    OSError for unreadable files.
     """
     solved, enlarged = ([folder / name for name in WORN] for folder in (capture.maps, capture.maps_4k))
     if not all(path.is_file() for path in enlarged):

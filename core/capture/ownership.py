@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whose a file in a capture is. WildCap deletes and replaces what it wrote, as it wrote it, and nothing else.
+"""Track which files of a capture WildCap wrote: it deletes and replaces only those, and only if unchanged.
 
-The capture's written.jsonl says what that is: one line for each file, with its content's hash, added before the file
-gets its name. So what a killed stage left is known to be ours, and a file that somebody put there or changed is known
-not to be. Standard library only.
+written.jsonl in the capture has a line for each file, with its content's hash, added before the file gets its name. So
+a killed stage's leftovers are known to be ours, and a file that somebody added or changed is known not to be.
 """
 
 from __future__ import annotations
@@ -24,18 +23,16 @@ from .regular_files import require_regular
 
 RECORD = "written.jsonl"
 KEPT = "kept"
-"""Folder of a capture for what was in the way: files of ours that somebody changed, and others under a name of ours."""
+"""Folder for files kept aside: ours that somebody changed, and foreign ones under a name of ours."""
 BOOKS = frozenset({"capture.json", "job.json", "lock", RECORD})
-"""The capture's own books, which are ours whatever stands in them."""
+"""The capture's own records, which are ours whatever their content."""
 LONG_BYTES = 1 << 18
-"""Of the record, from which on it is shortened: some thousand lines, of a long film's frames or of a day's painting."""
+"""Size from which the record is shortened: some thousand lines."""
 
 
 def root_of(path: Path) -> Path | None:
-    """The capture that a path lies in, if it lies in one; not what lies in a temporary folder of one, which is ours as
-    a whole."""
-    parents = Path(os.path.abspath(path)).parents
-    for folder in parents:
+    """Return the capture that contains a path, or None; a temporary folder of a capture does not count."""
+    for folder in Path(os.path.abspath(path)).parents:
         if (folder / "capture.json").is_file():
             return folder
         if folder.name.startswith("."):
@@ -44,45 +41,44 @@ def root_of(path: Path) -> Path | None:
 
 
 def note_written(root: Path, hashes: dict[str, str]) -> None:
-    """Adds files (path in the capture -> content hash) to the record, before they get their names."""
+    """Record files (path in the capture -> content hash) before they get their names."""
     _append(root, [{"path": path, "hash": digest} for path, digest in hashes.items() if path not in BOOKS])
 
 
 def note_temporary(root: Path, path: Path) -> None:
-    """Adds a temporary file or folder of this process to the record, before it is made."""
+    """Record a temporary file or folder of this process before it exists."""
     _append(root, [{"temporary": path_inside(root, path), "by": identify_process()}])
 
 
 def claim_all(folder: Path) -> None:
-    """Starts the record of a capture that was put together elsewhere by us: all that lies in it is ours."""
+    """Record all files of a folder as ours, for a capture assembled elsewhere."""
     note_written(folder, {path_inside(folder, path): read_hash(path) for path in files_in(folder)})
 
 
 def is_ours(root: Path, path: Path) -> bool:
-    """Whether a file of the capture is as we wrote it."""
+    """Return whether a file of the capture is as we wrote it."""
     inside = path_inside(root, path)
     return inside in BOOKS or _is_as_written(root, path, inside)
 
 
-def keep_aside(root: Path, path: Path, was: str = "") -> Path:
-    """Moves a file out of the way of one of ours, to kept/ under its own name (or `was`, a path in the capture), or
-    with a number where that is taken. Returns its new place."""
-    place = root / KEPT / (was or path_inside(root, path))
+def keep_aside(root: Path, path: Path, was: str = "") -> None:
+    """Move a file to kept/, under its own path in the capture or `was`, numbered if that is taken."""
+    place = free_place(root / KEPT / (was or path_inside(root, path)))
     place.parent.mkdir(parents=True, exist_ok=True)
-    free = free_place(place)
-    os.replace(path, free)
-    return free
+    os.replace(path, place)
 
 
 def free_place(place: Path) -> Path:
-    """The place, with a number where it is taken."""
+    """Return a path itself, or numbered if it is taken."""
     numbered = (place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000))
     return next(free for free in (place, *numbered) if not os.path.lexists(free))
 
 
 def clear_replaced(root: Path, replaced: Path, path: Path) -> None:
-    """Empties `replaced`, the folder that was at `path` before a new one took its name. What is ours goes, what
-    somebody changed is kept aside, and a file that others put there moves back to where it was."""
+    """Empty `replaced`, the folder that was at `path` before.
+
+    Our files are deleted, changed ones are kept aside, and foreign ones move back.
+    """
     for file in files_in(replaced):
         was = path / file.relative_to(replaced)
         inside = path_inside(root, was)
@@ -97,21 +93,18 @@ def clear_replaced(root: Path, replaced: Path, path: Path) -> None:
 
 
 def remove_empty_folders(folder: Path) -> None:
-    """A folder and those in it, as far as nothing else is left in them."""
-    for each in (
-        *sorted((path for path in folder.rglob("*") if path.is_dir() and not path.is_symlink()), reverse=True),
-        folder,
-    ):
-        with contextlib.suppress(OSError):  # it is not empty
+    """Remove a folder and those in it as far as they are empty."""
+    folders = [path for path in folder.rglob("*") if path.is_dir() and not path.is_symlink()]
+    for each in [*sorted(folders, reverse=True), folder]:
+        with contextlib.suppress(OSError):  # not empty
             each.rmdir()
 
 
 def clear_leftovers(root: Path) -> None:
-    """Removes the temporary files of processes that have ended, and takes back a folder that one of them had just put
-    aside."""
-    for left, by in read_record(root)[1].items():
-        path = root / left
-        # no link leads out of the capture
+    """Remove the temporary files of processes that have ended, and recover folders that they had put aside."""
+    for name, by in read_record(root)[1].items():
+        path = root / name
+        # a link must not lead out of the capture
         if is_gone(by) and os.path.lexists(path) and path.parent.resolve().is_relative_to(root.resolve()):
             if path.suffix == ".old":
                 take_back(root, path)
@@ -123,9 +116,10 @@ def clear_leftovers(root: Path) -> None:
 
 
 def _shorten(root: Path) -> None:
-    """Rewrites a record that has grown long without what no file answers to any more. Only under the lease; a line that
-    another process of the user adds in the same moment is lost, and its file then counts as changed, which loses
-    nothing."""
+    """Drop lines without a file from a long record.
+
+    Needs the lease. A line that another process adds meanwhile is lost: its file counts as changed, which is harmless.
+    """
     record = root / RECORD
     if not record.is_file() or record.stat().st_size < LONG_BYTES:
         return
@@ -143,8 +137,7 @@ def _shorten(root: Path) -> None:
 
 
 def take_back(root: Path, replaced: Path) -> None:
-    """A folder that was put aside for a new one: finishes that, or undoes it where the new one never came. A link is
-    kept aside as it is."""
+    """Finish replacing a folder that was put aside, or undo it if the new one never came. A link is kept aside."""
     path = replaced.with_name(replaced.name[1 : -len(".old")])
     if replaced.is_symlink():
         keep_aside(root, replaced, path_inside(root, path))
@@ -155,7 +148,7 @@ def take_back(root: Path, replaced: Path) -> None:
 
 
 def read_record(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:
-    """What was written: path -> content hashes; and what was temporary: path -> process."""
+    """Return the written files, path -> content hashes, and the temporary ones, path -> process."""
     record = root / RECORD
     try:
         info = require_regular(record).stat()
@@ -166,11 +159,11 @@ def read_record(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:
 
 @lru_cache(maxsize=8)
 def _parse(record: Path, size: int, changed: int) -> tuple[dict[str, set[str]], dict[str, dict]]:
-    """The record as it was at that size and time."""
+    """Parse the record as it was at that size and time."""
     written: dict[str, set[str]] = {}
     temporary: dict[str, dict] = {}
     for line in record.read_text(encoding="utf-8", errors="replace").splitlines():
-        with contextlib.suppress(ValueError, KeyError, TypeError):  # a line that was cut off when its writer was killed
+        with contextlib.suppress(ValueError, KeyError, TypeError):  # cut off when its writer was killed
             entry = json.loads(line)
             if "path" in entry:
                 written.setdefault(entry["path"], set()).add(entry["hash"])
@@ -180,57 +173,52 @@ def _parse(record: Path, size: int, changed: int) -> tuple[dict[str, set[str]], 
 
 
 def _is_temporary_name(path: str) -> bool:
-    """Whether it can be a temporary file or folder of ours: in the capture, and hidden. A record may come from a
-    stranger with the capture it lies in."""
+    """Return whether a path can be a temporary file of ours: a stranger's record may name anything."""
     parts = PurePosixPath(path).parts
-    return (
-        bool(parts)
-        and not {"..", "/"} & set(parts)
-        and "\\" not in path
-        and ":" not in path
-        and parts[-1].startswith(".")
-    )
+    inside = bool(parts) and not {"..", "/"} & set(parts) and "\\" not in path and ":" not in path
+    return inside and parts[-1].startswith(".")
 
 
 def _append(root: Path, lines: Iterable[dict]) -> None:
-    """In one write, so that the lines of two processes do not mix. Raises OSError where they do not fit on the disk."""
+    """Append lines in one write, so that those of two processes do not mix. Raises OSError if the disk is full."""
     text = b"".join(json.dumps(line).encode() + b"\n" for line in lines)
     if text:
         with open(root / RECORD, "ab+", buffering=0) as file:
             end = file.seek(0, os.SEEK_END)
             file.seek(max(end - 1, 0))
-            if end and file.read(1) != b"\n":  # a line that did not fit on the disk, or whose writer was killed
+            if end and file.read(1) != b"\n":  # cut off by a full disk or a kill
                 text = b"\n" + text
             if file.write(text) < len(text):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(root / RECORD))
 
 
 def path_inside(root: Path, path: Path) -> str:
-    """A path as the record has it: relative to the capture, with forward slashes."""
+    """Return a path relative to the capture, with forward slashes, as the record has it."""
     return Path(os.path.relpath(os.path.abspath(path), os.path.abspath(root))).as_posix()
 
 
 def _is_as_written(root: Path, file: Path, inside: str) -> bool:
-    """Whether a file, which is or was at `inside`, holds what we wrote there. A link is nobody's but whoever made
-    it."""
+    """Return whether a file, which is or was at `inside`, has the content that we wrote there. A link never has."""
     return not file.is_symlink() and read_hash(file) in read_record(root)[0].get(inside, ())
 
 
 def is_leftover(root: Path, path: Path) -> bool:
-    """Whether a file is temporary, or lies in a temporary folder, and its process has ended. Not in a folder that was
-    put aside, which may hold files of others."""
+    """Return whether a file is, or lies in, a temporary one of an ended process.
+
+    A folder that was put aside does not count: it may hold foreign files.
+    """
     inside = PurePosixPath(path_inside(root, path))
     owners = [
-        by for left, by in read_record(root)[1].items() if inside.is_relative_to(left) and not left.endswith(".old")
+        by for name, by in read_record(root)[1].items() if inside.is_relative_to(name) and not name.endswith(".old")
     ]
     return bool(owners) and not path.is_symlink() and all(is_gone(by) for by in owners)
 
 
 def files_in(folder: Path) -> list[Path]:
-    """All files and links in a folder and those below; what a link leads to is not looked at."""
+    """List all files and links below a folder, without following links."""
     return [path for path in sorted(folder.rglob("*")) if path.is_file() or path.is_symlink()]
 
 
 def kept_files(root: Path) -> set[str]:
-    """What was kept aside so far: paths in the capture."""
+    """Return the paths in the capture of all files kept aside."""
     return {path_inside(root, path) for path in files_in(root / KEPT)} if (root / KEPT).is_dir() else set()

@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths as a capture's own files hold them: relative to the capture where what they name would travel with it, so that
-a copy on another disk still works.
-
-Standard library only.
-"""
+"""Paths in a capture's own files: relative to the capture if the target would travel with it."""
 
 from __future__ import annotations
 
@@ -13,15 +9,13 @@ from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 
-from ..settings.settings import Settings
+from ..settings.settings import STAGE_KINDS
 
 
 def write_portable(path: str | Path, root: Path) -> str:
-    """A path for a file of the capture folder `root`: relative with forward slashes where both lie in one folder that
-    somebody may move, else absolute.
+    """Return a path for a file of the capture folder `root`: relative, with forward slashes, if both can move together.
 
-    Nobody moves a disk's top folder, a home folder or the one that holds the homes: what has only these in common is
-    not moved together.
+    Else it is absolute: nobody moves a disk's top folder, a home folder or the parents of one.
     """
     path, root = os.path.abspath(os.path.expanduser(path)), os.path.abspath(root)
     try:
@@ -35,21 +29,17 @@ def write_portable(path: str | Path, root: Path) -> str:
 
 
 def read_portable(text: str, root: Path) -> Path:
-    """The absolute path that `write_portable` wrote for the capture folder `root`."""
+    """Return the absolute path that `write_portable` wrote for the capture folder `root`."""
     return Path(os.path.abspath(os.path.join(root, text)))
 
 
 def convert_settings(by_stage: dict, convert: Callable[[str], str]) -> dict:
-    """The settings of stages, {stage: {name: value}} among other things, with `convert` applied to every path that is
-    given."""
-    kinds = {name: getattr(Settings(), name, None) for name in by_stage}
-    paths = {
-        name: {f.name for f in fields(kind) if "path" in f.metadata} if hasattr(kind, "__dataclass_fields__") else set()
-        for name, kind in kinds.items()
-    }
-    return {
-        stage: {name: convert(value) if name in paths[stage] and value else value for name, value in chosen.items()}
-        if isinstance(chosen, dict)
-        else chosen
-        for stage, chosen in by_stage.items()
-    }
+    """Apply `convert` to every path that is set in {stage: {name: value}}, which may hold other things too."""
+    converted = dict(by_stage)
+    for stage, settings in by_stage.items():
+        if isinstance(settings, dict):
+            paths = {f.name for f in fields(STAGE_KINDS[stage]) if "path" in f.metadata} if stage in STAGE_KINDS else ()
+            converted[stage] = {
+                name: convert(value) if name in paths and value else value for name, value in settings.items()
+            }
+    return converted

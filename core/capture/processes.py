@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which process works somewhere, told so that nothing else is ever taken for it: its host since that was started, its
-number, and when it began.
+"""Identify processes by host, number and beginning, so that none is mistaken for another.
 
-Standard library only. A process number alone is given to another process sooner or later, and after a restart of the
-machine at once.
+A process number alone is reused sooner or later, and after a restart of the machine at once.
 """
 
 from __future__ import annotations
@@ -17,14 +15,15 @@ from functools import cache
 from pathlib import Path
 
 QUERY_LIMITED_INFORMATION, ACCESS_DENIED, STILL_ACTIVE = 0x1000, 5, 259
-"""Of Windows: the right to ask a process when it began, the error of who does not have it, and the exit code of a
-process that runs."""
+"""Of Windows: the right to query a process, the error without it, and the exit code of a running process."""
 
 
 @cache
 def name_host() -> str:
-    """NAME/RUN/SPACE: this machine's name and, where it tells them, the identity of its present run and of the space in
-    which processes have numbers (containers of one machine have their own)."""
+    """Return NAME/RUN/SPACE: the machine's name and, if available, the ids of its boot and of the process namespace.
+
+    Containers on one machine have process numbers of their own.
+    """
     run = space = ""
     with contextlib.suppress(OSError):
         run = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()[:8]
@@ -34,19 +33,17 @@ def name_host() -> str:
 
 
 def identify_process() -> dict:
-    """This process as a file holds it: {"host", "pid", "began"}."""
+    """Return this process as files record it: {"host", "pid", "began"}."""
     return {"host": name_host(), "pid": os.getpid(), "began": _began(os.getpid())}
 
 
 def is_gone(process: dict) -> bool:
-    """Whether a process is certainly not running any more. One of another machine or container may be: only those
-    beside us can be asked after."""
-    name, run, space = _place(process)
-    _, our_run, our_space = _place({"host": name_host()})
-    if name != socket.gethostname():
+    """Return whether a process has certainly ended; one of another machine or container cannot be checked."""
+    (name, run, space), (our_name, our_run, our_space) = _split(process.get("host")), _split(name_host())
+    if name != our_name:
         return False
     if run and run != our_run:
-        return True  # this machine has been started again since
+        return True  # the machine was restarted
     if space and space != our_space:
         return False
     began = process.get("began")
@@ -54,29 +51,25 @@ def is_gone(process: dict) -> bool:
 
 
 def is_at_work(process: dict) -> bool:
-    """Whether a process runs beside us and has not been stopped: then it is awake when we are."""
-    name, _, space = _place(process)
-    if name != socket.gethostname() or space not in ("", _place({"host": name_host()})[2]) or is_gone(process):
+    """Return whether a process runs beside us and is not stopped."""
+    (name, _, space), (our_name, _, our_space) = _split(process.get("host")), _split(name_host())
+    if name != our_name or space not in ("", our_space) or is_gone(process):
         return False
     if process.get("began") and not _began(process["pid"]):
-        return False  # of another user, whose processes are not told: the number may have gone to another
+        return False  # hidden, of another user: the number may be another process's
     with contextlib.suppress(OSError, IndexError):
-        return Path(f"/proc/{process['pid']}/stat").read_bytes().rpartition(b") ")[2][:1] not in (b"T", b"t")
+        return _read_stat(process["pid"])[0] not in (b"T", b"t")
     return True
 
 
-def _place(process: dict) -> tuple[str, str, str]:
-    """Name, run and space of a process's host; '' for what is not told."""
-    name, _, rest = str(process.get("host")).partition("/")
-    run, _, space = rest.partition("/")
-    return name, run, space
+def _split(host) -> list[str]:
+    """Split NAME/RUN/SPACE; '' for unknown parts."""
+    return (str(host).split("/", 2) + ["", ""])[:3]
 
 
 def _began(pid: int) -> str:
-    """When a process of this machine began, in whatever form the system tells it; '' where it does not."""
-    if pid == os.getpid():
-        return _own_beginning(pid)
-    return _ask_beginning(pid)
+    """Return when a process of this machine began, in the system's own form, or ''."""
+    return _own_beginning(pid) if pid == os.getpid() else _ask_beginning(pid)
 
 
 @cache
@@ -88,25 +81,29 @@ def _ask_beginning(pid: int) -> str:
     if os.name == "nt":
         return _ask_windows(pid)[0]
     with contextlib.suppress(OSError, IndexError):
-        # Linux: clock ticks since the machine was started
-        return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2].split()[19].decode()
+        return _read_stat(pid)[19].decode()  # clock ticks since the boot
     with contextlib.suppress(OSError, subprocess.SubprocessError):
-        # in the same words for every program that asks, whatever its language and time zone
         completed = subprocess.run(
             ["ps", "-o", "lstart=", "-p", str(pid)],
             capture_output=True,
             text=True,
             timeout=5,
-            env={**os.environ, "LC_ALL": "C", "TZ": "UTC"},
+            env={**os.environ, "LC_ALL": "C", "TZ": "UTC"},  # the same text in every language and time zone
         )
         return completed.stdout.strip()
     return ""
 
 
+def _read_stat(pid: int) -> list[bytes]:
+    """Return the fields of Linux's /proc/PID/stat from the state on. Raises OSError on other systems."""
+    return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2].split()
+
+
 def _ask_windows(pid: int) -> tuple[str, bool]:
-    """When a process of this machine began, '' where that is not told, and whether it runs. One that has ended is there
-    for as long as somebody holds a handle of it, as Blender does of its worker; one of another user may not be asked
-    and does run."""
+    """Return when a process of this machine began, or '', and whether it runs.
+
+    An ended one exists while somebody holds a handle, as Blender does of its worker; one of another user runs.
+    """
     import ctypes
     from ctypes import wintypes
 
@@ -118,15 +115,15 @@ def _ask_windows(pid: int) -> tuple[str, bool]:
         return "", ctypes.get_last_error() == ACCESS_DENIED
     handle, code, times = wintypes.HANDLE(handle), wintypes.DWORD(), [wintypes.FILETIME() for _ in range(4)]
     try:
-        told = kernel.GetProcessTimes(handle, *map(ctypes.byref, times))
+        dated = kernel.GetProcessTimes(handle, *map(ctypes.byref, times))
         runs = not kernel.GetExitCodeProcess(handle, ctypes.byref(code)) or code.value == STILL_ACTIVE
-        return f"{times[0].dwHighDateTime}:{times[0].dwLowDateTime}" if told else "", runs
+        return f"{times[0].dwHighDateTime}:{times[0].dwLowDateTime}" if dated else "", runs
     finally:
         kernel.CloseHandle(handle)
 
 
 def _runs(pid: int) -> bool:
-    if not isinstance(pid, int) or pid <= 0:  # to the system, all processes or a group of them
+    if not isinstance(pid, int) or pid <= 0:  # kill(2) would mean a group of processes
         return False
     if os.name == "nt":
         return _ask_windows(pid)[1]
@@ -135,7 +132,6 @@ def _runs(pid: int) -> bool:
             os.kill(pid, 0)
     except (ProcessLookupError, OverflowError, TypeError, ValueError):
         return False
-    # Linux: a process that has ended, but that nobody has asked after, as in a container without an init
     with contextlib.suppress(OSError, IndexError):
-        return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2][:1] != b"Z"
+        return _read_stat(pid)[0] != b"Z"  # a zombie has ended, as in a container without an init
     return True

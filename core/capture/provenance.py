@@ -1,14 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""provenance.json of a delivery: what the head was made from, by what, and under which licences, so that it can be told
-years later.
+"""Write provenance.json of a delivery: what the head was made from, by what, and under which licences.
 
-Ground floor: standard library only. Files are named by their name and SHA-256, never by where they lie: no folder, no
-user's name leaves the machine.
+Files are named by name and SHA-256 only: no folder and no user's name leaves the machine.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import platform
@@ -32,19 +31,7 @@ CHUNK_BYTES = 1 << 22  # read at once
 
 
 def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Callable[[], None]) -> dict:
-    """Everything but the delivered files.
-
-    Parameters
-    ----------
-    capture : that is delivered
-    plan : of the delivery
-    settings : that say whose prior was used
-    tick : is called between two pieces of work, and may raise to stop
-
-    Returns
-    -------
-    provenance.json's content.
-    """
+    """Return the content of provenance.json but for the delivered files. `tick` is called often, and may raise."""
     record = capture.read()
     return {
         "made_by": MADE_BY,
@@ -59,7 +46,7 @@ def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Call
             "unit": plan.unit,
             "drops": list(plan.format.drops),
         },
-        "versions": {"WildCap": __version__, "Python": platform.python_version(), "packages": packages()},
+        "versions": {"WildCap": __version__, "Python": platform.python_version(), "packages": _packages()},
         "capture": {"name": capture.root.name, "sources": _sources(capture.source, record, tick)},
         "stages": {name: _stage(done) for name, done in record["stages"].items()},
         "weights": _weights(record, settings, tick),
@@ -73,36 +60,32 @@ def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Call
 
 
 def finish(folder: Path, **versions: str) -> None:
-    """Adds the folder's files with their hashes, and the versions of what wrote the mesh. Raises Problem where it
-    cannot be written."""
-    told = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-    told["versions"] |= versions
-    told["files"] = {
+    """Add the folder's files with their hashes, and the versions of what wrote the mesh.
+
+    Raises Problem if it cannot be written.
+    """
+    record = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+    record["versions"] |= versions
+    record["files"] = {
         path.relative_to(folder).as_posix(): sha256(path, lambda: None)
         for path in sorted(folder.rglob("*"))
         if path.is_file() and path.name != PROVENANCE
     }
-    write_json(folder / PROVENANCE, told)
+    write_json(folder / PROVENANCE, record)
 
 
-def packages() -> dict[str, str]:
-    """The versions of the packages that the worker works with, as they are installed here."""
-    listed = HERE.parent / "requirements" / "worker.txt"
-    names = (
-        re.findall(r"^([A-Za-z0-9_-]+)==", listed.read_text(encoding="utf-8"), flags=re.MULTILINE)
-        if listed.is_file()
-        else []
-    )
-    versions = {}
-    for name in names:
-        try:
+def _packages() -> dict[str, str]:
+    """Return the installed versions of the worker's packages."""
+    requirements, versions = HERE.parent / "requirements" / "worker.txt", {}
+    text = requirements.read_text(encoding="utf-8") if requirements.is_file() else ""
+    for name in re.findall(r"^([A-Za-z0-9_-]+)==", text, flags=re.MULTILINE):
+        with contextlib.suppress(metadata.PackageNotFoundError):
             versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
     return versions
 
 
 def sha256(path: Path, tick: Callable[[], None]) -> str:
+    """Return the SHA-256 of a file; `tick` is called for every CHUNK_BYTES."""
     digest = hashlib.sha256()
     with open(path, "rb") as file:
         while piece := file.read(CHUNK_BYTES):
@@ -112,18 +95,17 @@ def sha256(path: Path, tick: Callable[[], None]) -> str:
 
 
 def _sources(source: Path | None, record: dict, tick: Callable[[], None]) -> list[dict]:
-    """The video or the photographs: name, size and hash; without the hash where they are not there any more, or have
-    changed since."""
+    """Return name, size and hash of the video or photographs; no hash if they have been deleted or changed."""
     sources = []
-    for name, size, known in record.get("source_stamp", []):
+    for name, size, digest in record.get("source_stamp", []):
         file = source / name if source is not None and source.is_dir() else source
-        there = file is not None and same_source([[name, size, known]], hash_source(file))
+        there = file is not None and same_source([[name, size, digest]], hash_source(file))
         sources.append({"name": name, "bytes": size, "sha256": sha256(file, tick) if there else "not there any more"})
     return sources
 
 
 def _stage(done: dict) -> dict:
-    """How a stage was run. What an artist keeps elsewhere is named without its folder."""
+    """Return how a stage was run; places outside of the capture are named without their folder."""
     settings = {
         name: re.split(r"[\\/]", value.rstrip("\\/"))[-1] if isinstance(value, str) else value
         for name, value in done["settings"].items()
@@ -138,17 +120,16 @@ def _stage(done: dict) -> dict:
 
 
 def _weights(record: dict, settings: Settings, tick: Callable[[], None]) -> list[dict]:
-    """The shipped networks that the finished stages may have used: hash, licence, data and the command that trained
-    them, from their cards."""
-    read = [name for stage in stages.STAGES if stage.name in record["stages"] for name in data_files(stage.module)]
-    names = dict.fromkeys(name for name in read if name.endswith(".safetensors"))
+    """Return the networks of the finished stages: hash, and licence, data and training command from their cards."""
+    finished = [stage for stage in stages.STAGES if stage.name in record["stages"]]
+    names = dict.fromkeys(name for stage in finished for name in data_files(stage.module))
     networks = []
-    for name in names:
-        file, card = HERE / name, (HERE / name).with_suffix(".json")
-        told = json.loads(card.read_text(encoding="utf-8")) if card.is_file() else {}
+    for file in (HERE / name for name in names if name.endswith(".safetensors")):
         if file.is_file():
-            said = {key: told[key] for key in ("licence", "data", "command", "notices") if key in told}
-            networks.append({"name": file.name, "sha256": sha256(file, tick), **said})
+            path = file.with_suffix(".json")
+            card = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+            facts = {key: card[key] for key in ("licence", "data", "command", "notices") if key in card}
+            networks.append({"name": file.name, "sha256": sha256(file, tick), **facts})
     if settings.solve.prior:
         networks.append({"name": "the authors' prior, from a folder of the artist's", "licence": "its authors'"})
     return networks

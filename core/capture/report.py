@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""report.html: one page with a picture and the figures of each stage; what a person looks at first.
+"""report.html: one page with a picture and the figures of each stage.
 
-Ground floor: standard library only. Pictures are embedded, so the page can be sent to somebody; it loads nothing.
+Pictures are embedded and nothing is loaded, so the page can be sent to somebody.
 """
 
 from __future__ import annotations
 
 import base64
-import html
 from dataclasses import asdict
+from html import escape
 from pathlib import Path
 
 from .. import __version__
@@ -22,22 +22,19 @@ from .messages import name_some
 
 
 def write(capture: Capture, settings: Settings) -> None:
-    """Writes the capture's report.html; `settings` decide which stages count as out of date. Raises Problem when it
-    cannot be written."""
+    """Write the report; `settings` decide which stages are out of date. Raises Problem if it cannot be written."""
     record = capture.read()
-    sections = "\n".join(
-        _section(capture, stage, record["stages"].get(stage.name), settings) for stage in stages.STAGES
-    )
+    sections = (_section(capture, stage, record["stages"].get(stage.name), settings) for stage in stages.STAGES)
     renders = _pictures(
         sorted(p for p in capture.renders.glob("*") if p.suffix.lower() in (".jpg", ".jpeg", ".png")), "Render"
     )
     page = PAGE.format(
-        title=html.escape(capture.root.stem),
-        source=html.escape(str(capture.source or "")),
+        title=escape(capture.root.stem),
+        source=escape(str(capture.source or "")),
         summary=_summary(record),
         style=STYLE,
         doctor=_doctor(record),
-        sections=sections,
+        sections="\n".join(sections),
         renders=f"<section><h2>Renders</h2>{renders}</section>" if renders else "",
         version=__version__,
     )
@@ -46,95 +43,71 @@ def write(capture: Capture, settings: Settings) -> None:
 
 
 def findings(record: dict) -> list[dict]:
-    """What capture.json says is wrong with a capture, worst first: [{"stage", "problem", "remedy", "frames"}].
+    """List the flaws of a capture: [{"stage", "problem", "remedy", "frames", "stopped"}].
 
-    First the problem that stopped the chain, if any, then what the stages found, in their order.
+    First the problem that stopped the chain, if any, then the findings of the stages in their order.
     """
     stopped = record.get("stopped")
-    faults = (
-        [
-            {
-                "stage": stopped["stage"],
-                "problem": stopped["problem"],
-                "remedy": stopped["remedy"],
-                "frames": [],
-                "stopped": True,
-            }
-        ]
-        if stopped
-        else []
-    )
+    faults = []
+    if stopped:
+        faults.append({**{key: stopped[key] for key in ("stage", "problem", "remedy")}, "frames": [], "stopped": True})
     for name in stages.NAMES:
-        here = record["stages"].get(name, {}).get("findings", [])
+        own = list(record["stages"].get(name, {}).get("findings", []))
         if stopped and stopped["stage"] == name:
-            here = here + stopped["findings"]
-        faults += [{"stage": name, **finding, "stopped": False} for finding in here]
+            own += stopped["findings"]
+        faults += [{"stage": name, **finding, "stopped": False} for finding in own]
     return faults
 
 
 def _doctor(record: dict) -> str:
-    """The section on what is wrong with the video and how to shoot it again."""
-    faults = findings(record)
-    if not faults:
-        return ""
-    items = "".join(map(_finding, faults))
-    return f'<section id="doctor"><h2>What is wrong with this capture</h2><ul>{items}</ul></section>'
+    """Return the section on what is wrong with the video and how to film it again."""
+    items = "".join(map(_finding, findings(record)))
+    return f'<section id="doctor"><h2>What is wrong with this capture</h2><ul>{items}</ul></section>' if items else ""
 
 
 def _finding(finding: dict) -> str:
-    stage = html.escape(stages.by_name(finding["stage"]).label)
+    stage = escape(stages.by_name(finding["stage"]).label)
     frames = name_some([Path(name).stem for name in finding["frames"]], 12)
     return (
-        f'<li{" class=stopped" if finding["stopped"] else ""}>{html.escape(finding["problem"])} '
-        f'<b>{html.escape(finding["remedy"])}</b> '
+        f'<li{" class=stopped" if finding["stopped"] else ""}>{escape(finding["problem"])} '
+        f'<b>{escape(finding["remedy"])}</b> '
         f'<small>{"Stopped at: " if finding["stopped"] else ""}{stage}'
-        f'{f"; frames {html.escape(frames)}" if frames else ""}</small></li>'
+        f'{f"; frames {escape(frames)}" if frames else ""}</small></li>'
     )
 
 
 def _summary(record: dict) -> str:
-    done = record["stages"].values()
-    seconds = sum(stage["seconds"] for stage in done)
-    last = max((stage["finished"].replace("T", " ") for stage in done), default="never")
-    return (
-        f"{len(record['stages'])} of {len(stages.STAGES)} stages finished in {_duration(seconds)}; "
-        f"last change {html.escape(last)}"
-    )
+    entries = record["stages"].values()
+    seconds = sum(entry["seconds"] for entry in entries)
+    last = max((entry["finished"].replace("T", " ") for entry in entries), default="never")
+    return f"{len(entries)} of {len(stages.STAGES)} stages finished in {_duration(seconds)}; last change {escape(last)}"
 
 
 def _section(capture: Capture, stage: stages.Stage, finished: dict | None, settings: Settings) -> str:
     verdict = capture.verdict(stage, settings)
     words = f"out of date: {verdict.reason()}" if verdict.state == STALE else verdict.reason() or verdict.state
-    head = (
-        f'<h2>{html.escape(stage.label)} <small '
-        f'class="{verdict.state.replace(" ", "-")}">{html.escape(words)}</small></h2>'
-    )
+    head = f'<h2>{escape(stage.label)} <small class="{verdict.state.replace(" ", "-")}">{escape(words)}</small></h2>'
     if finished is None:
         return f'<section id="{stage.name}">{head}</section>'
     pictures = _pictures(sorted(capture.pictures.glob(f"{stage.name}_*.jpg")), stage.label, len(stage.name) + 1)
-    changed = _rows(_changed(stage.name, finished["settings"]), tooltips(type(getattr(settings, stage.name))))
-    figures = _rows(finished["figures"])
+    defaults = asdict(getattr(Settings(), stage.name))
+    changed = {name: value for name, value in finished["settings"].items() if defaults.get(name) != value}
     return (
         f'<section id="{stage.name}">{head}<p class="when">{_duration(finished["seconds"])}, '
-        f'{html.escape(finished["finished"].replace("T", " "))}, '
-        f'on {html.escape(finished["device"])}, seed {html.escape(str(finished["seed"]))}</p>{pictures}'
-        + (f"<h3>Figures</h3>{figures}" if figures else "")
-        + (f"<h3>Settings other than the defaults</h3>{changed}" if changed else "")
+        f'{escape(finished["finished"].replace("T", " "))}, '
+        f'on {escape(finished["device"])}, seed {escape(str(finished["seed"]))}</p>{pictures}'
+        + _table("Figures", finished["figures"], {})
+        + _table("Settings other than the defaults", changed, tooltips(type(getattr(settings, stage.name))))
         + "</section>"
     )
 
 
-def _changed(stage: str, options: dict) -> dict:
-    defaults = asdict(getattr(Settings(), stage))
-    return {name: value for name, value in options.items() if defaults.get(name) != value}
-
-
 def _pictures(paths: list[Path], label: str, cut: int = 0) -> str:
     return "".join(
-        f'<figure><img loading="lazy" alt="{html.escape(label)}: {caption}" '
+        f'<figure><img loading="lazy" alt="{escape(label)}: {caption}" '
         f'src="{_embedded(path)}"><figcaption>{caption}</figcaption></figure>'
         for path in paths
-        for caption in [html.escape(path.stem[cut:].replace("_", " "))]
+        for caption in [escape(path.stem[cut:].replace("_", " "))]
     )
 
 
@@ -143,15 +116,15 @@ def _embedded(path: Path) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
-def _rows(entries: dict, notes: dict | None = None) -> str:
+def _table(title: str, entries: dict, notes: dict) -> str:
     if not entries:
         return ""
     rows = (
-        f'<tr title="{html.escape((notes or {}).get(name, ""))}"><th>{html.escape(name.replace("_", " "))}</th>'
+        f'<tr title="{escape(notes.get(name, ""))}"><th>{escape(name.replace("_", " "))}</th>'
         f'<td>{_value(value)}</td></tr>'
         for name, value in entries.items()
     )
-    return f"<table>{''.join(rows)}</table>"
+    return f"<h3>{title}</h3><table>{''.join(rows)}</table>"
 
 
 def _value(value) -> str:
@@ -162,8 +135,8 @@ def _value(value) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(_value(item) for item in value)
     if isinstance(value, dict):
-        return "; ".join(f"{html.escape(str(name))}: {_value(item)}" for name, item in value.items())
-    return html.escape(str(value))
+        return "; ".join(f"{escape(str(name))}: {_value(item)}" for name, item in value.items())
+    return escape(str(value))
 
 
 def _duration(seconds: float) -> str:

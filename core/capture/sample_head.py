@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample head: a finished capture that is shipped, and copied to where one may write."""
+"""The sample head: a finished capture that ships with WildCap and is copied to be worked on."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from .messages import Problem
 
 SHIPPED = Path(__file__).resolve().parents[1] / "assets" / "sample_head"
 VERTICES = "head_vertices.obj"
-"""In place of head.obj: where its vertices are. The rest of it is the built-in head's."""
+"""The vertices of its head.obj; the rest is the built-in head's."""
 
 
 def copy_to(folder: Path) -> Capture:
-    """A writable copy of the sample head in `folder`; one that is there already is kept with the artist's work in it.
-    Raises Problem where it is missing from the installation, or cannot be written."""
+    """Copy the sample head into `folder`, unless it is there already with the artist's work.
+
+    Raises Problem if it is missing from the installation, or cannot be written.
+    """
     if not (SHIPPED / VERTICES).is_file():
         raise Problem("The sample head is missing from this installation.", "Install the extension's zip again.")
     capture = Capture(folder / "sample_head.wildcap")
@@ -28,13 +30,13 @@ def copy_to(folder: Path) -> Capture:
         with replacing_folder(capture.root) as temporary:
             for path in ownership.files_in(SHIPPED):
                 place = temporary / path.relative_to(SHIPPED)
-                # not shutil.copytree: a folder of an extension that nobody may write to would get a copy like that
+                # shutil.copytree would copy the mode of a read-only extension
                 place.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(path, place)
-            moved = (temporary / VERTICES).read_text(encoding="ascii")
+            vertices = (temporary / VERTICES).read_text(encoding="ascii")
             built_in = (SHIPPED.parent / "head.obj").read_text(encoding="ascii").splitlines(keepends=True)
             rest = "".join(line for line in built_in if not line.startswith("v "))
-            (temporary / capture.head.name).write_text(moved + rest, encoding="ascii")
+            (temporary / capture.head.name).write_text(vertices + rest, encoding="ascii")
             (temporary / VERTICES).unlink()
             write_json(temporary / capture.json.name, capture.read())
             ownership.claim_all(temporary)

@@ -1,34 +1,37 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The chain as data: what each stage reads and writes, in order. A name ending in / is a folder.
+"""The chain: the ten stages from a video to a relightable head, and the files that each reads and writes.
 
-Ground floor: standard library only; a stage's module is imported by the worker alone.
+Start here. A stage is one function, `run(capture, settings, report)` of its module: it reads files of the capture
+folder, calls the rooms below and writes other files of that folder, and knows nothing of the stages beside it. So each
+can be rerun, skipped, replaced or tested alone, and what has to run again follows from this table (freshness.py). Names
+are relative to the capture folder; one that ends in / is a folder. This is data: only the worker imports the modules.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from .messages import Problem
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Stage:
-    """One step of the chain: `module`'s `run(capture, settings, report)` turns `reads` into `writes`.
+    """One step of the chain, or one tool.
 
-    `optional_reads` are read when they are there. `shared` names the shared settings (seed, device) the result depends
-    on; which code and which shipped files it depends on is read from the sources (code_key.py). `on_device` says that
-    it computes on the device, where there is another than the CPU.
+    Optional inputs are read if they exist. `shared` names the shared settings (seed, device) that the result depends
+    on; code_key.py derives from the sources which code and shipped files it depends on. `on_device`: it can compute on
+    a GPU.
     """
 
     name: str
     label: str
-    reads: tuple[str, ...]
-    writes: tuple[str, ...]
     module: str
-    optional_reads: tuple[str, ...] = field(default=())
-    shared: tuple[str, ...] = field(default=())
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
+    optional_reads: tuple[str, ...] = ()
+    shared: tuple[str, ...] = ()
     on_device: bool = False
 
 
@@ -40,60 +43,83 @@ MAPS = (
     "shading.exr",
     "confidence.png",
 )
+SOLVE_INPUTS = ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png")
+SOLVED = tuple(f"maps/{name}" for name in MAPS)
+ENLARGED = tuple(f"maps_4k/{name}" for name in MAPS)
 STRANDS = "strands.npz"
-"""Beside the delivered maps, where hair was found: the single hairs that Grow Hair brings in."""
+"""Single hairs for Grow Hair, beside the delivered maps; only if hair was found."""
 OPEN_EYES = ("head_open.obj", "eyes.json")
+"""Written by the registration if the eyes were open."""
 PARTS = "texture_parts.png"
-"""What the face parser saw in the frames, where they were at hand."""
+"""Brows, beard and head hair as the face parser found them; written with the texture if the frames exist."""
 
 STAGES = (
-    Stage("frames", "Frames", (), ("frames/",), "core.stages.frames"),
-    Stage("cameras", "Cameras", ("frames/",), ("cameras/",), "core.stages.cameras", shared=("seed",)),
+    # Extract upright sRGB frames of one exposure from the video or photographs, and select the views.
+    Stage(name="frames", label="Frames", module="core.stages.frames", writes=("frames/",)),
+    # Solve calibrated, upright, metric cameras, or import them from another program.
     Stage(
-        "scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.stages.scan", shared=("device",), on_device=True
+        name="cameras",
+        label="Cameras",
+        module="core.stages.cameras",
+        reads=("frames/",),
+        writes=("cameras/",),
+        shared=("seed",),
     ),
+    # Reconstruct a dense mesh by stereo or Gaussian surfels.
     Stage(
-        "registration",
-        "Head",
-        ("frames/", "cameras/", "scan.ply"),
-        ("head.obj", "landmarks.json"),
-        "core.stages.registration",
-        optional_reads=("landmarks_artist.json",),
-    ),
-    Stage(
-        "delight",
-        "Delight",
-        ("frames/", "cameras/", "head.obj"),
-        ("delit/",),
-        "core.stages.delight",
+        name="scan",
+        label="Scan",
+        module="core.stages.scan",
+        reads=("frames/", "cameras/"),
+        writes=("scan.ply",),
         shared=("device",),
         on_device=True,
     ),
+    # Fit the built-in head, with its fixed UVs, to the scan and the landmarks.
     Stage(
-        "texture",
-        "Texture",
-        ("frames/", "delit/", "cameras/", "head.obj"),
-        ("texture.exr", "texture.png", "texture_confidence.exr"),
-        "core.stages.texture",
-        on_device=True,
-        optional_reads=OPEN_EYES,
+        name="registration",
+        label="Head",
+        module="core.stages.registration",
+        reads=("frames/", "cameras/", "scan.ply"),
+        writes=("head.obj", "landmarks.json"),
+        optional_reads=("landmarks_artist.json",),
     ),
+    # Remove most of the light from the frames.
     Stage(
-        "shadow_mask",
-        "Shadow Mask",
-        ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"),
-        ("shadow_mask_auto.png",),
-        "core.stages.shadow_mask",
+        name="delight",
+        label="Delight",
+        module="core.stages.delight",
+        reads=("frames/", "cameras/", "head.obj"),
+        writes=("delit/",),
+        shared=("device",),
+        on_device=True,
+    ),
+    # Project the delit frames into the head's UVs: the texture I_UV of the paper, and its confidence.
+    Stage(
+        name="texture",
+        label="Texture",
+        module="core.stages.texture",
+        reads=("frames/", "delit/", "cameras/", "head.obj"),
+        writes=("texture.exr", "texture.png", "texture_confidence.exr"),
+        optional_reads=OPEN_EYES,
+        on_device=True,
+    ),
+    # Propose where shadows stayed baked in. In Blender the chain stops here for the artist.
+    Stage(
+        name="shadow_mask",
+        label="Shadow Mask",
+        module="core.stages.shadow_mask",
+        reads=("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"),
+        writes=("shadow_mask_auto.png",),
         optional_reads=("texture_filmed.png", PARTS, "frames/", *OPEN_EYES),
     ),
+    # Sample albedo, specular and normals jointly with the light, as in the paper.
     Stage(
-        "solve",
-        "Solve",
-        ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-        tuple(f"maps/{name}" for name in MAPS),
-        "core.stages.solve",
-        shared=("seed",),
-        on_device=True,
+        name="solve",
+        label="Solve",
+        module="core.stages.solve",
+        reads=SOLVE_INPUTS,
+        writes=SOLVED,
         optional_reads=(
             "shadow_mask.png",
             "protect_mask.png",
@@ -104,96 +130,90 @@ STAGES = (
             "delit/",
             *OPEN_EYES,
         ),
+        shared=("seed",),
+        on_device=True,
     ),
+    # Enlarge the maps to 4K; find hair, the skin below it, and strands.
     Stage(
-        "upscale",
-        "4K Maps",
-        ("head.obj", *(f"maps/{name}" for name in MAPS)),
-        tuple(f"maps_4k/{name}" for name in MAPS),
-        "core.stages.upscale",
+        name="upscale",
+        label="4K Maps",
+        module="core.stages.upscale",
+        reads=("head.obj", *SOLVED),
+        writes=ENLARGED,
+        optional_reads=("texture_confidence.exr", "texture_detail.exr", PARTS),
         shared=("seed", "device"),
         on_device=True,
-        optional_reads=("texture_confidence.exr", "texture_detail.exr", PARTS),
     ),
+    # Bake the maps into the UVs of the artist's own mesh, and texture the scan.
     Stage(
-        "transfer",
-        "Delivery",
-        ("head.obj", *(f"maps/{name}" for name in MAPS)),
-        ("delivery/",),
-        "core.stages.transfer",
-        optional_reads=(
-            *(f"maps_4k/{name}" for name in MAPS),
-            "own_head.obj",
-            "own_head.json",
-            "scan.ply",
-            "frames/",
-            "cameras/",
-        ),
+        name="transfer",
+        label="Delivery",
+        module="core.stages.transfer",
+        reads=("head.obj", *SOLVED),
+        writes=("delivery/",),
+        optional_reads=(*ENLARGED, "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/"),
     ),
 )
 
 TOOLS = (
     Stage(
-        "mask_edges",
-        "Snap to Edges",
-        ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-        ("shadow_mask_edges.png",),
-        "core.stages.solve.snapping",
+        name="mask_edges",
+        label="Snap to Edges",
+        module="core.stages.solve.snapping",
+        reads=SOLVE_INPUTS,
+        writes=("shadow_mask_edges.png",),
         on_device=True,
     ),
     Stage(
-        "skin_tone",
-        "Skin Tone",
-        ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-        (),
-        "core.stages.solve.tone",
+        name="skin_tone",
+        label="Skin Tone",
+        module="core.stages.solve.tone",
+        reads=SOLVE_INPUTS,
         on_device=True,
     ),
-    Stage("white_point", "White Point", ("frames/",), (), "core.stages.solve.white_point"),
+    Stage(name="white_point", label="White Point", module="core.stages.solve.white_point", reads=("frames/",)),
     Stage(
-        "self_test",
-        "Self-Test",
-        ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-        (),
-        "core.stages.solve.self_test",
+        name="self_test",
+        label="Self-Test",
+        module="core.stages.solve.self_test",
+        reads=SOLVE_INPUTS,
         on_device=True,
     ),
     Stage(
-        "deliver",
-        "Deliver",
-        ("head.obj", *(f"maps/{name}" for name in MAPS if name.endswith(".png"))),
-        (),
-        "core.deliver",
+        name="deliver",
+        label="Deliver",
+        module="core.deliver",
+        reads=("head.obj", *(name for name in SOLVED if name.endswith(".png"))),
     ),
 )
-"""What a worker does for one button: no stage of the chain depends on it, and nothing of it is recorded."""
-LABELS = {stage.name: stage.label for stage in (*STAGES, *TOOLS)}
+"""Run by the worker for one button each: no stage depends on them, and capture.json does not record them."""
 
+LABELS = {stage.name: stage.label for stage in (*STAGES, *TOOLS)}
 NAMES = tuple(stage.name for stage in STAGES)
-MASK_STAGE = "shadow_mask"  # in Blender the chain stops after it, for the artist
+MASK_STAGE = "shadow_mask"
+
+
+def by_name(name: str) -> Stage:
+    """Return the stage of that name. Raises Problem for an unknown one."""
+    if name not in NAMES:
+        raise Problem(f"There is no stage named {name!r}.", f"The stages are {', '.join(NAMES)}.")
+    return STAGES[NAMES.index(name)]
 
 
 def advise_again(name: str) -> str:
-    """To run a stage again, as the tab and as the command line call it."""
+    """Advise to run a stage again, from the tab or the terminal."""
     return f"Run the stage {LABELS[name]} again, by the arrow beside it in Stages (in a terminal: --from {name})."
 
 
 def advise_remaking(path: Path, otherwise: str) -> str:
-    """What to do about a damaged file: have the stage that wrote it run again where it is an output in a capture;
-    `otherwise` for a user's own file."""
+    """Advise on a damaged file: run the stage that wrote it again, or `otherwise` for a user's own file."""
     for stage in STAGES:
         for name in stage.writes:
             own = PurePath(name).parts
-            parts = path.parts[:-1] if name.endswith("/") else path.parts
-            while len(parts) > len(own) and name.endswith("/") and parts[-len(own) :] != own:  # delit/shadow/00001.png
-                parts = parts[:-1]
-            if parts[-len(own) :] == own and Path(*parts[: -len(own)], "capture.json").is_file():
-                return advise_again(stage.name)
+            # a file, or any file below a folder, as delit/shadow/00001.png
+            places = path.parents if name.endswith("/") else (path,)
+            for place in places:
+                root = Path(*place.parts[: -len(own)])
+                if place.parts[-len(own) :] == own and (root / "capture.json").is_file():
+                    return advise_again(stage.name)
     return otherwise
-
-
-def by_name(name: str) -> Stage:
-    """The stage of that name. Raises Problem for an unknown one."""
-    if name not in NAMES:
-        raise Problem(f"There is no stage named {name!r}.", f"The stages are {', '.join(NAMES)}.")
-    return STAGES[NAMES.index(name)]

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of the SwitchLight API of Beeble, all of it here: where it is, how it is spoken to, what it charges.
+"""The SwitchLight API of Beeble: address, protocol and prices.
 
-Ground floor: standard library only. From its public documentation (switchlight-api.beeble.ai/docs: quickstart, material
-acquisition, FAQ), NOT VERIFIED AGAINST THE LIVE SERVICE. Calls to `acquire/albedo` answer with a PNG; that its page
-says so was not seen, only programs that rely on it.
+From its public documentation (switchlight-api.beeble.ai/docs: quickstart, material acquisition, FAQ), NOT VERIFIED
+AGAINST THE LIVE SERVICE. That `acquire/albedo` answers with a PNG is known only from programs that rely on it.
 """
 
 from __future__ import annotations
@@ -21,75 +20,72 @@ ALBEDO, CREDITS = "/acquire/albedo", "/credits"
 KEY_HEADER = "x-api-key"
 PICTURE_FIELD = "source_image"
 BALANCE = ("Credits", "Total")
-"""Where the answer to CREDITS holds what is left."""
+"""Keys of the remaining credits in the answer to CREDITS."""
 CREDITS_PER_PICTURE, CREDITS_PER_PREVIEW = 1.0, 0.5
 PREVIEW_PX = 512
-"""Longer side of a preview's answer at most. A picture longer than 2048 is made smaller by the service."""
+"""Largest side of a preview. The service reduces pictures longer than 2048."""
 MOST_AT_ONCE = 3
-"""Calls under way at the same time; the service takes 100 pictures a minute, and each takes it about five seconds."""
+"""Concurrent calls; the service takes 100 pictures a minute, and each takes about five seconds."""
 
 KEY_VARIABLE = "WILDCAP_SWITCHLIGHT_KEY"
 BASE_VARIABLE = "WILDCAP_SWITCHLIGHT_URL"
 OFFLINE_VARIABLE = "WILDCAP_OFFLINE"
-"""Environment variables: the key, another server that speaks the same protocol (for tests), and that nothing may be
-sent."""
+"""Environment variables: the key, another server with the same protocol (for tests), and that nothing may be sent."""
 
 
 _kept = ""
 
 
 def form(preview: bool) -> dict[str, str]:
-    """The fields that go with a picture. Without auto_key's default, the background would have to be cut out before."""
+    """Return the fields sent with a picture. auto_key has the service cut out the background."""
     return {"auto_key": "true", "preview": "true" if preview else "false"}
 
 
 def price(pictures: int, preview: bool) -> float:
-    """Credits for so many pictures."""
+    """Return the credits for a number of pictures."""
     return pictures * (CREDITS_PER_PREVIEW if preview else CREDITS_PER_PICTURE)
 
 
 def amount(credits: float) -> str:
-    """Credits in words: '16 credits', '0.5 credits'."""
+    """Format credits: '16 credits', '0.5 credits'."""
     return f"{credits:g} credit{'' if credits == 1 else 's'}"
 
 
 def base() -> str:
-    """The address that calls go to. Raises Problem where it would carry the key and the pictures unencrypted over a
-    network."""
+    """Return the address of the service. Raises Problem if it is not encrypted and on another machine."""
     address = os.environ.get(BASE_VARIABLE, "").rstrip("/") or BASE
     parts = urllib.parse.urlsplit(address)
     if parts.scheme != "https" and not (parts.scheme == "http" and local(address)):
         raise Problem(
             f"The address in {BASE_VARIABLE} is not a safe one.",
-            "It begins with https://, or with http:// on this very machine.",
+            "It begins with https://, or with http:// on this machine.",
         )
     return address
 
 
 def host() -> str:
-    """The name of the machine that pictures are sent to."""
+    """Return the name of the machine that pictures are sent to."""
     return urllib.parse.urlsplit(base()).hostname or ""
 
 
 def local(address: str) -> bool:
+    """Return whether an address is on this machine."""
     return urllib.parse.urlsplit(address).hostname in ("127.0.0.1", "localhost", "::1")
 
 
 def keep_key() -> None:
-    """Takes the key out of this process's environment, which all that it starts would inherit, and keeps it for
-    `key`."""
+    """Move the key out of this process's environment, which every child would inherit, for `key`."""
     global _kept
     _kept = os.environ.pop(KEY_VARIABLE, "")
 
 
 def environment_without_key() -> dict[str, str]:
-    """This process's environment, for what it starts and what has no use for the key."""
+    """Return this process's environment for children that do not need the key."""
     return {name: value for name, value in os.environ.items() if name != KEY_VARIABLE}
 
 
 def key() -> str:
-    """The artist's key. Raises Problem where there is none, or it cannot be one; its text is never part of a
-    message."""
+    """Return the artist's key. Raises Problem, never with its text, if it is missing or cannot be one."""
     api_key = (os.environ.get(KEY_VARIABLE) or _kept).strip()
     if not api_key:
         raise Problem(
@@ -99,7 +95,7 @@ def key() -> str:
         )
     if not (api_key.isascii() and api_key.isprintable()) or " " in api_key:
         raise Problem(
-            "This is no key of SwitchLight: it holds spaces or other characters that no key has.",
+            "This is not a SwitchLight key: it contains spaces or other invalid characters.",
             f"Copy it again from {WEBSITE}.",
         )
     return api_key

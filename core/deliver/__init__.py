@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tool deliver: the maps as a preset wants them, with provenance.json, in a hidden folder beside the target.
+"""The tool deliver: the maps as a preset wants them, with provenance.json, in a hidden folder beside the target.
 
-Blender adds the mesh there and gives the folder its name; with `whole` the mesh is written here, as OBJ, and the folder
-is in place at the end.
+Blender adds the mesh there and renames the folder; with `whole` the mesh is written here, as OBJ, and the folder
+renamed.
 """
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from ..capture import delivery_plan, freshness, provenance, stages
@@ -24,16 +25,16 @@ from ..imaging import images
 from ..settings.delivery_presets import HAIR, SCAN_MAPS, MapPicture
 from ..settings.settings import Settings
 from . import checks, maps, wavefront
+from .wavefront import HEAD_TILE
 
-HEAD_TILE = 1001  # UDIM
 UNIT_M = {"m": 1.0, "cm": 0.01}  # metres in a unit
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """The map set, packing.json that tells Blender what it is, and provenance.json -> the plan's staged folder, whole
-    or not at all.
+    """Write the maps, packing.json for Blender and provenance.json into the plan's staged folder, whole or not at all.
 
-    Raises Problem, and delivers nothing, where a stage is out of date, or one of its files is damaged."""
+    Raises Problem if a stage is out of date, or one of its files is damaged.
+    """
     plan = delivery_plan.plan(capture, settings.deliver)
     delivery_plan.check_target(plan)
     mesh = delivery_plan.needs(capture, plan.what)
@@ -42,67 +43,77 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         raise Problem(
             f"{plan.format.title} is written by Blender.", "Choose OBJ here, or deliver from the add-on's panel."
         )
-    tiles = _tiles(capture, plan, settings)
-    several = len(tiles) > 1
-    # what is shipped as it lies there is read once, to know that it is whole
+    tiles, roughness = _tiles(capture, plan, settings), settings.deliver.roughness / 100
+    # a damaged mesh must not be delivered
     if mesh == capture.head:
         read_head(capture)
     else:
         meshes.read_obj(mesh)
-    mean, regions = _mean_specular(capture), plan.what == "head"
-    pictures = _pictures(plan, settings)
     delivery_plan.discard(plan)
     with replacing_folder(plan.staged) as folder:
-        (folder / TEXTURES).mkdir()
-        made, size = [], 0
-        for i, (tile, paths) in enumerate(tiles.items()):
-            sources = maps.Sources(
-                paths, int(settings.deliver.size), settings.deliver.roughness / 100, mean, UNIT_M[plan.unit], regions
-            )
-            wanted = [picture for picture in pictures if sources.has(picture)]
-            for j, picture in enumerate(wanted):
-                number = f".{tile}" if plan.numbered or several else ""
-                name = f"{picture.name.format(name=plan.name)}{number}{plan.suffix}"
-                report.progress(i + j / len(wanted), len(tiles), f"writing {name}")
-                maps.write(picture, sources, folder / TEXTURES / name, plan)
-                made.append({"file": f"{TEXTURES}/{name}", "tile": tile, "kind": picture.kind, "slot": picture.slot})
-            size = max(size, sources.size)
-        report.progress(len(tiles), len(tiles), "writing what it was made from")
+        written, size = _write_maps(folder, capture, plan, tiles, settings, report)
+        report.progress(len(tiles), len(tiles), "writing the provenance")
         write_json(folder / delivery_plan.PROVENANCE, provenance.collect(capture, plan, settings, report.check))
         if settings.deliver.whole:
-            wavefront.write(mesh, folder / plan.mesh, plan, made, settings.deliver.roughness / 100)
+            wavefront.write(mesh, folder / plan.mesh, plan, written, roughness)
             provenance.finish(folder)
         else:
+            several = len(tiles) > 1
             packing = {
                 "name": plan.name,
                 "mesh": plan.mesh,
                 "several": several,
-                "maps": made,
-                "roughness": settings.deliver.roughness / 100,
+                "maps": written,
+                "roughness": roughness,
             }
             (folder / PACKING).write_text(json.dumps(packing, indent=1), encoding="utf-8")
     if settings.deliver.whole:
         delivery_plan.put_in_place(plan)
-    report.figure("files", len(made))
+    report.figure("files", len(written))
     report.figure("size_px", size)
     report.figure("delivered_to", str(plan.target))
 
 
+def _write_maps(
+    folder: Path,
+    capture: Capture,
+    plan: DeliveryPlan,
+    tiles: dict[int, dict[str, Path]],
+    settings: Settings,
+    report: Reporter,
+) -> tuple[list[dict], int]:
+    """Write the maps of all UV tiles; return {"file", "tile", "kind", "slot"} of each, and their largest side."""
+    (folder / TEXTURES).mkdir()
+    size, roughness = int(settings.deliver.size), settings.deliver.roughness / 100
+    mean, on_head = _mean_specular(capture), plan.what == "head"
+    written, sizes = [], [0]
+    for i, (tile, paths) in enumerate(tiles.items()):
+        sources = maps.Sources(paths, size, roughness, mean, UNIT_M[plan.unit], on_head)
+        available = [picture for picture in _pictures(plan, settings) if sources.has(picture)]
+        for j, picture in enumerate(available):
+            number = f".{tile}" if plan.numbered or len(tiles) > 1 else ""
+            name = f"{picture.name.format(name=plan.name)}{number}{plan.suffix}"
+            report.progress(i + j / len(available), len(tiles), f"writing {name}")
+            maps.write(picture, sources, folder / TEXTURES / name, plan)
+            written.append({"file": f"{TEXTURES}/{name}", "tile": tile, "kind": picture.kind, "slot": picture.slot})
+        sizes.append(sources.size)
+    return written, max(sizes)
+
+
 def _pictures(plan: DeliveryPlan, settings: Settings) -> list[MapPicture]:
-    """The preset's pictures and what goes along. Displacement has negative values, which no PNG holds."""
+    """Return the preset's pictures and the hair's. Displacement has negative values, which no PNG holds."""
     if plan.what == "scan":
         return list(SCAN_MAPS)
     base = [picture for picture in plan.preset.maps if picture.channels != ("displacement",) or plan.pictures == "exr"]
-    if plan.what == "head" and settings.deliver.clean:
-        base = [
-            MapPicture(p.name, tuple(c.replace("albedo.", "clean.") for c in p.channels), p.kind, p.slot) for p in base
-        ]
-    return base + (list(HAIR) if plan.what == "head" and settings.deliver.hair else [])
+    if plan.what == "own_mesh":
+        return base
+    if settings.deliver.clean:
+        base = [replace(p, channels=tuple(c.replace("albedo.", "clean.") for c in p.channels)) for p in base]
+    return base + (list(HAIR) if settings.deliver.hair else [])
 
 
 def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int, dict[str, Path]]:
-    """UV tile -> its maps by the names of maps.Sources, those that are there. Raises Problem where there is no
-    albedo."""
+    """Return UV tile -> its existing maps, by the names of maps.Sources. Raises Problem without an albedo."""
     delivery = capture.delivery
     if plan.what == "scan":
         files = {HEAD_TILE: {"albedo": delivery / "scan_albedo.png", "lit": delivery / "scan_lit.png"}}
@@ -139,12 +150,10 @@ def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int
 
 
 def _mean_specular(capture: Capture) -> float:
-    """The specular map's mean on cheeks and forehead, by which its values are told against skin's reflectance: as the
-    stage upscale found it, else the mean over the face."""
-    told = capture.read()["stages"].get("upscale", {}).get("figures", {}).get("specular_mean")
-    if told:
-        return float(told)
+    """Return the specular map's mean on cheeks and forehead, as the stage upscale found it, or over the face."""
+    mean = capture.read()["stages"].get("upscale", {}).get("figures", {}).get("specular_mean")
+    if mean:
+        return float(mean)
     specular = images.read_mask(capture.maps / "specular_albedo.png")
-    size = len(specular)
-    weight = template.mask("skin", size) * template.mask("face", size)
+    weight = template.mask("skin", len(specular)) * template.mask("face", len(specular))
     return float((specular * weight).sum() / weight.sum())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether what is delivered is what the capture's inputs and settings ask for."""
+"""Check that a delivery is up to date with the capture's inputs and settings."""
 
 from __future__ import annotations
 
@@ -11,30 +11,15 @@ from ..capture.freshness import OLDER, STALE
 from ..capture.messages import Problem, Reporter
 from ..settings.settings import Settings
 
-LAST = {"head": "upscale", "own_mesh": "transfer", "scan": "transfer"}
-"""What is delivered -> the last stage that it comes from. A head's displacement, which the stage after it makes, is
-left out where there is none."""
-
 
 def check_stages(capture: Capture, kind: str, settings: Settings, report: Reporter) -> None:
-    """Refuses to deliver what is out of date. What older code made is delivered, and named in the log.
+    """Raise Problem if a stage that `kind` ("head", "own_mesh" or "scan") comes from is stale; log what is older.
 
-    Parameters
-    ----------
-    capture : that is delivered
-    kind : what of it, a key of LAST
-    settings : by which its stages are judged
-    report : takes the log line
-
-    Raises
-    ------
-    Problem
-        Naming a stage, of those that `kind` comes from, whose inputs or settings have changed since.
+    A head comes from the stages up to upscale, and its displacement, if there is one, from transfer.
     """
+    to_transfer = kind != "head" or (capture.delivery / "displacement.exr").is_file()
+    last = stages.NAMES.index("transfer" if to_transfer else "upscale")
     older = []
-    last = stages.NAMES.index(LAST[kind])
-    if kind == "head" and (capture.delivery / "displacement.exr").is_file():
-        last = stages.NAMES.index("transfer")
     for stage in stages.STAGES[: last + 1]:
         verdict = capture.verdict(stage, settings)
         if verdict.state == STALE:

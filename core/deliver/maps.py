@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The map set of a delivery: channels packed, normals flipped, sizes, bit depth and colour space as the target wants
-them.
+"""The maps of a delivery: channels packed, normals flipped, size, bit depth and colour space as the target wants them.
 
 A map that the capture lacks is left out.
 """
@@ -22,18 +21,21 @@ from ..imaging import images
 from ..settings.delivery_presets import COLOUR, NORMAL, MapPicture
 
 F0 = 0.0278
-"""What skin of an IOR of 1.4 reflects at normal incidence, ((1.4 - 1) / (1.4 + 1))^2, where the specular map is at its
-mean of facial skin."""
+"""Reflectance of skin, IOR 1.4, at normal incidence: ((1.4 - 1) / (1.4 + 1))^2. The specular map's mean stands for
+it."""
 UNREAL_F0 = 0.08
-"""What Unreal's Specular of 1 reflects at normal incidence."""
+"""Reflectance at normal incidence of Unreal's Specular 1."""
 STRIP_ROWS = 256
-"""Rows that are worked on at once."""
+"""Rows encoded at once, to save memory."""
 
 
 class Sources:
-    """The maps of one UV tile, read when they are asked for, at one size. `paths`: albedo, normal, specular, clean, lit
-    ... -> file; `mean` is the specular map's mean on facial skin, `roughness` that of the cheeks, `regions` whether the
-    UVs are those of the built-in head, whose other regions are known; `unit` the metres that 1 is."""
+    """Maps of one UV tile, read on demand, at one size.
+
+    `paths`: albedo, normal, specular, clean, lit ... -> file. `roughness` is that of the cheeks, `mean` the specular
+    map's on facial skin, `unit` in metres. `regions`: the UVs are those of the built-in head, whose other regions are
+    known.
+    """
 
     def __init__(
         self, paths: dict[str, Path], size: int, roughness: float, mean: float, unit: float = 1.0, regions: bool = False
@@ -44,12 +46,14 @@ class Sources:
         self._read: dict[str, np.ndarray] = {}
 
     def has(self, picture: MapPicture) -> bool:
-        """Whether all files are there that the picture's channels come from; roughness needs none."""
+        """Return whether all files for the picture's channels exist; roughness needs none."""
         return {_file_of(term) for term in picture.channels} - {"roughness", ""} <= set(self.paths)
 
     def channel(self, term: str) -> np.ndarray:
-        """One channel float32 [S, S]: linear light of albedo, clean and lit, x, y, z of the normal in [-1, 1], stored
-        values of the rest."""
+        """Return one channel, float32 [S, S].
+
+        albedo, clean and lit are linear, x, y, z of the normal in [-1, 1], the rest as stored.
+        """
         name, _, component = term.partition(".")
         if component:
             return self._file(name)[..., "rgbxyz".index(component) % 3]
@@ -69,38 +73,25 @@ class Sources:
         return pixels / self.unit if term == "displacement" else pixels
 
     def check(self, name: str) -> None:
-        """Raises Problem for a file that is cut off or damaged, or no square."""
+        """Raise Problem for a file that is damaged, or not square."""
         self._file(name)
 
     def _file(self, name: str) -> np.ndarray:
         if name not in self._read:
-            read = (
-                images.read_linear
-                if name in ("albedo", "clean", "lit")
-                else images.read_normals
-                if name == "normal"
-                else images.read_mask
-            )
+            linear = dict.fromkeys(("albedo", "clean", "lit"), images.read_linear)
+            read = {**linear, "normal": images.read_normals}.get(name, images.read_mask)
             self._read[name] = _sized(_square(self.paths[name], read(self.paths[name])), self.size, name == "normal")
         return self._read[name]
 
 
 def write(picture: MapPicture, sources: Sources, path: Path, plan: DeliveryPlan) -> None:
-    """Writes one file of the set.
-
-    Parameters
-    ----------
-    picture : which one; its files must be there (Sources.has)
-    sources : the maps of its UV tile
-    path : the file, in a folder that is not in place yet
-    plan : of the delivery: bits, colour space, direction of the normals
-    """
+    """Write one file of the set from the maps of its UV tile, which must exist (Sources.has)."""
     bits = {"png8": 8, "png16": 16, "exr": 16}[plan.pictures]
     first = picture.channels[0]
     as_it_is = first.endswith((".r", ".x")) and len(picture.channels) == 3 and _file_of(first)
     if as_it_is and _stored_alike(picture, sources, plan, as_it_is):
         sources.check(as_it_is)
-        shutil.copyfile(sources.paths[as_it_is], path)  # byte for byte what the worker's stage wrote
+        shutil.copyfile(sources.paths[as_it_is], path)  # byte for byte as the stage wrote it
         return
     pixels = np.stack([sources.channel(term) for term in picture.channels], 2)
     if picture.kind == NORMAL:
@@ -120,7 +111,7 @@ def write(picture: MapPicture, sources: Sources, path: Path, plan: DeliveryPlan)
 
 
 def _shares(size: int) -> np.ndarray:
-    """How much rougher than the cheeks each texel of the built-in head is, as a share, float32 [size, size]."""
+    """Return how much rougher than the cheeks the built-in head is, as a share, float32 [size, size]."""
     brows = np.flatnonzero(template.mask("brows", size).max(1) > 0.5).min()
     above = np.clip((brows - np.arange(size)) / (skin_regions.FOREHEAD_FADE * size), 0, 1).astype(np.float32)
     result = np.zeros((size, size), np.float32)
@@ -131,7 +122,7 @@ def _shares(size: int) -> np.ndarray:
 
 
 def _file_of(term: str) -> str:
-    """The file that a channel comes from, '' for a constant."""
+    """Return the file that a channel comes from, '' for a constant."""
     if term in ("0", "1"):
         return ""
     name = term.partition(".")[0]
@@ -145,7 +136,7 @@ def _file_of(term: str) -> str:
 
 
 def _stored_alike(picture: MapPicture, sources: Sources, plan: DeliveryPlan, name: str) -> bool:
-    """Whether the capture's own file is the one that is wanted: 16 bit PNG of that size, sRGB or OpenGL."""
+    """Return whether the capture's own file will do: 16 bit PNG of that size, sRGB or OpenGL."""
     source = sources.paths[name]
     right = plan.colour == "srgb" if picture.kind == COLOUR else plan.normals == "opengl"
     return (
@@ -158,18 +149,18 @@ def _stored_alike(picture: MapPicture, sources: Sources, plan: DeliveryPlan, nam
 
 
 def _square(path: Path, pixels: np.ndarray) -> np.ndarray:
-    """The pixels [S, S(, C)] themselves. Raises Problem for a map of another shape."""
+    """Return the pixels [S, S(, C)]. Raises Problem for a map of another shape."""
     height, width = pixels.shape[:2]
     if width != height:
         raise Problem(
-            f"{path} is {width} x {height}, and a map is square.",
+            f"{path} is {width} x {height}, but a map is square.",
             advise_remaking(path, "Run the stage that makes it again."),
         )
     return pixels
 
 
 def _sized(pixels: np.ndarray, size: int, unit: bool) -> np.ndarray:
-    """[S, S(, C)] made smaller by averaging; normals stay of length 1."""
+    """Reduce [S, S(, C)] by averaging; normals (`unit`) keep length 1."""
     if pixels.shape[:2] == (size, size):
         return pixels
     pixels = images.resize(pixels, size, size)

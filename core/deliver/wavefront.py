@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture's OBJ with the delivery's unit, Y up, and an MTL that names its maps: what can be delivered without
-Blender.
+"""An OBJ of a capture in the delivery's unit, Y up, with an MTL that names its maps: a delivery without Blender.
 
-Lines are passed on one by one: polygons, UVs and the order of vertices stay as they are.
+Lines are passed on one by one: polygons, UVs and the order of vertices stay.
 """
 
 from __future__ import annotations
@@ -13,21 +12,16 @@ from pathlib import Path
 
 from ..capture.delivery_plan import DeliveryPlan
 
-HEAD_TILE = 1001
+HEAD_TILE = 1001  # UDIM
 LINKS = {"base_color": "map_Kd", "normal": "norm", "roughness": "map_Pr", "specular": "map_Ks"}
 """Slot -> MTL statement; norm, map_Pr and Pr are its extension for physically based materials."""
 
 
 def write(source: Path, path: Path, plan: DeliveryPlan, maps: list[dict], roughness: float) -> None:
-    """Writes the OBJ, and the .mtl beside it.
+    """Write the OBJ, Y up, and the .mtl beside it.
 
-    Parameters
-    ----------
-    source : the capture's OBJ, in metres, Z up, face towards -Y
-    path : the OBJ to write, Y up
-    plan : of the delivery: its unit, and the names of mesh and materials
-    maps : {"file", "tile", "slot"} of each map that was made
-    roughness : in [0, 1], the materials' constant
+    `source` is in metres, Z up, face towards -Y. `maps` has {"file", "tile", "slot"} of each map; `roughness`, in [0,
+    1], is the materials' constant.
     """
     factor = {"m": 1.0, "cm": 100.0}[plan.unit]
     tiles = sorted({entry["tile"] for entry in maps})
@@ -57,8 +51,7 @@ def write(source: Path, path: Path, plan: DeliveryPlan, maps: list[dict], roughn
 
 
 def _tile(corners: list[str], uvs: list[tuple[float, float]], tiles: list[int]) -> int:
-    """The UV tile that a face's middle lies in; faces in tiles without maps (teeth, eyes) get the first one's
-    material."""
+    """Return the UV tile of a face's middle, or the first one for a tile without maps (teeth, eyes)."""
     indices = [int(parts[1]) for parts in (corner.split("/") for corner in corners) if len(parts) > 1 and parts[1]]
     if not indices:
         return tiles[0]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours as settings write them: a skin tone and a white point. Standard library only."""
+"""Colours as settings write them: a skin tone and a white point."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import re
 from ..capture.messages import Problem
 
 TONE_DECIMALS = 4
-"""Decimals of a skin tone's sRGB channels, wherever one is estimated, chosen, shown or recorded: typing a tone that was
-shown gives the same maps."""
+"""Decimals of a skin tone's sRGB channels everywhere: typing a tone that was shown gives the same maps."""
 Colour = tuple[float, float, float]
 
 
 def parse_skin_tone(text: str) -> Colour | None:
-    """Encoded sRGB in (0, 1], rounded to TONE_DECIMALS, of three shares (0.69,0.54,0.46), three 8-bit values
-    (176,138,118) or a hexadecimal colour (#B08A76 or B08A76); None for auto. Raises Problem for anything else."""
+    """Parse three shares (0.69,0.54,0.46), three 8-bit values (176,138,118), #B08A76 or B08A76; None for auto.
+
+    Returns encoded sRGB in (0, 1], rounded to TONE_DECIMALS. Raises Problem for anything else.
+    """
     text = text.strip()
     if text == "auto":
         return None
@@ -36,19 +37,20 @@ def parse_skin_tone(text: str) -> Colour | None:
 
 
 def format_skin_tone(srgb) -> str:
-    """Encoded sRGB, three numbers, as `parse_skin_tone` reads it."""
+    """Write encoded sRGB, three numbers, as `parse_skin_tone` reads it."""
     return ",".join(f"{channel:.{TONE_DECIMALS}f}" for channel in srgb)
 
 
 def describe_estimate(deviation: float | None) -> tuple[str, str]:
-    """A sentence on a skin tone that was estimated from the pictures alone, and one on what to do; `deviation` in L*,
-    None where it is not known any more."""
+    """Describe an estimated skin tone, and advise on it; `deviation` in L*, None if it is not known any more."""
     return f"Skin tone: estimated{'' if deviation is None else f', ±{deviation:.0f}'}.", "Choose it if it looks wrong."
 
 
 def parse_white_point(text: str) -> Colour | None:
-    """Linear R, G and B of a white surface in the frames, each between 0.001 and 100; None for auto. Raises Problem for
-    anything else."""
+    """Parse linear R, G and B of a white surface, each between 0.001 and 100; None for auto.
+
+    Raises Problem for anything else.
+    """
     if text.strip() == "auto":
         return None
     channels = _numbers(text)

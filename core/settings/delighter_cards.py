@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The card of each delighter: what it is and whose, where it runs, what leaves the machine and what it costs. Written
-here and nowhere else.
+"""The card of each delighter: where it runs, what leaves the machine and what it costs.
 
-Ground floor: standard library only. Shown by the add-on beside the choice, by `python -m core delighters`, and in
-docs/delighters.md.
+Shown by the add-on beside the choice, by `python -m core delighters`, and in docs/delighters.md.
 """
 
 from __future__ import annotations
@@ -14,31 +12,35 @@ from dataclasses import dataclass, fields
 from ..capture import switchlight_api as service
 from .settings import DelightSettings
 
+NOTHING = "Nothing."
+
 
 @dataclass(frozen=True)
 class Card:
-    """Whole sentences for an artist. `settings` are the fields of DelightSettings that are this delighter's own;
-    `needed` says of those that may not stay empty what is missing then."""
+    """Whole sentences for an artist.
+
+    `settings` are the fields of DelightSettings that only this delighter uses; `needed` has (field, sentence) of those
+    that must not stay empty.
+    """
 
     title: str
     what: str
     best_for: str
     runs: str
-    leaves: str
-    costs: str
-    shadows: str
     weights: str
     licence: str
+    leaves: str = NOTHING
+    costs: str = NOTHING
+    shadows: str = "No."
     settings: tuple[str, ...] = ()
     needed: tuple[tuple[str, str], ...] = ()
 
     @property
     def sends(self) -> bool:
-        """Whether anything leaves the machine."""
+        """True if anything leaves the machine."""
         return self.leaves != NOTHING
 
 
-NOTHING = "Nothing."
 FACTS = (
     ("best_for", "Best for"),
     ("runs", "Where it runs"),
@@ -48,7 +50,7 @@ FACTS = (
     ("weights", "Weights"),
     ("licence", "Licence"),
 )
-"""The rows of a card below what the delighter is: field, and how it is called."""
+"""Rows of a card: field and label."""
 
 CARDS = {
     "network": Card(
@@ -56,8 +58,6 @@ CARDS = {
         "Our own network looks at each frame and at the head's shape, and takes light and shadow out of it.",
         best_for="Most captures: ordinary light, with or without hard shadows.",
         runs="On your machine, on the processor or on a GPU.",
-        leaves=NOTHING,
-        costs=NOTHING,
         shadows="Yes: it says of every pixel how much of the main light is blocked there.",
         weights="Come with the extension.",
         licence="GPL-3.0-or-later, code and weights; trained on synthetic faces of our own, with some painted skins "
@@ -69,8 +69,6 @@ CARDS = {
         "nothing can be invented.",
         best_for="Soft light. Hard shadows are left to the mask and the solver.",
         runs="On your machine, on the processor; seconds per frame.",
-        leaves=NOTHING,
-        costs=NOTHING,
         shadows="Yes, where there is a sun: those of the head itself, and of what stands beside it.",
         weights="None.",
         licence="GPL-3.0-or-later.",
@@ -87,7 +85,6 @@ CARDS = {
         costs=f"Per frame {service.amount(service.CREDITS_PER_PICTURE)} of your account, or "
         f"{service.amount(service.CREDITS_PER_PREVIEW)} for a small picture "
         f"of {service.PREVIEW_PX} px at most. An answer that has come is never paid for again.",
-        shadows="No.",
         weights="None on your machine.",
         licence=f"{service.COMPANY}'s terms ({service.WEBSITE}): what comes back may not be used to train a model.",
         settings=("switchlight_preview",),
@@ -97,9 +94,6 @@ CARDS = {
         "The published delighting network of the paper OpenDelight, where you have its weights.",
         best_for="Comparing, and whoever has the weights.",
         runs="On your machine; a GPU is of great help.",
-        leaves=NOTHING,
-        costs=NOTHING,
-        shadows="No.",
         weights="Yours to bring: the folder with the authors' two files. It was not verified on real weights.",
         licence="Our code GPL-3.0-or-later; the weights are under their authors' terms.",
         settings=("checkpoint",),
@@ -111,9 +105,7 @@ CARDS = {
         best_for="Using the best model that you have access to. Name the pictures like the frames; neither crop nor "
         "turn them.",
         runs="Wherever you made the pictures.",
-        leaves=NOTHING,
         costs="Nothing here.",
-        shadows="No.",
         weights="None here.",
         licence="You have to keep to the licence of the program that made the pictures.",
         settings=("folder",),
@@ -125,9 +117,6 @@ CARDS = {
         best_for="A face that was filmed under an overcast sky or in a light tent; and to see what the others are "
         "worth.",
         runs="On your machine, at once.",
-        leaves=NOTHING,
-        costs=NOTHING,
-        shadows="No.",
         weights="None.",
         licence="GPL-3.0-or-later.",
     ),
@@ -135,28 +124,27 @@ CARDS = {
 
 
 def choices() -> tuple[str, ...]:
-    """The delighters there are, in the order they are offered."""
+    """Return the delighters in the order of the menu."""
     return next(f for f in fields(DelightSettings) if f.name == "delighter").metadata["choices"]
 
 
 def missing(settings, delighter: str) -> list[str]:
-    """What a delighter lacks of its own settings, whole sentences. `settings` has the fields of DelightSettings."""
+    """Return sentences on the settings that a delighter needs and that are empty."""
     return [why for name, why in CARDS[delighter].needed if not getattr(settings, name)]
 
 
 def text() -> str:
-    """All cards for a terminal."""
+    """Format all cards for a terminal."""
     width = max(len(label) for _, label in FACTS)
     cards = []
-    for name in choices():
-        card = CARDS[name]
+    for name, card in CARDS.items():
         rows = [f"  {label:{width}}  {getattr(card, field)}" for field, label in FACTS]
         cards.append("\n".join([f"{name}: {card.what}", *rows]))
     return "\n\n".join(cards)
 
 
 def markdown() -> str:
-    """All cards for docs/delighters.md."""
+    """Format all cards for docs/delighters.md."""
     cards = []
     for name, card in CARDS.items():
         rows = [f"| {label} | {getattr(card, field)} |" for field, label in FACTS]

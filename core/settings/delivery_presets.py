@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a head goes: per target the names, packing, units and normals of its maps; per file format what it cannot hold.
-Written here and nowhere else.
+"""Delivery presets: names, packing, units and normals of the maps per target, and what each file format drops.
 
-Ground floor: standard library only. Shown by the add-on beside the choice, by `python -m core presets`, and in
-docs/guide/deliver.md.
+Shown by the add-on beside the choice, by `python -m core presets`, and in docs/guide/deliver.md.
 """
 
 from __future__ import annotations
@@ -19,9 +17,11 @@ F0 = ("f0", "f0", "f0")
 
 @dataclass(frozen=True)
 class MapPicture:
-    """One file of a map set. `channels` are terms of core/deliver/maps.py or the constants "0" and "1"; COLOUR is
-    stored in the chosen colour space, NORMAL as OpenGL or DirectX, DATA as it is. `slot` is the input of the exported
-    material that the file is linked to, '' for none."""
+    """One file of a map set.
+
+    `channels` are terms of core/deliver/maps.py or the constants "0" and "1". COLOUR is stored in the chosen colour
+    space, NORMAL as OpenGL or DirectX, DATA as it is. `slot` is the linked input of the exported material, '' for none.
+    """
 
     name: str
     channels: tuple[str, ...]
@@ -31,8 +31,7 @@ class MapPicture:
 
 @dataclass(frozen=True)
 class Format:
-    """A mesh file. `unit` and `normals` '': the preset decides. `pictures`: the kinds it can refer to. `drops`: what it
-    loses, whole sentences."""
+    """Mesh file. `drops`: sentences on what it loses. `unit` and `normals` '': the preset decides."""
 
     title: str
     suffix: str
@@ -43,19 +42,21 @@ class Format:
     shape_keys: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DeliveryPreset:
-    """A target. `hint` says in one sentence how it is brought in there; `open_eyes`: it wants the head with its lids
-    open, and no shape keys. Y is up in every format but USD, which says its own axis."""
+    """Target program. `hint` says how to import the delivery; `open_eyes`: open lids and no shape keys.
+
+    Y is up in every format but USD, which has its own axis.
+    """
 
     title: str
     hint: str
-    format: str
-    unit: str
-    normals: str
-    pictures: str
-    numbered: bool
     maps: tuple[MapPicture, ...]
+    format: str = "fbx"
+    unit: str = "cm"
+    normals: str = "opengl"
+    pictures: str = "png8"
+    numbered: bool = False
     open_eyes: bool = False
 
 
@@ -101,14 +102,12 @@ PICTURES = {"png8": "PNG, 8 bit", "png16": "PNG, 16 bit", "exr": "EXR, half floa
 
 PRESETS = {
     "blender": DeliveryPreset(
-        "Blender",
-        "Import it: the maps are linked; for skin with scattering, Assemble Material in this add-on.",
-        "glb",
-        "m",
-        "opengl",
-        "png16",
-        False,
-        (
+        title="Blender",
+        hint="Import it: the maps are linked; for skin with scattering, Assemble Material in this add-on.",
+        format="glb",
+        unit="m",
+        pictures="png16",
+        maps=(
             MapPicture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_normal", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_roughness", ("roughness",), DATA, "roughness"),
@@ -116,26 +115,18 @@ PRESETS = {
         ),
     ),
     "metahuman": DeliveryPreset(
-        "MetaHuman from Mesh",
-        "Import it as a static mesh for a MetaHuman Identity, which wants open eyes: the head has them, and no shape "
-        "keys.",
-        "fbx",
-        "cm",
-        "directx",
-        "png8",
-        False,
-        (MapPicture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),),
+        title="MetaHuman from Mesh",
+        hint="Import it as a static mesh for a MetaHuman Identity, which wants open eyes: the head has them, and no "
+        "shape keys.",
+        normals="directx",
+        maps=(MapPicture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),),
         open_eyes=True,
     ),
     "unreal": DeliveryPreset(
-        "Unreal",
-        "Leave Flip Green Channel off; switch sRGB off for all maps but BaseColor.",
-        "fbx",
-        "cm",
-        "directx",
-        "png8",
-        False,
-        (
+        title="Unreal",
+        hint="Leave Flip Green Channel off; switch sRGB off for all maps but BaseColor.",
+        normals="directx",
+        maps=(
             MapPicture("T_{name}_BaseColor", ALBEDO, COLOUR, "base_color"),
             MapPicture("T_{name}_N", TANGENT, NORMAL, "normal"),
             MapPicture("T_{name}_ORM", ("1", "roughness", "0")),
@@ -143,43 +134,29 @@ PRESETS = {
         ),
     ),
     "unity_hdrp": DeliveryPreset(
-        "Unity HDRP",
-        "A Lit material of the type Subsurface Scattering; reflectance at normal incidence comes from its diffusion "
-        "profile (IOR 1.4).",
-        "fbx",
-        "cm",
-        "opengl",
-        "png8",
-        False,
-        (
+        title="Unity HDRP",
+        hint="A Lit material of the type Subsurface Scattering; reflectance at normal incidence comes from its "
+        "diffusion profile (IOR 1.4).",
+        maps=(
             MapPicture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_NormalMap", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_MaskMap", ("0", "1", "1", "smoothness")),
         ),
     ),
     "unity_urp": DeliveryPreset(
-        "Unity URP",
-        "A Lit material with the workflow Specular; its smoothness is in the specular map's alpha.",
-        "fbx",
-        "cm",
-        "opengl",
-        "png8",
-        False,
-        (
+        title="Unity URP",
+        hint="A Lit material with the workflow Specular; its smoothness is in the specular map's alpha.",
+        maps=(
             MapPicture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_BumpMap", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_SpecGlossMap", (*F0, "smoothness"), COLOUR),
         ),
     ),
     "character_creator": DeliveryPreset(
-        "Character Creator",
-        "Give it to Headshot's mesh mode, or as a prop with the maps in its PBR channels.",
-        "obj",
-        "cm",
-        "opengl",
-        "png8",
-        False,
-        (
+        title="Character Creator",
+        hint="Give it to Headshot's mesh mode, or as a prop with the maps in its PBR channels.",
+        format="obj",
+        maps=(
             MapPicture("{name}_Diffuse", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_Normal", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_Roughness", ("roughness",), DATA, "roughness"),
@@ -187,14 +164,11 @@ PRESETS = {
         ),
     ),
     "arnold": DeliveryPreset(
-        "Arnold",
-        "The files are named after standard_surface's parameters: specular is a weight for specular_IOR 1.4.",
-        "fbx",
-        "cm",
-        "opengl",
-        "exr",
-        True,
-        (
+        title="Arnold",
+        hint="The files are named after standard_surface's parameters: specular is a weight for specular_IOR 1.4.",
+        pictures="exr",
+        numbered=True,
+        maps=(
             MapPicture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_normal_camera", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_specular", ("weight",), DATA, "specular"),
@@ -203,14 +177,11 @@ PRESETS = {
         ),
     ),
     "redshift": DeliveryPreset(
-        "Redshift",
-        "The files are named after the Standard Material's inputs: refl_weight is for refl_ior 1.4.",
-        "fbx",
-        "cm",
-        "opengl",
-        "exr",
-        True,
-        (
+        title="Redshift",
+        hint="The files are named after the Standard Material's inputs: refl_weight is for refl_ior 1.4.",
+        pictures="exr",
+        numbered=True,
+        maps=(
             MapPicture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
             MapPicture("{name}_bump_input", TANGENT, NORMAL, "normal"),
             MapPicture("{name}_refl_weight", ("weight",), DATA, "specular"),
@@ -226,7 +197,7 @@ HAIR = (
     MapPicture("{name}_beard_mask", ("beard",)),
     MapPicture("{name}_clean_albedo", ("clean.r", "clean.g", "clean.b"), COLOUR),
 )
-"""What goes along with every preset where the capture has it: masks to groom hair by, and the skin below."""
+"""Added to every preset if the capture has them: masks to groom hair by, and the skin below."""
 
 WHAT = {
     "head": ("Head", "The head in its own UVs, with its shape keys"),
@@ -237,22 +208,20 @@ SCAN_MAPS = (
     MapPicture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
     MapPicture("{name}_lit", ("lit.r", "lit.g", "lit.b"), COLOUR),
 )
-"""Of the scan, whatever the preset: it has no other maps."""
+"""Maps of the scan, for every preset."""
 
 
 def markdown() -> str:
-    """The table of docs/guide/deliver.md."""
+    """Format the tables of docs/guide/deliver.md."""
     lines = ["| preset | mesh | unit | normals | pictures | maps |", "| --- | --- | --- | --- | --- | --- |"]
     for preset in PRESETS.values():
         names = ", ".join(
             f"`{picture.name.format(name='NAME')}{'.1001' if preset.numbered else ''}`" for picture in preset.maps
         )
-        normals = {"opengl": "OpenGL, Y+", "directx": "DirectX, Y-"}[FORMATS[preset.format].normals or preset.normals]
-        lines.append(
-            f"| {preset.title} | {FORMATS[preset.format].title} | "
-            f"{FORMATS[preset.format].unit or preset.unit} | {normals} "
-            f"| {PICTURES[preset.pictures]} | {names} |"
-        )
+        format = FORMATS[preset.format]
+        normals = {"opengl": "OpenGL, Y+", "directx": "DirectX, Y-"}[format.normals or preset.normals]
+        row = (preset.title, format.title, format.unit or preset.unit, normals, PICTURES[preset.pictures], names)
+        lines.append(f"| {' | '.join(row)} |")
     lines += ["", "| format | what it drops |", "| --- | --- |"]
     return "\n".join(
         [*lines, *(f"| {each.title} (`{each.suffix}`) | {' '.join(each.drops)} |" for each in FORMATS.values())]

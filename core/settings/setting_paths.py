@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files and folders that settings name, checked before any stage runs. Standard library only."""
+"""Check the files and folders that settings name before any stage runs."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from .settings import Settings
 
 
 def check_paths(settings: Settings, stages: Iterable[str]) -> None:
-    """Raise Problem where a file or folder that one of these stages needs was not chosen, is not there, or lacks what
-    it has to hold."""
+    """Raise Problem if a file or folder that one of these stages needs is not set, missing, or lacks files."""
     for stage in stages:
         own = getattr(settings, stage)
         for field in fields(own):
@@ -28,24 +27,21 @@ def check_paths(settings: Settings, stages: Iterable[str]) -> None:
 def _check(name: str, field: Field, value: str) -> None:
     about = field.metadata
     setting = f"{about['flag']} ({name})" if "flag" in about else name
+    advice = f"Choose {PATHS[about['path']]}{' with ' + ' and '.join(about['holds']) if 'holds' in about else ''}."
     if not value:
         if about.get("required"):
-            raise Problem(f"{setting} is empty.", f"Choose {_describe(about)}.")
+            raise Problem(f"{setting} is empty.", advice)
         return
     path = Path(os.path.expanduser(value))
     if not path.exists():
         raise Problem(
-            f"There is no file or folder at {path}, which {setting} names.",
-            "Check its name and whether the disk it is on is connected.",
+            f"There is no file or folder at {path}, the value of {setting}.",
+            "Check its name, and that its disk is connected.",
         )
     if (about["path"] == "folder" and not path.is_dir()) or (about["path"] == "file" and not path.is_file()):
-        raise Problem(f"{path}, which {setting} names, is not a {about['path']}.", f"Choose {_describe(about)}.")
-    missing = [held for held in about.get("holds", ()) if path.is_dir() and not (path / held).is_file()]
+        raise Problem(f"{path}, the value of {setting}, is not a {about['path']}.", advice)
+    missing = [file for file in about.get("holds", ()) if path.is_dir() and not (path / file).is_file()]
     if missing:
-        raise Problem(f"{path}, which {setting} names, holds no {missing[0]}.", f"Choose {_describe(about)}.")
+        raise Problem(f"{path}, the value of {setting}, contains no {missing[0]}.", advice)
     if name == "solve.together":
         captures_in(value)
-
-
-def _describe(about) -> str:
-    return PATHS[about["path"]] + (f" with {' and '.join(about['holds'])}" if "holds" in about else "")

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a setting is: a field with metadata, by which its value is checked, made from text and said in words.
+"""A setting: a dataclass field with metadata by which its value is checked, parsed and described.
 
-Ground floor: standard library only. A `name` is how people call a setting: STAGE.NAME, or the name alone for what all
-stages share.
+A `name` is STAGE.NAME, or the name alone for a setting that all stages share.
 """
 
 from __future__ import annotations
@@ -15,31 +14,25 @@ from pathlib import Path
 from ..capture.messages import Problem
 
 SWITCH = {"on": True, "true": True, "yes": True, "1": True, "off": False, "false": False, "no": False, "0": False}
-"""What a switch may be called in text, in any case of the letters."""
+"""Words for a switch, in upper or lower case."""
 PATHS = {"file": "a file", "folder": "a folder", "file_or_folder": "a file or a folder"}
-"""The kinds of places on the disk that a setting may name (its `path`), in words."""
+"""The kinds of `path` in words."""
 
 
 def setting(default, **metadata):
-    """A field whose type is that of its default (bool, int, float or str).
+    """Declare a field whose type is that of its default (bool, int, float or str).
 
-    A number has `min` and `max`, and may have a `unit`. A text has `choices`, or is a `path` ("file", "folder" or
-    "file_or_folder"), or has a `form` (how it is written, in a few words) and the function that reads it, `parse`,
-    which raises Problem. A path may say `when` it is used, a function of the stage's settings, whether it is `required`
-    then, and what a folder `holds`: names of files. `label` is its name in Blender where the one
-    made of the field's does not do, `titles` are those of choices whose own does not do, `flag` is its short option of
-    `core run` (of `core deliver` for what delivers). `per_face` is True for what a quality leaves as it is, as it
-    leaves every path; `affects_result` is False for what no result depends on.
+    min, max, unit: of a number. choices: of a text. path: the text names a "file", "folder" or "file_or_folder". form,
+    parse: syntax of a text in a few words, and its parser, which raises Problem. when: whether a path is used, by the
+    stage's settings; required: then it must not be empty; holds: files in the folder. label, titles: names in Blender
+    of the setting and its choices. flag: option of `core run` or `core deliver`. per_face: not changed by a quality.
+    affects_result: False if no result depends on it.
     """
     return dataclasses.field(default=default, metadata=metadata)
 
 
 def check_value(name: str, field: dataclasses.Field, value):
-    """The value as the setting keeps it: a whole number becomes a float where one is wanted.
-
-    Raises Problem for a wrong type, for what is none of its choices or not of its form, and for what lies outside of
-    its range (not-a-number does).
-    """
+    """Return the value, an int as a float if the setting is one. Raises Problem for a wrong type or value, or NaN."""
     expected, limits = type(field.default), field.metadata
     whole_for_float = expected is float and type(value) is int
     if type(value) is not expected and not whole_for_float:
@@ -57,19 +50,9 @@ def check_value(name: str, field: dataclasses.Field, value):
 
 
 def value_from_text(name: str, field: dataclasses.Field, text: str, folder: Path | None = None):
-    """The value that a text means, by the type of the field.
+    """Parse a text by the type of the field. A relative path begins at `folder`, or the working directory.
 
-    Parameters
-    ----------
-    name : of the setting, for the Problem
-    field : of the settings' dataclass
-    text : as it was typed
-    folder : from which a path is made absolute, None: the working directory
-
-    Raises
-    ------
-    Problem
-        For a text that means none of the setting's values.
+    Raises Problem for a text that is no value of the setting.
     """
     kind = type(field.default)
     if "path" in field.metadata:
@@ -89,13 +72,12 @@ def value_from_text(name: str, field: dataclasses.Field, text: str, folder: Path
 
 
 def absolute_path(text: str, folder: Path | None = None) -> str:
-    """A path with ~ expanded, from `folder` on where it is relative (None: the working directory); '' stays ''."""
+    """Expand ~, and make a path absolute from `folder` (None: the working directory); '' stays ''."""
     return str(Path(folder or "", os.path.expanduser(text)).absolute()) if text else ""
 
 
 def describe_values(field: dataclasses.Field) -> str:
-    """What a setting may be, in a few words: its choices, its range with the unit, what it names, or the form of its
-    text."""
+    """Describe the values of a setting: choices, range with unit, kind of path, or form."""
     limits = field.metadata
     unit = f" {limits['unit']}" if "unit" in limits else ""
     if "choices" in limits:
@@ -108,11 +90,11 @@ def describe_values(field: dataclasses.Field) -> str:
 
 
 def advise_values(field: dataclasses.Field) -> str:
-    """The same as a sentence."""
+    """Describe the values of a setting in a sentence."""
     words = "Choose one of" if "choices" in field.metadata else "It goes from" if "min" in field.metadata else "It is"
     return f"{words} {describe_values(field)}."
 
 
 def value_to_text(value) -> str:
-    """A value as `value_from_text` reads it."""
+    """Write a value as `value_from_text` reads it."""
     return ("on" if value else "off") if isinstance(value, bool) else str(value)

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of all stages together: how they are found by name, checked, laid over each other and written; the
-presets of quality. What each stage has is in stage_settings.py.
+"""The settings of all stages: found by name, checked, combined and written, and the presets of quality.
 
-Ground floor: standard library only.
+stage_settings.py declares those of each stage.
 """
 
 from __future__ import annotations
@@ -34,13 +33,12 @@ from .stage_settings import (
 
 @dataclass(frozen=True)
 class Settings:
-    """All stages' settings, with what they share."""
+    """Settings of all stages, and those that they share."""
 
     seed: int = setting(0, min=0, max=2**31 - 1, flag="--seed")
     """The same seed gives the same maps"""
     device: str = setting("auto", choices=("auto", "cpu", "cuda", "mps"), flag="--device")
     """Where the solver computes; auto: where a pass of its network has been shown to run, and faster than on the CPU"""
-    # how a result was reached is no condition of it
     edited_part: bool = setting(False, flag="--edited-part", affects_result=False)
     """Solve only what a mask edit touched since the last solve, where that can be done"""
     frames: FramesSettings = field(default_factory=FramesSettings)
@@ -57,16 +55,15 @@ class Settings:
 
     @property
     def compute_device(self) -> str:
-        """The device by name. A worker puts the one that it has proven in the place of auto before a stage runs;
-        without a worker that is the CPU."""
+        """Device by name; a worker replaces auto by a tested one before a stage runs, else it is the CPU."""
         return "cpu" if self.device == "auto" else self.device
 
 
 STAGE_KINDS = {f.name: f.default_factory for f in fields(Settings) if f.default_factory is not MISSING}
-"""Stage -> the class of its settings; deliver, a button's tool, is among them."""
-WRITTEN = 'Settings are written as {"solve": {"steps": 30}, "seed": 1}.'
+"""Stage, or the tool deliver -> class of its settings."""
+SYNTAX = 'Settings are written as {"solve": {"steps": 30}, "seed": 1}.'
 CARDS = {"grey": 0.18, "white": 0.88}
-"""Reflectance of what a white point may be measured on: a grey card, and white paper"""
+"""Reflectance of a grey card and of white paper, to measure a white point on."""
 QUALITIES = ("draft", "standard", "film")
 _PRESETS = {
     "draft": {"solve": {"size": 512, "steps": 30, "guidance": "proximal"}, "scan": {"pairs": 16}},
@@ -76,26 +73,26 @@ _PRESETS = {
 
 
 def preset(quality: str) -> Settings:
-    """The settings of a quality preset. Raises Problem for an unknown name."""
+    """Return the settings of a quality. Raises Problem for an unknown name."""
     if quality not in _PRESETS:
         raise Problem(f"There is no quality named {quality!r}.", f"Choose one of {', '.join(QUALITIES)}.")
-    return from_json({stage: overrides for stage, overrides in _PRESETS[quality].items()})
+    return from_json(_PRESETS[quality])
 
 
 def to_json(settings: Settings) -> dict:
+    """Return settings as `from_json` reads them."""
     return asdict(settings)
 
 
 @cache
 def known_settings() -> dict[str, Field]:
-    """Every setting there is: STAGE.NAME, or the name alone for the shared ones -> its field. The shared ones come
-    first."""
+    """Return the field of every setting by name, STAGE.NAME; the shared ones come first."""
     shared = {f.name: f for f in fields(Settings) if f.name not in STAGE_KINDS}
     return {**shared, **{f"{stage}.{f.name}": f for stage, kind in STAGE_KINDS.items() for f in fields(kind)}}
 
 
 def result_settings(stage_settings) -> dict:
-    """The settings of one stage that its result depends on: name -> value."""
+    """Return the settings of one stage that its result depends on: name -> value."""
     return {
         f.name: getattr(stage_settings, f.name)
         for f in fields(stage_settings)
@@ -104,8 +101,7 @@ def result_settings(stage_settings) -> dict:
 
 
 def result_paths(stage_settings) -> dict[str, str]:
-    """The files and folders whose content the result of one stage depends on: name -> path with ~ expanded, of the
-    settings that are not empty."""
+    """Return the files and folders that the result of one stage depends on: name -> path with ~ expanded."""
     paths = [f.name for f in fields(stage_settings) if "path" in f.metadata]
     return {
         name: os.path.expanduser(value)
@@ -115,26 +111,25 @@ def result_paths(stage_settings) -> dict[str, str]:
 
 
 def quality_settings(kind: type) -> list[str]:
-    """The names of the settings of one stage's class that a quality sets; it leaves alone what is about the face, and
-    every path."""
+    """List the settings of one stage's class that a quality sets: none about the face, and no path."""
     return [f.name for f in fields(kind) if not f.metadata.get("per_face") and "path" not in f.metadata]
 
 
 def from_json(by_stage: dict, base: Settings | None = None) -> Settings:
-    """Settings with `by_stage` (stage -> {name: value}, and seed, device) laid over `base` or the defaults.
+    """Apply `by_stage` (stage -> {name: value}, and shared name -> value) to `base` or the defaults.
 
-    Raises Problem for what is no such object, an unknown name, a wrong type, or a value out of its range.
+    Raises Problem for another object, an unknown name, a wrong type, or a value out of its range.
     """
     settings = base or Settings()
     if not isinstance(by_stage, dict):
-        raise Problem(f"The settings have to be a JSON object, not {by_stage!r:.60}.", WRITTEN)
+        raise Problem(f"The settings have to be a JSON object, not {by_stage!r:.60}.", SYNTAX)
     for name, value in by_stage.items():
         if "." in name:
-            raise Problem(f"There is no key {name!r} in the settings: each stage has an object of its own.", WRITTEN)
+            raise Problem(f"There is no key {name!r} in the settings: each stage has an object of its own.", SYNTAX)
         if name not in STAGE_KINDS:
             value = check_value(name, find_setting(name), value)
         elif not isinstance(value, dict):
-            raise Problem(f"The settings of the stage {name} have to be an object, not {value!r:.60}.", WRITTEN)
+            raise Problem(f"The settings of the stage {name} have to be an object, not {value!r:.60}.", SYNTAX)
         else:
             value = replace(
                 getattr(settings, name),
@@ -145,7 +140,7 @@ def from_json(by_stage: dict, base: Settings | None = None) -> Settings:
 
 
 def find_setting(name: str) -> Field:
-    """The field of STAGE.NAME, or of a shared setting. Raises Problem for an unknown one and names the nearest."""
+    """Return the field of a setting. Raises Problem for an unknown name, and suggests the nearest."""
     if name not in known_settings():
         near = difflib.get_close_matches(name, [*known_settings(), *STAGE_KINDS], 1, 0.5)
         raise Problem(
@@ -158,7 +153,7 @@ def find_setting(name: str) -> Field:
 
 @cache
 def tooltips(kind: type) -> dict[str, str]:
-    """Field name -> the docstring under it, in one line, read from the class's source."""
+    """Return field name -> the docstring below it, in one line, from the class's source."""
     body = ast.parse(inspect.getsource(kind)).body[0].body
     docstrings = {}
     for node, following in zip(body, body[1:], strict=False):

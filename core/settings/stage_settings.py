@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One frozen dataclass per stage. All that is said of a stage's setting is written here and nowhere else: Blender's
-panels, the command line, what a stage's result depends on and what is read as a path follow from it.
+"""One frozen dataclass per stage: the only declaration of its settings.
 
-Ground floor: standard library only. The docstring under a field is its tooltip in Blender and its line in the command
-line's help.
+Blender's panels, the command line, the inputs of a stage's result and the paths to check follow from it. The docstring
+below a field is its tooltip in Blender and its help on the command line.
 """
 
 from __future__ import annotations
@@ -183,7 +182,7 @@ class TransferSettings:
 
 @dataclass(frozen=True)
 class DeliverSettings:
-    """What a delivery is made for; names and packing of every preset stand in delivery_presets.py."""
+    """A delivery; delivery_presets.py has names and packing of the maps."""
 
     preset: str = setting("blender", choices=tuple(delivery_presets.PRESETS), flag="--preset")
     """The program it is for: its names of the maps, its units, its normals"""

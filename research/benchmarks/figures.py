@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core.capture.files import write_json
+from core.capture.files import replacing
 from core.capture.messages import Problem
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -62,7 +62,9 @@ def write_record(path: Path, benchmark: str, command: str, figures: dict, keep: 
     if keep and path.is_file():
         figures = merged(read_record(path.stem, path.parent)["figures"], figures)
     here = {"commit": commit(), "date": datetime.date.today().isoformat(), "machine": machine_line()}
-    write_json(path, {"benchmark": benchmark, "command": command, **here, "figures": figures})
+    with replacing(path) as temporary:
+        text = layout({"benchmark": benchmark, "command": command, **here, "figures": figures})
+        temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def read_record(name: str, folder: Path = PUBLISHED) -> dict:
@@ -83,6 +85,19 @@ def read_record(name: str, folder: Path = PUBLISHED) -> dict:
             'It holds "benchmark", "command", "commit" and "figures"; research/benchmarks/figures.py writes it.',
         )
     return record
+
+
+def layout(record: dict, indent: int = 0) -> str:
+    """JSON text with one line for each row of figures, that is for each dict that holds no other."""
+    if not any(isinstance(value, dict) for value in record.values()):
+        return json.dumps(record, ensure_ascii=False)
+    space = " " * (indent + 1)
+    lines = (
+        f"{space}{json.dumps(key, ensure_ascii=False)}: "
+        + (layout(value, indent + 1) if isinstance(value, dict) else json.dumps(value, ensure_ascii=False))
+        for key, value in record.items()
+    )
+    return "{\n" + ",\n".join(lines) + f"\n{' ' * indent}}}"
 
 
 def markdown(head: list[str], rows: list[list]) -> str:

@@ -31,7 +31,7 @@ from core.capture.messages import Problem
 from core.imaging import images
 from core.settings.settings import Settings
 
-from .costs.stage import measure_stage
+from .costs import measure_stage
 from .figures import ROOT, read_record, write_record
 from .geometry_table import published, table
 
@@ -116,7 +116,7 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
         print(f"{capture.root.stem}: stage {stage}", flush=True)
         cost = measure_stage(capture.root, stage, source.absolute())
         if "problem" in cost:
-            return costs, {"stage": stage, **cost}
+            return costs, {"stage": stage, **cost, "remedy": ""}
         costs[stage] = cost
         write_json(path, costs)
     return costs, None

@@ -27,7 +27,7 @@ from core.geometry.meshes import Mesh
 from core.geometry.noise import noise
 from core.geometry.views import View, read_views
 from core.imaging import images
-from core.stages.shadow_mask.lift import lift_shadows
+from core.stages.shadow_mask.frames import lift_shadows
 
 from ..people.identities import subject_mesh
 from ..people.light import SkyAndSun, bake, random_light

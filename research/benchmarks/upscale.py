@@ -17,7 +17,9 @@ it. cost: 1024 to 4096 in a process of its own, seconds and peak memory.
 from __future__ import annotations
 
 import argparse
+import resource
 import tempfile
+import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -45,7 +47,6 @@ from ..people.parameters import sample_parameters
 from ..people.skin import make_skin
 from ..training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
 from .ablation_measures import feature_distance
-from .costs.meter import GIB, peak, spending
 from .detail import moles
 from .figures import markdown, write_record
 from .shadow_captures import render_picture, write_views
@@ -164,9 +165,10 @@ def cost(method: str, size: int = 1024) -> dict[str, float]:
         blank,
         blank[..., 0],
     )
-    with spending() as spent:
-        enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
-    return {"seconds": round(spent.seconds, 1), "peak GiB": round(peak() / GIB, 2)}
+    began = time.monotonic()
+    enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return {"seconds": round(time.monotonic() - began, 1), "peak GiB": round(peak / 2**30, 2)}
 
 
 def _enlarged(small: np.ndarray, method: str) -> np.ndarray:

@@ -2,13 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What benchmarks put into their records has the keys by which research/benchmarks/results asks for it."""
 
-import json
-
 import pytest
 
-from core.capture.capture import Capture
-from research.benchmarks import figures, shadow_mask, skin_tone, whole_chain
-from tests.fixtures.recorded import make_entry
+from research.benchmarks import figures, shadow_mask, skin_tone
 
 
 def test_tones_are_summed_up_by_group():
@@ -27,36 +23,6 @@ def test_tones_are_summed_up_by_group():
         and found["dark"]["scene"]["within_two"] == 0
     )
     assert set(found["all"]["scene"]) == set(figures.read_record("skin_tone")["figures"]["groups"]["all"]["scene"])
-
-
-def test_a_chains_rows_are_those_of_its_table(tmp_path):
-    capture = Capture(tmp_path / "scan.wildcap")
-    capture.root.mkdir()
-    record = {"format": 2, "stages": {"delight": make_entry(figures={"delighter": "network"})}}
-    (capture.root / "capture.json").write_text(json.dumps(record), encoding="utf-8")
-
-    def score(psnr):
-        return {"raw": {"psnr": psnr, "ssim": 0.9, "flip": 0.1}}
-
-    found = whole_chain._figures(
-        capture,
-        {
-            "chain": score(30.0),
-            "solve_off": score(29.0),
-            "true_mask": score(31.0),
-            "mask": {"iou": 0.8},
-            "delighters": {"none": {**score(24.0), "solve_off": score(16.0)}},
-        },
-    )
-    assert found["rows"]["scan, network"]["true_mask"] == {"psnr": 31.0, "ssim": 0.9}
-    assert found["mask_iou"] == {"scan": 0.8}
-    assert found["rows"]["scan, none"] == {
-        "capture": "scan",
-        "delighter": "none",
-        "solve_off": {"psnr": 16.0, "ssim": 0.9},
-        "solved": {"psnr": 24.0, "ssim": 0.9},
-        "true_mask": {"psnr": None, "ssim": None},
-    }
 
 
 def test_a_masks_row_has_the_columns_of_its_table():

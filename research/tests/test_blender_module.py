@@ -27,9 +27,7 @@ def test_the_extension_is_enabled_without_a_word_of_numpys():
     assert "NumPy" not in ran.stderr and "Traceback" not in ran.stderr, ran.stderr
 
 
-@pytest.mark.parametrize(
-    "renderer", ["research.people.render", "research.people.lifelike.render", "research.benchmarks.long_films_render"]
-)
+@pytest.mark.parametrize("renderer", ["research.people.render", "research.people.lifelike.render"])
 def test_subjects_are_rendered_without_a_word_of_numpys(renderer):
     pytest.importorskip("bpy")
     ran = subprocess.run(

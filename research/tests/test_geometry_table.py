@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The tables of research.benchmarks.geometry: what was measured stands in them, what was not is said."""
 
-import numpy as np
-
 from research.benchmarks import figures, geometry_table
-from research.benchmarks.costs import meter
 
 RESULTS = {
     "sample": {
@@ -74,8 +71,3 @@ def test_what_is_published_makes_the_same_tables(tmp_path):
         geometry_table.published(long),
     )
     assert geometry_table.table(figures.read_record("geometry", tmp_path)["figures"]) == geometry_table.table(long)
-
-
-def test_peak_memory_is_at_least_what_was_held():
-    held = np.ones(300_000_000, np.uint8)
-    assert meter.peak() >= held.nbytes

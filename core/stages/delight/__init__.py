@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """frames + cameras + head -> delit/NNNNN.png, the frames without most of their light (sRGB, 16 bit).
 
-Which frames: those the chosen delighter serves. Where it also says which light it made up for, delit/shadow/NNNNN.png
-holds that (grey, 8 bit), for the shadow_mask stage.
+The chosen delighter decides which frames. If it also reports the light that it made up for, delit/shadow/NNNNN.png
+holds that (grey, 8 bit), for the stage shadow_mask.
 """
 
 from __future__ import annotations
@@ -42,12 +42,11 @@ PHOTOGRAPHERS: dict[str, Photographer] = {
     "opendelight": delight_with_opendelight,
     "none": leave_photograph,
 }
-"""Those that also serve a photograph that belongs to no capture."""
+"""Delighters of a single photograph without a capture."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Runs the delighter of `settings.delight.delighter` and replaces the folder delit/ by what it yields. Raises
-    Problem where that is nothing."""
+    """Replace the folder delit/ by the output of the chosen delighter. Raises Problem if that is nothing."""
     shown = []
     with replacing_folder(capture.delit) as delit:
         for result in DELIGHTERS[settings.delight.delighter](capture, settings, report):
@@ -55,16 +54,14 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             images.write_srgb(delit / f"{stem}.png", result.image, bits=16)
             if result.shadow is not None:
                 images.write_data(delit / "shadow" / f"{stem}.png", result.shadow)
-            shown.append((result.view, _small(result.view.read()), _small(result.image)))
+            shown.append((_small(result.view.read()), _small(result.image)))
             report.check()
         if not shown:
             raise Problem("None of the frames that were chosen for the texture has a camera.", advise_again("cameras"))
     report.figure("delighter", settings.delight.delighter)
     report.figure("delit_views", len(shown))
-    middle = shown[:: max(1, len(shown) // 4)][:4]
-    images.write_srgb(
-        capture.picture("delight", "views"), np.vstack([np.hstack([pair[i] for pair in middle]) for i in (1, 2)])
-    )
+    before, after = zip(*shown[:: max(1, len(shown) // 4)][:4], strict=True)
+    images.write_srgb(capture.picture("delight", "views"), np.vstack([np.hstack(before), np.hstack(after)]))
 
 
 def _small(image: np.ndarray, height: int = 320) -> np.ndarray:

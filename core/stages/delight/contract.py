@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every delighter is: a function from a capture's views to delit pictures, one at a time.
+"""Interface of the delighters: a function from a capture's views to delit pictures, one at a time.
 
     def delighter(capture, settings, report) -> Iterator[Delit]
 
@@ -26,10 +26,10 @@ from ...settings.settings import DelightSettings, Settings
 
 @dataclass(frozen=True)
 class Delit:
-    """image float32 [H, W, 3]: the frame without its light, sRGB in [0, 1], seen through `view`'s camera.
+    """Frame without its light, float32 [H, W, 3], sRGB in [0, 1], seen through `view`'s camera.
 
-    shadow float32 [H, W] in [0, 1] or None: where a light was found to be blocked and its loss was made up for, so that
-    the result is to be trusted less; None when the delighter does not say.
+    shadow float32 [H, W] in [0, 1]: where light was blocked and its loss made up for, so that the result is to be
+    trusted less; None if the delighter does not say.
     """
 
     view: View

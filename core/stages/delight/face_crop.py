@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face cut out of a frame, upright and at a fixed size, and put back: FFHQ's alignment by eyes and mouth (Karras et
-al. 2019).
+"""Face cut out of a frame, upright, by FFHQ's alignment by eyes and mouth (Karras et al. 2019), and put back.
 
 Maps [2, 3] go from frame to crop in pixels whose centres lie at +0.5.
 """
@@ -15,19 +14,16 @@ from ...face.faces import Face
 from ...imaging import images
 
 EYES = ((33, 160, 158, 133, 153, 144), (362, 385, 387, 263, 373, 380))
-"""Landmarks round the person's right and left eye: the places of 36 to 47 of the 68 points that FFHQ's alignment is
-written for."""
+"""Landmarks around the person's right and left eye, where FFHQ's 68 points have numbers 36 to 47."""
 MOUTH = (61, 291)
 BROWS = (105, 334)
-FOREHEAD_RATIO = 0.3
-"""How much farther than the landmarks, which end below the hairline, the forehead reaches over the brows."""
-FEATHER_PX = 16  # pixels of the crop over which a face runs out
-MAX_DETAIL_RATIO = 4.0
-"""By what factor a pixel may differ from the crop's blur of it."""
+FOREHEAD_RATIO = 0.3  # extension over the brows past the landmarks, which end below the hairline
+FEATHER_PX = 16  # width of the face's soft edge, in pixels of the crop
+MAX_DETAIL_RATIO = 4.0  # between a pixel and the crop's blur of it
 
 
 def ffhq_alignment(face: Face, size: int, margin: float) -> np.ndarray:
-    """The similarity that FFHQ cuts a face by, its square smaller or larger by `margin`."""
+    """Return the similarity [2, 3] by which FFHQ crops a face, its square scaled by `margin`."""
     points = face.landmarks[:, :2].astype(np.float64)
     right, left = (points[list(eye)].mean(0) for eye in EYES)
     eyes, down = (right + left) / 2, points[list(MOUTH)].mean(0) - (right + left) / 2
@@ -39,25 +35,16 @@ def ffhq_alignment(face: Face, size: int, margin: float) -> np.ndarray:
 
 
 def cut_face(srgb: np.ndarray, to_crop: np.ndarray, size: int) -> np.ndarray:
-    """The crop [size, size, 3]; black where the frame ends."""
+    """Return the crop [size, size, 3]; black where the frame ends."""
     shrinks = 1 / np.hypot(*to_crop[:, 0])
     source = cv2.GaussianBlur(srgb, (0, 0), 0.5 * np.sqrt(shrinks**2 - 1)) if shrinks > 1.2 else srgb
     return np.clip(cv2.warpAffine(source, _from_centres(to_crop), (size, size), flags=cv2.INTER_CUBIC), 0, 1)
 
 
 def face_mask(face: Face, to_crop: np.ndarray, size: int, growth: float = 1.0) -> np.ndarray:
-    """The hull of a face's landmarks, carried on over the forehead.
+    """Return float32 [size, size], 1 in the hull of a face's landmarks, extended over the forehead, in its crop.
 
-    Parameters
-    ----------
-    face : in a frame
-    to_crop : [2, 3], from the frame's pixels to the crop's
-    size : of the crop, in pixels
-    growth : factor by which the hull is enlarged about its middle
-
-    Returns
-    -------
-    float32 [size, size], 0 or 1.
+    The hull is scaled by `growth` about its middle.
     """
     points = face.landmarks[:, :2] @ to_crop[:, :2].T + to_crop[:, 2]
     brow = points[list(BROWS), 1].mean()
@@ -72,26 +59,15 @@ def face_mask(face: Face, to_crop: np.ndarray, size: int, growth: float = 1.0) -
 def put_face_back(
     frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask: np.ndarray, to_crop: np.ndarray
 ) -> np.ndarray:
-    """The frame with what was made of its crop, inside of the mask and feathered; elsewhere it stays.
+    """Paste an edited crop into its frame, feathered inside of the mask; float32 [H, W, 3], sRGB.
 
-    What the way through the crop took of the frame's sharpness is given back, so that a crop that was not changed gives
-    the frame itself.
-
-    Parameters
-    ----------
-    frame : [H, W, 3], sRGB in [0, 1]
-    before, after : [S, S, 3], sRGB in [0, 1], the crop as it was cut and what was made of it
-    mask : [S, S], 1 where the crop is taken
-    to_crop : [2, 3], from the frame's pixels to the crop's
-
-    Returns
-    -------
-    float32 [H, W, 3], sRGB.
+    before, after: sRGB [S, S, 3], the crop as it was cut and edited. The sharpness that the crop lost is given back, so
+    that an unchanged crop gives the frame itself.
     """
     height, width = frame.shape[:2]
     inverse = cv2.invertAffineTransform(_from_centres(to_crop))
-    # 0 along the crop's border too
-    inside = cv2.distanceTransform(np.pad(mask[2:-2, 2:-2], 2).astype(np.uint8), cv2.DIST_L2, 5)
+    inner = np.pad(mask[2:-2, 2:-2], 2).astype(np.uint8)  # 0 along the crop's border too
+    inside = cv2.distanceTransform(inner, cv2.DIST_L2, 5)
     alpha, through, made = (
         cv2.warpAffine(picture.astype(np.float32), inverse, (width, height), flags=cv2.INTER_CUBIC)
         for picture in (np.clip(inside / FEATHER_PX, 0, 1), before, after)
@@ -104,5 +80,5 @@ def put_face_back(
 
 
 def _from_centres(matrix: np.ndarray) -> np.ndarray:
-    """The same map for OpenCV, which counts from pixel centres."""
+    """Convert a map for OpenCV, which counts from pixel centres."""
     return np.column_stack([matrix[:, :2], matrix[:, 2] + matrix[:, :2] @ [0.5, 0.5] - 0.5])

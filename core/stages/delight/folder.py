@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter that takes pictures made elsewhere, by any tool; core/geometry/frame_pictures.py says which belongs to
-which frame."""
+"""Delighter that takes pictures made elsewhere, by any tool; core/geometry/frame_pictures.py matches them to frames."""
 
 from __future__ import annotations
 
@@ -15,8 +14,10 @@ from .contract import Delit
 
 
 def folder(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """The pictures of `settings.delight.folder`, at the frames' size. Raises Problem where none belongs to a registered
-    frame."""
+    """Yield the pictures of `settings.delight.folder` at the frames' size.
+
+    Raises Problem if none belongs to a registered frame.
+    """
     pairs = pictures_of(capture, settings.delight.folder, "delit")
     for i, (view, path) in enumerate(pairs):
         report.progress(i, len(pairs), "Reading delit pictures")

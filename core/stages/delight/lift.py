@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Log-shading from a network's coarse map to every pixel, along the picture's own edges.
+"""Coarse log-shading lifted to every pixel along the picture's own edges.
 
 In each small window the shading is taken for an affine function of the picture's log colour (He, Sun and Tang, Guided
 Image Filtering, 2013; fast form 2015): at a shadow's edge it follows the picture, on even skin it is a constant. The
-guide knows no pores, so none can pass into the shading.
+guide has no pores, so none can pass into the shading.
 """
 
 from __future__ import annotations
@@ -13,15 +13,13 @@ import cv2
 import numpy as np
 
 WINDOW_CELLS = 1  # radius, in cells of the coarse map
-EDGE_LOG = 0.02  # natural log units: what varies less in a window is skin and not an edge
-# of the picture's side, and in log units: what is finer and fainter is left out of the guide
-PORE_SHARE, PORE_LOG = 0.006, 0.25
-WIDEST_PX = 6.0  # sigma of the widest filter that is run: a face of 1,000 pixels. Its cost per pixel is its square
+EDGE_LOG = 0.02  # natural log units: less variation in a window is skin and not an edge
+PORE_SHARE, PORE_LOG = 0.006, 0.25  # share of the side, log units: finer and fainter detail is left out of the guide
+WIDEST_PX = 6.0  # sigma of the widest filter, for a face of 1,000 pixels; its cost per pixel is its square
 
 
 def lift_shading(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
-    """Coarse log-shading [h, w, C] and the log of the linear picture [H, W, C] that it covers -> log-shading [H, W,
-    C]."""
+    """Lift coarse log-shading [h, w, C] to the size of the picture that it covers, whose log is [H, W, C]."""
     guide = remove_pores(log)
     height, width = shading.shape[:2]
     small = cv2.resize(guide, (width, height), interpolation=cv2.INTER_AREA).reshape(shading.shape)
@@ -34,19 +32,22 @@ def lift_shading(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
 
 
 def lift_share(share: np.ndarray, log: np.ndarray) -> np.ndarray:
-    """The same for a coarse share [h, w] in [0, 1], guided by luminance: [H, W] in [0, 1]."""
+    """Lift a coarse share [h, w] in [0, 1], guided by luminance, to [H, W] in [0, 1]."""
     return np.clip(lift_shading(share[..., None].astype(np.float32), log.mean(-1, keepdims=True))[..., 0], 0, 1)
 
 
 def remove_pores(log: np.ndarray) -> np.ndarray:
-    """A log picture [H, W, C] smoothed where it varies finely and faintly; edges stay."""
+    """Smooth a log picture [H, W, C] where it varies finely and faintly; edges stay."""
     reach = max(1.0, PORE_SHARE * max(log.shape[:2]))
     return np.stack([_smooth(np.ascontiguousarray(log[..., k], np.float32), reach) for k in range(log.shape[-1])], -1)
 
 
 def _smooth(channel: np.ndarray, reach: float) -> np.ndarray:
-    """A channel [H, W] smoothed over `reach` pixels (sigma) but for its edges. Where that is wide, the finest goes at
-    the full size, and what the rest takes away is smooth: it is found at half the size."""
+    """Smooth a channel [H, W] over `reach` pixels (sigma) but for its edges.
+
+    If that is wide, only the finest detail is removed at full size; the rest of the change is smooth and computed at
+    half the size.
+    """
     if reach <= WIDEST_PX:
         return cv2.bilateralFilter(channel, -1, PORE_LOG, reach)
     fine = cv2.bilateralFilter(channel, -1, PORE_LOG, WIDEST_PX / 2)
@@ -56,8 +57,7 @@ def _smooth(channel: np.ndarray, reach: float) -> np.ndarray:
 
 
 def _affine(guide: np.ndarray, shading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Per channel the slope and offset [h, w, C] that carry guide to values in each window, averaged over the windows a
-    cell is in."""
+    """Return per channel the slope and offset [h, w, C] from guide to shading, averaged over each cell's windows."""
 
     def mean(x: np.ndarray) -> np.ndarray:
         return cv2.blur(np.ascontiguousarray(x, np.float32), (2 * WINDOW_CELLS + 1,) * 2).reshape(x.shape)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The default delighter: our own network tells the shading and the shadows of a face, from the picture and from what is
-known of the head.
+"""Default delighter: our own network estimates the shading and the shadows of a face from picture and head.
 
 It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's
 pixels along its edges (lift.py), and the picture is divided by it, so pores are kept and none can be invented. In a
@@ -35,23 +34,26 @@ from .evening import ShadingEstimate, even_out
 from .lift import WINDOW_CELLS, lift_shading, lift_share
 from .lit_head import MAX_ALBEDO, LitHead, fit_lit_head
 from .occlusion import remove_seams
-from .second_opinion import average_cells, continue_beyond, weigh_in
+from .second_opinion import continue_beyond, weigh_in
 from .shading import light_in_frame, light_seen
 from .unet import MIN_LINEAR, SIDE_PX, DelightNet, network_input
 
 DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
 WEIGHTS = Path(__file__).resolve().parents[2] / DATA_FILES[0]
-FACE_MARGIN = 1.35  # side of the square, in sides of the face's landmarks; training shows 1.25 to 2
+FACE_MARGIN = 1.35  # side of the square, in sides of the face's landmarks; 1.25 to 2 in training
 SEAM_ZONE_CELLS, SEAM_FINE_CELLS = 2 * WINDOW_CELLS, 2 / 3
-"""How far the lift blurs the answer about a shadow's edge, through two windows one after the other; and the deviation
-below which detail is the skin's own, a third of that, about as the delighter Shading has it (occlusion.py)."""
-FADE_SHARE = 0.06  # of the square's side: along its border it gives way to the fitted light
+"""Reach of the lift's blur about a shadow's edge, two windows in a row; and the deviation below which detail is the
+skin's own, a third of that, about as in the delighter Shading (occlusion.py)."""
+FADE_SHARE = 0.06  # of the square's side, along its border, over which the fitted light takes over
 
 
 @dataclass(frozen=True)
 class Answers:
-    """What is told of a capture's selected frames: the head and its light; the views; looks: the network's answers; and
-    for each look the log-shading of the fitted light, [h, h, 3], and the bare skin and the hair in it, [h, h]."""
+    """Both answers on a capture's selected frames.
+
+    looks: the network's; for each look, fitted [h, h, 3]: the log-shading of the fitted light, and the bare skin and
+    the hair in it, [h, h].
+    """
 
     head: LitHead
     views: list[View]
@@ -62,20 +64,21 @@ class Answers:
 
 
 def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see
-    the head."""
+    """Yield the selected frames without their shading.
+
+    Raises Problem if the weights are missing or the views hardly see the head.
+    """
     answers = ask(capture, settings, report)
+    count = len(answers.views)
     for i, (view, look, skin) in enumerate(zip(answers.views, put_together(answers), answers.skins, strict=True)):
-        report.progress(
-            3 * len(answers.views) + i, 4 * len(answers.views), f"Delighting frame {i + 1} of {len(answers.views)}"
-        )
+        report.progress(3 * count + i, 4 * count, f"Delighting frame {i + 1} of {count}")
         srgb = view.read()
         albedo, shadow = divide(srgb, look, skin, light_in_frame(view, answers.head, srgb))
         yield Delit(view, albedo, shadow)
 
 
 def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
-    """Both answers on a capture, before they are put together. Raises Problem as `network` does."""
+    """Return both answers on a capture, before they are put together. Raises Problem as `network` does."""
     net, views = load_network(settings.compute_device), read_views(capture, selected_only=True)
     head = fit_lit_head(read_head(capture), views, report)
     looks, fitted = [], []
@@ -89,15 +92,15 @@ def ask(capture: Capture, settings: Settings, report: Reporter) -> Answers:
 
 
 def put_together(answers: Answers) -> list[ShadingEstimate]:
-    """One shading for each frame out of both answers."""
+    """Return one shading for each frame out of both answers."""
     own = even_out(answers.head, answers.views, answers.looks)
     looks = weigh_in(own, answers.fitted, answers.skins)
-    looks = [fill_hair(*told) for told in zip(looks, own, answers.fitted, answers.hair, strict=True)]
+    looks = [fill_hair(*each) for each in zip(looks, own, answers.fitted, answers.hair, strict=True)]
     return settle_dim_hues(remove_casts(looks, answers.skins), answers.skins)
 
 
 def load_network(device: str) -> DelightNet:
-    """The shipped network. Raises Problem where its file or its card is missing."""
+    """Load the shipped network. Raises Problem if its file or its card is missing."""
     if not has_files(WEIGHTS):
         raise Problem(
             "The weights of the delighting network are missing.",
@@ -107,8 +110,10 @@ def load_network(device: str) -> DelightNet:
 
 
 def square_around(points: np.ndarray) -> tuple[float, float, float]:
-    """Left, top and side of the square around a face's landmarks [N, 2] in whole pixels: what is told there of the
-    picture is brought back without being resampled, which would blur it."""
+    """Return left, top and side of the square around a face's landmarks [N, 2].
+
+    They are whole pixels, so that answers are brought back without being resampled, which would blur them.
+    """
     low, high = points.min(0), points.max(0)
     side = round(FACE_MARGIN * float((high - low).max()))
     left, top = np.round((low + high) / 2 - side / 2)
@@ -116,12 +121,11 @@ def square_around(points: np.ndarray) -> tuple[float, float, float]:
 
 
 def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.ndarray:
-    """The square `box` of a picture [H, W(, C)] at size x size pixels; what lies beyond the border repeats it."""
+    """Cut the square `box` from a picture [H, W(, C)] at size x size pixels; beyond the border it repeats."""
     left, top, side = box
     scale = size / side
-    if scale < 0.6:  # the mean of what falls into a pixel, not one of them
-        step = max(1, round(1 / scale))
-        fine = crop(picture, box, size * step)
+    if scale < 0.6:  # average the pixels instead of picking one
+        fine = crop(picture, box, size * round(1 / scale))
         return cv2.resize(fine, (size, size), interpolation=cv2.INTER_AREA)
     to_crop = np.float32([[scale, 0, -left * scale + 0.5 * (scale - 1)], [0, scale, -top * scale + 0.5 * (scale - 1)]])
     return cv2.warpAffine(
@@ -134,7 +138,7 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
 
 
 def ask_of_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEstimate, np.ndarray]:
-    """What the network says of a frame, and the log-shading of the fitted light at the same size."""
+    """Return the network's answer on a frame and the log-shading of the fitted light at the same size."""
     pixels, _ = view.project(template.landmark_points(head.mesh))
     box = square_around(pixels[np.isfinite(pixels).all(1)])
     face, bary = _hits(view, head, box, SIDE_PX)
@@ -142,16 +146,14 @@ def ask_of_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEsti
     geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, (face >= 0).astype(np.float32))
     picture = crop(view.read(), box, SIDE_PX)
     look = look_at(net, box, picture, geometry)
-    light, _ = light_seen(
-        images.srgb_to_linear(picture), head, face, bary, round(max(view.width, view.height) * SIDE_PX / box[2])
-    )
+    frame_side = round(max(view.width, view.height) * SIDE_PX / box[2])
+    light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary, frame_side)
     cell_face, cell_bary = _hits(view, head, box, SIDE_PX // 2)
-    return replace(look, face=cell_face, bary=cell_bary), average_cells(light, SIDE_PX // 2)
+    return replace(look, face=cell_face, bary=cell_bary), np.log(np.maximum(_halved(light), 1e-4))
 
 
 def _hits(view: View, head: LitHead, box: tuple[float, float, float], side: int) -> tuple[np.ndarray, np.ndarray]:
-    """The head's face [side, side] (-1: none) and the place on it [side, side, 3] at the centres of the cells of a
-    square of a frame."""
+    """Return the head's face [side, side] (-1: none) and place on it [side, side, 3] at a square's cell centres."""
     y, x = np.mgrid[0:side, 0:side]
     rays = view.rays((np.stack([x.ravel(), y.ravel()], -1) + 0.5) * box[2] / side + box[:2])
     face, bary, _ = head.caster.first_hits(np.repeat(view.centre[None], len(rays), 0), rays)
@@ -162,7 +164,7 @@ def _hits(view: View, head: LitHead, box: tuple[float, float, float], side: int)
 def look_at(
     net: DelightNet, box: tuple[float, float, float], picture: np.ndarray, geometry: tuple = ()
 ) -> ShadingEstimate:
-    """The mean of what the network says of a square picture and of its mirror image."""
+    """Return the network's mean answer on a square picture and its mirror image."""
     layers, middle = network_input(picture, *geometry)
     mirrored = layers[:, :, ::-1].copy()
     mirrored[12] *= -1
@@ -172,37 +174,42 @@ def look_at(
     shading, shadow = (
         (output[0] + output[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2 for output in (shading, shadow.sigmoid())
     )
-    small = cv2.resize(images.srgb_to_linear(picture), (SIDE_PX // 2, SIDE_PX // 2), interpolation=cv2.INTER_AREA)
-    return ShadingEstimate(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, MIN_LINEAR)))
+    log = np.log(np.maximum(_halved(images.srgb_to_linear(picture)), MIN_LINEAR))
+    return ShadingEstimate(box, shading + middle, shadow[..., 0], log)
+
+
+def _halved(picture: np.ndarray) -> np.ndarray:
+    """Average a square linear picture down to the size of the network's answers."""
+    return cv2.resize(np.asarray(picture, np.float32), (SIDE_PX // 2, SIDE_PX // 2), interpolation=cv2.INTER_AREA)
 
 
 def seen_in(head: LitHead, vertex_values: np.ndarray, look: ShadingEstimate) -> np.ndarray:
-    """Values [V] of the head where a look shows it, [h, h]."""
+    """Return values [V] of the head where a look shows it, [h, h]."""
     return interpolate(vertex_values[:, None], head.mesh.faces, look.face, look.bary)[..., 0]
 
 
 def divide(
     srgb: np.ndarray, look: ShadingEstimate, skin: np.ndarray, fitted: tuple | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A picture without its shading, and its shadows at its own size. On `skin` [h, h] in [0, 1] no outline of a shadow
-    stays, and it tells how bright the picture came out: the wall behind may be whiter. Beyond the square `fitted` (of
-    light_in_frame) is taken; without it the shading is that of the square's border, and nothing is said of shadows.
+    """Return a picture without its shading, and its shadows at its own size.
+
+    On `skin` [h, h] in [0, 1] no outline of a shadow stays, and it limits the brightness: the wall behind may be
+    whiter. Beyond the square `fitted` (of light_in_frame) is used; without it the shading of the square's border, and
+    no shadows.
     """
     linear = images.srgb_to_linear(srgb)
     size = round(look.box[2])
     log = np.log(np.maximum(crop(linear, look.box, size), MIN_LINEAR))
     shading, shadow = lift_shading(look.shading, log), lift_share(look.shadow, log)
     cell, skin = size / len(skin), cv2.resize(skin, (size, size), interpolation=cv2.INTER_LINEAR)
-    shading = shading + remove_seams(
-        log - shading, 1 - shadow, skin > 0.5, SEAM_ZONE_CELLS * cell, SEAM_FINE_CELLS * cell
-    )
-    y, x = np.mgrid[0 : srgb.shape[0], 0 : srgb.shape[1]]
+    zone, fine = SEAM_ZONE_CELLS * cell, SEAM_FINE_CELLS * cell
+    shading = shading + remove_seams(log - shading, 1 - shadow, skin > 0.5, zone, fine)
+    shape = srgb.shape[:2]
+    y, x = np.mgrid[0 : shape[0], 0 : shape[1]]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]
-    within = np.minimum(at, size - at).min(1).reshape(srgb.shape[:2])  # pixels to the square's border
+    within = np.minimum(at, size - at).min(1).reshape(shape)  # pixels to the square's border
     inside = within >= 0
-    shading, shadow, skin = (
-        sample(layer, at).reshape(*srgb.shape[:2], *layer.shape[2:]) for layer in (shading, shadow, skin)
-    )
+    shading, shadow, skin = (sample(layer, at).reshape(*shape, *layer.shape[2:]) for layer in (shading, shadow, skin))
     shadow = shadow * inside
     if fitted is not None:
         share = np.clip(within / (FADE_SHARE * size), 0, 1).astype(np.float32)
@@ -210,6 +217,5 @@ def divide(
     albedo = linear / np.exp(shading)
     bare = inside & (skin > 0.5)
     bright = float(np.quantile(albedo[bare].max(-1), 0.75)) if bare.any() else 0.0
-    return images.linear_to_srgb(albedo * min(1.0, MAX_ALBEDO / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(
-        np.float32
-    )
+    albedo = images.linear_to_srgb(albedo * min(1.0, MAX_ALBEDO / max(bright, 1e-6)))
+    return albedo, np.clip(shadow, 0, 1).astype(np.float32)

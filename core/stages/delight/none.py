@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter that leaves the light in: for evenly lit captures, and to see what the others are worth."""
+"""Delighter that leaves the light in: for evenly lit captures, and to compare the others with."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .contract import Delit
 
 
 def none(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """The selected frames as they are."""
+    """Yield the selected frames as they are."""
     views = read_views(capture, selected_only=True)
     for i, view in enumerate(views):
         report.progress(i, len(views), "Copying frames")
@@ -24,5 +24,5 @@ def none(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Del
 
 
 def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, None]:
-    """The photograph as it is."""
+    """Return the photograph as it is."""
     return srgb, None

@@ -1,12 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter that runs the authors' OpenDelight checkpoint, where the user has it: faces are cut out aligned, delit,
-given their detail and put back.
+"""Delighter that runs the authors' OpenDelight checkpoint, if the user has it, on aligned crops of the faces.
 
 The two networks (Han et al., "Learning a Delighting Prior for Facial Appearance Capture in the Wild", SIGGRAPH 2026)
 are modules of the published names and shapes: a ViT encoder (He et al., Masked Autoencoders, 2022) with register tokens
-and a decoder of transposed convolutions, then a U-Net that gives the picture's detail back. What is off the face stays
-as it was shot. It does not say where shadows were. Not verified on the authors' weights.
+and a decoder of transposed convolutions, then a U-Net that gives the picture's detail back. Off the face the frame
+stays as it was shot. Shadows are not reported. Not verified on the authors' weights.
 """
 
 from __future__ import annotations
@@ -37,20 +36,19 @@ CHOOSE = (
 )
 WIDTH, DEPTH, CHANNELS, UNET = 768, 12, 512, 64  # tokens, blocks, decoder and first level of the U-Net, as published
 HEAD_WIDTH = 64  # of an attention head
-PATCH_PX = 16
-DOUBLINGS = 4  # which undo the patches
-REGISTER_SET = 0  # which set of register tokens: 0 the studio scans' albedo, as the authors' test does; 1 FaceOLAT's
+PATCH_PX, DOUBLINGS = 16, 4  # the latter undo the patches
+REGISTER_SET = 0  # register tokens: 0 for the studio scans' albedo, as in the authors' test; 1 for FaceOLAT's
 MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 CROP_PX = 512
-FFHQ_MARGIN = 0.85  # of FFHQ's square, which the checkpoint was trained on
-FACE_RIM = 1.14  # how far beyond the landmarks there is skin, where there is a person at all
+FFHQ_MARGIN = 0.85  # of FFHQ's square, as in the checkpoint's training
+FACE_RIM = 1.14  # scale of the landmarks' hull within which the person's pixels are skin
 
 
 def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """The selected frames in which a face is found. Raises Problem where none is, and for a checkpoint that is none."""
+    """Yield the selected frames in which a face is found. Raises Problem if there is none, or for a bad checkpoint."""
     checkpoint = load(settings.delight.checkpoint, settings.compute_device)
     views = read_views(capture, selected_only=True)
-    face, face_count = None, 0
+    face, with_face = None, 0
     for i, view in enumerate(views):
 
         def step(i: int = i) -> None:
@@ -62,16 +60,16 @@ def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Itera
         if face is None:
             report.log(f"No face was found in frame {view.name}; it is left out.")
             continue
-        face_count += 1
+        with_face += 1
         yield Delit(view, delight_face(srgb, face, checkpoint, settings.compute_device, step))
-    report.figure("frames_without_face", len(views) - face_count)
+    report.figure("frames_without_face", len(views) - with_face)
     report.figure("detail_enhanced", checkpoint.enhancer is not None)
-    if not face_count:
+    if not with_face:
         raise Problem("OpenDelight found no face in any of the selected frames.", "Choose another delighter.")
 
 
 def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, None]:
-    """A photograph sRGB [H, W, 3] whose face is delit, on the processor. Raises Problem where it shows no face."""
+    """Return a photograph sRGB [H, W, 3] with its face delit, on the CPU. Raises Problem if it shows no face."""
     path = Path(settings.checkpoint)
     checkpoint = _kept(settings.checkpoint, path.stat().st_mtime_ns if path.exists() else 0)
     face = detect(srgb)
@@ -83,7 +81,7 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
 
 
 class Checkpoint(NamedTuple):
-    """The network, and the one that gives detail back, None where its file does not lie beside the first."""
+    """Network, and the one that restores detail; None if its file is not beside the first."""
 
     base: nn.Module
     enhancer: nn.Module | None
@@ -92,25 +90,14 @@ class Checkpoint(NamedTuple):
 def delight_face(
     srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu", step: Callable[[], None] = lambda: None
 ) -> np.ndarray:
-    """A frame with the albedo of one face in it.
+    """Return a frame sRGB [H, W, 3] with the albedo of one face in it.
 
-    Parameters
-    ----------
-    srgb : [H, W, 3] in [0, 1], the frame
-    face : in it
-    checkpoint : OpenDelight's
-    device : that torch computes on
-    step : is called between layers, and may raise to cancel
-
-    Returns
-    -------
-    [H, W, 3], sRGB.
+    `step` is called between layers, and may raise to cancel.
     """
     to_crop = ffhq_alignment(face, CROP_PX, FFHQ_MARGIN)
     crop = cut_face(srgb, to_crop, CROP_PX)
-    mask = np.maximum(
-        face_mask(face, to_crop, CROP_PX), face_mask(face, to_crop, CROP_PX, FACE_RIM) * (segment_person(crop) > 0.5)
-    )
+    rim = face_mask(face, to_crop, CROP_PX, FACE_RIM) * (segment_person(crop) > 0.5)
+    mask = np.maximum(face_mask(face, to_crop, CROP_PX), rim)
     picture = torch.from_numpy((crop * mask[..., None]).transpose(2, 0, 1)[None].astype(np.float32)).to(device)
     albedo = delight_crop(checkpoint, picture, step)[0].permute(1, 2, 0).cpu().numpy()
     return put_face_back(srgb, crop, albedo, mask, to_crop)
@@ -118,20 +105,12 @@ def delight_face(
 
 @torch.inference_mode()
 def delight_crop(checkpoint: Checkpoint, picture: Tensor, step: Callable[[], None] = lambda: None) -> Tensor:
-    """Albedo of an aligned face, sRGB [1, 3, S, S].
+    """Return the albedo of an aligned face from its picture [1, 3, S, S], sRGB in [0, 1], black off the face.
 
-    Parameters
-    ----------
-    checkpoint : without its enhancer the base's answer stays
-    picture : [1, 3, S, S], sRGB in [0, 1], black off the face; S a multiple of 16
-    step : is called between layers
+    S is a multiple of 16. `step` is called between layers.
     """
-
-    def look(*_) -> None:
-        step()
-
     layers = [layer for network in checkpoint if network is not None for layer in network.modules()]
-    hooks = [layer.register_forward_hook(look) for layer in layers]
+    hooks = [layer.register_forward_hook(lambda *_: step()) for layer in layers]
     try:
         albedo = checkpoint.base(picture)
         return albedo if checkpoint.enhancer is None else checkpoint.enhancer(torch.cat([albedo, picture], 1))
@@ -141,7 +120,7 @@ def delight_crop(checkpoint: Checkpoint, picture: Tensor, step: Callable[[], Non
 
 
 def load(path: str, device: str = "cpu") -> Checkpoint:
-    """The checkpoint in a folder, or the first network's file. Raises Problem for anything else."""
+    """Load the checkpoint in a folder, or of the first network's file. Raises Problem for anything else."""
     if not path:
         raise Problem("No checkpoint of OpenDelight was chosen.", CHOOSE)
     chosen = Path(path)
@@ -177,25 +156,16 @@ def _kept(path: str, modified: int) -> Checkpoint:
 
 
 class Base(nn.Module):
-    """Picture [1, 3, S, S], sRGB in [0, 1] -> albedo of the same kind."""
+    """Network from picture [1, 3, S, S], sRGB in [0, 1], to albedo of the same kind."""
 
     def __init__(self) -> None:
         super().__init__()
         self.encoder = Encoder()
-        doublings = [
-            layer
-            for i in range(DOUBLINGS)
-            for layer in (
-                nn.ConvTranspose2d(CHANNELS if i else WIDTH, CHANNELS, 4, 2, 1, bias=False),
-                nn.InstanceNorm2d(CHANNELS),
-                nn.SiLU(inplace=True),
-            )
-        ]
-        further = [
-            layer
-            for _ in range(4)
-            for layer in (nn.Conv2d(CHANNELS, CHANNELS, 1), nn.InstanceNorm2d(CHANNELS), nn.SiLU(inplace=True))
-        ]
+        doublings, further = [], []
+        for width in (WIDTH, *[CHANNELS] * (DOUBLINGS - 1)):
+            doublings += [nn.ConvTranspose2d(width, CHANNELS, 4, 2, 1, bias=False), *_norm()]
+        for _ in range(4):
+            further += [nn.Conv2d(CHANNELS, CHANNELS, 1), *_norm()]
         self.decoder = nn.Sequential(
             OrderedDict(
                 deconv_layers=nn.Sequential(*doublings),
@@ -208,8 +178,12 @@ class Base(nn.Module):
         return torch.sigmoid(self.decoder(self.encoder(picture)))
 
 
+def _norm() -> list[nn.Module]:
+    return [nn.InstanceNorm2d(CHANNELS), nn.SiLU(inplace=True)]
+
+
 class Encoder(nn.Module):
-    """Picture [1, 3, S, S] -> [1, WIDTH, S / PATCH_PX, S / PATCH_PX]."""
+    """Network from picture [1, 3, S, S] to [1, WIDTH, S / PATCH_PX, S / PATCH_PX]."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -231,7 +205,7 @@ class Encoder(nn.Module):
 
 
 class Block(nn.Module):
-    """Tokens [1, N, WIDTH] to such: attention, then two layers."""
+    """Transformer block on tokens [1, N, WIDTH]: attention, then two layers."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -248,8 +222,7 @@ class Block(nn.Module):
 
 
 def _positions(side: int, width: int) -> Tensor:
-    """Fixed sine and cosine positions [1, side * side, width], column first (Vaswani et al. 2017, in two
-    dimensions)."""
+    """Return sine and cosine positions [1, side * side, width], column first (Vaswani et al. 2017, in 2D)."""
     rates = 10000.0 ** -(torch.arange(width // 4, dtype=torch.float64) / (width // 4))
     phases = torch.arange(side, dtype=torch.float64)[:, None] * rates
     waves = torch.cat([phases.sin(), phases.cos()], 1).float()  # [side, width / 2]
@@ -257,7 +230,7 @@ def _positions(side: int, width: int) -> Tensor:
 
 
 class Enhancer(nn.Module):
-    """The U-Net on albedo and picture [1, 6, S, S] -> albedo [1, 3, S, S]."""
+    """U-Net from albedo and picture [1, 6, S, S] to albedo [1, 3, S, S]."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -281,8 +254,10 @@ class Enhancer(nn.Module):
 
 
 class Residual(nn.Module):
-    """A residual block that normalises before it convolves, but for the first one; where the width changes, its
-    shortcut is a convolution."""
+    """Residual block that normalises before it convolves, but for the first one.
+
+    If the width changes, its shortcut is a convolution.
+    """
 
     def __init__(self, into: int, out: int, first: bool = False) -> None:
         super().__init__()

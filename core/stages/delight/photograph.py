@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A single photograph without its light, as a capture of one frame: the built-in head is fitted to the face's
-landmarks, a light to the skin that the photograph shows of it, and the network is asked with both.
+"""Single photograph without its light, delit as a capture of one frame.
 
-Brows and eyes get the shading of the skin around them. Where the parser sees none, in the dark or on closed lids, the
-landmarks say where they are.
+The built-in head is fitted to the face's landmarks, a light to the skin that the photograph shows of it, and the
+network runs with both. Brows and eyes get the shading of the skin around them. Where the parser sees none, in the dark
+or on closed lids, they lie where the landmarks do.
 """
 
 from __future__ import annotations
@@ -32,13 +32,12 @@ from .unet import SIDE_PX
 
 NAME = "photograph"
 OUTLINES = dict(zip(FEATURES, (faces.BROW_LINES, faces.EYE_LINES), strict=True))
-OVERLOOKED = 0.25
-"""Share of an outline below which what the parser sees of it is chance: of one that it does see it finds about half."""
+OVERLOOKED = 0.25  # share of an outline below which the parser missed it; it finds about half of one that it sees
 
 
 @dataclass(frozen=True)
 class PhotographView(View):
-    """A view whose picture [H, W, 3] (sRGB) is no frame of a capture."""
+    """View whose picture [H, W, 3] (sRGB) is no frame of a capture."""
 
     picture: np.ndarray
 
@@ -47,8 +46,10 @@ class PhotographView(View):
 
 
 def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, np.ndarray]:
-    """A single photograph [H, W, 3] (sRGB) of a face -> its albedo [H, W, 3] (sRGB) and its shadows [H, W]. Raises
-    Problem where no face is found."""
+    """Return albedo [H, W, 3] (sRGB) and shadows [H, W] of a photograph [H, W, 3] (sRGB) of a face.
+
+    Raises Problem if no face is found.
+    """
     face = faces.detect(srgb)
     if face is None:
         raise Problem(
@@ -68,8 +69,10 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
 
 
 def fit_head(srgb: np.ndarray, points: np.ndarray) -> tuple[PhotographView, Head]:
-    """The photograph [H, W, 3] as a view of the head of the identity space that its landmarks [468, 2] (pixels) show.
-    How far away it stands is a guess, for its focal length is."""
+    """Fit a head of the identity space to the landmarks [468, 2] (pixels) of a photograph [H, W, 3], and its view.
+
+    The distance is a guess, for the focal length is.
+    """
     height, width = srgb.shape[:2]
     bundle = place_by_landmarks(
         [{"names": [NAME], "width": width, "height": height, "focal_px": None}], {NAME: 0}, [NAME], {NAME: points}
@@ -80,15 +83,12 @@ def fit_head(srgb: np.ndarray, points: np.ndarray) -> tuple[PhotographView, Head
     )
     mesh = template.load()
     mesh = mesh.moved(mesh.vertices + np.tensordot(bundle.coefficients, template.identity(), 1))
-    return (
-        PhotographView(NAME, Path(NAME), camera, bundle.rotations[0], bundle.translations[0], True, srgb),
-        Head(mesh),
-    )
+    view = PhotographView(NAME, Path(NAME), camera, bundle.rotations[0], bundle.translations[0], True, srgb)
+    return view, Head(mesh)
 
 
 def _ask(srgb: np.ndarray, points: np.ndarray) -> ShadingEstimate:
-    """What the network says of the photograph, and beside it the fitted light; without both where the photograph shows
-    too little bare skin for a light to be fitted."""
+    """Return the network's answer on a photograph, with the fitted light if there is enough bare skin for one."""
     net = load_network("cpu")
     view, head = fit_head(srgb, points)
     try:
@@ -100,14 +100,14 @@ def _ask(srgb: np.ndarray, points: np.ndarray) -> ShadingEstimate:
     return weigh_in([look], [fitted], [seen_in(lit, lit.skin, look)])[0]
 
 
-def _share_of(seen: np.ndarray, outlines: list[np.ndarray]) -> np.ndarray:
-    """What the parser sees [h, h] of a feature, and the whole of each of its outlines bool [h, h] that it overlooks."""
-    overlooked = [outline for outline in outlines if outline.any() and seen[outline].mean() < OVERLOOKED]
-    return np.max([seen, *overlooked], 0).astype(np.float32)
+def _share_of(parsed: np.ndarray, outlines: list[np.ndarray]) -> np.ndarray:
+    """Return the parsed share [h, h] of a feature, completed by the outlines bool [h, h] that were overlooked."""
+    overlooked = [outline for outline in outlines if outline.any() and parsed[outline].mean() < OVERLOOKED]
+    return np.max([parsed, *overlooked], 0).astype(np.float32)
 
 
 def _filled(outline: np.ndarray, box: tuple[float, float, float], side: int) -> np.ndarray:
-    """bool [side, side]: the cells of the square `box` within an outline [N, 2] in pixels."""
+    """Return bool [side, side]: cells of the square `box` within an outline [N, 2] in pixels."""
     cells = np.zeros((side, side), np.uint8)
     cv2.fillPoly(cells, [np.round((outline - box[:2]) * side / box[2] - 0.5).astype(np.int32)], 1)
     return cells > 0

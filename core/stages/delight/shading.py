@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter that needs no network: one light for all frames, fitted to the skin of the registered head and divided
-out.
+"""Delighter without a network: one light for all frames, fitted to the skin of the registered head and divided out.
 
-The head's own shadows and the shadows of what stands beside it are told from dark skin by the sun's colour and
-contrast (occlusion.py). What the geometry gets wrong, and the shadows' edges, stay for the mask and the solver.
+The head's own shadows and the shadows of what stands beside it differ from dark skin by the sun's colour and contrast
+(occlusion.py). Errors of the geometry, and the shadows' edges, stay for the mask and the solver.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from .occlusion import FINE_SHARE, ZONE_SHARE, estimate_sun_share, remove_seams
 
 
 def shading(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """The selected frames divided by their shading, which is 1 where the skin is best lit."""
+    """Yield the selected frames divided by their shading, which is 1 where the skin is best lit."""
     views = read_views(capture, selected_only=True)
     head = fit_lit_head(read_head(capture), views, report)
     for i, view in enumerate(views):
@@ -37,8 +36,8 @@ def shading(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
 def _delight(view: View, head: LitHead) -> Delit:
     srgb = view.read()
     shadow = np.zeros(srgb.shape[:2], np.float32)
-    if (seen := light_in_frame(view, head, srgb)) is not None:
-        box, lit, share, here = seen
+    if (fitted := light_in_frame(view, head, srgb)) is not None:
+        box, lit, share, here = fitted
         srgb[box] = images.linear_to_srgb(images.srgb_to_linear(srgb[box]) / lit * head.best_lit)
         shadow[box] = (1 - share) * here
     return Delit(view, srgb, shadow if head.light.has_sun else None)
@@ -47,8 +46,10 @@ def _delight(view: View, head: LitHead) -> Delit:
 def light_in_frame(
     view: View, head: LitHead, srgb: np.ndarray
 ) -> tuple[tuple[slice, slice], np.ndarray, np.ndarray, np.ndarray] | None:
-    """Where a frame [H, W, 3] shows the head, with a margin: that part of it, and there what `light_seen` says and
-    where the head is; None if nowhere."""
+    """Return the part of a frame [H, W, 3] with the head, the results of `light_seen` there, and the head's pixels.
+
+    None if the frame does not show it.
+    """
     face, bary, _ = render_view(head.caster, view)
     if not (face >= 0).any():
         return None
@@ -60,20 +61,10 @@ def light_in_frame(
 def light_seen(
     linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray, side: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The light that the head's fit expects in a picture.
+    """Return the light that the fit expects in a linear picture [h, w, 3] of the head with raster `face`, `bary`.
 
-    Parameters
-    ----------
-    linear : [h, w, 3], the picture
-    head : with the fitted light
-    face : [h, w], the triangle that each pixel shows, -1 for none
-    bary : [h, w, 3], where in it
-    side : the longer side of the frame in pixels, at the picture's scale
-
-    Returns
-    -------
-    The skin's expected linear colour [h, w, 3], carried on past the head's edge, and the share of the sun [h, w] in [0,
-    1].
+    That is the skin's linear colour [h, w, 3], continued past the head's edge, and the share of the sun [h, w] in [0,
+    1]. side: the longer side of the frame in pixels, at the picture's scale.
     """
     here = face >= 0
     ambient, direct, free, _ = head.at(face, bary)
@@ -83,14 +74,11 @@ def light_seen(
         share = estimate_sun_share(linear, ambient, direct, free, 1 - own, here, side)
     lit = np.maximum(bleed((ambient + share[..., None] * direct).astype(np.float32), here), 1e-4)
     if head.light.has_sun:
-        lit = lit * np.exp(
-            remove_seams(np.log(np.maximum(linear, 1e-3) / lit), share, here, ZONE_SHARE * side, FINE_SHARE * side)
-        )
+        log_albedo = np.log(np.maximum(linear, 1e-3) / lit)
+        lit = lit * np.exp(remove_seams(log_albedo, share, here, ZONE_SHARE * side, FINE_SHARE * side))
     return lit, share
 
 
 def _box(mask: np.ndarray, margin: int = 8) -> tuple[slice, slice]:
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    return slice(max(rows[0] - margin, 0), rows[-1] + margin + 1), slice(
-        max(columns[0] - margin, 0), columns[-1] + margin + 1
-    )
+    spans = (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
+    return tuple(slice(max(span[0] - margin, 0), span[-1] + margin + 1) for span in spans)

@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter that the paper uses: SwitchLight, a paid service of Beeble (Kim et al., CVPR 2024). The selected frames
-leave the machine.
+"""Delighter of the paper: SwitchLight, a paid service of Beeble (Kim et al., CVPR 2024). Frames leave the machine.
 
-Nothing is sent without the artist's consent (core/capture/consent.py), nothing twice: answers are kept in the capture
-by the hash of what was sent. They say nothing about shadows. What is known of the service, and how well, is in
-core/capture/switchlight_api.py.
+Nothing is sent without the artist's consent (core/capture/consent.py), and nothing twice: answers are kept in the
+capture by the hash of what was sent. They report no shadows. core/capture/switchlight_api.py describes the service.
 """
 
 from __future__ import annotations
@@ -33,8 +31,10 @@ PATIENCE = Patience()
 
 
 def switchlight(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """SwitchLight's albedo of the selected frames, at their size. Raises Problem without consent, key, credits or a
-    service that answers."""
+    """Yield SwitchLight's albedo of the selected frames, at their size.
+
+    Raises Problem without consent, key, credits or a service that answers.
+    """
     views, preview = read_views(capture, selected_only=True), settings.delight.switchlight_preview
     plan = consent.sending(capture, preview, [view.name for view in views])
     calls = obtain(capture, plan, report) if plan.frames else 0
@@ -44,12 +44,11 @@ def switchlight(capture: Capture, settings: Settings, report: Reporter) -> Itera
     for i, view in enumerate(views):
         report.progress(i, len(views), "Reading SwitchLight's answers")
         answer = consent.answer(capture, hash_file(view.path), preview)
-        yield Delit(view, fitted(images.read_data(answer), view))
+        yield Delit(view, fit_answer(images.read_data(answer), view))
 
 
 def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
-    """Has the frames of a plan answered, after everything that could forbid it was asked; the number of calls. Raises
-    Problem."""
+    """Obtain the answers to the frames of a plan, after all checks, and return the number of calls. Raises Problem."""
     if os.environ.get(service.OFFLINE_VARIABLE):
         raise Problem(
             "Blender is set to work offline, and SwitchLight is on the network: nothing was sent.",
@@ -59,42 +58,26 @@ def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
     account = Account(service.base(), service.key())
     for line in consent.lines(plan):
         report.log(line)
-    left = _listening(report, lambda: balance(account))
-    if left is not None and left < plan.credits:
+    credits = _run_cancellable(lambda: balance(account), report)
+    if credits is None:
+        report.log("SwitchLight does not say how many credits are left.")
+    elif credits < plan.credits:
         raise Problem(
             f"{service.amount(plan.credits)} are needed, and your SwitchLight account has "
-            f"{service.amount(left)}: nothing was sent.",
+            f"{service.amount(credits)}: nothing was sent.",
             f"Buy some at {service.WEBSITE}, lower Views under Reconstruction, Frames, or take small "
             "pictures at half the credits (--preview).",
         )
-    report.log(
-        "SwitchLight does not say how many credits are left."
-        if left is None
-        else f"Your account has {service.amount(left)}."
-    )
-    return send(
-        account,
-        [pack_frame(capture, name, content, plan.preview) for name, content in plan.frames.items()],
-        plan.preview,
-        report,
-        PATIENCE,
-    )
+    else:
+        report.log(f"Your account has {service.amount(credits)}.")
+    parcels = [pack_frame(capture, name, content, plan.preview) for name, content in plan.frames.items()]
+    return send(account, parcels, plan.preview, report, PATIENCE)
 
 
 def pack_frame(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
-    """A frame as it is sent: its file as it is, and as it was agreed to.
+    """Return a frame's file as it is sent, if it still has the hash `content` that consent was given for.
 
-    Parameters
-    ----------
-    capture : that consent was given for
-    name : of the frame
-    content : hash of the frame that was agreed to
-    preview : whether small pictures are asked for, at half the credits
-
-    Raises
-    ------
-    Problem
-        Where the frame has changed, and for a kind that the service does not take.
+    Raises Problem if the frame has changed, and for a kind of file that the service does not take.
     """
     path = capture.frames / name
     if path.suffix.lower() not in MEDIA_TYPES:
@@ -110,26 +93,28 @@ def pack_frame(capture: Capture, name: str, content: str, preview: bool) -> Parc
     return Parcel(name, data, path.suffix.lower(), consent.answer(capture, content, preview))
 
 
-def _listening(report: Reporter, ask: Callable[[], float | None]) -> float | None:
-    """What `ask()` gives or raises, asked in a thread, so that a cancel is heard meanwhile."""
-    with_answer = Future()
+def _run_cancellable(ask: Callable[[], float | None], report: Reporter) -> float | None:
+    """Return or raise what `ask()` does, in a thread, so that the user can cancel meanwhile."""
+    answer = Future()
 
     def work() -> None:
         try:
-            with_answer.set_result(ask())
+            answer.set_result(ask())
         except Exception as error:  # raised again by result()
-            with_answer.set_exception(error)
+            answer.set_exception(error)
 
     threading.Thread(target=work, name="switchlight-balance", daemon=True).start()
-    while not with_answer.done():
+    while not answer.done():
         report.check()
-        wait([with_answer], 0.1)
-    return with_answer.result()
+        wait([answer], 0.1)
+    return answer.result()
 
 
-def fitted(answer: np.ndarray, view: View) -> np.ndarray:
-    """An answer [h, w, 1 to 4] as its frame, sRGB [H, W, 3]: where the service cut the background away, the frame's own
-    shows. Raises Problem where it is another section."""
+def fit_answer(answer: np.ndarray, view: View) -> np.ndarray:
+    """Return an answer [h, w, 1 to 4] at its frame's size, sRGB [H, W, 3], over the frame's background if it was cut.
+
+    Raises Problem for another shape.
+    """
     if abs(answer.shape[1] / answer.shape[0] - view.width / view.height) > 0.01:
         raise Problem(
             f"SwitchLight answered {view.name} with {answer.shape[1]} x {answer.shape[0]} pixels, but the "
@@ -139,6 +124,6 @@ def fitted(answer: np.ndarray, view: View) -> np.ndarray:
     if answer.shape[:2] != (view.height, view.width):
         answer = images.resize(answer, view.width, view.height).reshape(view.height, view.width, -1)
     colour = answer[..., :3] if answer.shape[2] >= 3 else np.repeat(answer[..., :1], 3, 2)
-    if answer.shape[2] in (2, 4):  # OpenImageIO hands out colours that are multiplied by alpha
+    if answer.shape[2] in (2, 4):  # OpenImageIO returns colours that are multiplied by alpha
         colour = colour + (1 - np.clip(answer[..., -1:], 0, 1)) * view.read()
     return np.clip(colour, 0, 1)

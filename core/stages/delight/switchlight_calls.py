@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One call to the SwitchLight API: a picture goes out as multipart/form-data (RFC 7578), a PNG comes back, and every
-failure gets its meaning.
+"""One call to the SwitchLight API: a picture as multipart/form-data (RFC 7578), answered by a PNG or an error.
 
 The key is in one header of the request and in no message. Redirections are not followed: they would carry it to another
 machine.
@@ -20,7 +19,8 @@ import urllib.request
 import uuid
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 
 from ... import __version__
 from ...capture import switchlight_api as service
@@ -31,9 +31,11 @@ BUSY_STATUSES = (408, 425, 429, 500, 502, 503, 504)
 
 
 class AgainError(Exception):
-    """It may work later: `reason` in a few words. `after_s` is how long the service asks to be left alone, None if it
-    does not say; `spoiled` that an answer came which is no use and may have been charged, `reached` that there was a
-    connection at all."""
+    """Failure that may not last, for a `reason` in a few words.
+
+    after_s: seconds that the service asks to wait, None if it does not say; spoiled: a useless answer came that may
+    have been charged; reached: there was a connection.
+    """
 
     def __init__(self, reason: str, after_s: float | None = None, spoiled: bool = False, reached: bool = True):
         super().__init__(reason)
@@ -41,18 +43,15 @@ class AgainError(Exception):
 
 
 class AccountProblem(Problem):
-    """What no other picture and no later call would change: the key, the credits, a machine that is not who it says."""
+    """Failure of all calls: the key, the credits, a machine that is not who it says."""
 
 
 @dataclass(frozen=True)
 class Account:
-    """Whom the calls are made for, and where to."""
+    """Address of the service, and the key that pays."""
 
     base: str
-    key: str
-
-    def __repr__(self) -> str:  # a traceback's or a log's view of it has no key
-        return f"Account({self.base})"
+    key: str = field(repr=False)  # not in tracebacks and logs
 
 
 def albedo(
@@ -64,24 +63,10 @@ def albedo(
     call_s: float,
     stopped: Callable[[], bool],
 ) -> bytes:
-    """The whole PNG that answers a picture.
+    """Send a picture file and return the whole PNG that answers it.
 
-    Parameters
-    ----------
-    account : that pays
-    data : the picture's file
-    suffix : of its name
-    preview : whether the cheap answer is asked for
-    silence_s : without a byte that are too long
-    call_s : for all of it that are too long
-    stopped : is asked between the parts of the answer
-
-    Raises
-    ------
-    AgainError
-        For what may go well when it is asked again.
-    Problem
-        For what no repetition mends.
+    Gives up after silence_s without a byte, after call_s in all, and between parts of the answer once `stopped()`.
+    Raises AgainError for failures that may not last, Problem for others.
     """
     boundary = uuid.uuid4().hex
     request = _request(account, service.ALBEDO, _multipart(boundary, data, suffix, service.form(preview)))
@@ -93,12 +78,13 @@ def albedo(
 
 
 def balance(account: Account, silence_s: float = 10.0) -> float | None:
-    """Credits left on the account, None where the service does not say. Raises Problem where it refuses the key or
-    cannot be reached at all."""
+    """Return the account's credits, None if the service does not say.
+
+    Raises Problem if it refuses the key or cannot be reached.
+    """
     try:
-        reply = json.loads(
-            _answer(account, _request(account, service.CREDITS), silence_s, time.monotonic() + silence_s, lambda: False)
-        )
+        request, end = _request(account, service.CREDITS), time.monotonic() + silence_s
+        reply = json.loads(_answer(account, request, silence_s, end, lambda: False))
         for name in service.BALANCE:
             reply = reply[name]
         return float(reply)
@@ -111,12 +97,12 @@ def balance(account: Account, silence_s: float = 10.0) -> float | None:
     except AccountProblem:
         raise
     except (Problem, ValueError, KeyError, TypeError):
-        pass  # a service that does not tell its balance may still work
+        pass  # a service that does not report its balance may still work
     return None
 
 
 def is_whole_png(data: bytes) -> bool:
-    """Whether every chunk up to the last is there and has its checksum (PNG specification, 5.3)."""
+    """Return True if every chunk up to the last is there and has its checksum (PNG specification, 5.3)."""
     if data[:8] != b"\x89PNG\r\n\x1a\n":
         return False
     at = 8
@@ -138,7 +124,7 @@ def _request(account: Account, path: str, body: bytes | None = None) -> urllib.r
 
 
 def _multipart(boundary: str, data: bytes, suffix: str, fields: dict[str, str]) -> bytes:
-    """The body; the picture's own name stays here, it may say who that is."""
+    """Return the body; the picture's own name is not sent, as it may name a person."""
     parts = [
         f'--{boundary}\r\nContent-Disposition: form-data; name="{name}"\r\n\r\n{value}\r\n'.encode()
         for name, value in fields.items()
@@ -159,18 +145,17 @@ class _Stay(urllib.request.HTTPRedirectHandler):
 def _answer(
     account: Account, request: urllib.request.Request, silence_s: float, end: float, stopped: Callable[[], bool]
 ) -> bytes:
-    """The body of an answer with status 200, whole. Raises AgainError or Problem."""
-    # Studios reach the internet by the proxy that their machines are set up with; this very machine is reached
-    # directly.
-    opener = urllib.request.build_opener(
-        _Stay, *([urllib.request.ProxyHandler({})] if service.local(account.base) else [])
-    )
+    """Return the whole body of an answer with status 200. Raises AgainError or Problem."""
+    # the system's proxy, if any, but not to this machine
+    proxy = [urllib.request.ProxyHandler({})] if service.local(account.base) else []
+    opener = urllib.request.build_opener(_Stay, *proxy)
     try:
         with opener.open(request, timeout=silence_s) as response:
             return _read(response, end, stopped)
     except urllib.error.HTTPError as error:
-        with error:
-            body = _start(error)
+        body = b""
+        with error, suppress(OSError, http.client.HTTPException, ValueError):
+            body = error.read(4096)
         if error.code in BUSY_STATUSES:
             raise AgainError(f"it is busy ({error.code})", _after(error.headers.get("Retry-After"))) from None
         raise _refusal(account, error.code, body) from None
@@ -182,9 +167,8 @@ def _answer(
             ) from None
         if isinstance(error.reason, TimeoutError):
             raise AgainError("it did not answer in time") from None
-        raise AgainError(
-            f"it cannot be reached ({getattr(error.reason, 'strerror', None) or error.reason})", reached=False
-        ) from None
+        cause = getattr(error.reason, "strerror", None) or error.reason
+        raise AgainError(f"it cannot be reached ({cause})", reached=False) from None
     except TimeoutError:
         raise AgainError("it did not answer in time") from None
     except (OSError, http.client.HTTPException) as error:
@@ -199,43 +183,37 @@ def _read(response, end: float, stopped: Callable[[], bool]) -> bytes:
         parts.append(chunk)
         if time.monotonic() > end or stopped():
             raise TimeoutError
-    body, told = b"".join(parts), response.headers.get("Content-Length")
-    if told is not None and len(body) != int(told):
-        raise http.client.IncompleteRead(b"", int(told) - len(body))
+    body, length = b"".join(parts), response.headers.get("Content-Length")
+    if length is not None and len(body) != int(length):
+        raise http.client.IncompleteRead(b"", int(length) - len(body))
     return body
 
 
-def _start(error: urllib.error.HTTPError) -> bytes:
-    try:
-        return error.read(4096)
-    except (OSError, http.client.HTTPException, ValueError):
-        return b""
-
-
 def _refusal(account: Account, status: int, body: bytes) -> Problem | None:
-    """What a refusal means; None for an answer with status 200 that says nothing."""
-    said = _said(body).replace(account.key, "(the key)")
-    if status == 402 or "no credit" in said.lower():
+    """Return the meaning of a refusal; None for an answer with status 200 without a message."""
+    message = _message(body).replace(account.key, "(the key)")
+    detail = f"({status}: {message})" if message else f"({status})"
+    if status == 402 or "no credit" in message.lower():
         return AccountProblem(
             "SwitchLight says that your account has no credits left.",
             f"Buy some at {service.WEBSITE}, then run again: what came is kept.",
         )
     if status in (401, 403):
         return AccountProblem(
-            f"SwitchLight does not accept the key ({status}{f': {said}' if said else ''}).",
+            f"SwitchLight does not accept the key {detail}.",
             f"Compare it with the one on your account's page at {service.WEBSITE}.",
         )
-    if status != 200 or said:
+    if status != 200 or message:
         return Problem(
-            f"SwitchLight's answer is not as documented ({status}{f': {said}' if said else ''}).",
+            f"SwitchLight's answer is not as documented {detail}.",
             "What came is kept. If this happens again, the service may have changed: look for a newer "
             "version of this extension.",
         )
     return None
 
 
-def _said(body: bytes) -> str:
-    """What a JSON answer has to say, in one line; '' for none."""
+def _message(body: bytes) -> str:
+    """Return the message of a JSON answer in one line; "" for none."""
     try:
         answer = json.loads(body)
         text = answer.get("message") or answer.get("detail") or answer.get("error") or answer
@@ -245,7 +223,7 @@ def _said(body: bytes) -> str:
 
 
 def _after(header: str | None) -> float | None:
-    """Seconds of a Retry-After header, which is a number of them or a date (RFC 9110, 10.2.3); None for none."""
+    """Return the seconds of a Retry-After header, a number of them or a date (RFC 9110, 10.2.3); None for none."""
     if header is None:
         return None
     if header.strip().isdigit():

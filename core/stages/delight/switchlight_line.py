@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures in line for SwitchLight: three calls at once at most, patience with a busy service, and every answer kept
-the moment it is whole.
+"""Queue for SwitchLight: at most three calls at once, patience with a busy service, every whole answer kept at once.
 
-A cancel is obeyed at once: calls that are under way are left to their threads, which keep what still comes for as long
-as the process lives.
+A cancel is obeyed at once: calls under way are left to their threads, which keep what still comes for as long as the
+process lives.
 """
 
 from __future__ import annotations
@@ -24,8 +23,10 @@ from .switchlight_calls import Account, AgainError, albedo
 
 @dataclass(frozen=True)
 class Patience:
-    """How often and how long a picture is tried. The wait doubles from `first_s` to `most_s`, at random between half of
-    it and all of it."""
+    """Limits of the tries for a picture.
+
+    The wait doubles from `first_s` to `most_s`, at random between half of it and all of it.
+    """
 
     tries: int = 6
     spoiled: int = 2  # answers that came broken and may have been charged: more are not risked
@@ -33,12 +34,12 @@ class Patience:
     most_s: float = 60.0
     silence_s: float = 30.0
     call_s: float = 120.0
-    longest_s: float = 300.0  # a service that wants to be left alone for longer is left alone
+    longest_s: float = 300.0  # a service that asks for a longer wait is given up
 
 
 @dataclass(frozen=True)
 class Parcel:
-    """A frame as it is sent, and where its answer goes."""
+    """Frame as it is sent, and the path of its answer."""
 
     name: str
     data: bytes
@@ -47,24 +48,9 @@ class Parcel:
 
 
 def send(account: Account, parcels: list[Parcel], preview: bool, report: Reporter, patience: Patience) -> int:
-    """Obtains and keeps the answer to every parcel.
+    """Obtain and keep the answer to every parcel; return the number of calls.
 
-    Parameters
-    ----------
-    account : that pays
-    parcels : what is sent
-    preview : whether the cheap answer is asked for
-    report : hears of progress
-    patience : how often and how long is tried
-
-    Returns
-    -------
-    The number of calls it took.
-
-    Raises
-    ------
-    Problem
-        Once the calls that are under way have ended; CancelledError at once.
+    Raises Problem once the calls under way have ended; CancelledError at once.
     """
     line = _Line(account, parcels, preview, patience)
     threads = [
@@ -85,7 +71,7 @@ def send(account: Account, parcels: list[Parcel], preview: bool, report: Reporte
 
 
 class _Line:
-    """What the threads share. `error` is the first that no patience helps against; then nothing new is begun."""
+    """State shared by the threads. After `error`, the first that no patience helps against, no call is started."""
 
     def __init__(self, account: Account, parcels: list[Parcel], preview: bool, patience: Patience):
         self.error: Exception | None = None
@@ -94,24 +80,23 @@ class _Line:
         self._waiting = list(reversed(parcels))
         self._of = len(parcels)
         self._lock = threading.Lock()
-        self._closed = threading.Event()
-        self._cancelled = False
+        self._closed, self._abandoned = threading.Event(), False
         self._not_before = 0.0
         self._reason = ""
 
     def close(self) -> None:
-        """Nothing new is begun; nobody waits any longer."""
-        self._cancelled = True
+        """Start no call, end all waits, and give up the calls under way."""
+        self._abandoned = True
         self._closed.set()
 
     def text(self) -> str:
-        left = self._not_before - time.monotonic()
-        if left > 0.5 and self._reason:
-            return f"SwitchLight: {self._reason}, trying again in {left:.0f} s"
+        wait_s = self._not_before - time.monotonic()
+        if wait_s > 0.5 and self._reason:
+            return f"SwitchLight: {self._reason}, trying again in {wait_s:.0f} s"
         return f"SwitchLight: {self.done} of {self._of} frames have come"
 
     def work(self) -> None:
-        """One thread: a parcel after the other."""
+        """Handle one parcel after the other in a thread."""
         while not self._closed.is_set():
             with self._lock:
                 if not self._waiting:
@@ -119,7 +104,7 @@ class _Line:
                 parcel = self._waiting.pop()
             try:
                 self._obtain(parcel)
-            except Exception as error:  # a thread has nobody above it: `send` raises it
+            except Exception as error:  # raised by `send`
                 self._stop(error)
 
     def _obtain(self, parcel: Parcel) -> None:
@@ -130,19 +115,16 @@ class _Line:
             with self._lock:
                 self.calls += 1
             try:
-                self._keep(
-                    parcel,
-                    albedo(
-                        self._account,
-                        parcel.data,
-                        parcel.suffix,
-                        self._preview,
-                        self._patience.silence_s,
-                        self._patience.call_s,
-                        lambda: self._cancelled,
-                    ),
+                answer = albedo(
+                    self._account,
+                    parcel.data,
+                    parcel.suffix,
+                    self._preview,
+                    self._patience.silence_s,
+                    self._patience.call_s,
+                    lambda: self._abandoned,
                 )
-                return
+                return self._keep(parcel, answer)
             except AgainError as error:
                 spoiled += error.spoiled
                 last = error
@@ -157,8 +139,7 @@ class _Line:
         )
 
     def _keep(self, parcel: Parcel, answer: bytes) -> None:
-        """Keeps an answer that can be read as a picture. Raises AgainError for one that cannot, Problem where it cannot
-        be written."""
+        """Write an answer. Raises AgainError if it cannot be read as a picture, Problem if it cannot be written."""
         with replacing(parcel.answer) as temporary:
             temporary.write_bytes(answer)
             try:
@@ -169,7 +150,7 @@ class _Line:
             self.done += 1
 
     def _postpone(self, error: AgainError, attempt: int) -> None:
-        """All threads leave the service alone for a while: what it asks for, and never less than our own wait."""
+        """Make all threads wait as long as the service asks, and at least our own wait."""
         wait = min(self._patience.most_s, self._patience.first_s * 2**attempt) * random.uniform(0.5, 1.0)
         if error.after_s is not None and error.after_s > self._patience.longest_s:
             raise Problem(
@@ -181,9 +162,9 @@ class _Line:
             self._reason = error.reason
 
     def _wait(self) -> bool:
-        """Waits until the service may be asked; False where the line is closed meanwhile."""
-        while (left := self._not_before - time.monotonic()) > 0:
-            if self._closed.wait(left):
+        """Wait until the service may be called; return False if the line is closed meanwhile."""
+        while (wait_s := self._not_before - time.monotonic()) > 0:
+            if self._closed.wait(wait_s):
                 return False
         return not self._closed.is_set()
 

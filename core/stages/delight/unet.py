@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighting network: a small U-Net from a picture of a face to its log-shading and its shadows, at half the
-picture's resolution.
+"""Delighting network: a small U-Net from a picture of a face to its log-shading and shadows, at half the resolution.
 
-What goes in is the same in training and in use: `network_input`. All logarithms are natural and of linear light.
+Training and use share `network_input`. All logarithms are natural and of linear light.
 """
 
 from __future__ import annotations
@@ -16,12 +15,11 @@ from torch.nn import functional
 from ...face.networks import Ladder
 from ...imaging import images
 
-SIDE_PX = 256  # of the picture it looks at
-CHANNELS = 16  # layers that `network_input` makes
+SIDE_PX = 256  # of its picture
+CHANNELS = 16  # of `network_input`
 FINE = 24  # features at half the picture's resolution
 MIN_LINEAR = 0.004  # linear; below is noise
-FARTHEST_LOG = 2.5  # natural log: what is left of a picture under the fitted light, at most
-MULTIPLE_PX = 32  # of pixels, to be halved so often
+FARTHEST_LOG = 2.5  # natural log: largest ratio between a picture and the fitted light
 
 
 def network_input(
@@ -31,19 +29,11 @@ def network_input(
     normal: np.ndarray | None = None,
     head: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
-    """What the network reads of a picture. Without the head's geometry its channels are 0, and so is the last, which
-    says so.
+    """Return the network's input [CHANNELS, S, S] for a picture sRGB [S, S, 3], and the middle of its natural log.
 
-    Parameters
-    ----------
-    srgb : [S, S, 3] in [0, 1]
-    ambient, sunlit : [S, S, 3], linear colour of the head's skin under the fitted sky alone, and with the fitted sun
-    normal : [S, S, 3], unit, in camera coordinates
-    head : [S, S] in [0, 1], where these three hold
-
-    Returns
-    -------
-    [CHANNELS, S, S] and the middle of the picture's natural log, by which the log-shading that comes out is lower.
+    The latter is to be added to the log-shading that comes out. ambient, sunlit [S, S, 3]: linear colour of the head's
+    skin under the fitted sky alone, and with the fitted sun; normal [S, S, 3]: unit, in camera coordinates; head [S, S]
+    in [0, 1]: where these hold, also the last channel. Without them their channels are 0.
     """
     log = np.log(np.maximum(images.srgb_to_linear(srgb), MIN_LINEAR))
     side = len(log)
@@ -54,18 +44,18 @@ def network_input(
     layers[3:6] = (log - middle).transpose(2, 0, 1)
     if ambient is not None:
         for first, light in ((6, ambient), (9, sunlit)):
-            rest = log - np.log(np.maximum(light, MIN_LINEAR / 4))
-            layers[first : first + 3] = (np.clip(rest, -FARTHEST_LOG, FARTHEST_LOG) * head[..., None]).transpose(
-                2, 0, 1
-            )
+            ratio = np.clip(log - np.log(np.maximum(light, MIN_LINEAR / 4)), -FARTHEST_LOG, FARTHEST_LOG)
+            layers[first : first + 3] = (ratio * head[..., None]).transpose(2, 0, 1)
         layers[12:15] = (normal * head[..., None]).transpose(2, 0, 1)
         layers[15] = head
     return layers, middle
 
 
 class DelightNet(Ladder):
-    """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2].
-    S is a multiple of MULTIPLE_PX. The coarsest level attends to all of itself."""
+    """Network from [N, CHANNELS, S, S] to log-shading less the picture's middle, [N, 3, S/2, S/2], and shadow logits.
+
+    These are [N, 1, S/2, S/2]; S is a multiple of 32. The coarsest level attends to all of itself.
+    """
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__()
@@ -92,7 +82,7 @@ class DelightNet(Ladder):
 
 
 class Attention(nn.Module):
-    """Self-attention over the coarsest map: one side of a face tells the colour of the other."""
+    """Self-attention over the coarsest map, where one side of a face informs the other."""
 
     def __init__(self, width: int, heads: int = 4):
         super().__init__()

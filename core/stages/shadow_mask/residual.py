@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shadows that are still in the texture: skin that is darker than lit skin should be, by the one colour that a shadow
-has.
+"""Shadows left in the texture: skin that is darker than lit skin should be, by the one colour that a shadow has.
 
 log I_UV = smooth light over the normals + shadow colour * hidden 0 or 1 + skin's own variation. Fitted by expectation
 maximisation; a shadow colour must be darker in every channel and must explain the texture clearly better than none.
@@ -20,47 +19,35 @@ OUTLIER_RANGE_LOG = 3.0  # log units over which an outlier may lie, per channel
 LEAST_STEP_LOG = 0.3  # a shadow takes a quarter of the light or more; flushed noses and beards take less
 LEAST_LIKELIHOOD_GAIN = 0.08  # of log likelihood per texel over a texture without shadow
 FIRST_STEPS_LOG = (-0.4, -0.8, -1.3)  # darkenings that the fit starts from, natural log units
-LIKELIEST_SHARE = 0.35
+FIRST_SHARE = 0.35  # of skin in shadow, that the fit starts from
 
 
-def find_shadow(
-    colours: np.ndarray, normals: np.ndarray, skin: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Linear texture colours [N, 3], unit normals [N, 3], bool [N]: plain skin to fit on.
+def find_shadow(colours: np.ndarray, normals: np.ndarray, skin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the log odds [N] that texels are in shadow and the shadow's log colour [3]; -12 and zeros if none.
 
-    Returns the log odds [N] that a texel is in shadow (-12 everywhere if there is none), its residual [N, 3] against
-    lit skin in log units, and the shadow's colour [3] in log units (zeros: none).
+    colours: linear [N, 3]; normals: unit [N, 3]; skin: bool [N], the plain skin to fit on.
     """
-    log = np.log(np.maximum(colours, 1e-4))
-    basis = smooth_basis(normals)
-    drawn = np.flatnonzero(skin)
-    drawn = drawn[:: max(1, len(drawn) // 6000)]
-    none = (np.zeros(len(log)) - 12, log - np.median(log, 0), np.zeros(3))
-    if len(drawn) < 200:
+    none = np.full(len(colours), -12.0), np.zeros(3)
+    log, basis = np.log(np.maximum(colours, 1e-4)), smooth_basis(normals)
+    fit = np.flatnonzero(skin)
+    fit = fit[:: max(1, len(fit) // 6000)]
+    if len(fit) < 200:
         return none
-    plain = _expectation_maximisation(log[drawn], basis[drawn], np.zeros(3), iterations=15, fixed=True)
-    fits = [
-        _expectation_maximisation(log[drawn], basis[drawn], np.full(3, start), iterations=40)
-        for start in FIRST_STEPS_LOG
-    ]
+    without, _, _ = _expectation_maximisation(log[fit], basis[fit], np.zeros(3), iterations=15, fixed=True)
+    fits = [_expectation_maximisation(log[fit], basis[fit], np.full(3, first), 40) for first in FIRST_STEPS_LOG]
     likelihood, smooth, step = max(fits, key=lambda fit: fit[0])
-    if (
-        step.mean() > -LEAST_STEP_LOG
-        or step.max() > -0.05
-        or likelihood - plain[0] < LEAST_LIKELIHOOD_GAIN * len(drawn)
-    ):
-        return none[0], log - basis @ plain[1], none[2]
+    is_shadow = step.mean() <= -LEAST_STEP_LOG and step.max() <= -0.05
+    if not is_shadow or likelihood - without < LEAST_LIKELIHOOD_GAIN * len(fit):
+        return none
     residual = log - basis @ smooth
-    odds = _log_likelihood(residual - step) - _log_likelihood(residual)
-    return np.clip(odds, -12, 12), residual, step
+    return np.clip(_log_likelihood(residual - step) - _log_likelihood(residual), -12, 12), step
 
 
 def _expectation_maximisation(log, basis, step, iterations, fixed=False):
-    """-> (log likelihood, smooth [9, 3], step [3]) from a first guess of the step; `fixed` leaves it there with no
-    texel in shadow."""
+    """Return (log likelihood, smooth [9, 3], step [3]) from a first step; `fixed` keeps it, with no texel in shadow."""
     count = len(log)
     dark = np.zeros(count) if fixed else (log.mean(1) < np.quantile(log.mean(1), 0.9) + 0.6 * step.mean()).astype(float)
-    inlier, share = np.ones(count), 1e-6 if fixed else LIKELIEST_SHARE
+    inlier, share = np.ones(count), 1e-6 if fixed else FIRST_SHARE
     ridge = np.diag([0.0, *[2e-3] * 3, *[2e-2] * 5]) * count
     for _ in range(iterations):
         weighted = basis * inlier[:, None]
@@ -70,19 +57,19 @@ def _expectation_maximisation(log, basis, step, iterations, fixed=False):
         residual = log - basis @ smooth
         if not fixed:
             step = (residual * (dark * inlier)[:, None]).sum(0) / max((dark * inlier).sum(), 1e-6)
-        terms = np.stack(
+        terms = np.stack(  # [3, N]
             [
                 np.log(share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual - step),
-                # [3, N]
                 np.log1p(-share) + np.log1p(-OUTLIER_SHARE) + _log_likelihood(residual),
                 np.full(count, np.log(OUTLIER_SHARE) - 3 * np.log(OUTLIER_RANGE_LOG)),
             ]
         )
         peak = terms.max(0)
         shares = np.exp(terms - peak)
-        dark = np.zeros(count) if fixed else shares[0] / np.maximum(shares[0] + shares[1], 1e-30)
         inlier = 1 - shares[2] / shares.sum(0)
-        share = share if fixed else float(np.clip((dark * inlier).sum() / max(inlier.sum(), 1e-6), 0.01, 0.9))
+        if not fixed:
+            dark = shares[0] / np.maximum(shares[0] + shares[1], 1e-30)
+            share = float(np.clip((dark * inlier).sum() / max(inlier.sum(), 1e-6), 0.01, 0.9))
     return float((peak + np.log(shares.sum(0))).sum()), smooth, step
 
 
@@ -94,7 +81,6 @@ def _log_likelihood(residual: np.ndarray) -> np.ndarray:
 
 
 def smooth_basis(normals: np.ndarray) -> np.ndarray:
-    """The polynomials of the second-order spherical harmonics in unit normals [N, 3], centred: [N, 9], the first column
-    1."""
+    """Return the second-order spherical-harmonic polynomials of normals [N, 3], centred: [N, 9], the first column 1."""
     columns = np.stack(sh_polynomials(normals)[1:], 1)
     return np.concatenate([np.ones((len(columns), 1)), columns - columns.mean(0)], 1)

@@ -9,7 +9,6 @@ that the tone comes from all views and the pores from the one that saw them best
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -21,32 +20,32 @@ from ...capture.messages import Problem, Reporter
 from ...face import template
 from ...face.head import Head, Unfolded, read_filmed_head
 from ...geometry.frame_pictures import check_shape, delit_views
-from ...geometry.views import View
 from ...imaging import images
 from ...settings.settings import Settings
 from .align import align
-from .blend import bands_of, blend, equalise, robust_weights
+from .blend import bands_of, blend, equalise, filmed, robust_weights
 from .blinks import leave_out_blinks
 from .detail import fine_detail
 from .fill import fill
-from .filmed import filmed
 from .foreign import clothes, leave_out_background, leave_out_hair
-from .held_picture import HeldPicture, read_held
+from .held_picture import read_held
 from .parts_shown import GROWTHS, PartsShown, tell_parts
 from .projection import UnwrappedView, observe
 
 OBSERVED_TEXELS = 1024
-"""Side of the maps on which views are looked at, aligned and weighed: all of that is smooth, and all views are held at
-once. Of a larger texture one view after the other is read along it."""
+"""Largest side of the maps on which views are compared, aligned and weighted: these are smooth, and all are in memory.
+
+A larger texture is blended one view at a time."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """delit/, cameras/, head.obj -> texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1],
-    texture_filmed.png (sRGB), the same with the light in it, and texture_parts.png (brows, beard and head hair in [0,
-    1]) where the frames are still there, and texture_detail.exr where they show more than a texel; where not, those of
-    another run go.
+    """Write the texture, and what it comes with, from delit/, cameras/ and head.obj.
 
-    Raises Problem where no view was delit or none of them sees the head.
+    texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1]; if the frames are still there
+    texture_filmed.png (sRGB), the same with its light, and texture_parts.png (brows, beard and head hair in [0, 1]);
+    texture_detail.exr if they show more than a texel. Files of an earlier run that do not apply are removed.
+
+    Raises Problem if no view was delit or none of them sees the head.
     """
     head = read_filmed_head(capture)
     size = settings.texture.size
@@ -56,36 +55,35 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if built.confidence[covered].max(initial=0) <= 0:
         raise Problem(
             "No delit frame sees the head.",
-            "Check the cameras' and the head's pictures in the report, and run those stages again.",
+            "Check the pictures of Cameras and Head in the report, and run those stages again.",
         )
     texture = fill(np.exp(built.log_texture), built.confidence, covered)
-
+    for path in (capture.texture_parts, capture.texture_detail, capture.texture_filmed):
+        remove_file(path)
     images.write_linear(capture.texture, texture)
     images.write_srgb(capture.texture_png, images.linear_to_srgb(texture))
     images.write_data(capture.texture_confidence, built.confidence)
-    remove_file(capture.texture_parts)
     if shown.judged.any():
         images.write_data(capture.texture_parts, shown.shares[..., : len(GROWTHS)])
-    _leave_figures(capture, report, observations, built, texture, covered)
+    _report_texture(capture, report, observations, built, texture, covered)
     detail = fine_detail(observations, surface, size, report)
-    remove_file(capture.texture_detail)
     if detail is not None:
         images.write_data(capture.texture_detail, detail)
+        agreed = detail[..., 1][detail[..., 1] > 0]
         report.figure("fine_detail_size_px", len(detail))
-        report.figure(
-            "fine_detail_agreed_percent",
-            round(100 * float(detail[..., 1][detail[..., 1] > 0].mean()), 1) if detail[..., 1].any() else 0.0,
-        )
+        report.figure("fine_detail_agreed_percent", round(100 * float(agreed.mean()), 1) if len(agreed) else 0.0)
     lit = filmed(observations, surface.covered, size, report)
-    remove_file(capture.texture_filmed)
     if lit is not None:
         images.write_srgb(capture.texture_filmed, images.linear_to_srgb(fill(lit, built.confidence, covered)))
 
 
 @dataclass
 class Built:
-    """log_texture [S, S, 3] natural logarithm of linear colour; confidence [S, S] in [0, 1]; log gains [V, 3]; mean
-    warp in texels; losses of the perceptual step before and after ({} where it is off)."""
+    """Texture before its holes are filled.
+
+    log_texture [S, S, 3]: natural logarithm of linear colour; confidence [S, S] in [0, 1]; gains [V, 3]: log gains;
+    shift: mean warp in texels; losses of the perceptual step before and after ({} if it is off).
+    """
 
     log_texture: np.ndarray
     confidence: np.ndarray
@@ -97,20 +95,9 @@ class Built:
 def observe_all(
     capture: Capture, head: Head, size: int, report: Reporter
 ) -> tuple[list[UnwrappedView], Unfolded, PartsShown]:
-    """What each delit view sees of the head, the frame's own sharpness counted, and which parts of the person they
-    show.
+    """Return what each delit view sees of the head, at `size` texels, and which parts of the person they show.
 
-    Parameters
-    ----------
-    capture : with delit views
-    head : in the capture
-    size : of the maps, in texels along a side
-    report : hears of progress
-
-    Raises
-    ------
-    Problem
-        Where no view was delit.
+    Raises Problem if no view was delit, or a delit picture has not its frame's shape.
     """
     frames = read_frames(capture).by_name
     views = delit_views(capture)
@@ -129,19 +116,14 @@ def observe_all(
     observations = []
     for i, (view, path) in enumerate(views):
         report.progress(i, len(views) + 6, f"projecting {view.name}")
-        observations.append(observe(view, _delit(path, view), surface, frames[view.name].sharpness / best, pixel_m))
+        picture = read_held(path)
+        check_shape(path, picture.stored, view, "delit")
+        observations.append(observe(view, picture, surface, frames[view.name].sharpness / best, pixel_m))
     report.figure("blinks", len(leave_out_blinks(capture, observations, surface, report)))
     shown = tell_parts(observations, surface, report)
     hair = leave_out_hair(observations, shown, surface)
     report.figure("hair_percent", round(100 * float(hair[surface.covered].mean()), 1))
     return observations, surface, shown
-
-
-def _delit(path: Path, view: View) -> HeldPicture:
-    """A delit picture. Raises Problem where it is not of its frame's shape."""
-    picture = read_held(path)
-    check_shape(path, picture.stored, view, "delit")
-    return picture
 
 
 def build(
@@ -152,16 +134,9 @@ def build(
     size: int | None = None,
     aligned: bool = True,
 ) -> Built:
-    """One map from what the views see.
+    """Build one map of `size` (None: the observations' own) from what the views see.
 
-    Parameters
-    ----------
-    observations : of the views; change (gains, warps, weights)
-    surface : of the head, unfolded at their size
-    settings : of the texture
-    report : hears of progress, takes the figures
-    size : of the map, in texels along a side; None: the observations' own
-    aligned : off for measurements only
+    Changes the observations' gains, warps and weights. `aligned` is switched off for measurements only.
     """
     leave_out_background(observations, report)
     gains = equalise(observations)
@@ -170,8 +145,8 @@ def build(
     robust_weights(observations)
     own, losses = len(surface.covered), {}
     log_texture = blend(observations, surface.covered, own, report)
-    seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
-    confidence = np.where(surface.covered, seen, 0).astype(np.float32)
+    observed = 1 - np.prod([1 - o.quality for o in observations], axis=0)
+    confidence = np.where(surface.covered, observed, 0).astype(np.float32)
     confidence = confidence * (1 - clothes(log_texture, confidence, surface))
     if size and size > own:
         log_texture = blend(observations, surface.covered, size, report)
@@ -190,7 +165,7 @@ def build(
     return Built(log_texture, confidence, gains, shift, losses)
 
 
-def _leave_figures(capture, report, observations, built, texture, covered):
+def _report_texture(capture, report, observations, built, texture, covered) -> None:
     log_texture, confidence = built.log_texture, built.confidence
     height = min(512, len(texture))
     sheet = [
@@ -201,15 +176,13 @@ def _leave_figures(capture, report, observations, built, texture, covered):
     small = images.resize(log_texture, *observations[0].weight.shape)
     residuals = [np.abs(o.log_colour - small)[o.weight > 0.25 * o.weight.max()].ravel()[::16] for o in observations]
     fine = bands_of(log_texture, confidence > 0)[0]
+    inner = cv2.erode((confidence > 0.3).astype(np.uint8), np.ones((9, 9))) > 0
     report.figure("views", len(observations))
     report.figure("seen_percent", round(100 * float((confidence[covered] > 0.05).mean()), 1))
     report.figure("disagreement_percent", round(100 * float(np.median(np.concatenate(residuals))), 2))
     report.figure("alignment_shift_texels", round(built.shift, 2))
     report.figure("gain_spread_percent", round(100 * float(np.std(built.gains)), 2))
-    report.figure(
-        "fine_contrast_percent",
-        round(100 * float(np.std(fine[cv2.erode((confidence > 0.3).astype(np.uint8), np.ones((9, 9))) > 0])), 2),
-    )
+    report.figure("fine_contrast_percent", round(100 * float(np.std(fine[inner])), 2))
     if built.losses:
         report.figure("perceptual_loss_before", round(built.losses["before"], 5))
         report.figure("perceptual_loss_after", round(built.losses["after"], 5))

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Takes out what is left of pose and surface errors: a smooth warp of each view's UV texture onto the others'
-consensus.
+"""Alignment: a smooth warp of each view's UV texture onto the others' consensus, against pose and surface errors.
 
 After Zhou and Koltun, "Color Map Optimization for 3D Reconstruction with Consumer Depth Cameras" (2014), with dense
 optical flow (DIS) in UV space in the place of their control lattice.
@@ -20,15 +19,12 @@ from .blend import blurred, weighted_mean
 from .projection import UnwrappedView
 
 ROUNDS = 2
-LARGEST_WARP_SHARE = 10 / 1024
-"""Longest warp, as a part of the map's side."""
-SMOOTH_SIDE_SHARE = 24 / 1024
-"""Gaussian sigma of the warp's smoothing, as a part of the map's side."""
+LARGEST_WARP_SHARE = 10 / 1024  # longest warp, share of the map's side
+SMOOTH_SIDE_SHARE = 24 / 1024  # Gaussian sigma of the warp's smoothing, share of the map's side
 
 
 def align(observations: list[UnwrappedView], surface: Unfolded, report: Reporter) -> float:
-    """Resamples every observation along its warp. Returns the mean length of the last warps in texels, where they
-    count."""
+    """Resample every observation along its warp; return the mean length of the warps in texels, where they count."""
     if len(observations) < 2:
         return 0.0
     size = len(surface.covered)
@@ -49,23 +45,25 @@ def align(observations: list[UnwrappedView], surface: Unfolded, report: Reporter
         for warp, observation in zip(warps, observations, strict=True):
             report.check()
             warp -= drift  # the views may move against each other, not the texture over the surface
-            _limit(warp, LARGEST_WARP_SHARE * size)
+            warp *= np.minimum(1, LARGEST_WARP_SHARE * size / np.maximum(lengths(warp)[..., None], 1e-6))
             observation.resample(_moved(observation.pixels, warp), warp if step == ROUNDS - 1 else None)
     moved = [lengths(warp)[o.weight > 0.25 * o.weight.max()] for warp, o in zip(warps, observations, strict=True)]
     return float(np.concatenate(moved).mean())
 
 
 def _detail(observation: UnwrappedView) -> np.ndarray:
-    """[S, S] band-passed log luminance: what can be matched whatever the light."""
+    """Return the band-passed log luminance [S, S], which can be matched whatever the light."""
     grey = observation.log_colour.mean(-1)
-    seen = (observation.weight > 0).astype(np.float32)
+    observed = (observation.weight > 0).astype(np.float32)
     size = len(grey)
-    return (blurred(grey, seen, size / 1024) - blurred(grey, seen, 10 * size / 1024)) * seen
+    return (blurred(grey, observed, size / 1024) - blurred(grey, observed, 10 * size / 1024)) * observed
 
 
 def _flow(consensus: np.ndarray, detail: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Smooth float32 [S, S, 2] with consensus(x) = detail(x + flow(x)), decided by where the view sees well and there
-    is something to see."""
+    """Return smooth float32 [S, S, 2] with consensus(x) = detail(x + flow(x)).
+
+    It is decided where the view sees well and there is something to match.
+    """
     trust = np.clip(weight / max(np.percentile(weight[weight > 0], 80) if (weight > 0).any() else 1, 1e-9), 0, 1)
     spread = max(float(consensus[trust > 0.2].std()) if (trust > 0.2).any() else 0.0, 1e-4)
     first, second = (
@@ -73,19 +71,13 @@ def _flow(consensus: np.ndarray, detail: np.ndarray, weight: np.ndarray) -> np.n
     )
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     dis.setFinestScale(1)
-    raw = dis.calc(first, second, None)
-    scale = len(consensus) / 1024
-    contrast = cv2.GaussianBlur(np.abs(consensus), (0, 0), 6 * scale) / spread
+    flow = dis.calc(first, second, None)
+    contrast = cv2.GaussianBlur(np.abs(consensus), (0, 0), 6 * (len(consensus) / 1024)) / spread
     sure = trust * np.minimum(contrast, 2) + 1e-4
-    return blurred(raw, sure, SMOOTH_SIDE_SHARE * len(consensus)).astype(np.float32)
-
-
-def _limit(warp: np.ndarray, longest: float) -> None:
-    length = lengths(warp)[..., None]
-    warp *= np.minimum(1, longest / np.maximum(length, 1e-6))
+    return blurred(flow, sure, SMOOTH_SIDE_SHARE * len(consensus)).astype(np.float32)
 
 
 def _moved(pixels: np.ndarray, warp: np.ndarray) -> np.ndarray:
-    """pixels(x + warp(x)): where the picture shows what belongs at texel x."""
+    """Return pixels(x + warp(x)): where the picture shows what belongs at texel x."""
     y, x = np.mgrid[0 : len(warp), 0 : len(warp)].astype(np.float32)
     return cv2.remap(pixels, x + warp[..., 0], y + warp[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the frames show that the texture is too coarse to hold: pores, the edges of moles, single hairs, as a band of
-log luminance on a finer map.
+"""Detail that the texture is too coarse for: pores, the edges of moles, single hairs, as a band of log luminance.
 
 Each view is read again at more texels along the warp that aligned it. What several views show alike is skin, what
 differs between them is noise, so the band is shrunk by Wiener's factor, the share of it that the views agree on.
@@ -15,48 +14,37 @@ import numpy as np
 from ...capture.messages import Reporter
 from ...face.head import Unfolded
 from ...geometry import raster
+from ...imaging.normalized_convolution import weighted_blur
 from .projection import UnwrappedView
 
-WORTH_PX_PER_TEXEL = 1.3
-"""Pixels per texel of the texture from which a map twice as fine is worth its while; half of it, from twice as many,
-one four times as fine."""
+WORTH_PX_PER_TEXEL = 1.3  # pixels per texel that make a map twice as fine worthwhile; twice as many: four times as fine
 LARGEST_TEXELS = 4096
-COARSE_SIGMA_TEXELS = 1.0
-"""Sigma, in texels of the texture, of the blur that parts what it holds from what it does not."""
-AROUND_SIGMA_TEXELS = 3.0
-"""Sigma, in texels of the texture, of the neighbourhood over which agreement is judged."""
-SHARP_EXPONENT = 2.0
-"""Exponent of the views' weights: near the best view's own detail, yet of several."""
+COARSE_SIGMA_TEXELS = 1.0  # of the blur, in texels of the texture, that separates what it holds from what it does not
+AROUND_SIGMA_TEXELS = 3.0  # of the neighbourhood, in texels of the texture, over which agreement is judged
+SHARP_EXPONENT = 2.0  # of the views' weights: near the best view's own detail, yet of several
 
 
 def fine_detail(
     observations: list[UnwrappedView], surface: Unfolded, texels: int, report: Reporter
 ) -> np.ndarray | None:
-    """What the frames hold that is finer than the texture.
+    """Return what the frames hold that is finer than a texture of `texels` along a side, float32 [F S, F S, 2].
 
-    Parameters
-    ----------
-    observations : of the views
-    surface : of the head, unfolded at their size
-    texels : side S of the texture
-    report : hears of progress
-
-    Returns
-    -------
-    float32 [F S, F S, 2]: the band of log luminance (natural), and Wiener's factor in [0, 1] that it is already
-    multiplied by. None where the frames hold nothing finer, or fewer than two views see the head.
+    The channels are the band of log luminance (natural) and Wiener's factor in [0, 1], by which it is already
+    multiplied. None if the frames hold nothing finer, or fewer than two views see the head.
     """
     factor = finer(observations, texels)
     if factor == 1 or len(observations) < 2:
         return None
     size = factor * texels
+
+    def enlarge(image: np.ndarray) -> np.ndarray:
+        return cv2.resize(image, (size, size), interpolation=cv2.INTER_LINEAR)
+
     total, squares, weights, weights2 = (np.zeros((size, size), np.float32) for _ in range(4))
     for observation in observations:
         report.progress(len(observations) + 4, len(observations) + 6, f"fine detail of {observation.name}")
-        weight = cv2.resize(observation.weight, (size, size), interpolation=cv2.INTER_LINEAR) ** SHARP_EXPONENT
-        pixels = cv2.resize(
-            raster.bleed(observation.pixels, surface.covered), (size, size), interpolation=cv2.INTER_LINEAR
-        )
+        weight = enlarge(observation.weight) ** SHARP_EXPONENT
+        pixels = enlarge(raster.bleed(observation.pixels, surface.covered))
         grey = observation.picture.log_colours(pixels).mean(-1)
         band = grey - cv2.GaussianBlur(grey, (0, 0), COARSE_SIGMA_TEXELS * factor)
         total += weight * band
@@ -64,23 +52,19 @@ def fine_detail(
         weights += weight
         weights2 += weight**2
     mean = total / np.maximum(weights, 1e-9)
-    views = weights**2 / np.maximum(weights2, 1e-12)  # how many views count, in effect
-    seen = (views > 1.2) & (cv2.resize(surface.covered.astype(np.float32), (size, size)) > 0.99)
-
-    def around(image: np.ndarray) -> np.ndarray:
-        sigma = AROUND_SIGMA_TEXELS * factor
-        spread = cv2.GaussianBlur(image * seen, (0, 0), sigma)
-        return spread / np.maximum(cv2.GaussianBlur(seen.astype(np.float32), (0, 0), sigma), 1e-6)
-
-    # variance of the mean
-    noise = np.maximum(squares / np.maximum(weights, 1e-9) - mean**2, 0) / np.maximum(views - 1, 0.2)
-    agreed = np.clip(1 - around(noise) / np.maximum(around(mean**2), 1e-9), 0, 1) * seen
+    views = weights**2 / np.maximum(weights2, 1e-12)  # effective number of views
+    shared = (views > 1.2) & (enlarge(surface.covered.astype(np.float32)) > 0.99)
+    variance = np.maximum(squares / np.maximum(weights, 1e-9) - mean**2, 0) / np.maximum(views - 1, 0.2)  # of the mean
+    noise, power = (weighted_blur(each, shared, AROUND_SIGMA_TEXELS * factor) for each in (variance, mean**2))
+    agreed = np.clip(1 - noise / np.maximum(power, 1e-9), 0, 1) * shared
     return np.stack([mean * agreed, agreed], -1).astype(np.float32)
 
 
 def finer(observations: list[UnwrappedView], texels: int) -> int:
-    """1, 2 or 4: how many texels of a side the frames can fill where a texture of `texels` has one, judged where each
-    view sees the head best."""
+    """Return 1, 2 or 4: how many times finer than a texture of `texels` a map may be that the frames still fill.
+
+    It is judged where each view sees the head best.
+    """
     density = []
     for observation in observations:
         across, down = (np.gradient(observation.pixels, axis=axis) for axis in (1, 0))

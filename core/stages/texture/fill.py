@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fills what no view saw: smoothly inside the charts (push-pull, after Gortler et al. 1996), by the nearest texel
-outside them."""
+"""Holes of a texture, filled: inside the charts by push-pull (Gortler et al. 1996), outside by the nearest texel."""
 
 from __future__ import annotations
 
@@ -10,22 +9,19 @@ import numpy as np
 
 from ...geometry import raster
 
-TRUSTED_CONFIDENCE = 0.1
-"""Confidence from which a texel is kept as it was seen."""
+TRUSTED_CONFIDENCE = 0.1  # texels above keep their colour
 
 
 def fill(texture: np.ndarray, confidence: np.ndarray, covered: np.ndarray) -> np.ndarray:
-    """Linear [S, S, 3] with confidence [S, S] in [0, 1] -> the same without holes; texels above TRUSTED_CONFIDENCE are
-    unchanged."""
-    known = np.clip(confidence / TRUSTED_CONFIDENCE, 0, 1).astype(np.float32)
-    smooth = _push_pull(texture * known[..., None], known)
-    filled = texture * known[..., None] + smooth * (1 - known[..., None])
+    """Fill the holes of a linear texture [S, S, 3] with confidence [S, S] in [0, 1]."""
+    trust = np.clip(confidence / TRUSTED_CONFIDENCE, 0, 1).astype(np.float32)
+    smooth = _push_pull(texture * trust[..., None], trust)
+    filled = texture * trust[..., None] + smooth * (1 - trust[..., None])
     return raster.bleed(filled.astype(np.float32), covered)
 
 
 def _push_pull(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Values times weight [h, w, 3] and weight [h, w] -> a full picture: known values where the weight is one, coarser
-    means elsewhere."""
+    """Return [h, w, 3] from values times weight and weight [h, w]: coarser means take over as the weight falls to 0."""
     mean = weighted / np.maximum(weight, 1e-6)[..., None]
     height, width = weight.shape
     if min(height, width) <= 2:
@@ -33,7 +29,7 @@ def _push_pull(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
         return np.where(weight[..., None] > 1e-6, mean, overall).astype(np.float32)
     half = (width + 1) // 2, (height + 1) // 2
     down = [cv2.resize(x, half, interpolation=cv2.INTER_AREA) for x in (weighted, weight)]
-    gain = np.minimum(4 * down[1], 1) / np.maximum(down[1], 1e-6)  # one known texel of four is enough
+    gain = np.minimum(4 * down[1], 1) / np.maximum(down[1], 1e-6)  # one trusted texel of four is enough
     coarse = _push_pull(down[0] * gain[..., None], down[1] * gain)
     coarse = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
     kept = np.minimum(weight, 1)[..., None]

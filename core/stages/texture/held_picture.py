@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A picture as a view is held by: the part of it that shows the head, in the file's own integers, which are brought to
-linear light when they are read. As floats, 64 views of 4K would take 6 GB."""
+"""Pictures in memory: the part that shows the head, in the file's own integers, made linear when they are read.
+
+As floats, 64 views of 4K would take 6 GB.
+"""
 
 from __future__ import annotations
 
@@ -13,27 +15,25 @@ import numpy as np
 
 from ...imaging import images
 
-DARKEST_LINEAR = 2e-3
-"""Linear values below this are noise to a logarithm."""
-MARGIN_PX = 8
-"""Pixels that are held around the head: a cubic reads 2 beyond where it looks, the perceptual step 4."""
+DARKEST_LINEAR = 2e-3  # below this a logarithm sees noise
+MARGIN_PX = 8  # held around the head: a cubic reads 2 beyond its place, the perceptual step 4
 
 
 @dataclass(frozen=True)
 class HeldPicture:
-    """A linear picture of `shape` [H, W], as far as it is held.
+    """Part of a linear picture of `shape` [H, W].
 
-    stored [h, w, 3] is its part whose first column and row are `corner`: integers that encode sRGB, or linear floats
-    where the file's were floats. Its linear values are multiplied by exp(log_gain) [3].
+    stored [h, w, 3], whose first column and row are `corner`, holds integers that encode sRGB, or linear floats if the
+    file's were floats. Its linear values are multiplied by exp(log_gain) [3].
     """
 
     stored: np.ndarray
     corner: tuple[int, int]
     shape: tuple[int, int]
-    log_gain: np.ndarray | None = None
+    log_gain: np.ndarray | float = 0.0
 
     def around(self, pixels: np.ndarray) -> HeldPicture:
-        """No more of it than a margin around pixels [..., 2] (x, y; pixel centres at + 0.5)."""
+        """Return the part around pixels [..., 2] (x, y; pixel centres at + 0.5), with a margin."""
         height, width = self.shape
         points = pixels.reshape(-1, 2)
         left, top = np.clip(np.floor(points.min(0)) - MARGIN_PX, 0, [width - 1, height - 1]).astype(int)
@@ -43,16 +43,18 @@ class HeldPicture:
         )
 
     def brightened(self, log_gain: np.ndarray) -> HeldPicture:
-        """The same under another exposure [3]."""
-        return replace(self, log_gain=log_gain if self.log_gain is None else self.log_gain + log_gain)
+        """Return the same under another exposure [3]."""
+        return replace(self, log_gain=self.log_gain + log_gain)
 
     def linear(self, rows: slice, columns: slice) -> np.ndarray:
-        """float32 [h, w, 3] of rows and columns of the whole picture, which are held."""
+        """Return float32 [h, w, 3] for rows and columns of the whole picture, which must be held."""
         return self._decoded(self._part(rows, columns))
 
     def log_colours(self, pixels: np.ndarray) -> np.ndarray:
-        """Bicubic natural log of linear colours [S, S, 3] at pixels [S, S, 2]; bilinear would soften pores. Beyond what
-        is held its border repeats."""
+        """Return the natural log of linear colours [S, S, 3] at pixels [S, S, 2]; the border of the part repeats.
+
+        Interpolation is bicubic, for bilinear would soften pores.
+        """
         x, y = (np.ascontiguousarray(pixels[..., i] - 0.5 - self.corner[i], np.float32) for i in range(2))
         colours = cv2.remap(self._decoded(self.stored), x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         return np.log(np.maximum(colours, DARKEST_LINEAR))
@@ -62,7 +64,7 @@ class HeldPicture:
         return self.stored[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
 
     def _decoded(self, stored: np.ndarray) -> np.ndarray:
-        gain = 1.0 if self.log_gain is None else np.exp(self.log_gain)
+        gain = np.exp(self.log_gain)
         if stored.dtype == np.float32:
             return (stored * gain).astype(np.float32)
         most = np.iinfo(stored.dtype).max
@@ -72,12 +74,12 @@ class HeldPicture:
 
 
 def hold(linear: np.ndarray) -> HeldPicture:
-    """A linear picture [H, W, 3] that no file holds."""
+    """Hold a linear picture [H, W, 3] that is in no file."""
     return HeldPicture(np.asarray(linear, np.float32), (0, 0), linear.shape[:2])
 
 
 def read_held(path: Path) -> HeldPicture:
-    """A picture file, whole; its linear values are those of `images.read_linear`."""
+    """Read a whole picture file; its linear values are those of `images.read_linear`."""
     bits = images.bits(path)
     if images.is_linear(path) or bits > 16:
         return hold(images.read_linear(path))
@@ -86,5 +88,5 @@ def read_held(path: Path) -> HeldPicture:
 
 
 def _as_read(integers: np.ndarray, most: int) -> np.ndarray:
-    """Integers in [0, 1] as OpenImageIO scales them: by a product, which is not always the quotient."""
+    """Scale integers to [0, 1] as OpenImageIO does: by a product, which is not always the quotient."""
     return integers.astype(np.float32) * (np.float32(1) / np.float32(most))

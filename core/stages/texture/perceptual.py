@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's texture loss: a perceptual distance plus L1 of the gradients, between the textured head as the V views
-see it and their delit frames.
+"""Perceptual step, the paper's texture loss: perceptual distance plus L1 of the gradients to the V delit frames.
 
 Starts from the blend, which also keeps the tone: only detail finer than KEPT_SIGMA_TEXELS is taken from the
 optimisation. The rendering is differentiable in the texture alone: where each pixel looks on the map is worked out once
@@ -27,24 +26,17 @@ from .features import Features
 from .held_picture import DARKEST_LINEAR
 from .projection import UnwrappedView
 
-TILE_PX = 288
-"""Pixels along a side of the part of a view that one step looks at: bounds memory and seconds whatever the frames'
-size; a multiple of 16."""
-RAYS_PER_SIDE = 2
-"""Rays along a pixel's side; their mean is what keeps a map that is finer than the picture from aliasing."""
-LEARNING_RATE = 0.002
-"""Adam's first step, in the logarithm of linear colour; falls to a tenth."""
-GRADIENT_WEIGHT = 10.0
-"""Weight of the gradients' L1 beside the perceptual distance, both means over positions."""
-KEPT_SIGMA_TEXELS = 8.0
-"""Sigma in texels of a 1024 map: coarser changes are taken back, so that tone stays the mean of all views."""
+TILE_PX = 288  # side of the part of a view that one step compares, a multiple of 16: bounds memory and time
+RAYS_PER_SIDE = 2  # rays along a pixel's side, averaged so that a map finer than the picture does not alias
+LEARNING_RATE = 0.002  # Adam's first step, in the logarithm of linear colour; falls to a tenth
+GRADIENT_WEIGHT = 10.0  # of the gradients' L1 beside the perceptual distance, both means over positions
+KEPT_SIGMA_TEXELS = 8.0  # in texels of a 1024 map: coarser changes are undone, so the tone stays the mean of all views
 
 
 @dataclass
 class Target:
-    """What one step compares: a view's picture and where its rays meet the map, cut to the head."""
+    """Picture of a view, and where its rays meet the map, cut to the head."""
 
-    name: str
     picture: np.ndarray  # float32 [h, w, 3] sRGB
     grid: np.ndarray  # float32 [RAYS_PER_SIDE * h, RAYS_PER_SIDE * w, 2]: the map as grid_sample counts it, in [-1, 1]
     trust: np.ndarray  # float32 [h, w] in [0, 1]: how far a pixel may pull; zero off the head
@@ -59,21 +51,10 @@ def refine(
     steps: int,
     report: Reporter,
 ) -> tuple[np.ndarray, dict]:
-    """The blend with its detail optimised; same machine, same map.
+    """Optimise the detail of the blend, [S, S, 3], natural log of linear colour, on the device of `features`.
 
-    Parameters
-    ----------
-    log_texture : [S, S, 3], natural log of linear colour
-    observations : the views
-    surface : of the head, unfolded at their size
-    face_mask : bool [S, S], texels worth looking at (the face)
-    features : what tells the perceptual distance; its device is computed on
-    steps : of the optimisation
-    report : hears of progress
-
-    Returns
-    -------
-    The texture as `log_texture` is, and {"before", "after"}: the mean loss over the same tiles.
+    face_mask: bool [S, S], texels to refine. Returns the texture and the mean loss over the same tiles, {"before",
+    "after"}, or {} if no view sees these texels. Same machine, same map.
     """
     device = features.device
     targets = []
@@ -83,38 +64,42 @@ def refine(
             targets.append(target)
     if not targets or steps < 1:
         return log_texture, {}
-    rng = np.random.default_rng(0)
     covered = surface.covered_at(len(log_texture))
     start = _tensor(raster.bleed(log_texture, covered), device)  # [1, 3, S, S]
+    checks = [_tile(target, np.random.default_rng(1), device) for target in targets[:: max(1, len(targets) // 4)]]
+    before = _losses(start, checks, features, report)
+    moved = _optimise(start, targets, features, steps, report)
+    scale = len(log_texture) / 1024
+    fine = moved - blurred(moved, covered.astype(np.float32), KEPT_SIGMA_TEXELS * scale)
+    fine *= cv2.GaussianBlur(face_mask.astype(np.float32), (0, 0), 4 * scale)[..., None] * covered[..., None]
+    refined = log_texture + fine
+    after = _losses(_tensor(raster.bleed(refined, covered), device), checks, features, report)
+    return refined.astype(np.float32), {"before": before, "after": after}
+
+
+def _optimise(start: Tensor, targets: list[Target], features: Features, steps: int, report: Reporter) -> np.ndarray:
+    """Return the change [S, S, 3] of a log texture [1, 3, S, S] that lowers the loss, by a random tile per step."""
+    rng = np.random.default_rng(0)
     change = torch.zeros_like(start, requires_grad=True)
     optimiser = torch.optim.Adam([change], lr=LEARNING_RATE, betas=(0.8, 0.99))
     schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / steps))
-    checks = [_tile(target, np.random.default_rng(1), device) for target in targets[:: max(1, len(targets) // 4)]]
-    before = _losses(start, checks, features, report)
     order = np.concatenate([rng.permutation(len(targets)) for _ in range(-(-steps // len(targets)))])[:steps]
     for step, index in enumerate(order):
         report.progress(step, steps, f"perceptual step {step + 1} of {steps}")
         optimiser.zero_grad()
-        _loss(start + change, _tile(targets[index], rng, device), features).backward()
+        _loss(start + change, _tile(targets[index], rng, start.device), features).backward()
         optimiser.step()
         schedule.step()
-    moved = change.detach()[0].cpu().numpy().transpose(1, 2, 0)
-    scale = len(log_texture) / 1024
-    fine = moved - blurred(moved, covered.astype(np.float32), KEPT_SIGMA_TEXELS * scale)
-    fine *= cv2.GaussianBlur(face_mask.astype(np.float32), (0, 0), 4 * scale)[..., None] * covered[..., None]
-    result = log_texture + fine
-    after = _losses(_tensor(raster.bleed(result, covered), device), checks, features, report)
-    return result.astype(np.float32), {"before": before, "after": after}
+    return change.detach()[0].cpu().numpy().transpose(1, 2, 0)
 
 
 def _target(observation: UnwrappedView, surface: Unfolded, face_mask: np.ndarray) -> Target | None:
-    """A view's pixels that see wanted texels; None where there are none. Follows the alignment, so all views pull at
-    the same texels."""
-    seen = (observation.weight > 0) & face_mask
-    if seen.sum() < 64:
+    """Return a view's pixels that see `face_mask`, None if too few; they follow the alignment, as all views' do."""
+    visible = (observation.weight > 0) & face_mask
+    if visible.sum() < 64:
         return None
     height, width = observation.picture.shape[:2]
-    pixels = observation.pixels[seen]
+    pixels = observation.pixels[visible]
     low = np.maximum(np.floor(pixels.min(0)).astype(int) - 4, 0)
     high = np.minimum(np.ceil(pixels.max(0)).astype(int) + 4, [width, height])
     (w, h), view, size = high - low, observation.view, len(face_mask)
@@ -129,23 +114,18 @@ def _target(observation: UnwrappedView, surface: Unfolded, face_mask: np.ndarray
     # pixels(x) shows what lay at x + warp(x) before: the texel that now shows there is one warp back
     if observation.warp is not None:
         texel -= raster.sample(observation.warp, texel)
-    weight = np.minimum(observation.weight / max(np.percentile(observation.weight[seen], 80), 1e-9), 1) * face_mask
-    trust = np.where(face >= 0, raster.sample(weight.astype(np.float32), texel), 0).reshape(
-        RAYS_PER_SIDE * h, RAYS_PER_SIDE * w
-    )
+    weight = np.minimum(observation.weight / max(np.percentile(observation.weight[visible], 80), 1e-9), 1) * face_mask
+    trust = np.where(face >= 0, raster.sample(weight.astype(np.float32), texel), 0).reshape(y.shape)
     trust = cv2.resize(trust.astype(np.float32), (int(w), int(h)), interpolation=cv2.INTER_AREA)
     picture = images.linear_to_srgb(observation.picture.linear(slice(low[1], high[1]), slice(low[0], high[0])))
-    return Target(
-        observation.name,
-        picture,
-        (texel / size * 2 - 1).astype(np.float32).reshape(RAYS_PER_SIDE * h, RAYS_PER_SIDE * w, 2),
-        trust,
-    )
+    return Target(picture, (texel / size * 2 - 1).astype(np.float32).reshape(*y.shape, 2), trust)
 
 
-def _tile(target: Target, rng: np.random.Generator, device: str) -> tuple[Tensor, Tensor, Tensor]:
-    """A random part of a view: picture [1, 3, t, t'], grid [1, RAYS_PER_SIDE t, RAYS_PER_SIDE t', 2], trust [1, 1, t,
-    t']; sides at most TILE_PX, around a trusted pixel."""
+def _tile(target: Target, rng: np.random.Generator, device: str | torch.device) -> tuple[Tensor, Tensor, Tensor]:
+    """Draw a part of a view around a trusted pixel, its sides at most TILE_PX.
+
+    Returns picture [1, 3, t, t'], grid [1, RAYS_PER_SIDE t, RAYS_PER_SIDE t', 2], trust [1, 1, t, t'].
+    """
     height, width = target.trust.shape
     y, x = np.unravel_index(
         rng.choice(np.flatnonzero(target.trust.ravel() > 0.2 * target.trust.max())), target.trust.shape
@@ -157,15 +137,14 @@ def _tile(target: Target, rng: np.random.Generator, device: str) -> tuple[Tensor
 
 
 def _span(centre: int, side: int) -> slice:
-    """TILE_PX pixels around `centre`, or as many of `side` as are a multiple of 16."""
+    """Return TILE_PX pixels around `centre`, or as many of `side` as are a multiple of 16."""
     length = min(side, TILE_PX) // 16 * 16 or side
     start = int(np.clip(centre - length // 2, 0, side - length))
     return slice(start, start + length)
 
 
 def _loss(log_texture: Tensor, tile: tuple[Tensor, Tensor, Tensor], features: Features) -> Tensor:
-    """Perceptual distance plus the gradients' L1; off the head and where a view sees badly, the rendering is the
-    picture itself."""
+    """Return the perceptual distance plus the gradients' L1; untrusted pixels are replaced by the picture's own."""
     picture, grid, trust = tile
     linear = functional.grid_sample(
         log_texture.exp(), grid, mode="bilinear", padding_mode="border", align_corners=False
@@ -181,6 +160,7 @@ def _loss(log_texture: Tensor, tile: tuple[Tensor, Tensor, Tensor], features: Fe
 
 
 def _losses(log_texture: Tensor, tiles: list, features: Features, report: Reporter) -> float:
+    """Return the mean loss over tiles."""
     total = 0.0
     with torch.no_grad():
         for tile in tiles:
@@ -194,7 +174,7 @@ def _srgb(linear: Tensor) -> Tensor:
     return torch.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear.clamp(min=0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def _tensor(picture: np.ndarray, device: str) -> Tensor:
-    """[h, w(, C)] -> [1, C, h, w]."""
-    picture = picture if picture.ndim == 3 else picture[..., None]
-    return torch.from_numpy(np.ascontiguousarray(picture.transpose(2, 0, 1)))[None].to(device)
+def _tensor(picture: np.ndarray, device: str | torch.device) -> Tensor:
+    """Convert [h, w(, C)] to [1, C, h, w]."""
+    picture = np.atleast_3d(picture).transpose(2, 0, 1)
+    return torch.from_numpy(np.ascontiguousarray(picture))[None].to(device)

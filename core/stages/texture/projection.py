@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What one view sees of the head's surface: its colours at every texel, and how well it saw them."""
+"""One view of the head's surface: its colours at every texel, and how well it sees them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -12,14 +12,12 @@ import numpy as np
 from ...face.head import Unfolded
 from ...geometry import raster
 from ...geometry.views import View, lengths
+from ...geometry.visibility import points_in_view, silhouette_distance
 from .held_picture import HeldPicture
 
-MARGIN_PX = (1.5, 12.0)
-"""Pixels from a silhouette at which a texel starts to count, and counts in full."""
-GRAZING_COSINE = 0.15
-"""Cosine of the steepest viewing angle that counts."""
-POINTS_AT_ONCE = 1 << 18
-"""Points of the surface that are looked at at once: of a whole map the numbers on the way would take a gigabyte."""
+MARGIN_PX = (1.5, 12.0)  # pixels from a silhouette at which a texel starts to count, and counts in full
+GRAZING_COSINE = 0.15  # cosine of the steepest viewing angle that counts
+POINTS_AT_ONCE = 1 << 18  # bounds the memory: intermediate values of a whole map would take a gigabyte
 
 
 @dataclass
@@ -39,16 +37,24 @@ class UnwrappedView:
     def name(self) -> str:
         return self.view.name
 
+    def fade(self, kept: np.ndarray) -> None:
+        """Keep a share [S, S] in [0, 1] of quality and weight."""
+        self.quality, self.weight = self.quality * kept, self.weight * kept
+
     def resample(self, pixels: np.ndarray, warp: np.ndarray | None) -> None:
-        """Reads the picture anew, at other pixels [S, S, 2]; one resampling from the original, never two. They are kept
-        with the warp that led to them, where that is the last one."""
+        """Read the picture anew at other pixels [S, S, 2]: one resampling from the original, never two.
+
+        With the last warp that led to them, the pixels are kept.
+        """
         if warp is not None:
             self.pixels, self.warp = pixels, warp
         self.log_colour = self.picture.log_colours(pixels)
 
     def enlarged(self, size: int, covered: np.ndarray) -> UnwrappedView:
-        """The same on a map of `size`, `covered` [S, S] being the texels of this one: where each texel is seen, and how
-        well, vary smoothly; the picture is read anew."""
+        """Return the view on a map of `size`; covered: bool [S, S], texels of the head on this one.
+
+        Where each texel is seen, and how well, vary smoothly; the picture is read anew.
+        """
         if size == len(self.weight):
             return self
 
@@ -57,73 +63,43 @@ class UnwrappedView:
 
         pixels = larger(raster.bleed(self.pixels, covered))
         warp = None if self.warp is None else larger(self.warp) * np.float32(size / len(self.weight))
-        return replace(
-            self,
-            pixels=pixels,
-            log_colour=self.picture.log_colours(pixels),
-            quality=larger(self.quality),
-            weight=larger(self.weight),
-            warp=warp,
+        return UnwrappedView(
+            self.view,
+            self.picture,
+            pixels,
+            self.picture.log_colours(pixels),
+            larger(self.quality),
+            larger(self.weight),
+            warp,
         )
 
 
 def observe(
     view: View, picture: HeldPicture, surface: Unfolded, sharpness: float, reference_m: float | None = None
 ) -> UnwrappedView:
-    """Projects every texel into a picture of a view.
+    """Project every texel into a picture, of any size, of a view; only the part that shows the head is kept.
 
-    Parameters
-    ----------
-    view : the camera
-    picture : of any size; no more of it is kept than shows the head
-    surface : of the head, unfolded
-    sharpness : in [0, 1], scales the view's weight
-    reference_m : width in metres, on the head, of the pixels of the view that others are weighed beside; None: this
-        view's own
+    `sharpness` in [0, 1] scales the view's weight, and so does the size of its pixels on the head against
+    `reference_m`, in metres (None: the view's own).
     """
     count, scale = len(surface.points), [picture.shape[1] / view.width, picture.shape[0] / view.height]
-    pixels, quality, distance = np.empty((count, 2), np.float32), np.empty(count), np.empty(count)
-    seen, silhouette = np.empty(count, bool), _silhouette_distance(surface.caster, view)
+    pixels, quality, visible = np.empty((count, 2), np.float32), np.zeros(count), np.zeros(count, bool)
+    silhouette, (near, far) = silhouette_distance(surface.caster, view, scale=0.5, slope=16), MARGIN_PX
     for first in range(0, count, POINTS_AT_ONCE):
         chunk = slice(first, first + POINTS_AT_ONCE)
-        xy, quality[chunk], distance[chunk], seen[chunk] = _look(view, surface, chunk, silhouette)
+        index, cosine, xy = points_in_view(
+            surface.caster, view, surface.points[chunk], surface.normals[chunk], GRAZING_COSINE
+        )
+        away = raster.sample(silhouette, xy[index]).astype(np.float64)
+        margin = np.clip((away - near) / (far - near), 0, 1)
+        quality[first + index] = (cosine[index] - GRAZING_COSINE) / (1 - GRAZING_COSINE) * margin
+        visible[first + index] = True
         pixels[chunk] = np.nan_to_num(xy, nan=-1) * scale
     picture, pixels = picture.around(pixels), surface.spread(pixels)
-    pixel_m = distance / view.camera.mean_focal_length()
+    pixel_m = lengths(view.centre - surface.points) / view.camera.mean_focal_length()
     if reference_m is None:
-        reference_m = float(np.median(pixel_m[seen])) if seen.any() else 1.0
+        reference_m = float(np.median(pixel_m[visible])) if visible.any() else 1.0
     weight = quality**2 * sharpness * (reference_m / pixel_m) ** 2
     return UnwrappedView(
         view, picture, pixels, picture.log_colours(pixels), surface.spread(quality), surface.spread(weight)
     )
-
-
-def _look(
-    view: View, surface: Unfolded, rows: slice, silhouette: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of a part of the surface's points: pixels [N, 2] (nan behind the camera), quality [N], distance [N], and whether
-    they are seen [N]."""
-    points, normals = surface.points[rows], surface.normals[rows]
-    xy, depth = view.project(points)
-    inside = (depth > 0) & (xy[:, 0] > 1) & (xy[:, 1] > 1) & (xy[:, 0] < view.width - 1) & (xy[:, 1] < view.height - 1)
-    towards = view.centre - points
-    distance = lengths(towards)
-    cosine = (towards * normals).sum(1) / distance
-    seen = inside & (cosine > GRAZING_COSINE)
-    seen[seen] = raster.visible_from(surface.caster, points[seen], normals[seen], view.centre)
-    margin = np.zeros(len(xy))
-    margin[seen] = raster.sample(silhouette, xy[seen])
-    near, far = MARGIN_PX
-    ramp = np.clip((margin - near) / (far - near), 0, 1)
-    return xy, np.where(seen, np.clip((cosine - GRAZING_COSINE) / (1 - GRAZING_COSINE), 0, 1) * ramp, 0), distance, seen
-
-
-def _silhouette_distance(caster: raster.RayCaster, view: View, scale: float = 0.5) -> np.ndarray:
-    """[H, W]: pixels to the nearest depth jump (one part of the head before another, or before the background)."""
-    _, _, distance = raster.render_view(caster, view, scale)
-    footprint = 1 / (scale * view.camera.mean_focal_length())  # metres across a pixel, per metre of distance
-    depth = np.where(np.isfinite(distance), distance, 1e3)
-    # 3 x 3 spans two pixels: 83 degrees
-    jump = cv2.morphologyEx(depth.astype(np.float32), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 16 * footprint * depth
-    to_jump = cv2.distanceTransform((~jump).astype(np.uint8), cv2.DIST_L2, 5) / scale
-    return cv2.resize(to_jump, (view.width, view.height), interpolation=cv2.INTER_LINEAR)

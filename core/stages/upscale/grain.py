@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from scipy.optimize import nnls
 
 from ...geometry.noise import noise
+from ...imaging.normalized_convolution import weighted_blur
 from .surface import HeadSurface
 
 SIGMAS_MM = (0.24, 0.48, 0.96, 1.92)
@@ -121,8 +121,7 @@ def bands(picture: np.ndarray, weight: np.ndarray, texel: float) -> list[np.ndar
 
 def blurred(picture: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray:
     """Gaussian mean of [S, S, C] by weight [S, S]; sigma in texels."""
-    top = cv2.GaussianBlur(picture * weight[..., None], (0, 0), max(sigma, 0.3)).reshape(picture.shape)
-    return top / np.maximum(cv2.GaussianBlur(weight, (0, 0), max(sigma, 0.3)), 1e-4)[..., None]
+    return weighted_blur(picture, weight, max(sigma, 0.3), 1e-4)
 
 
 def _answers(

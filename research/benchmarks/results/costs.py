@@ -1,89 +1,49 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/results/costs.md: time and memory of the chain, stage by stage, and what grows with what; a step of the solver,
-and what was done about it."""
+"""docs/results/costs.md: time and memory of the chain, stage by stage."""
 
 from __future__ import annotations
 
-from ..costs.rows import table
-from ..figures import Figures, markdown
+from ..costs import table
+from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "Time and memory"
-SAYS = (
-    "Each stage's seconds and peak memory at three qualities, and how they grow with frames, views and texels; a "
-    "step of the solver, plain and as it is; an edited part."
-)
-RECORDS = ("costs", "solver_speed", "edited_part")
+SAYS = "Each stage's seconds and peak memory at two qualities and for a long film, and an edited part."
+RECORDS = ("costs", "edited_part")
 
 
-def sections(costs: Figures, speed: Figures, part: Figures) -> Sections:
-    return [("The chain", chain(costs)), ("The solver", solver(speed, part))]
+def sections(costs: Figures, part: Figures) -> Sections:
+    return [("The chain", chain(costs)), ("An edited part", edit(part))]
 
 
 def chain(costs: Figures) -> str:
-    whole, here = costs.together, costs.machine
     return prose(
         f"""
-        60 frames at standard quality take {whole.standard.minutes:.1f} minutes (asked for: 4), in float32
-        {whole.float32.minutes:.1f} (6), 300 frames {whole["frames-300"].minutes:.1f} (7), 1,000 frames
-        {whole["frames-1000"].minutes:.1f}, and {whole.float32.peak_mb / 1000:.1f} GB at most (3), by the solve in
-        float32.
+        60 frames at standard quality take {costs.standard.together.minutes:.1f} minutes (asked for: 4), 300 frames
+        {costs["frames-300"].together.minutes:.1f} (7), a draft {costs.draft.together.minutes:.1f}.
 
-        The sample video on {here.cores} cores, without a GPU. Each stage runs in a process of its own; its seconds
-        begin with importing its libraries, its peak memory holds them. Where other processes took more than 0.2 cores
-        meanwhile the cell says so: its seconds are an upper bound. Frames and cameras of a draft have the standard's
-        settings and are not measured twice. This processor ran the networks in {here.networks}; *float32* has solve and
-        4K as a processor runs them that does not multiply bfloat16. frames-N is the whole chain on a film of so many
-        frames (`research.benchmarks.long_films`).
+        The sample video on two cores, without a GPU. Each stage runs in a process of its own; its seconds begin with
+        importing its libraries, and its peak memory holds them. A draft shares the standard quality's frames and
+        cameras; its total counts them. This processor ran the networks in bfloat16.
         """,
         table(costs),
-        f"""
-        Of a texture above 1024, views are looked at and aligned on maps of 1024 and read along them one by one:
-        {costs["texture-2048"].texture.peak_mb / 1000:.1f} GB at 2048. 1024 is the largest side that can be chosen for
-        the solve: the prior has seen nothing finer, so 2048 says what it would cost, not that it would help. From 512
-        the network makes a map of 2048, the rest is resampled. The number of frames reaches frames and cameras alone:
-        of more than 40 frames 40 carry the structure, and the others are placed by them; the scan takes 24 pairs of
-        whatever there is, delight and texture the views V. Exponents are fits of the logarithm of the processor's
-        seconds to that of the size: for a side, 2 is linear in texels. *over*: the stage was ended after so long.
+        """
+        The number of frames reaches frames and cameras alone: of more than 40 frames 40 carry the structure, and the
+        others are placed by them; the scan takes 24 pairs of whatever there is, delight and texture the selected views.
+        1024 is the largest side that can be chosen for the solve: the prior has seen nothing finer.
         """,
     )
 
 
-def solver(speed: Figures, part: Figures) -> str:
-    return prose(
-        f"""
-        Each row runs in a process of its own, {speed.python_gib:.2f} GiB of whose peak are Python and its libraries;
-        two threads, nothing else running. A step is the mean of four that go down the sizes of the walk at 1024.
-
-        - *plain*: float32, channels first, the whole size from the first step on
-        - *ours*: bfloat16, channels last, coarse to fine
-        - *draft*: closed form instead of the network's gradient; the whole stage takes 30 steps at 512, *standard* 20
-          at 1024
-        """,
-        markdown(
-            ["1024", "a step", "to plain", "peak memory"],
-            [
-                [name, f"{row.seconds_per_step:.2f} s", f"{row.to_plain:.2f}", f"{row.peak_gib:.2f} GiB"]
-                for name, row in speed.steps.items()
-            ],
-        ),
-        markdown(
-            ["the whole stage, loading included", "seconds", "allowed", "peak memory"],
-            [
-                [name, f"{row.seconds:.0f} s", f"{row.allowed} s", f"{row.peak_gib:.2f} GiB"]
-                for name, row in speed.stage.items()
-            ],
-        ),
-        f"""
+def edit(part: Figures) -> str:
+    return prose(f"""
         After a mask edit of {part.edited_texels} x {part.edited_texels} texels in the finished scan, {part.rows} x
         {part.columns} texels were solved again in {part.seconds} s, {part.seconds_with_loading} s with loading
         (allowed: 25).
 
-        Low memory takes a third off the peak, not half: what a single layer works on, the network's input and the
-        evidence at full size stay. *float32* above is a processor without bfloat16; a GPU was not at hand. The work
-        is not cropped to the box of what was seen: our UV square is nearly filled by it. A draft's normals and specular
-        are those the prior expects of its albedo, in one evaluation (`tests/core/solver/test_draft.py`
-        holds it to less error than the closed form leaves).
-        """,
-    )
+        A GPU was not at hand. The work is not cropped to the box of what was seen: our UV square is nearly filled by
+        it. A draft's normals and specular are those the prior expects
+        of its albedo, in one evaluation (`tests/core/solver/test_draft.py` holds it to less error than the closed form
+        leaves).
+        """)

@@ -10,13 +10,12 @@ from ..pages import Sections, prose
 
 TITLE = "Geometry and texture"
 SAYS = "Cameras, scan, head and texture of the sample, the head scan and a bust, against the truth."
-RECORDS = ("geometry", "head_scale")
+RECORDS = ("geometry",)
 
 
-def sections(geometry: Figures, scale: Figures) -> Sections:
+def sections(geometry: Figures) -> Sections:
     sun = geometry.lps_sun
     truth, head = sun.cameras.against_truth, sun.head.against_truth
-    worst = max(abs(scale.set_on.worst), abs(scale.others.worst))
     return [
         (
             "",
@@ -28,8 +27,7 @@ def sections(geometry: Figures, scale: Figures) -> Sections:
                 f"""
         Made on a machine shared with other work: its seconds are upper bounds, and older than [the costs](costs.md).
 
-        **Scale** comes from the whole head fitted to the landmarks; on the scan it came out {100 * scale.scan:.1f} %
-        too large, on nine synthetic heads at most {100 * worst:.1f} % off. **A focal length that is too
+        **Scale** comes from the whole head fitted to the landmarks. **A focal length that is too
         short** on the scan ({truth.focal_px:.0f} px of {truth.true_focal_px:.0f}) costs a quarter of the head's
         distance to the truth: {head.by_cameras.median_mm:.2f} mm by the cameras, {head.after_icp.median_mm:.2f} mm
         after ICP. **The scan has holes** where a nose or an ear is in hard light from one side only (the head bridges

@@ -22,7 +22,6 @@ RECORDS = (
     "relit",
     "relit_people",
     "scan_albedo",
-    "whole_chain",
     "costs",
     "comparison",
     "photographs",
@@ -45,9 +44,9 @@ GROUPS = {
         "prior",
         "confidence",
     ),
-    "Before the solve": ("geometry", "eyes", "delighters", "answers", "photographs", "shadows", "skin_tone"),
-    "After the solve": ("head", "upscale", "whole_head", "hair", "even_light", "engines", "delivery", "reimported"),
-    "Time and memory": ("costs", "blender"),
+    "Before the solve": ("geometry", "eyes", "delighters", "photographs", "shadows", "skin_tone"),
+    "After the solve": ("upscale", "whole_head", "hair", "even_light", "delivery"),
+    "Time and memory": ("costs",),
 }
 ELSEWHERE = """
     - **Elsewhere**: [promises](../promises.md), [farm](../farm.md), [cameras](../cameras.md), [scan and
@@ -88,7 +87,7 @@ def over_people(summary: Figures, method: str) -> str:
 
 def headline(of: Figures) -> str:
     """The same answers on every set: PSNR in dB."""
-    summary, sample, scan, minutes = of.state.summary, of.demo.rows, of.scan_albedo.rows, of.costs.together
+    summary, sample, scan, costs = of.state.summary, of.demo.rows, of.scan_albedo.rows, of.costs
     relit, people = of.relit.sample, of.relit_people.mean
 
     def others(row: str) -> list[str | None]:
@@ -119,8 +118,9 @@ def headline(of: Figures) -> str:
         markdown(head, rows),
         f"""
         The true skin tone is given to all; in the first column each picture gets one gain per channel on top. On
-        sample and scan the filmed frames stand for their texture. A face takes [{minutes.standard.minutes:.1f} minutes
-        on 2 cores](costs.md), of 300 frames {minutes["frames-300"].minutes:.1f}.
+        sample and scan the filmed frames stand for their texture. A face takes
+        [{costs.standard.together.minutes:.1f} minutes on 2 cores](costs.md), of 300 frames
+        {costs["frames-300"].together.minutes:.1f}.
         """,
     )
 
@@ -204,7 +204,7 @@ def losses(of: Figures) -> str:
     against = paired({name: one for name, one in of.comparison.subjects.items() if name != "scan"})["delit"]
     relit, people, tones = of.relit.sample, of.relit_people.mean, of.skin_tone.groups
     known = of.confidence.summary[SHIPPED]
-    alone, scalp = of.whole_chain.rows["scan, network"], of.whole_head.synthetic.scalp
+    scalp = of.whole_head.synthetic.scalp
     return prose(f"""
         - **In {sum(map(flat_wins, of.state.captures.values()))} of {len(of.state.captures)} captures one flat colour is
           as near to the truth** in the picture as our albedo (over people {answers["flat colour"].psnr.mean:.2f} and
@@ -213,8 +213,7 @@ def losses(of: Figures) -> str:
         - **The delighter decides**: on a bearded man under seven lamps it leaves {lamps.network.light_slope.mean:.2f}
           of a change of the light, {lamps.network.psnr.mean:.1f} dB where a flat colour has
           {lamps["flat colour"].psnr.mean:.1f} ([photographs](photographs.md)). On the head scan the solve takes beard
-          and cheeks for light, and loses {alone.solve_off.psnr - alone.solved.psnr:.1f} dB to the delit texture
-          ([scan](scan.md)).
+          and cheeks for light ([scan](scan.md)).
         - **On delit synthetic people one environment is as good a light as ours**: ours is ahead of it by
           {"{:+.2f} ± {:.2f}".format(*against["environment"]["PSNR, dB"])} dB, of ten regions by
           {"{:+.2f} ± {:.2f}".format(*against["regions 10"]["PSNR, dB"])} dB ([page](comparison.md)).

@@ -5,20 +5,18 @@
 from __future__ import annotations
 
 from ..albedo_score import table
-from ..figures import Figures, markdown
+from ..figures import Figures
 from ..pages import Sections, prose
 from .split import OLDER
 
 TITLE = "A head scan under hard sun through leaves"
-SAYS = "The one real skin: albedo, cameras and head against the truth, and what the solve adds to each delighter."
-RECORDS = ("scan_albedo", "whole_chain", "geometry")
+SAYS = "The one real skin: albedo, cameras and head against the truth."
+RECORDS = ("scan_albedo", "geometry")
 
 
-def sections(albedo: Figures, chain: Figures, geometry: Figures) -> Sections:
-    cameras, truth, rows = geometry.lps_sun.cameras, geometry.lps_sun.cameras.against_truth, chain.rows
+def sections(albedo: Figures, geometry: Figures) -> Sections:
+    cameras, truth = geometry.lps_sun.cameras, geometry.lps_sun.cameras.against_truth
     head, icp = geometry.lps_sun.head.against_truth.by_cameras, geometry.lps_sun.head.against_truth.after_icp
-    lost = rows["scan, network"].solve_off.psnr - rows["scan, network"].solved.psnr
-    proposed = rows["scan, network"].true_mask.psnr - rows["scan, network"].solved.psnr
     return [
         (
             "",
@@ -40,32 +38,6 @@ def sections(albedo: Figures, chain: Figures, geometry: Figures) -> Sections:
             ),
         ),
         (
-            "What the solve adds",
-            prose(
-                """
-        *Solve off* is the texture at the true tone, taken for the albedo; raw PSNR and SSIM.
-        """,
-                markdown(
-                    ["capture", "delighter", "solve off", "solved", "solved with the true shadow as mask"],
-                    [
-                        [
-                            row.capture,
-                            row.delighter,
-                            *(quality(row[key]) for key in ("solve_off", "solved", "true_mask")),
-                        ]
-                        for row in rows.values()
-                    ],
-                ),
-                f"""
-        The proposed mask costs {proposed:.2f} dB on the scan against the true one (intersection over union on the scan
-        {chain.mask_iou.scan:.2f}, on the sample {chain.mask_iou.sample:.2f}). The solve gains
-        {rows["scan, none"].solved.psnr - rows["scan, none"].solve_off.psnr:.1f} dB on raw frames and
-        {rows["sample, network"].solved.psnr - rows["sample, network"].solve_off.psnr:.1f} dB on the sample, and **loses
-        {lost:.1f} dB on the scan**: there it takes a part of the beard and the cheeks for light.
-        """,
-            ),
-        ),
-        (
             "Read with care",
             prose("""
         How far the lights were held back had been chosen while looking at this scan, the sample and the six people:
@@ -76,7 +48,3 @@ def sections(albedo: Figures, chain: Figures, geometry: Figures) -> Sections:
         """),
         ),
     ]
-
-
-def quality(record: Figures) -> str | None:
-    return None if record.psnr is None else f"{record.psnr:.2f} dB, {record.ssim:.3f}"

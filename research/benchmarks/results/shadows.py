@@ -1,19 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/results/shadows.md: the mask that is proposed, and a shadow that is masked exactly."""
+"""docs/results/shadows.md: the mask that is proposed."""
 
 from __future__ import annotations
 
-from .. import shadow_steps
 from ..figures import Figures, markdown
 from ..pages import Sections, prose
 
 TITLE = "Shadow masks"
-SAYS = (
-    "The proposed mask against the true shadow, what a shadow that is masked exactly leaves in the albedo, and "
-    "how much of a step along a mask's border is light."
-)
-RECORDS = ("shadow_mask", "painted_shadow", "shadow_steps")
+SAYS = "The proposed mask against the true shadow."
+RECORDS = ("shadow_mask",)
 SCORES = {
     "true": "true",
     "masked": "masked",
@@ -24,7 +20,7 @@ SCORES = {
 }
 
 
-def sections(proposed: Figures, painted: Figures, steps: Figures) -> Sections:
+def sections(proposed: Figures) -> Sections:
     seconds = proposed.processor_seconds
     return [
         (
@@ -54,38 +50,6 @@ def sections(proposed: Figures, painted: Figures, steps: Figures) -> Sections:
         texture. Occlusion is found where shape and texture agree; `shading` divides it out, so that little is left to
         find after it. The proposal has no measure yet on real people, whose shadows nobody has drawn.
         """,
-            ),
-        ),
-        (
-            "A shadow that is masked exactly",
-            prose(
-                """
-        A disc on the sample head's cheek is darkened in its texture and solved at 512: the share of the darkening that
-        stays in the albedo.
-        """,
-                markdown(
-                    ["light in the shadow", "mask", "left of the shadow in the albedo"],
-                    [[f"{row.light:.1f}", row.mask, f"{100 * row.left:.0f} %"] for row in painted.rows.values()],
-                ),
-                """
-        After a delighter local light is held to what the shadow's own border says is missing
-        (`core/solver/extensions/border.py`),
-        for a proposal takes dark skin and beards along. What the artist adds to the proposal is taken at its word.
-        """,
-            ),
-        ),
-        (
-            "Steps along a mask's border",
-            prose(
-                """
-        Inside of M less outside, natural log, mean ± deviation along its border: what the delighter took out; what the
-        solver sees, its texture over the mean face in its light; and what is left of the light in truth. The last
-        differs by much the same on every capture, whatever is seen: what is seen beyond it is skin's own (a beard
-        along whose edge the mask runs). So the solver takes LEFT^2 over the variance of what it sees for light. *Taken
-        for light*: that share, with LEFT from other people alone; *best*: the slope of the true steps on those
-        that are seen.
-        """,
-                shadow_steps.table(steps.rows),
             ),
         ),
     ]

@@ -14,8 +14,7 @@ SAYS = (
 )
 RECORDS = ("state",)
 CHOSEN = (
-    "How far the fitted light counts in the delit texture was chosen on these people but the six bald, and on "
-    "others; what it is worth to people who are left out of the choice is on [the page of answers](answers.md). "
+    "How far the fitted light counts in the delit texture was chosen on these people but the six bald, and on others. "
     "The delighter of that commit did not expect a sky yet ([what that is "
     "worth](delighters.md#after-the-solve))."
 )

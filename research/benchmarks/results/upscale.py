@@ -48,7 +48,7 @@ def sections(upscale: Figures, training: Figures, costs: Figures) -> Sections:
 
         1024 to 4096 takes {cost.network.seconds:.0f} s on two cores with bfloat16 (Lanczos {cost.Lanczos.seconds:.0f}
         s) and {cost.network.peak_gib:.1f} GiB; the body sees the whole map, the tail goes in strips that leave no seam.
-        The whole stage takes {costs.standard.upscale.seconds:.0f} s, in float32 {costs.float32.upscale.seconds:.0f} s.
+        The whole stage takes {costs.standard.upscale.seconds:.0f} s.
         """,
             ),
         ),

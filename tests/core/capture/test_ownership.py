@@ -4,20 +4,18 @@
 killed writer left goes."""
 
 import os
-import subprocess
-import sys
+import signal
+import time
 from pathlib import Path
 
 import pytest
 
 from core.capture.capture import Capture
-from core.capture.files import remove_file, replacing, replacing_folder
+from core.capture.files import remove_file, replacing, replacing_folder, write_json
 from core.capture.messages import Log, Problem
+from core.worker import runner
 from core.worker.job import write_job
-from core.worker.runner import run_job
-from tests.fixtures.kept_capture import contents, make, make_frames
-
-ROOT = Path(__file__).resolve().parents[3]
+from tests.fixtures.kept_capture import contents, fork, kill_at_rename, make, make_frames, needs_fork
 
 
 @pytest.fixture
@@ -46,13 +44,6 @@ def test_a_file_of_ours_is_replaced_and_one_that_was_changed_is_kept_aside(captu
     assert (kept / "texture.txt").read_text() == "by hand" and (kept / "texture_2.txt").read_text() == "by hand again"
 
 
-def test_a_stranger_under_a_name_of_ours_is_kept_aside(capture):
-    (capture.root / "scan.ply").write_text("my own scan")
-    with replacing(capture.scan) as temporary:
-        temporary.write_text("ours")
-    assert (capture.root / "kept" / "scan.ply").read_text() == "my own scan"
-
-
 def test_removing_removes_ours_alone(capture):
     path = capture.root / "texture_detail.exr"
     with replacing(path) as temporary:
@@ -71,12 +62,8 @@ def test_every_file_of_a_capture_has_the_users_mode(capture):
     with replacing_folder(capture.frames) as folder:
         os.close(os.open(folder / "b.bin", os.O_CREAT | os.O_WRONLY, 0o600))
     (capture.root.parent / "theirs").write_text("")
-    usual = (capture.root.parent / "theirs").stat().st_mode
-    assert {
-        (capture.root / "a.bin").stat().st_mode,
-        (capture.frames / "b.bin").stat().st_mode,
-        capture.json.stat().st_mode,
-    } == {usual}
+    files = capture.root / "a.bin", capture.frames / "b.bin", capture.json, capture.root.parent / "theirs"
+    assert len({path.stat().st_mode for path in files}) == 1
 
 
 # -- folders
@@ -104,21 +91,16 @@ def test_every_file_is_on_the_disk_before_it_gets_its_name(capture, monkeypatch)
     assert len(named) == 3
 
 
-def test_files_that_others_put_into_a_folder_of_ours_stay_where_they_are(capture):
+def test_others_files_in_a_folder_of_ours_stay_and_changed_ones_are_kept_aside(capture):
+    """Whether the new folder has a file of that name or not."""
     make_frames(capture, "00000.jpg", "00001.jpg")
     (capture.frames / "holiday.jpg").write_text("a picture")
     (capture.frames / "more").mkdir()
     (capture.frames / "more" / "notes.txt").write_text("notes")
-    make_frames(capture, "00000.jpg", text="new")
-    assert contents(capture.frames) == {"00000.jpg": b"new", "holiday.jpg": b"a picture", "more/notes.txt": b"notes"}
-
-
-def test_a_changed_file_in_a_folder_of_ours_is_kept_aside_whether_there_is_a_new_one_or_not(capture):
-    make_frames(capture, "00000.jpg", "00001.jpg")
     for name in ("00000.jpg", "00001.jpg"):
         (capture.frames / name).write_text(f"retouched {name}")
     make_frames(capture, "00000.jpg", text="new")
-    assert contents(capture.frames) == {"00000.jpg": b"new"}
+    assert contents(capture.frames) == {"00000.jpg": b"new", "holiday.jpg": b"a picture", "more/notes.txt": b"notes"}
     assert contents(capture.root / "kept") == {
         f"frames/{name}": f"retouched {name}".encode() for name in ("00000.jpg", "00001.jpg")
     }
@@ -151,63 +133,31 @@ def test_a_link_in_place_of_a_file_or_folder_of_ours_is_kept_aside_and_what_it_l
     assert contents(tmp_path / "larger") == before
 
 
-KILLED = """
-import os, sys
-sys.path.insert(0, {root!r})
-from core.capture import capture as module
-from core.capture.capture import Capture
-from core.capture.files import replacing_folder
-at = {at}
-count = 0
-rename = os.replace
-def counted(*places):
-    global count
-    count += 1
-    if count > at:
-        os._exit(9)
-    rename(*places)
-module.os.replace = counted
-with replacing_folder(Capture({capture!r}).frames) as folder:
-    (folder / "00000.jpg").write_text("new")
-    if at < 0:
-        os._exit(9)
-"""
-
-
-@pytest.mark.parametrize("at", range(-1, 6))
+@needs_fork
+@pytest.mark.parametrize("at", range(6))
 def test_killed_at_any_rename_nothing_is_lost_and_the_next_run_clears_up(capture, at):
     make_frames(capture, "00000.jpg", "00001.jpg")
     (capture.frames / "00001.jpg").write_text("retouched")
     for name in ("holiday.jpg", "z.jpg"):
         (capture.frames / name).write_text(name)
-    subprocess.run([sys.executable, "-c", KILLED.format(root=str(ROOT), at=at, capture=str(capture.root))], check=False)
+    kill_at_rename(at, lambda: make_frames(capture, "00000.jpg", text="new"))
     with capture.locked():
         assert not [path for path in capture.root.rglob(".*")], "what the killed one left is gone"
     found = contents(capture.root)
-    assert {found[name] for name in found if name.startswith("frames/holiday") or name.startswith("frames/z")} == {
-        b"holiday.jpg",
-        b"z.jpg",
-    }
+    assert {found[f"frames/{name}"] for name in ("holiday.jpg", "z.jpg")} == {b"holiday.jpg", b"z.jpg"}
     assert found["frames/00000.jpg"] in (b"frame", b"new")
     assert b"retouched" in found.values()
 
 
+@needs_fork
 @pytest.mark.parametrize("at", [0, 1])
 def test_killed_while_it_writes_the_captures_own_books_leaves_nothing_either(tmp_path, at):
     """capture.json when the folder becomes a capture (at 0: its first rename), and job.json."""
-    root = tmp_path / "anna.wildcap"
-    code = KILLED
-    for old, new in (
-        ("with replacing_folder", "Capture({capture!r}).claim()\nwith replacing"),
-        (".frames)", ".job)"),
-        ('(folder / "00000.jpg")', "folder"),
-        ("import replacing_folder", "import replacing"),
-    ):
-        code = code.replace(old, new)
-    subprocess.run([sys.executable, "-c", code.format(root=str(ROOT), at=at, capture=str(root))], check=False)
-    assert len(list(root.glob(".*.tmp.json"))) == 1
-    with Capture(root).locked():
-        assert contents(root).keys() == {"capture.json", "lock"}
+    capture = Capture(tmp_path / "anna.wildcap")
+    kill_at_rename(at, lambda: (capture.claim(), write_json(capture.job, {})))
+    assert len(list(capture.root.glob(".*.tmp.json"))) == 1
+    with capture.locked():
+        assert contents(capture.root).keys() == {"capture.json", "lock"}
 
 
 def test_temporary_files_in_use_and_those_of_others_are_never_cleared_away(capture):
@@ -219,36 +169,34 @@ def test_temporary_files_in_use_and_those_of_others_are_never_cleared_away(captu
     assert (capture.root / "slow.txt").exists() and (capture.root / ".mine.123.tmp.txt").exists()
 
 
-def test_what_a_stage_needs_for_a_while_lies_in_the_capture_and_goes_with_its_process(capture):
+@needs_fork
+def test_the_workspace_of_a_stage_goes_with_its_process(capture):
     with capture.workspace() as work:
         assert work.is_relative_to(capture.root) and work.is_dir()
     assert not work.exists()
-    code = f"""
-import sys, time
-sys.path.insert(0, {str(ROOT)!r})
-from core.capture.capture import Capture
-with Capture({str(capture.root)!r}).workspace() as work:
-    (work / "database.db").write_text("half")
-    print(work, flush=True)
-    time.sleep(60)
-"""
-    other = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    left = Path(other.stdout.readline().strip())
+    reading, writing = os.pipe()
+
+    def dwell():
+        with capture.workspace() as work:
+            (work / "database.db").write_text("half")
+            os.write(writing, str(work).encode())
+            time.sleep(60)
+
+    other = fork(dwell)
+    left = Path(os.read(reading, 1000).decode())
     with capture.locked():
         assert left.exists(), "in use"
-    other.kill()
-    other.wait()
+    os.kill(other, signal.SIGKILL)
+    os.waitpid(other, 0)
     with capture.locked():
         assert not left.exists()
 
 
-# -- what runs tell
+# -- what runs log
 
 
 @pytest.mark.parametrize("fails", [False, True])
-def test_a_run_tells_what_it_kept_aside_also_where_it_fails(capture, monkeypatch, fails):
-    from core.worker import runner
-
+def test_a_run_logs_what_it_kept_aside_also_where_it_fails(capture, monkeypatch, fails):
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
 
     def run(capture, *_):
@@ -261,6 +209,6 @@ def test_a_run_tells_what_it_kept_aside_also_where_it_fails(capture, monkeypatch
     (capture.frames / "00000.jpg").write_text("retouched")
     film = capture.root.parent / "film.mp4"
     film.write_bytes(b"film")
-    said: list = []
-    run_job(write_job(capture, source=film, last="frames"), said.append)
-    assert any(isinstance(line, Log) and line.text.endswith("it is now kept/frames/00000.jpg.") for line in said), said
+    messages: list = []
+    runner.run_job(write_job(capture, source=film, last="frames"), messages.append)
+    assert any(isinstance(each, Log) and "kept/frames/00000.jpg" in each.text for each in messages), messages

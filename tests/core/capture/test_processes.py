@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which process wrote a line or holds a lease, and whether it is still there."""
+"""Processes as records name them, and whether they still run."""
 
 import ctypes
 import os
@@ -9,14 +9,15 @@ from types import SimpleNamespace
 import pytest
 
 from core.capture import processes
+from tests.fixtures.kept_capture import NO_PROCESS
 
 
 def test_processes_are_told_apart():
     me = processes.identify_process()
     assert not processes.is_gone(me) and processes.is_at_work(me)
-    assert processes.is_gone({**me, "began": "another time"}) and processes.is_gone({**me, "pid": 2**22 + 1})
+    assert processes.is_gone({**me, "began": "another time"}) and processes.is_gone({**me, "pid": NO_PROCESS})
     assert processes.is_gone({**me, "pid": -1}) and processes.is_gone({**me, "pid": 0}), "to kill(2), many at once"
-    container = {**me, "pid": 2**22 + 1, "host": processes.name_host() + "0"}
+    container = {**me, "pid": NO_PROCESS, "host": processes.name_host() + "0"}
     assert not processes.is_gone(container) and not processes.is_at_work(container), "a number there means nothing here"
     elsewhere = {**me, "host": "another machine"}
     assert not processes.is_gone(elsewhere) and not processes.is_at_work(elsewhere)
@@ -36,8 +37,8 @@ def test_a_process_whose_beginning_is_not_told_is_neither_gone_nor_known_to_be_a
         (7, 0, 1, ("3:4", False)),  # killed, and whoever started it still holds it
         (0, processes.ACCESS_DENIED, 0, ("", True)),  # another user's
         (0, 87, 0, ("", False)),
-    ],
-)  # nobody's number
+    ],  # the last: nobody's number
+)
 def test_windows_is_asked_whether_a_process_has_ended(monkeypatch, handle, error, code, told):
     closed = []
 

@@ -15,7 +15,7 @@ from core.face import template
 from core.face.head import Head, read_filmed_head, read_head
 from core.geometry import meshes, raster
 from core.settings.settings import from_json
-from tests.core.stages.delight.test_delight import SUN, render_frames, write_cameras
+from tests.fixtures.lit_head import SUN, render_frames, write_cameras
 from tests.fixtures.painted_skin import SHORT
 
 SIZE = 64

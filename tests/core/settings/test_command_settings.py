@@ -4,19 +4,21 @@
 what cannot be is refused."""
 
 import json
-from pathlib import Path
+from dataclasses import replace
 
 import pytest
 
 from core.__main__ import main
 from core.capture.capture import Capture
-from core.settings.settings import Settings, find_setting, known_settings, preset
+from core.settings.setting_values import value_from_text
+from core.settings.settings import Settings, find_setting, from_json, known_settings, preset
 from core.worker import terminal
 from core.worker.job import read_job
 
-RUN = [name for name in known_settings() if not name.startswith("deliver.")]
-DELIVER = [name for name in known_settings() if name.startswith("deliver.")]
-FLAGGED = [name for name in known_settings() if "flag" in find_setting(name).metadata]
+COMMANDS = {
+    command: [name for name in known_settings() if name.startswith("deliver.") == (command == "deliver")]
+    for command in ("run", "deliver")
+}
 
 
 @pytest.fixture
@@ -54,45 +56,58 @@ def other(name: str) -> tuple[str, object]:
     return ("mine/é", "mine/é") if "path" in limits else (found, found)
 
 
-@pytest.mark.parametrize("name", known_settings())
-def test_every_setting_can_be_set(capture, name, tmp_path, capsys):
-    text, kept = other(name)
-    command = "deliver" if name in DELIVER else "run"
-    if name == "deliver.whole":  # the command's own choice, and its only one
-        assert job(capture, "--set", "deliver.whole=yes", command=command).deliver.whole
-        assert main(["deliver", str(capture.root), "--set", "deliver.whole=no"]) == 2
-        assert "ended by Blender" in capsys.readouterr().err
-        return
-    settings = job(capture, "--set", f"{name}={text}", command=command)
-    assert value(settings, name) == (str(tmp_path / "mine" / "é") if "path" in find_setting(name).metadata else kept)
-    assert type(value(settings, name)) is type(find_setting(name).default)
-    expected = read_job(capture.job)
-    unchanged = [each for each in RUN if each != name and value(settings, each) != value(Settings(), each)]
-    assert expected.settings == settings and not unchanged
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_setting_can_be_set(capture, command, tmp_path):
+    texts = {name: other(name) for name in COMMANDS[command] if name != "deliver.whole"}  # the command's own choice
+    words = [word for name, (text, _) in texts.items() for word in ("--set", f"{name}={text}")]
+    settings = job(capture, *words, command=command)
+    for name, (_, kept) in texts.items():
+        kept = str(tmp_path / "mine" / "é") if "path" in find_setting(name).metadata else kept
+        assert value(settings, name) == kept and type(value(settings, name)) is type(kept), name
 
 
-@pytest.mark.parametrize("name", FLAGGED)
-def test_a_flag_says_the_same_as_set(capture, name):
-    text, _ = other(name)
-    field = find_setting(name)
-    needed = {
-        "delight.folder": ["--delighter", "folder"],
-        "delight.checkpoint": ["--delighter", "opendelight"],
-        "delight.switchlight_preview": ["--delighter", "switchlight"],
-        "registration.new_atlas": ["--template", "mine.obj"],
-    }.get(name, [])
-    words = [field.metadata["flag"]] if isinstance(field.default, bool) else [field.metadata["flag"], text]
-    command = "deliver" if name in DELIVER else "run"
-    by_set = job(capture, *needed, "--set", f"{name}={text}", command=command)
-    assert job(capture, *needed, *words, command=command) == by_set
+def test_a_setting_that_is_set_changes_no_other(capture):
+    assert job(capture, "--set", "solve.steps=7") == from_json({"solve": {"steps": 7}})
+
+
+def test_the_terminal_delivers_the_mesh_as_well(capture, capsys):
+    assert job(capture, "--set", "deliver.whole=yes", command="deliver").deliver.whole
+    assert main(["deliver", str(capture.root), "--set", "deliver.whole=no"]) == 2
+    assert "deliver.whole" in capsys.readouterr().err
+
+
+NEEDED = {
+    "delight.folder": ["--delighter", "folder"],
+    "delight.checkpoint": ["--delighter", "opendelight"],
+    "delight.switchlight_preview": ["--delighter", "switchlight"],
+    "registration.new_atlas": ["--template", "mine.obj"],
+}
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in known_settings() if isinstance(find_setting(name).default, bool) and name in RUN]
+    ("command", "names"),
+    [
+        *(
+            (command, [name for name in names if "flag" in find_setting(name).metadata and name not in NEEDED])
+            for command, names in COMMANDS.items()
+        ),
+        *(("run", [name]) for name in NEEDED),
+    ],
+    ids=str,
 )
-def test_a_switch_has_many_words(capture, name):
-    for words, state in (("on true YES 1", True), ("off False no 0", False)):
-        assert {value(job(capture, "--set", f"{name}={word}"), name) for word in words.split()} == {state}
+def test_a_flag_says_the_same_as_set(capture, command, names):
+    flags, assignments = list(NEEDED.get(names[0], [])), list(NEEDED.get(names[0], []))
+    for name in names:
+        text, field = other(name)[0], find_setting(name)
+        flags += [field.metadata["flag"]] if isinstance(field.default, bool) else [field.metadata["flag"], text]
+        assignments += ["--set", f"{name}={text}"]
+    assert job(capture, *flags, command=command) == job(capture, *assignments, command=command)
+
+
+@pytest.mark.parametrize(("words", "state"), [("on true YES 1", True), ("off False no 0", False)])
+def test_a_switch_has_many_words(words, state):
+    field = find_setting("upscale.hair")
+    assert {value_from_text("upscale.hair", field, word) for word in words.split()} == {state}
 
 
 def test_a_file_lies_over_the_quality_and_set_and_flags_over_the_file(capture, tmp_path):
@@ -101,27 +116,10 @@ def test_a_file_lies_over_the_quality_and_set_and_flags_over_the_file(capture, t
         '"deliver": {"preset": "unreal"}}',
         encoding="utf-8",
     )
-    settings = job(
-        capture,
-        "--quality",
-        "draft",
-        "--settings",
-        "mine.json",
-        "--set",
-        "solve.size=128",
-        "--set",
-        "solve.grid_cells=8",
-        "--skin-tone",
-        "auto",
-    )
-    assert (
-        settings.seed,
-        settings.solve.steps,
-        settings.solve.size,
-        settings.solve.grid_cells,
-        settings.solve.skin_tone,
-    ) == (3, 7, 128, 8, "auto")
-    assert settings.solve.guidance == preset("draft").solve.guidance
+    words = "--quality draft --settings mine.json --set solve.size=128 --set solve.grid_cells=8 --skin-tone auto"
+    settings = job(capture, *words.split())
+    expected = {"steps": 7, "size": 128, "grid_cells": 8, "skin_tone": "auto"}
+    assert settings.seed == 3 and settings.solve == replace(preset("draft").solve, **expected)
     assert json.loads(capture.job.read_text(encoding="utf-8"))["quality"] == "draft"
     assert job(capture, "--settings", "mine.json", command="deliver").deliver.preset == "unreal"
     kept = job(capture, "--settings", "mine.json", "--pictures", "png8", command="deliver")
@@ -139,9 +137,9 @@ def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
         "cameras": {"import_from": str(tmp_path / "rig.json")},
     }
     (tmp_path / "studio" / "mine.json").write_text(json.dumps(places), encoding="utf-8")
-    settings = job(
-        capture, "--settings", "studio/mine.json", "--set", "texture.perceptual_network=vgg", "--softened", "~/soft"
-    )
+    (tmp_path / "home").mkdir()
+    words = ["--set", "texture.perceptual_network=vgg", "--softened", "~/soft"]
+    settings = job(capture, "--settings", "~/../studio/mine.json", *words)
     assert settings.delight.folder == str(tmp_path / "studio" / "delit")
     assert settings.solve.prior == str(tmp_path / "home" / "authors")
     assert settings.registration.template == "" and settings.cameras.import_from == str(tmp_path / "rig.json")
@@ -155,34 +153,22 @@ def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (
-            ["--set", "solve.steps"],
-            "--set solve.steps gives no value. Write --set solve.steps=VALUE, as solve.steps=20.",
-        ),
-        (["--set", "solve.stps=5"], "no setting named 'solve.stps'. Did you mean solve.steps?"),
-        (["--set", "slove.steps=5"], "Did you mean solve.steps?"),
-        (["--set", "solve.steps=many"], "solve.steps is 'many', which is not a whole number. It goes from 4 to 600."),
-        (["--set", "solve.steps=5.5"], "not a whole number"),
-        (["--set", "solve.steps="], "'', which is not a whole number"),
-        (["--set", "solve.steps=3"], "solve.steps is 3. It goes from 4 to 600."),
-        (["--set", "scan.voxel_mm=wide"], "which is not a number. It goes from 0.3 to 5 mm."),
-        (["--set", "scan.voxel_mm=nan"], "It goes from 0.3 to 5 mm."),
-        (["--set", "upscale.hair=perhaps"], "upscale.hair is 'perhaps'. It is on or off."),
-        (["--set", "scan.method=magic"], "Choose one of auto, stereo, splats."),
-        (["--seed", "-1"], "seed is -1. It goes from 0 to 2147483647."),
-        (
-            ["--set", "seed=1", "--seed", "2"],
-            "--seed and --set seed=1 ask for two values of seed. Leave one of them out.",
-        ),
-        (["--set", "scan.pairs=5", "--set", "scan.pairs=6"], "ask for two values of scan.pairs."),
-        (
-            ["--set", "deliver.preset=unreal"],
-            "`core run` has no use for deliver.preset. It is a setting of `core deliver`.",
-        ),
-        (["--new-atlas"], "--new-atlas goes with --template only."),
-        (["--folder", "x", "--delighter", "none"], "--folder goes with --delighter folder only."),
-        (["--checkpoint", "x"], "--checkpoint goes with --delighter opendelight only."),
-        (["--preview"], "--preview and --send-frames go with --delighter switchlight"),
+        (["--set", "solve.steps"], "--set solve.steps=VALUE"),
+        (["--set", "solve.stps=5"], "Did you mean solve.steps?"),
+        (["--set", "solve.steps=many"], "4 to 600"),
+        (["--set", "solve.steps=5.5"], "whole number"),
+        (["--set", "solve.steps=3"], "4 to 600"),
+        (["--set", "scan.voxel_mm=wide"], "0.3 to 5 mm"),
+        (["--set", "upscale.hair=perhaps"], "on or off"),
+        (["--set", "scan.method=magic"], "auto, stereo, splats"),
+        (["--seed", "-1"], "0 to 2147483647"),
+        (["--set", "seed=1", "--seed", "2"], "two values of seed"),
+        (["--set", "scan.pairs=5", "--set", "scan.pairs=6"], "two values of scan.pairs"),
+        (["--set", "deliver.preset=unreal"], "`core deliver`"),
+        (["--new-atlas"], "--template"),
+        (["--folder", "x", "--delighter", "none"], "--delighter folder"),
+        (["--checkpoint", "x"], "--delighter opendelight"),
+        (["--preview"], "--delighter switchlight"),
     ],
 )
 def test_what_cannot_be_is_refused(capture, words, said, capsys):
@@ -205,16 +191,11 @@ def test_two_words_for_one_value_are_no_contradiction(capture):
     ("content", "said"),
     [
         (None, "mine.json cannot be read"),
-        (b"", "cannot be read"),
         (b"{", "cannot be read"),
         (b"\xff\xfe\x00", "cannot be read"),
-        (b"[1]", "object, not [1]"),
-        (b'"solve"', "object, not 'solve'"),
-        (b'{"solve": [5]}', "settings of the stage solve have to be an object"),
-        (b'{"solve": {"prior": 5}}', "not a str"),
+        (b"[1]", "object"),
+        (b'{"solve": [5]}', "stage solve"),
         (b'{"slove": {}}', "Did you mean solve?"),
-        (b'{"scan": {"voxel_mm": NaN}}', "0.3 to 5 mm"),
-        (b"[" * 100_000, "cannot be read"),
     ],
 )
 def test_a_settings_file_that_is_none_is_refused(capture, tmp_path, content, said, capsys):
@@ -233,7 +214,6 @@ def test_all_settings_are_listed(capsys):
     assert "solve.white_point = auto; R,G,B or auto  (run --white-point R,G,B)" in lines
     assert "    Sampling steps" in lines
     assert "deliver.size = 4096; 4096, 2048, 1024 px  (deliver --size VALUE)" in lines
-    assert all(len(line) < 160 for line in lines)
 
 
 def test_the_help_has_the_tooltips(capsys):
@@ -241,9 +221,3 @@ def test_the_help_has_the_tooltips(capsys):
         with pytest.raises(SystemExit):
             main([command, "--help"])
         assert said in " ".join(capsys.readouterr().out.split())
-
-
-def test_a_settings_file_in_the_home_folder(capture, tmp_path, monkeypatch):
-    monkeypatch.setenv("HOME", str(tmp_path))
-    Path(tmp_path / "mine.json").write_text('{"edited_part": true}')
-    assert job(capture, "--settings", "~/mine.json").edited_part

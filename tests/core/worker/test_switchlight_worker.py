@@ -16,7 +16,7 @@ from core.capture import consent
 from core.capture import switchlight_api as service
 from core.capture.capture import Capture
 from core.worker.job import write_job
-from tests.core.stages.delight.test_switchlight import make
+from tests.fixtures.switchlight_capture import make
 from tests.fixtures.switchlight_server import KEY, Service
 
 ROOT = Path(__file__).resolve().parents[3]

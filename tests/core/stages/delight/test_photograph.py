@@ -18,7 +18,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 from core.stages.delight.evening import ShadingEstimate
 from core.stages.delight.surface import skin_weights
-from tests.core.stages.delight.test_delight import SUN_COLOUR, capture, render_frames  # noqa: F401  a fixture
+from tests.fixtures.lit_head import SUN_COLOUR, make, render_frames
 
 photograph = importlib.import_module("core.stages.delight.photograph")
 IDENTITY = np.random.default_rng(5).normal(0, 0.7, len(template_landmarks().basis))
@@ -38,30 +38,28 @@ def parts_of(**shares: np.ndarray) -> SimpleNamespace:
     return SimpleNamespace(of=lambda *names: sum((shares.get(name, nothing) for name in names), nothing))
 
 
-def test_the_head_that_landmarks_show_lies_under_them_from_where_they_were_seen(capture):  # noqa: F811
-    picture = np.full((320, 240, 3), 0.5, np.float32)
-    for view in read_views(capture):
-        true = template_landmarks().shape(IDENTITY)
+def test_the_head_that_landmarks_show_lies_under_them_from_where_they_were_seen(tmp_path):
+    picture, true = np.full((320, 240, 3), 0.5, np.float32), template_landmarks().shape(IDENTITY)
+    for view in read_views(make(tmp_path / "two", (-30, 10))):
         pixels, _ = view.project(true + np.random.default_rng(1).normal(0, 0.0003, true.shape))
-        found, head = photograph.fit_head(picture, pixels)
-        miss = np.linalg.norm(found.project(template.landmark_points(head.mesh))[0] - pixels, axis=1)
+        fitted, head = photograph.fit_head(picture, pixels)
+        miss = np.linalg.norm(fitted.project(template.landmark_points(head.mesh))[0] - pixels, axis=1)
         assert np.median(miss[template.landmark_weights() > 0.2]) < 0.01 * np.ptp(pixels[:, 0])
-        turned = found.rotation @ view.rotation.T
+        turned = fitted.rotation @ view.rotation.T
         assert np.degrees(np.arccos((np.trace(turned) - 1) / 2)) < 5
-        assert found.read() is picture
+        assert fitted.read() is picture
 
 
-def test_the_light_of_a_photograph_leaves_the_better_for_the_head_that_is_fitted(capture, monkeypatch):  # noqa: F811
+def test_the_light_of_a_photograph_leaves_the_better_for_the_head_that_is_fitted(tmp_path, monkeypatch):
     """Skin of one colour under a sky and a sun from the side: how unlike it comes out, beside the picture and beside
     the network alone."""
-    heads = render_frames(capture, SUN_COLOUR)
-    view, seen = read_views(capture)[1], heads[1]
-    srgb, marks = view.read(), template.landmark_points(template.load())
+    capture, mesh = make(tmp_path / "one", (-10,), (180, 240)), template.load()
+    (on_head,), (view,) = render_frames(capture, SUN_COLOUR), read_views(capture)
+    srgb, marks = view.read(), template.landmark_points(mesh)
     monkeypatch.setattr(photograph.faces, "detect", lambda srgb: face_at(view.project(marks)[0]))
-    monkeypatch.setattr(photograph.parser, "parse", lambda srgb, landmarks: parts_of(skin=seen.astype(np.float32)))
-    face, bary, _ = raster.render_view(raster.RayCaster(template.load()), view)
-    told = skin_weights(Head(template.load()))[0]
-    skin = raster.interpolate(told[:, None], template.load().faces, face, bary)[..., 0] > 0.9
+    monkeypatch.setattr(photograph.parser, "parse", lambda srgb, landmarks: parts_of(skin=on_head.astype(np.float32)))
+    face, bary, _ = raster.render_view(raster.RayCaster(mesh), view)
+    skin = raster.interpolate(skin_weights(Head(mesh))[0][:, None], mesh.faces, face, bary)[..., 0] > 0.9
 
     def spread(picture: np.ndarray) -> float:
         log = np.log(np.maximum(images.srgb_to_linear(picture)[skin], 1e-3))
@@ -108,5 +106,5 @@ def test_a_brow_stays_where_the_parser_sees_one_and_where_only_landmarks_tell_of
 
 def test_a_photograph_without_a_face_is_refused(monkeypatch):
     monkeypatch.setattr(photograph.faces, "detect", lambda srgb: None)
-    with pytest.raises(Problem, match="No face was found"):
+    with pytest.raises(Problem, match="No face"):
         photograph.delight_photograph(np.zeros((64, 64, 3), np.float32), None)

@@ -11,7 +11,7 @@ import pytest
 
 from core.capture import stages
 from core.capture.messages import Problem, Reporter
-from core.capture.together import captures_in, hash_told
+from core.capture.together import captures_in, hash_inputs
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
@@ -73,7 +73,7 @@ def test_what_cannot_be_solved_together_is_refused(two, tmp_path):
     second.texture.unlink()
     for named, problem in (
         (first.root, "this capture itself"),
-        (tmp_path / "nothing", "no capture"),
+        (tmp_path / "nothing", "capture"),
         (second.root, "no texture"),
         (other.root, "not WildCap's head"),
     ):
@@ -84,12 +84,12 @@ def test_what_cannot_be_solved_together_is_refused(two, tmp_path):
 
 def test_of_another_capture_only_what_is_read_counts(two):
     _, second, _ = two
-    told = hash_told(str(second.root))
+    told = hash_inputs(str(second.root))
     (second.root / "maps").mkdir(exist_ok=True)
     (second.root / "maps" / "diffuse_albedo.png").write_bytes(b"solved since")
-    assert hash_told(str(second.root)) == told and told
+    assert hash_inputs(str(second.root)) == told and told
     images.write_data(second.shadow_mask, np.zeros((SIZE, SIZE), np.float32))
-    assert hash_told(str(second.root)) != told
+    assert hash_inputs(str(second.root)) != told
     assert set(stages.by_name("solve").reads) <= {name.partition("/")[2] for name in told}
 
 

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Detail finer than the texture: taken from frames that hold it, shrunk by what the views disagree on, put in the place
-of what was made up."""
+"""Detail finer than the texture: taken from frames that hold it, shrunk by what the views disagree on."""
 
 from types import SimpleNamespace
 

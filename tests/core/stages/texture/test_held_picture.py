@@ -8,7 +8,7 @@ import pytest
 from core.imaging import images
 from core.stages.texture.held_picture import MARGIN_PX, hold, read_held
 
-ROWS, COLUMNS = slice(0, 256), slice(0, 256)
+WHOLE = slice(0, 256), slice(0, 256)
 
 
 @pytest.mark.parametrize(("ending", "bits"), [("png", 8), ("png", 16), ("jpg", 8), ("exr", 16)])
@@ -20,20 +20,13 @@ def test_every_level_that_a_file_can_hold_is_read_as_it_is_from_the_file(tmp_pat
         images.write_linear(path, 4 * picture)
     else:
         images.write_srgb(path, picture, bits=bits)
-    held = read_held(path)
-    assert np.array_equal(held.linear(ROWS, COLUMNS), images.read_linear(path))
+    held, linear = read_held(path), images.read_linear(path)
+    assert np.array_equal(held.linear(*WHOLE), linear)
     assert held.stored.itemsize == (4 if ending == "exr" else bits // 8) and held.shape == (256, 256)
-
-
-def test_a_brightened_picture_is_its_linear_values_times_the_gain(tmp_path):
-    path = tmp_path / "levels.png"
-    images.write_srgb(path, np.random.default_rng(0).random((256, 256, 3), np.float32), bits=16)
     gain = np.array([0.2, -0.1, 0.03])
-    brighter = read_held(path).brightened(gain)
-    assert np.array_equal(brighter.linear(ROWS, COLUMNS), (images.read_linear(path) * np.exp(gain)).astype(np.float32))
-    assert np.array_equal(
-        brighter.linear(ROWS, COLUMNS), hold(images.read_linear(path)).brightened(gain).linear(ROWS, COLUMNS)
-    )
+    brighter = (linear * np.exp(gain)).astype(np.float32)
+    for picture in (held, hold(linear)):
+        assert np.array_equal(picture.brightened(gain).linear(*WHOLE), brighter)
 
 
 def test_of_a_picture_no_more_is_kept_than_the_head_with_a_margin_and_there_nothing_changes(tmp_path):
@@ -49,7 +42,7 @@ def test_of_a_picture_no_more_is_kept_than_the_head_with_a_margin_and_there_noth
     assert np.array_equal(part.linear(slice(16, 84), slice(86, 194)), whole.linear(slice(16, 84), slice(86, 194)))
 
 
-def test_a_head_that_leaves_the_picture_is_held_up_to_its_border(tmp_path):
+def test_a_head_that_leaves_the_picture_is_held_up_to_its_border():
     whole = hold(np.random.default_rng(0).random((40, 30, 3), np.float32))
     pixels = np.float32([[[-20, 35], [12, 90]]])
     part = whole.around(pixels)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texture's optional perceptual step, its network slot, what is not the head, and the measure of moles and
-pores."""
+"""The texture's optional perceptual step, its network slot, what is not the head, and maps larger than the views'."""
 
 import importlib
 from types import SimpleNamespace
@@ -19,10 +18,10 @@ from core.stages import texture
 from core.stages.texture import features, foreign
 from core.stages.texture.held_picture import hold
 from core.stages.texture.perceptual import refine
-from research.benchmarks.detail import moles
 from tests.fixtures.photographed_head import capture_of, skin
 
 SIZE = 256
+QUIET = Reporter("texture")
 
 
 def tiny_features() -> features.Features:
@@ -36,22 +35,46 @@ def fine(log):
     return cv2.GaussianBlur(log, (0, 0), 0.8) - cv2.GaussianBlur(log, (0, 0), 3)
 
 
+def inner(mask):
+    return cv2.erode(mask.astype(np.uint8), np.ones((9, 9))) > 0
+
+
+def build(capture, side: int, size: int):
+    """What the views see at `side` texels, and the map of `size` built from it."""
+    observations, surface, _ = texture.observe_all(capture, read_head(capture), side, QUIET)
+    return observations, surface, texture.build(observations, surface, from_json({}), QUIET, size)
+
+
 def test_the_step_brings_back_detail_that_a_mean_has_lost(tmp_path):
     paint = skin(SIZE)
     capture = capture_of(tmp_path / "head", paint, (-40, 0, 40))
-    observations, surface, _ = texture.observe_all(capture, read_head(capture), SIZE, Reporter("texture"))
-    built = texture.build(observations, surface, from_json({}), Reporter("texture"))
+    observations, surface, built = build(capture, SIZE, SIZE)
     dull = cv2.GaussianBlur(built.log_texture, (0, 0), 1.5)
     wanted = built.confidence > 0.6
-    found, losses = refine(dull, observations, surface, wanted, tiny_features(), 25, Reporter("texture"))
-    inner = cv2.erode(wanted.astype(np.uint8), np.ones((9, 9))) > 0
-    true = fine(np.log(paint))[inner]
+    refined, losses = refine(dull, observations, surface, wanted, tiny_features(), 25, QUIET)
+    sure = inner(wanted)
+    true = fine(np.log(paint))[sure]
     assert losses["after"] < 0.8 * losses["before"]
-    assert np.std(fine(found)[inner]) > 1.1 * np.std(fine(dull)[inner])
-    assert np.abs(fine(found)[inner] - true).mean() < 0.8 * np.abs(fine(dull)[inner] - true).mean()
-    tone = cv2.GaussianBlur(found - dull, (0, 0), 8)[inner]
+    assert np.std(fine(refined)[sure]) > 1.1 * np.std(fine(dull)[sure])
+    assert np.abs(fine(refined)[sure] - true).mean() < 0.8 * np.abs(fine(dull)[sure] - true).mean()
+    tone = cv2.GaussianBlur(refined - dull, (0, 0), 8)[sure]
     assert np.abs(tone).max() < 0.02, "the tone stays the blend's"
-    assert np.array_equal(found[~surface.covered], dull[~surface.covered])
+    assert np.array_equal(refined[~surface.covered], dull[~surface.covered])
+
+
+def test_a_texture_larger_than_its_views_maps_is_read_from_the_frames(tmp_path):
+    """Observed at half the side and read at the whole, a texture shows what it does where all is done at the whole, and
+    not the small one enlarged."""
+    capture = capture_of(tmp_path / "head", skin(2 * SIZE), (-40, 0, 40))
+    (*_, small), (*_, large), (*_, whole) = (
+        build(capture, side, size) for side, size in ((SIZE, SIZE), (SIZE, 2 * SIZE), (2 * SIZE, 2 * SIZE))
+    )
+    sure = inner(whole.confidence > 0.6)
+    enlarged = cv2.resize(small.log_texture, (2 * SIZE, 2 * SIZE), interpolation=cv2.INTER_CUBIC)
+    apart, lost = (np.abs(fine(each) - fine(whole.log_texture))[sure].mean() for each in (large.log_texture, enlarged))
+    assert large.log_texture.shape == whole.log_texture.shape and sure.sum() > 1000
+    assert apart < 0.3 * lost and np.abs(large.confidence - whole.confidence)[sure].mean() < 0.05
+    assert (large.log_texture[large.confidence > 0] < -0.01).all(), "what no view sees has no colour to be trusted"
 
 
 def test_the_package_is_asked_for_only_when_it_is_used(monkeypatch):
@@ -64,35 +87,20 @@ def test_the_package_is_asked_for_only_when_it_is_used(monkeypatch):
 def test_a_vgg_of_the_users_is_read_and_is_lpips_only_with_its_weights(tmp_path):
     from safetensors.torch import save_file
 
-    sizes = {
-        0: (64, 3),
-        2: (64, 64),
-        5: (128, 64),
-        7: (128, 128),
-        10: (256, 128),
-        12: (256, 256),
-        14: (256, 256),
-        17: (512, 256),
-        19: (512, 512),
-        21: (512, 512),
-        24: (512, 512),
-        26: (512, 512),
-        28: (512, 512),
-    }
-    state = {f"features.{i}.weight": torch.full((*shape, 3, 3), 0.02) for i, shape in sizes.items()}
-    save_file(
-        {**state, **{f"features.{i}.bias": torch.zeros(shape[0]) for i, shape in sizes.items()}},
-        tmp_path / "vgg16.safetensors",
-    )
+    state, into = {}, 3
+    for i, out in zip(
+        (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28), (64, 64, 128, 128, *[256] * 3, *[512] * 6), strict=True
+    ):
+        state |= {f"features.{i}.weight": torch.full((out, into, 3, 3), 0.02), f"features.{i}.bias": torch.zeros(out)}
+        into = out
+    save_file(state, tmp_path / "vgg16.safetensors")
     network = features.load_features(str(tmp_path / "vgg16.safetensors"))
     layers = network.layers(torch.rand(1, 3, 32, 32, generator=torch.Generator().manual_seed(0)))
+    widths = [64, 128, 256, 512, 512]
     assert network.name == "VGG16 features" and layers[-1].shape[-1] == 2
-    assert [layer.shape[1] for layer in layers] == [64, 128, 256, 512, 512]
+    assert [layer.shape[1] for layer in layers] == widths
     assert float(network.distance(layers, layers)) == 0
-    torch.save(
-        {f"lin{i}.model.1.weight": torch.ones(1, n, 1, 1) for i, n in enumerate((64, 128, 256, 512, 512))},
-        tmp_path / "vgg.pth",
-    )
+    torch.save({f"lin{i}.model.1.weight": torch.ones(1, n, 1, 1) for i, n in enumerate(widths)}, tmp_path / "vgg.pth")
     assert features.load_features(str(tmp_path)).name == "LPIPS (VGG16)"
 
 
@@ -120,57 +128,28 @@ def test_a_cloth_at_the_neck_is_found_and_skin_is_not(head):
     shirt = np.zeros((SIZE, SIZE), bool)
     shirt[round(0.96 * SIZE) :] = True
     log[shirt] = np.log(np.float32([0.2, 0.5, 0.25]))
-    found = foreign.clothes(log, seen, head)
+    cloth = foreign.clothes(log, seen, head)
     at_neck = shirt & head.covered & (template.mask("neck", SIZE) > 0.5)
-    assert at_neck.sum() > 100 and found[at_neck].mean() > 0.9
-    assert found[template.mask("face", SIZE) > 0.5].max() < 0.05 and (found > 0.5).sum() < 6 * at_neck.sum()
+    assert at_neck.sum() > 100 and cloth[at_neck].mean() > 0.9
+    assert cloth[template.mask("face", SIZE) > 0.5].max() < 0.05 and (cloth > 0.5).sum() < 6 * at_neck.sum()
 
 
-def test_background_takes_a_views_weight_outside_the_face_only(head, tmp_path, monkeypatch):
+def test_background_takes_a_views_weight_outside_the_face_only(tmp_path, monkeypatch):
     path = tmp_path / "frame.jpg"
     path.write_bytes(b"there")
     pixels = np.stack(np.meshgrid(*[(np.arange(SIZE) + 0.5) / SIZE * 64] * 2), -1).astype(np.float32)
-    ones = np.ones((SIZE, SIZE), np.float32)
+    ones, black = np.ones((SIZE, SIZE), np.float32), np.zeros((64, 64, 3), np.float32)
 
-    def seen(person):
+    def cut(person):
         monkeypatch.setattr(foreign.faces, "segment_person", lambda srgb: person)
-        view = SimpleNamespace(name="x", path=path, read=lambda: np.zeros((64, 64, 3), np.float32))
-        observation = texture.UnwrappedView(view, hold(np.zeros((64, 64, 3))), pixels, ones, ones, ones)
-        return foreign.leave_out_background([observation], Reporter("texture")), observation.weight
+        view = SimpleNamespace(name="x", path=path, read=lambda: black)
+        observation = texture.UnwrappedView(view, hold(black), pixels, ones, ones, ones)
+        return foreign.leave_out_background([observation], QUIET), observation.weight
 
     person = np.ones((64, 64), np.float32)
     person[:, :8] = 0
-    cut, weight = seen(person)
+    count, weight = cut(person)
     face = template.mask("face", SIZE)
-    assert cut == 1 and weight[:, 64:].min() == 1 and weight[face > 0.99].min() > 0.99
+    assert count == 1 and weight[:, 64:].min() == 1 and weight[face > 0.99].min() > 0.99
     assert weight[:, :20][face[:, :20] < 0.01].max() < 0.01
-    assert seen(np.zeros((64, 64), np.float32))[0] == 0, "a segmentation that misses the face is not believed"
-
-
-def test_moles_are_found_where_they_are_and_lines_are_none():
-    log = np.zeros((120, 120), np.float32)
-    for y, x in ((30, 40), (80, 70)):
-        cv2.circle(log, (x, y), 2, -0.5, -1)
-    cv2.line(log, (10, 100), (110, 100), -0.5, 2)
-    band = cv2.GaussianBlur(log, (0, 0), 1.2) - cv2.GaussianBlur(log, (0, 0), 5.0)
-    assert sorted(moles(band, np.ones((120, 120), bool))) == [(30, 40), (80, 70)]
-
-
-def test_a_texture_larger_than_its_views_maps_is_read_from_the_frames(tmp_path):
-    """Observed at half the side and read at the whole, a texture shows what it does where all is done at the whole, and
-    not the small one enlarged."""
-    paint = skin(2 * SIZE)
-    capture = capture_of(tmp_path / "head", paint, (-40, 0, 40))
-    head, report = read_head(capture), Reporter("texture")
-
-    def made(side: int, size: int) -> texture.Built:
-        return texture.build(*texture.observe_all(capture, head, side, report)[:2], from_json({}), report, size)
-
-    small, large, whole = made(SIZE, SIZE), made(SIZE, 2 * SIZE), made(2 * SIZE, 2 * SIZE)
-    inner = cv2.erode((whole.confidence > 0.6).astype(np.uint8), np.ones((9, 9))) > 0
-    enlarged = cv2.resize(small.log_texture, (2 * SIZE, 2 * SIZE), interpolation=cv2.INTER_CUBIC)
-    apart, lost = (np.abs(fine(each) - fine(whole.log_texture))[inner].mean() for each in (large.log_texture, enlarged))
-    assert large.log_texture.shape == whole.log_texture.shape and inner.sum() > 1000
-    assert apart < 0.3 * lost and np.abs(large.confidence - whole.confidence)[inner].mean() < 0.05
-    sure = large.log_texture[large.confidence > 0]
-    assert (sure < -0.01).all(), "what no view sees has no colour, and must not be trusted for one"
+    assert cut(np.zeros((64, 64), np.float32))[0] == 0, "a segmentation that misses the face is not believed"

@@ -1,10 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contrast of brows, eyes, lips and chin on drawn faces, and the two slopes that tell skin from light."""
-
-import importlib.util
-import json
-from pathlib import Path
+"""Measures of maps on drawn pictures: contrast of brows, eyes, lips and chin, the two slopes that tell skin from light,
+moles, and the scores of masks."""
 
 import cv2
 import numpy as np
@@ -13,11 +10,11 @@ import pytest
 from core.face import template
 from core.geometry.raster import interpolate
 from core.imaging import images
+from research.benchmarks.detail import moles
 from research.benchmarks.measures.features_kept import BROWS, contrast_kept, contrasts, joint
 from research.benchmarks.measures.slopes import slope
+from research.benchmarks.shadow_mask import scores
 
-SHARED = Path(__file__).resolve().parents[5] / "shared"
-FACEOLAT, EVALUATE = SHARED / "data" / "faceolat", SHARED / "evaluate" / "feature_contrast.py"
 SIZE = 640
 SKIN = np.float32([0.40, 0.26, 0.19])
 
@@ -40,27 +37,23 @@ def drawn(points, brows: float) -> np.ndarray:
     return picture
 
 
-def measured(points, linear) -> dict:
-    return contrasts(images.linear_to_srgb(linear), points, np.ones((SIZE, SIZE), bool))
+def measured(points, linear, face=True) -> dict:
+    return contrasts(images.linear_to_srgb(linear), points, np.full((SIZE, SIZE), face))
 
 
 def test_a_contrast_is_the_logarithm_of_skin_over_feature(points):
     found = measured(points, drawn(points, 0.5))
-    assert found["brows"] == pytest.approx(np.log(2), abs=1e-3) and found["lips"] == pytest.approx(0, abs=1e-3)
-    assert found["eyes"] == pytest.approx(0, abs=1e-3) and found["chin"] == pytest.approx(0, abs=1e-3)
+    assert found == pytest.approx({**dict.fromkeys(found, 0), "brows": np.log(2)}, abs=1e-3)
+    assert {"brows", "lips", "eyes", "chin"} <= set(found)
 
 
-def test_a_gain_changes_nothing_and_a_square_root_halves(points):
-    truth = measured(points, drawn(points, 0.4))
-    assert contrast_kept(measured(points, 0.3 * drawn(points, 0.4)), truth) == pytest.approx({"brows": 1.0}, abs=1e-3)
-    assert contrast_kept(measured(points, np.sqrt(drawn(points, 0.4))), truth)["brows"] == pytest.approx(0.5, abs=1e-3)
-    assert contrast_kept(measured(points, drawn(points, 1.0)), truth)["brows"] == pytest.approx(0, abs=1e-3)
-
-
-def test_what_is_not_seen_has_no_contrast(points):
-    face = np.zeros((SIZE, SIZE), bool)
-    found = contrasts(images.linear_to_srgb(drawn(points, 0.5)), points, face)
-    assert set(found.values()) == {None} and contrast_kept(found, measured(points, drawn(points, 0.5))) == {}
+def test_a_gain_changes_no_contrast_a_square_root_halves_it_and_what_is_not_seen_has_none(points):
+    picture = drawn(points, 0.4)
+    truth = measured(points, picture)
+    for answer, kept in ((0.3 * picture, 1.0), (np.sqrt(picture), 0.5), (drawn(points, 1.0), 0.0)):
+        assert contrast_kept(measured(points, answer), truth)["brows"] == pytest.approx(kept, abs=1e-3)
+    unseen = measured(points, picture, face=False)
+    assert set(unseen.values()) == {None} and contrast_kept(unseen, truth) == {}
 
 
 def test_jointly_a_bleached_face_loses_all_and_the_pictures_themselves_keep_their_light():
@@ -71,24 +64,6 @@ def test_jointly_a_bleached_face_loses_all_and_the_pictures_themselves_keep_thei
     assert joint(halved, filmed) == pytest.approx({"lost": 0.05, "between_lights": 0.5})
     assert joint(filmed[:1], filmed[:1])["between_lights"] is None
     assert joint([{}], [{}]) == {"lost": None, "between_lights": None}
-
-
-def test_a_face_that_was_measured_elsewhere_has_the_same_contrasts():
-    if not (FACEOLAT.is_dir() and EVALUATE.is_file()):
-        pytest.skip("the light stage's photographs and their measure are not at hand")
-    spec = importlib.util.spec_from_file_location("feature_contrast", EVALUATE)
-    theirs = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(theirs)
-    for name, landmarks in json.loads((FACEOLAT / "landmarks.json").read_text()).items():
-        landmarks, (person, camera) = np.array(landmarks, float), name.split("_")
-        face = images.read_mask(FACEOLAT / "align_mask_face" / f"{name}.png") > 127 / 255 + 1e-3
-        for path in (
-            FACEOLAT / "align_diffuse" / f"{name}.png",
-            next(iter(sorted((FACEOLAT / "align_image" / person / camera).glob("*.png")))),
-        ):
-            srgb = images.read_srgb(path)
-            wanted = theirs.contrasts(srgb.astype(np.float64), landmarks, face)
-            assert contrasts(srgb, landmarks, face) == pytest.approx(wanted, abs=1e-4)
 
 
 RNG = np.random.default_rng(2)
@@ -110,18 +85,34 @@ def test_doing_nothing_follows_both_and_a_flat_colour_neither():
     assert slope(flat, lights, HERE) == pytest.approx(0)
     assert slope((albedo, other_albedo), (albedo, other_albedo), HERE) == 1, "the true light"
     assert slope((albedo, albedo), lights, HERE) == 0
+    assert slope((albedo, albedo), (albedo, 2 * albedo), HERE) is None, "nothing differs but a gain"
 
 
-def test_an_answer_that_mixes_both_by_half_has_slopes_of_a_half():
+def test_an_answer_that_mixes_both_by_half_has_slopes_of_a_half_and_pixels_outside_count_nothing():
     albedo, light, other = 0.3 * field(0.2), field(0.3), field(0.3)
-    answers = tuple(albedo * np.sqrt(each) for each in (light, other))
-    assert slope(answers, (albedo * light, albedo * other), HERE) == pytest.approx(0.5)
-
-
-def test_a_gain_and_pixels_that_are_not_asked_for_change_nothing():
-    albedo, light, other = 0.3 * field(0.2), field(0.3), field(0.3)
+    lights = albedo * light, albedo * other
+    assert slope(tuple(albedo * np.sqrt(each) for each in (light, other)), lights, HERE) == pytest.approx(0.5)
     inside = HERE.copy()
     inside[:20] = False
     spoilt = np.where(inside[..., None], albedo * other, 5.0)
-    assert slope((albedo * light, spoilt * [2, 3, 4]), (albedo * light, albedo * other), inside) == pytest.approx(1)
-    assert slope((albedo, albedo), (albedo, 2 * albedo), HERE) is None, "nothing differs but a gain"
+    assert slope((albedo * light, spoilt * [2, 3, 4]), lights, inside) == pytest.approx(1)
+
+
+def test_moles_are_found_where_they_are_and_lines_are_none():
+    log = np.zeros((120, 120), np.float32)
+    for y, x in ((30, 40), (80, 70)):
+        cv2.circle(log, (x, y), 2, -0.5, -1)
+    cv2.line(log, (10, 100), (110, 100), -0.5, 2)
+    band = cv2.GaussianBlur(log, (0, 0), 1.2) - cv2.GaussianBlur(log, (0, 0), 5.0)
+    assert sorted(moles(band, np.ones((120, 120), bool))) == [(30, 40), (80, 70)]
+
+
+def test_scores_of_masks_with_known_overlap():
+    y, x = np.mgrid[0:256, 0:256]
+    disc, shifted = (np.hypot(x - middle, y - 128) < 51 for middle in (128, 133))
+    half, everywhere = disc & (x < 128), np.ones_like(disc)
+    assert scores(disc, disc, everywhere)[2:] == (1, 1, 1, 1)
+    assert scores(half, disc, everywhere)[2:5] == pytest.approx((0.5, 1, 0.5), abs=0.02)
+    # by 20 texels of a 1024 map: only where the borders cross do they meet
+    assert scores(shifted, disc, everywhere)[5] < 0.4
+    assert scores(~disc, disc, everywhere)[2:5] == (0, 0, 0)
