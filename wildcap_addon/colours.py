@@ -42,6 +42,16 @@ def as_data(image: bpy.types.Image) -> None:
         image.colorspace_settings.is_data = True
 
 
+def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
+    """Decode sRGB in [0, 1] (IEC 61966-2-1)."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
+    """Encode linear light as sRGB."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.clip(linear, 0, 1) ** (1 / 2.4) - 0.055)
+
+
 def to_working(linear: np.ndarray | tuple) -> np.ndarray:
     """Linear colours [..., 3] of sRGB's primaries in the scene's working space."""
     return np.asarray(linear) @ _towards_working()

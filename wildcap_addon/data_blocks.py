@@ -75,3 +75,33 @@ def stop_animation(data_block: bpy.types.ID) -> None:
     data_block.animation_data_clear()
     if action is not None and action.users == 0:
         bpy.data.actions.remove(action)
+
+
+def new_child(obj: bpy.types.Object, name: str, data=None) -> bpy.types.Object:
+    """Return a new child of an object, in the same collections."""
+    child = bpy.data.objects.new(name, data)
+    for collection in obj.users_collection:
+        collection.objects.link(child)
+    child.parent = obj
+    return child
+
+
+def add_driver(block, field: str, expression: str, index: int = -1) -> bpy.types.Driver:
+    """Drive a field by a simple expression, which needs no Python; its variables are still to be added."""
+    driver = block.driver_add(field, index).driver
+    driver.type = 'SCRIPTED'
+    driver.expression = expression
+    return driver
+
+
+def add_variable(driver: bpy.types.Driver, keys: bpy.types.Key, path: str, name: str = "") -> None:
+    """Add a driver's variable that reads a property of shape keys."""
+    variable = driver.variables.new()
+    variable.name = name or variable.name
+    variable.targets[0].id_type, variable.targets[0].id = 'KEY', keys
+    variable.targets[0].data_path = path
+
+
+def value_path(key: str) -> str:
+    """Return the path of a shape key's value, by its name."""
+    return f'key_blocks["{key}"].value'

@@ -16,6 +16,29 @@ def of(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
     return block.node_tree
 
 
+def principled(material: bpy.types.Material) -> bpy.types.Node:
+    """Return the Principled BSDF of a material that has one."""
+    return next(node for node in of(material).nodes if node.type == 'BSDF_PRINCIPLED')
+
+
+def add(tree: bpy.types.NodeTree, kind: str, inputs: dict | tuple = (), **settings) -> bpy.types.Node:
+    """Add a node with its settings and its inputs, as `feed` takes them."""
+    node = tree.nodes.new(kind)
+    for name, value in settings.items():
+        setattr(node, name, value)
+    feed(node, inputs)
+    return node
+
+
+def feed(node: bpy.types.Node, inputs: dict | tuple) -> None:
+    """Set a node's inputs, by index or name: link a socket, or set a value."""
+    for name, value in inputs.items() if isinstance(inputs, dict) else enumerate(inputs):
+        if isinstance(value, bpy.types.NodeSocket):
+            node.id_data.links.new(value, node.inputs[name])
+        else:
+            node.inputs[name].default_value = value
+
+
 def fingerprint(material: bpy.types.Material, without: str) -> str:
     """Stands for a material's nodes, their values and links; the pictures that they show, what stands where, and the
     node `without` count for nothing."""

@@ -34,7 +34,6 @@ def unfold(*names: str) -> None:
 def open_sample_head():
     """The tab, and the sample head by its button; returns the capture's folder."""
     yield from d.open_tab("WildCap")
-    yield from d.park()
     yield from d.press("wildcap.open_sample_head")
     yield from d.until(lambda: "sample_head" in bpy.data.objects, "the sample head", 20)
     yield 1.0

@@ -180,8 +180,8 @@ def scroll(steps: int):
 
 
 def open_tab(name: str):
-    """Shows the sidebar on one tab; its tabs exist only after it was drawn once. An artist presses N and clicks on the
-    tab."""
+    """Shows the sidebar on one tab, which exists only after it was drawn once, and takes the cursor off it. An artist
+    presses N and clicks on the tab."""
     act(2)
     view().spaces.active.show_region_ui = True
     for _ in range(100):
@@ -195,6 +195,7 @@ def open_tab(name: str):
             if sidebar.active_panel_category == name:
                 sidebar.tag_redraw()
                 yield 0.3
+                yield from park()
                 return
             sidebar.tag_redraw()
     raise AssertionError(f"the tab {name} never appeared")

@@ -38,7 +38,6 @@ def drag_in_zip():
 def choose_python():
     """Use an Existing Python, from the tab of a Blender that has just got the add-on."""
     yield from d.open_tab("WildCap")
-    yield from d.park()
     d.screenshot("walk_1_empty")
     yield from d.press("wildcap.use_python")
     yield from d.browse(addon.CHECKOUT / ".venv" / "bin" / "python")
@@ -72,6 +71,19 @@ def begin(command: str, root: Path):
     """The leading button's job, under way."""
     yield from d.lead(command)
     assert addon.job(root) is not None, addon.problem(root) or addon.problem()
+
+
+def make(root: Path, picture: str = ""):
+    """The large button's way from a video to a solved head in its material."""
+    yield from begin("wildcap.make_my_head", root)
+    if picture:
+        yield 12.0
+        d.screenshot(picture)
+    yield from d.until(lambda: head() is not None or addon.job(root) is None, "the head in the scene", 1200)
+    assert addon.job(root) is not None, addon.problem(root)
+    d.say("the head comes in while it is solved")
+    yield from ended("wildcap.make_my_head", root)
+    assert addon.problem(root).startswith("Your head is ready."), addon.problem(root)
 
 
 def ended(command: str, root: Path):

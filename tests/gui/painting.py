@@ -14,12 +14,6 @@ from mathutils import Vector
 from mathutils.geometry import barycentric_transform
 
 
-def enter(command: str = "wildcap.paint_mask"):
-    """Into the painting by a click on the sidebar's first button for it."""
-    yield from d.press(command)
-    yield from in_hand()
-
-
 def in_hand():
     yield from d.until(lambda: bpy.context.mode == 'PAINT_TEXTURE', "texture painting", 10)
     yield 0.5

@@ -19,29 +19,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import addon  # noqa: E402
 import driver as d  # noqa: E402
 import painting  # noqa: E402
+from suite import BLENDER  # noqa: E402
 
 
 def start(part: str, folder: Path) -> subprocess.Popen:
     """The second Blender, in a smaller window that leaves the first one's tab to be seen. What it prints goes into the
     flow's log."""
     folder.mkdir(parents=True, exist_ok=True)
-    return subprocess.Popen(
-        [
-            "blender",
-            "--enable-event-simulate",
-            "--no-window-focus",
-            "-p",
-            "0",
-            "0",
-            "900",
-            "700",
-            "-P",
-            str(Path(__file__).resolve()),
-            "--",
-            part,
-            str(folder),
-        ]
-    )
+    return subprocess.Popen([*BLENDER, "900", "700", "-P", Path(__file__).resolve(), "--", part, folder])
 
 
 def heard(process: subprocess.Popen, folder: Path, name: str, limit_s: float):

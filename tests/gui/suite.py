@@ -17,6 +17,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 SIZE = (1280, 800)
+BLENDER = ("blender", "--enable-event-simulate", "--no-window-focus", "-p", "0", "0")
 LIMIT_S = 1800
 WITHOUT = {"one_button", "button_by_button"}
 """Flows that begin without the add-on: they drag its zip into the window."""
@@ -79,18 +80,7 @@ def run(flow: Path, archive: Path, out: Path, display: str) -> tuple[bool, float
         with open(log, "w", encoding="utf-8") as file:
             try:
                 code = subprocess.call(
-                    [
-                        "blender",
-                        "--enable-event-simulate",
-                        "--no-window-focus",
-                        "-p",
-                        "0",
-                        "0",
-                        str(SIZE[0]),
-                        str(SIZE[1]),
-                        "-P",
-                        str(flow),
-                    ],
+                    [*BLENDER, *map(str, SIZE), "-P", HERE / "launch.py", "--", flow.stem],
                     env=environment,
                     stdout=file,
                     stderr=subprocess.STDOUT,
@@ -104,7 +94,6 @@ def run(flow: Path, archive: Path, out: Path, display: str) -> tuple[bool, float
             print(text[-6000:])
             return False, time.monotonic() - started
         print("\n".join(line for line in text.splitlines() if line.startswith("| ")))
-
         return True, time.monotonic() - started
 
 

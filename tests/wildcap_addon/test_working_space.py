@@ -16,9 +16,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from tests.wildcap_addon.acting.test_acting import head, write_head  # noqa: E402, F401  (head is a fixture)
-from tests.wildcap_addon.acting.test_close_up import drawn_once, things  # noqa: E402, F401  (drawn_once is a fixture)
-from tests.wildcap_addon.groom.test_groom import write_strands  # noqa: E402
+from tests.fixtures.acting_heads import capture_of, things  # noqa: E402
+from tests.fixtures.grown_hair import write_strands  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 WIDE = "OCIO" in os.environ
@@ -60,10 +59,9 @@ def test_the_others_hold_in_acescg(tmp_path):
     assert result.returncode == 0 and ran and int(ran[1]) >= 4, result.stdout[-3000:]
 
 
-def test_eyes_teeth_and_hair(head, capture, addon):  # noqa: F811
-    acting, close_up = addon("acting.materials"), addon("acting.close_up.materials")
-    strands = write_strands(capture / "maps", write_head(capture, 0.95), addon("acting.asset").load())
-    bpy.ops.wildcap.close_up()
+def test_eyes_teeth_and_hair(close_up, addon):
+    head, acting, materials = close_up, addon("acting.materials"), addon("acting.close_up.materials")
+    strands = write_strands(capture_of(head), addon("acting.asset").load())
     bpy.ops.wildcap.iris(iris='blue')
     bpy.ops.wildcap.grow_hair()
     worn = things(head)
@@ -71,7 +69,7 @@ def test_eyes_teeth_and_hair(head, capture, addon):  # noqa: F811
     iris = next(slot.material for slot in worn["Left Eye"].material_slots if "Iris" in slot.material.name)
     assert list(iris.node_tree.nodes["WildCap Iris"].outputs[0].default_value)[:3] == pytest.approx(working(own), NEAR)
     assert list(iris.diffuse_color)[:3] == pytest.approx(working(own), NEAR)
-    assert base_colour(worn["Teeth"].material_slots[0].material) == pytest.approx(working(close_up.ENAMEL), NEAR)
+    assert base_colour(worn["Teeth"].material_slots[0].material) == pytest.approx(working(materials.ENAMEL), NEAR)
     assert base_colour(inside["Mouth"]) == pytest.approx(working((0.22, 0.05, 0.045)), NEAR)
     assert base_colour(inside["Teeth"]) == pytest.approx(working((0.66, 0.58, 0.45)), NEAR)
     assert acting.colour_of(head) == own

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head that can act: the lips and lids of the registered head opened, eyes and mouth behind them, ARKit's face units
-as shape keys."""
+"""Face units: the head's lips and lids cut open, eyes and mouth behind them, ARKit's units as shape keys."""
 
 import bpy
 
@@ -9,18 +8,18 @@ from .. import head
 from . import gaze, mesh, operators, panel
 from .close_up import building
 
+COMPLETERS = (mesh.open_filmed_eyes, gaze.keep_up, building.keep_up)
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
 
 
 def register():
     _register()
-    head.FOLLOWERS.append(mesh.renewed)
-    head.COMPLETERS.extend((mesh.open_filmed_eyes, gaze.keep_up, building.keep_up))
+    head.FOLLOWERS.append(mesh.follow)
+    head.COMPLETERS.extend(COMPLETERS)
 
 
 def unregister():
-    head.COMPLETERS.remove(mesh.open_filmed_eyes)
-    head.COMPLETERS.remove(gaze.keep_up)
-    head.COMPLETERS.remove(building.keep_up)
-    head.FOLLOWERS.remove(mesh.renewed)
+    for completer in COMPLETERS:
+        head.COMPLETERS.remove(completer)
+    head.FOLLOWERS.remove(mesh.follow)
     _unregister()

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: face units onto the head, the iris' colour, what the eyes look at, eyes and mouth for a close-up, and all
-sliders back to zero."""
+"""Operators of the face units: add and rest them, the iris, the gaze, the close-up."""
 
 import bpy
 
@@ -12,6 +11,11 @@ from . import gaze, materials, mesh
 from .close_up import building
 
 FILMED = ("filmed", "As Filmed", "What the frames show, where the eyes were open; brown otherwise")
+IRIS = {
+    "name": "Iris",
+    "description": "Colour of the eyes",
+    "items": [FILMED, *((name, name.title(), "") for name in materials.IRISES)],
+}
 
 
 class WILDCAP_OT_add_face_units(HeadOperator, bpy.types.Operator):
@@ -21,11 +25,7 @@ class WILDCAP_OT_add_face_units(HeadOperator, bpy.types.Operator):
     bl_label = "Add Face Units"
     bl_options = {'REGISTER', 'UNDO'}
 
-    iris: bpy.props.EnumProperty(
-        name="Iris",
-        description="Colour of the eyes",
-        items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)],
-    )
+    iris: bpy.props.EnumProperty(**IRIS)
 
     def work(self, context):
         item = captures.require(context)
@@ -46,11 +46,7 @@ class WILDCAP_OT_iris(HeadOperator, bpy.types.Operator):
     bl_label = "Iris"
     bl_options = {'REGISTER', 'UNDO'}
 
-    iris: bpy.props.EnumProperty(
-        name="Iris",
-        description="Colour of the eyes",
-        items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)],
-    )
+    iris: bpy.props.EnumProperty(**IRIS)
 
     def work(self, context):
         obj = _acting(context)
@@ -69,7 +65,7 @@ class WILDCAP_OT_rest_face(HeadOperator, bpy.types.Operator):
 
 
 class _Toggle(HeadOperator):
-    """Mixin: adds to the head what the module `switched` makes, or takes it away again."""
+    """Mixin: adds to the head what the module `switched` makes, or removes it."""
 
     bl_options = {'REGISTER', 'UNDO'}
 
@@ -104,7 +100,7 @@ class WILDCAP_OT_close_up(_Toggle, bpy.types.Operator):
 
 
 def _acting(context):
-    """The capture's head with its units. Raises Problem if it has none."""
+    """Return the capture's head with face units. Raises Problem if it has none."""
     obj = captures.require_head(context, captures.require(context))
     if not mesh.has(obj):
         raise Problem("This head has no face units yet.", "Click Add Face Units.")

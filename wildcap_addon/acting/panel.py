@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: face units, and the sliders one tries first; all of them stand under Shape Keys in the mesh's properties."""
+"""Panel of the face units, with the sliders one tries first; all are under Shape Keys in the mesh's properties."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head, or what else was made of it, for other programs."""
+"""Deliver: the head, or what else was made of it, for other programs."""
 
 import bpy
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A delivery as a word of the terminal."""
+"""Terminal command for a delivery."""
 
 import contextlib
 import time
@@ -13,40 +13,39 @@ from .. import captures, head, jobs, problems
 from ..terminal import Command
 from . import waiting
 
-POLL_S = 0.1  # between two looks at the worker
+POLL_S = 0.1
 
 
-def _deliver(arguments) -> list[Path]:
-    """The delivery's folder. Empties the open file first. Raises Problem as the buttons do."""
+def _deliver(options) -> list[Path]:
+    """Deliver and return the folder; empties the open file first. Raises Problem as the buttons do."""
     bpy.ops.wm.read_homefile(use_empty=True)
-    item = captures.add(bpy.context, arguments.capture.absolute())
+    item = captures.add(bpy.context, options.capture.absolute())
     obj = head.bring_in(bpy.context, item)
-    if arguments.what == "head":
+    if options.what == "head":
         head.complete(obj, captures.folder(item))
-        if delivery_presets.PRESETS[arguments.preset].open_eyes and not obj.data.shape_keys:
+        if delivery_presets.PRESETS[options.preset].open_eyes and not obj.data.shape_keys:
             bpy.ops.wildcap.add_face_units()
-    chosen = item.deliver
-    chosen.what, chosen.preset, chosen.format = arguments.what, arguments.preset, arguments.format
-    chosen.folder = str(arguments.to or "")
-    root = captures.root(item)
-    with contextlib.suppress(RuntimeError):  # what the button refuses, it has told
+    settings, root = item.deliver, captures.root(item)
+    settings.what, settings.preset, settings.format = options.what, options.preset, options.format
+    settings.folder = str(options.to or "")
+    with contextlib.suppress(RuntimeError):  # a refusal is in problems.of
         bpy.ops.wildcap.deliver('EXEC_DEFAULT')
     while jobs.poll():
         time.sleep(POLL_S)
-    if waiting.ready(root) is not None:  # no window, no click: the mesh is added here
+    if waiting.ready(root) is not None:  # without a window the mesh is added here
         return [waiting.finish(bpy.context, item)]
-    told = problems.of(root)
-    if told is not None and not isinstance(told, problems.Notice):
-        raise told
+    problem = problems.of(root)
+    if problem is not None and not isinstance(problem, problems.Notice):
+        raise problem
     return [waiting.last(root)]
 
 
-def _of_deliver(kind) -> None:
-    kind.add_argument("capture", type=Path)
-    kind.add_argument("--preset", choices=tuple(delivery_presets.PRESETS), default="blender")
-    kind.add_argument("--format", choices=("preset", *delivery_presets.FORMATS), default="preset")
-    kind.add_argument("--what", choices=tuple(delivery_presets.WHAT), default="head")
-    kind.add_argument("--to", type=Path, metavar="FOLDER", help="where to; default: exports in the capture")
+def _add_options(parser) -> None:
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("--preset", choices=tuple(delivery_presets.PRESETS), default="blender")
+    parser.add_argument("--format", choices=("preset", *delivery_presets.FORMATS), default="preset")
+    parser.add_argument("--what", choices=tuple(delivery_presets.WHAT), default="head")
+    parser.add_argument("--to", type=Path, metavar="FOLDER", help="where to; default: exports in the capture")
 
 
-COMMANDS = (Command("deliver", "the head with its maps as another program wants them", _of_deliver, _deliver),)
+COMMANDS = (Command("deliver", "the head with its maps as another program wants them", _add_options, _deliver),)

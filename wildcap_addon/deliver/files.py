@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mesh files, by Blender's own exporters: neutral pose and shape keys, Y up (USD: Z, as it says itself), the maps
-referred to by relative paths.
+"""Write the mesh file by Blender's own exporters.
 
-Options are given by name where this Blender has them: 4.2 and 5.x differ in a few.
+Neutral pose and shape keys, Y up (USD: Z, as it declares), maps referred to by relative paths. Options are passed only
+where this Blender has them: 4.2 and 5.x differ in a few.
 """
 
 from contextlib import contextmanager
@@ -15,11 +15,11 @@ from ...core.capture.delivery_plan import DeliveryPlan
 from ...core.capture.messages import Problem
 
 ADDONS = {".glb": "gltf", ".gltf": "gltf", ".fbx": "fbx"}
-"""Exporters that are add-ons of Blender, which may be switched off: the operator of bpy.ops.export_scene."""
+"""Operator in bpy.ops.export_scene of exporters that are add-ons of Blender, which may be switched off."""
 
 
 def check(suffix: str) -> None:
-    """Raises Problem where this Blender has no exporter for that file."""
+    """Raise Problem if this Blender has no exporter for such files."""
     name = ADDONS.get(suffix)
     if name and name not in dir(bpy.ops.export_scene):
         raise Problem(
@@ -36,13 +36,12 @@ def has_usd() -> bool:
     return bool(bpy.app.build_options.usd)
 
 
-def export(plan: DeliveryPlan) -> Path:
-    """Writes the selected object of the window's scene to plan.staged. Raises Problem when no file came of it."""
+def export(plan: DeliveryPlan) -> None:
+    """Write the selected object of the window's scene to plan.staged. Raises Problem if there is no file then."""
     path = plan.staged / plan.mesh
     {".glb": _gltf, ".gltf": _gltf, ".usdc": _usd, ".fbx": _fbx, ".obj": _obj}[plan.format.suffix](path)
     if not path.is_file() or path.stat().st_size == 0:
         raise Problem(f"Blender's exporter wrote no {path.name}.", "The system console says why; the disk may be full.")
-    return path
 
 
 def _gltf(path: Path) -> None:
@@ -88,48 +87,25 @@ def _usd(path: Path) -> None:
 
 
 def _fbx(path: Path) -> None:
-    with _relative_alone():
-        _fbx_as_it_is(path)
-
-
-@contextmanager
-def _relative_alone():
-    """Has the FBX exporter write a map's relative path where it would also write the absolute one, which holds a user's
-    name and is gone with the staged folder."""
-    try:
-        from io_scene_fbx import export_fbx_bin as writer
-    except ImportError:
-        writer = None
-    paths_of = getattr(writer, "_gen_vid_path", None)
-    if paths_of is None:  # another version of the exporter: then both stand in the file
-        yield
-        return
-    writer._gen_vid_path = lambda *arguments: (paths_of(*arguments)[1],) * 2
-    try:
-        yield
-    finally:
-        writer._gen_vid_path = paths_of
-
-
-def _fbx_as_it_is(path: Path) -> None:
-    _call(
-        bpy.ops.export_scene.fbx,
-        path,
-        use_selection=True,
-        object_types={'MESH'},
-        axis_forward='-Z',
-        axis_up='Y',
-        bake_space_transform=True,
-        apply_unit_scale=True,
-        apply_scale_options='FBX_SCALE_NONE',
-        path_mode='RELATIVE',
-        embed_textures=False,
-        mesh_smooth_type='FACE',
-        use_mesh_modifiers=False,
-        bake_anim=False,
-        add_leaf_bones=False,
-        use_custom_props=False,
-    )
+    with _only_relative_paths():
+        _call(
+            bpy.ops.export_scene.fbx,
+            path,
+            use_selection=True,
+            object_types={'MESH'},
+            axis_forward='-Z',
+            axis_up='Y',
+            bake_space_transform=True,
+            apply_unit_scale=True,
+            apply_scale_options='FBX_SCALE_NONE',
+            path_mode='RELATIVE',
+            embed_textures=False,
+            mesh_smooth_type='FACE',
+            use_mesh_modifiers=False,
+            bake_anim=False,
+            add_leaf_bones=False,
+            use_custom_props=False,
+        )
 
 
 def _obj(path: Path) -> None:
@@ -146,16 +122,30 @@ def _obj(path: Path) -> None:
     )
 
 
-def _call(operator, path: Path, **options) -> None:
-    """Calls an exporter with those of the options that it has. Its own error becomes a Problem."""
-    known = operator.get_rna_type().properties.keys()
+@contextmanager
+def _only_relative_paths():
+    """Keep absolute paths of maps out of an FBX: they contain a user's name and the staged folder."""
     try:
-        operator(
-            'EXEC_DEFAULT',
-            filepath=str(path),
-            check_existing=False,
-            **{name: value for name, value in options.items() if name in known},
-        )
+        from io_scene_fbx import export_fbx_bin as writer
+    except ImportError:
+        writer = None
+    paths_of = getattr(writer, "_gen_vid_path", None)
+    if paths_of is None:  # another version of the exporter: both are in the file
+        yield
+        return
+    writer._gen_vid_path = lambda *arguments: (paths_of(*arguments)[1],) * 2
+    try:
+        yield
+    finally:
+        writer._gen_vid_path = paths_of
+
+
+def _call(operator, path: Path, **options) -> None:
+    """Call an exporter with those of the options that it has. Its error becomes a Problem."""
+    available = operator.get_rna_type().properties.keys()
+    options = {name: value for name, value in options.items() if name in available}
+    try:
+        operator('EXEC_DEFAULT', filepath=str(path), check_existing=False, **options)
     except RuntimeError as error:
         raise Problem(
             f"Blender's exporter failed: {str(error).strip().splitlines()[-1]}",

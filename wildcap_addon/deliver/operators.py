@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: deliver the head, the artist's own mesh or the scan to another program; the maps are the worker's, the
-mesh file is Blender's."""
+"""Operators that deliver the head, the artist's own mesh or the scan: the worker writes the maps, Blender the mesh."""
 
 from contextlib import ExitStack
 
@@ -28,30 +27,27 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         return cls.in_object_mode(context) and jobs.can_start(cls, context)
 
     def tell(self) -> tuple[str, ...]:
-        """What is written where, what of an older delivery goes, and what the format drops."""
+        """Return what is written where, what is replaced, and what the format drops."""
         plan = planned(bpy.context)
-        where = iface_("{} with its maps, for {}, goes to {}").format(plan.mesh, plan.preset.title, plan.target)
-        replaced = (
-            (iface_("The delivery that is there is replaced once the new one is complete; files that you added stay."),)
-            if plan.target.exists()
-            else ()
-        )
+        lines = [iface_("{} with its maps, for {}, goes to {}").format(plan.mesh, plan.preset.title, plan.target)]
+        if plan.target.exists():
+            lines.append(
+                iface_(
+                    "The delivery that is there is replaced once the new one is complete; files that you added stay."
+                )
+            )
         obj = captures.head(bpy.context, captures.require(bpy.context))
-        left = stand.left_behind(obj, plan.what, plan.format.suffix)
-        return (where, *replaced, *plan.format.drops, *left, plan.preset.hint)
+        left_out = stand.left_behind(obj, plan.what, plan.format.suffix)
+        return (*lines, *plan.format.drops, *left_out, plan.preset.hint)
 
     def work(self, context):
         item = captures.require(context)
-        plan, root = planned(context), captures.root(item)
+        plan, root, obj = planned(context), captures.root(item), captures.head(context, item)
         delivery_plan.check_target(plan)
-        stand.require_eyes(plan, captures.head(context, item))
-        chosen = {
-            **properties.job_settings(item)["deliver"],
-            "roughness": roughness(captures.head(context, item)),
-            "whole": False,
-        }
+        stand.require_eyes(plan, obj)
+        settings = {**properties.job_settings(item)["deliver"], "roughness": roughness(obj), "whole": False}
         until_it_ends = ExitStack()
-        at = until_it_ends.enter_context(read_only.stand_in(captures.folder(item), chosen["folder"]))
+        at = until_it_ends.enter_context(read_only.stand_in(captures.folder(item), settings["folder"]))
         try:
             jobs.start_tool(
                 item,
@@ -60,7 +56,7 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
                 then=lambda: waiting.maps_made(root, plan),
                 at=at,
                 ended=until_it_ends.close,
-                deliver=chosen,
+                deliver=settings,
             )
         except BaseException:
             until_it_ends.close()
@@ -92,22 +88,21 @@ class WILDCAP_OT_open_delivery(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        known = cls.with_capture(context) and waiting.last(captures.root(captures.active(context))) is not None
-        return cls.allowed(known, "Nothing has been delivered since Blender was started")
+        delivered = cls.with_capture(context) and waiting.last(captures.root(captures.active(context))) is not None
+        return cls.allowed(delivered, "Nothing has been delivered since Blender was started")
 
     def work(self, context):
         folder = waiting.last(captures.root(captures.require(context)))
         if not folder.is_dir():
-            raise Problem(f"The delivery {folder.name} is not there any more.", "Click Deliver to write it again.")
+            raise Problem(f"The delivery {folder.name} has been deleted or moved.", "Click Deliver to write it again.")
         bpy.ops.wm.path_open(filepath=str(folder))
 
 
 def planned(context) -> DeliveryPlan:
-    """The delivery that the settings ask for. Raises Problem where it cannot be made."""
+    """Return the delivery that the settings ask for. Raises Problem if it cannot be made."""
     item = captures.require(context)
-    settings = properties.settings(item).deliver
     capture = captures.folder(item)
-    plan = delivery_plan.plan(capture, settings)
+    plan = delivery_plan.plan(capture, properties.settings(item).deliver)
     delivery_plan.needs(capture, plan.what)
     if plan.what == "head":
         captures.require_head(context, item)
@@ -116,11 +111,10 @@ def planned(context) -> DeliveryPlan:
 
 
 def roughness(head) -> int:
-    """The roughness of the head's skin material in percent; 45 where there is none."""
-    for slot in head.material_slots if head is not None else ():
-        for node in (
-            slot.material.node_tree.nodes if slot.material is not None and slot.material.node_tree is not None else ()
-        ):
+    """Return the roughness of the head's skin material in percent, 45 if it has none."""
+    materials = [slot.material for slot in head.material_slots] if head is not None else []
+    for material in materials:
+        for node in material.node_tree.nodes if material is not None and material.node_tree is not None else ():
             if node.type == 'GROUP' and "Roughness" in node.inputs and not node.inputs["Roughness"].is_linked:
                 return round(100 * min(1.0, max(0.0, node.inputs["Roughness"].default_value)))
     return 45

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: for which program, which mesh, in which file; what that file drops; and what the artist's own mesh and the
-scan are made by."""
+"""Panel of target program, mesh and file, what the file drops, and settings of the artist's own mesh and the scan."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -26,12 +25,11 @@ class WILDCAP_PT_deliver(CapturePanel, bpy.types.Panel):
             layout.prop(settings, name)
         preset = PRESETS[settings.preset]
         format_name = preset.format if settings.format == "preset" else settings.format
-        width = region_width(context)
         chosen = FORMATS[format_name]
         unit = chosen.unit or preset.unit
         pictures = preset.pictures if settings.pictures == "preset" else settings.pictures
-        words = iface_("{}, {}, {}").format(iface_(chosen.title), unit, iface_(PICTURES[pictures]))
-        layout.label(text=words, translate=False, icon='FILE_3D')
+        text = iface_("{}, {}, {}").format(iface_(chosen.title), unit, iface_(PICTURES[pictures]))
+        layout.label(text=text, translate=False, icon='FILE_3D')
         if waiting.ready(root) is not None:
             layout.operator("wildcap.finish_delivery", icon='EXPORT')
         layout.operator("wildcap.deliver", icon='EXPORT')
@@ -39,9 +37,9 @@ class WILDCAP_PT_deliver(CapturePanel, bpy.types.Panel):
             layout.operator("wildcap.open_delivery", icon='FILE_FOLDER')
         header, body = layout.panel("wildcap_deliver_drops", default_closed=False)
         header.label(text="What This Drops")
-        left = stand.left_behind(captures.head(context, item), settings.what, chosen.suffix)
-        for sentence in (*chosen.drops, *left) if body else ():
-            problems.draw_text(body, sentence, width, 'INFO')
+        left_out = stand.left_behind(captures.head(context, item), settings.what, chosen.suffix)
+        for sentence in (*chosen.drops, *left_out) if body else ():
+            problems.draw_text(body, sentence, region_width(context), 'INFO')
         header, body = layout.panel("wildcap_deliver_maps", default_closed=True)
         header.label(text="Maps")
         for name in ("size", "pictures", "colour", "udim", "hair", "clean", "folder", "replace") if body else ():

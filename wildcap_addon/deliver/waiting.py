@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deliveries whose maps are made: Blender adds the mesh at once where the artist is in Object Mode and not in the
-middle of a move, else at the next click.
+"""Deliveries that wait for their mesh once the worker has written the maps.
 
-Run-time state only, per capture folder.
+Blender adds it at once in Object Mode outside a modal operator, otherwise at the next click. Run-time state only, per
+capture folder.
 """
 
 from pathlib import Path
@@ -21,17 +21,17 @@ _last: dict[str, Path] = {}
 
 
 def ready(root: str) -> DeliveryPlan | None:
-    """The capture's delivery that lacks its mesh alone."""
+    """Return the capture's delivery that lacks only its mesh."""
     return _ready.get(root)
 
 
 def last(root: str) -> Path | None:
-    """Where the capture was last delivered to, in this session."""
+    """Return the folder to which the capture was last delivered in this session."""
     return _last.get(root)
 
 
 def maps_made(root: str, plan: DeliveryPlan) -> None:
-    """What follows the worker. Raises Problem as `finish` does."""
+    """Add the mesh after the worker's part, if the artist is not busy. Raises Problem as `finish` does."""
     _ready[root] = plan
     window = next(iter(bpy.context.window_manager.windows), None)
     if window is None or window.modal_operators:
@@ -43,21 +43,18 @@ def maps_made(root: str, plan: DeliveryPlan) -> None:
 
 
 def finish(context, item) -> Path:
-    """The mesh beside the maps, and the folder by its name; returns it. Raises Problem, and then what was delivered
-    before is as it was."""
+    """Add the mesh, give the folder its name and return it. Raises Problem and then keeps the previous delivery."""
     root = captures.root(item)
     plan = _ready.pop(root, None)
     if plan is None or not (plan.staged / PACKING).is_file():
-        raise Problem("The maps of this delivery are not there any more.", "Click Deliver again.")
+        raise Problem("The maps of this delivery have been deleted.", "Click Deliver again.")
     try:
-        mesh = (
-            captures.require_head(context, item)
-            if plan.what == "head"
-            else delivery_plan.needs(captures.folder(item), plan.what)
-        )
         files.check(plan.format.suffix)
         if plan.what == "head":
+            mesh = captures.require_head(context, item)
             stand.require_eyes(plan, mesh)
+        else:
+            mesh = delivery_plan.needs(captures.folder(item), plan.what)
         with stand.standing(context, plan, mesh):
             files.export(plan)
         (plan.staged / PACKING).unlink()
@@ -72,6 +69,7 @@ def finish(context, item) -> Path:
 
 
 def forget() -> None:
+    """Discard unfinished deliveries."""
     for plan in _ready.values():
         delivery_plan.discard(plan)
     _ready.clear()

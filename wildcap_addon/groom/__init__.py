@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Brows, lashes and beard as Blender's hair curves on the head, over the albedo of the skin below them."""
+"""Hair: brows, lashes and beard as hair curves on the head, over the albedo of the skin below them."""
 
 import bpy
 

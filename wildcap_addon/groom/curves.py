@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair curves on a head: rooted in its UVs, so that they go along with its face units and can be combed with Blender's
-own brushes.
+"""Hair curves on a head, rooted in its UVs: they follow its face units, and Blender's own brushes comb them.
 
-One object for each part, a child of the head, marked by the custom property captures.HAIR_KEY. A digest tells whether
-somebody combed them since.
+One object per part, a child of the head with the custom property captures.HAIR_KEY. A digest tells whether somebody
+combed it since.
 """
 
 import hashlib
@@ -16,55 +15,41 @@ from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
 from .. import captures, colours, head, local_view, node_trees
-from ..data_blocks import find, read_field, replace_data
+from ..data_blocks import find, new_child, read_field, replace_data
 
 TITLES = {"brows": "Brows", "lashes": "Lashes", "beard": "Beard"}
 GROWN, MATERIAL = "wildcap_grown", "wildcap_hair_material"
 ROOT = "wildcap_root"
-"""Attribute of each curve: the place of the skin, in the head's axes, to which it is rooted."""
+"""Attribute of each curve: the place of the skin to which it is rooted, in the head's axes."""
 ROOTED_M = 0.01
-"""Farther from its first point no place of the skin is a hair's root."""
+"""Farther than this from its first point, no place is a hair's root."""
 UVS = "surface_uv_coordinate"
 ROUGHNESS, IOR = 0.4, 1.55
-"""Of keratin; hairs' scales spread its shine."""
+"""Surface of keratin, whose scales spread the highlight."""
 INNER_TILE = 10
-"""Where the UVs of what is no skin go."""
+"""Offset of the UVs of what is no skin."""
 DEFORM = "WildCap Hair on Head"
 
 
 def of(obj) -> list[bpy.types.Object]:
-    """The hair of a head, by part."""
+    """Return the hair of a head, in the order of TITLES."""
     hairs = {hair[captures.HAIR_KEY]: hair for hair in captures.hair(obj)}
     return [hairs[part] for part in TITLES if part in hairs]
 
 
 def grow_part(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bool:
-    """Puts the hairs of a part on the head; those that somebody combed only follow the skin.
+    """Put the hairs of a part on the head; combed ones only follow the skin, and the result is False.
 
-    Parameters
-    ----------
-    context : Blender's
-    obj : the head
-    part : a key of TITLES
-    points : [M, K, 3], metres in the head's axes, from the root on
-    radius : [M, K], metres
-    colour : [M, 3], linear
-
-    Returns
-    -------
-    False where the hairs stay as they were combed.
+    points: [M, K, 3] from the root on, metres in the head's axes; radius: [M, K], metres; colour: [M, 3], linear.
     """
     hair = next((child for child in of(obj) if child[captures.HAIR_KEY] == part), None)
     if hair is not None and is_combed(hair):
         follow(hair, obj)
         return False
     colour = colours.to_working(colour)
-    data = _made(f"{obj.name} {TITLES[part]}", points, radius, colour)
+    data = _make(f"{obj.name} {TITLES[part]}", points, radius, colour)
     if hair is None:
-        hair = bpy.data.objects.new(data.name, data)
-        for collection in obj.users_collection:
-            collection.objects.link(hair)
-        hair.parent = obj
+        hair = new_child(obj, data.name, data)
         hair[captures.HAIR_KEY] = part
     else:
         replace_data(hair, data, bpy.data.hair_curves)
@@ -77,13 +62,15 @@ def grow_part(context, obj, part: str, points: np.ndarray, radius: np.ndarray, c
 
 
 def is_combed(hair) -> bool:
-    """Whether somebody moved, cut, added, thickened or coloured hairs since they were grown."""
+    """Return whether hairs were moved, cut, added, thickened or coloured since they were grown."""
     return hair.get(GROWN) != _digest(hair.data)
 
 
 def follow(hair, obj) -> None:
-    """Moves each hair as the skin under its root moved, where the head has another shape than when they were rooted,
-    and keeps what was combed. Hairs that a brush added since have no such place yet: they are rooted where they are."""
+    """Move each hair as the skin under its root moved since it was rooted; what was combed stays.
+
+    Hairs that a brush added since have no root yet: they are rooted where they are.
+    """
     data, combed = hair.data, is_combed(hair)
     if ROOT not in data.attributes or UVS not in data.attributes or not data.curves:
         return
@@ -91,12 +78,12 @@ def follow(hair, obj) -> None:
     offsets, position = _offsets(data), _read(data.attributes["position"], "vector", 3)
     first = position[offsets[:-1]]
     uv, before = _read(data.attributes[UVS], "vector", 2), _read(data.attributes[ROOT], "vector", 3)
-    known = np.linalg.norm(before - first, axis=1) < ROOTED_M
+    rooted = np.linalg.norm(before - first, axis=1) < ROOTED_M
     places = before.copy()
-    places[known] = _places(obj.data, uv[known], before[known])
-    uv[~known], places[~known] = _nearest(obj.data, first[~known])
-    moved = np.where(known[:, None], places - before, 0)
-    if known.all() and np.abs(moved).max() < 1e-6:
+    places[rooted] = _places(obj.data, uv[rooted], before[rooted])
+    uv[~rooted], places[~rooted] = _nearest(obj.data, first[~rooted])
+    moved = np.where(rooted[:, None], places - before, 0)
+    if rooted.all() and np.abs(moved).max() < 1e-6:
         return
     position += np.repeat(moved, np.diff(offsets), 0)
     for name, vectors in (("position", position), (ROOT, places), (UVS, uv)):
@@ -106,35 +93,32 @@ def follow(hair, obj) -> None:
         hair[GROWN] = _digest(data)
 
 
-def _made(name: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bpy.types.Curves:
+def _make(name: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bpy.types.Curves:
     count, knots = points.shape[:2]
     data = bpy.data.hair_curves.new(name)
     data.add_curves([knots] * count)
-    data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
-    _attribute(data, "radius", 'FLOAT', 'POINT').data.foreach_set("value", radius.astype(np.float32).ravel())
     rgba = np.concatenate([colour, np.ones((count, 1))], 1)
-    _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR', 'CURVE').data.foreach_set(
-        "color", rgba.astype(np.float32).ravel()
-    )
+    _write(data, "position", 'FLOAT_VECTOR', 'POINT', "vector", points)
+    _write(data, "radius", 'FLOAT', 'POINT', "value", radius)
+    _write(data, captures.HAIR_COLOUR, 'FLOAT_COLOR', 'CURVE', "color", rgba)
     return data
 
 
 def _root(hair, obj) -> None:
-    """Binds each hair to the nearest place of the head's skin at rest, by its UVs."""
+    """Bind each hair to the nearest place of the head's skin at rest, by its UVs."""
     data = hair.data
     roots = _read(data.attributes["position"], "vector", 3)[_offsets(data)[:-1]]
     uv, places = _nearest(obj.data, roots)
-    _attribute(data, UVS, 'FLOAT2', 'CURVE').data.foreach_set("vector", uv.astype(np.float32).ravel())
-    _attribute(data, ROOT, 'FLOAT_VECTOR', 'CURVE').data.foreach_set("vector", places.astype(np.float32).ravel())
+    _write(data, UVS, 'FLOAT2', 'CURVE', "vector", uv)
+    _write(data, ROOT, 'FLOAT_VECTOR', 'CURVE', "vector", places)
     data.surface, data.surface_uv_map = obj, _rooting_uvs(obj.data)
-    obj.add_rest_position_attribute = True  # what hair is bent against when the head moves
+    obj.add_rest_position_attribute = True  # hair is bent relative to it when the head moves
     if DEFORM not in hair.modifiers:
-        modifier = hair.modifiers.new(DEFORM, 'NODES')
-        modifier.node_group = _deform_group()
+        hair.modifiers.new(DEFORM, 'NODES').node_group = _deform_group()
 
 
 def _rooting_uvs(mesh) -> str:
-    """The name of the UV map in which each place of the skin is the only one with its UVs, made where there is none."""
+    """Return the name of the UV map in which the skin is alone, made if there is none."""
     if head.OUTER in mesh and head.HAIR_UVS not in mesh.uv_layers:
         active = mesh.uv_layers.active_index
         uv = read_field(mesh.uv_layers[0].data, "uv", 2)
@@ -145,7 +129,7 @@ def _rooting_uvs(mesh) -> str:
 
 
 def _nearest(mesh, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """UVs [M, 2] and places [M, 3] of the skin nearest to roots [M, 3]; sockets, eyes and mouth are no skin."""
+    """Return UVs [M, 2] and places [M, 3] of the skin nearest to roots [M, 3]."""
     corners, places, uvs = _skin(mesh)
     tree = BVHTree.FromPolygons(places.tolist(), corners.tolist())
     uv, nearest = np.zeros((len(roots), 2)), np.zeros((len(roots), 3))
@@ -157,7 +141,7 @@ def _nearest(mesh, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _places(mesh, uv: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-    """Where the skin has UVs [M, 2], [M, 3]; `otherwise` [M, 3] where no triangle has them."""
+    """Return the places [M, 3] of UVs [M, 2] on the skin; `otherwise` [M, 3] where no triangle has them."""
     corners, places, uvs = _skin(mesh)
     flat = np.concatenate([uvs.reshape(-1, 2), np.zeros((3 * len(corners), 1))], 1)
     tree = BVHTree.FromPolygons(flat.tolist(), np.arange(len(flat)).reshape(-1, 3).tolist())
@@ -171,13 +155,10 @@ def _places(mesh, uv: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
 
 
 def _skin(mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles [F, 3] of the head's own skin at rest, the places of all vertices [V, 3], and the triangles' UVs [F, 3,
-    2]."""
+    """Return the skin at rest, without sockets, eyes and mouth: triangles [F, 3], vertices [V, 3], UVs [F, 3, 2]."""
     mesh.calc_loop_triangles()
-    corners, loops, polygons = (
-        read_field(mesh.loop_triangles, field, width, np.int32)
-        for field, width in (("vertices", 3), ("loops", 3), ("polygon_index", 1))
-    )
+    fields = ("vertices", 3), ("loops", 3), ("polygon_index", 1)
+    corners, loops, polygons = (read_field(mesh.loop_triangles, field, width, np.int32) for field, width in fields)
     places = read_field(mesh.shape_keys.reference_key.data if mesh.shape_keys else mesh.vertices, "co", 3)
     uvs = read_field(mesh.uv_layers[0].data, "uv", 2)
     skin = polygons < mesh.get(head.OUTER, len(mesh.polygons))
@@ -185,48 +166,47 @@ def _skin(mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _deform_group() -> bpy.types.NodeTree:
-    """Curves go along with the surface that they are rooted in: made once per file."""
+    """Return the nodes by which curves follow the surface that they are rooted in, made once per file."""
     group = find(bpy.data.node_groups, DEFORM)
     if group is None:
         group = bpy.data.node_groups.new(DEFORM, 'GeometryNodeTree')
         group.is_modifier = True
         for side in ('INPUT', 'OUTPUT'):
             group.interface.new_socket("Geometry", in_out=side, socket_type='NodeSocketGeometry')
-        source, deform, target = (
-            group.nodes.new(kind) for kind in ('NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface', 'NodeGroupOutput')
-        )
-        deform.location, target.location = (200, 0), (420, 0)
-        group.links.new(source.outputs[0], deform.inputs["Curves"])
-        group.links.new(deform.outputs["Curves"], target.inputs[0])
+        curves = node_trees.add(group, 'NodeGroupInput').outputs[0]
+        deform = node_trees.add(group, 'GeometryNodeDeformCurvesOnSurface', {"Curves": curves}, location=(200, 0))
+        node_trees.add(group, 'NodeGroupOutput', (deform.outputs["Curves"],), location=(420, 0))
     return group
 
 
 def _material(name: str, mean: np.ndarray) -> bpy.types.Material:
-    """Hair in its own colour, in Solid shading in their mean [3]; one of that name keeps the artist's changes.
+    """Return hair in its own colour, in Solid shading in the mean [3]; an existing one keeps the artist's changes.
 
-    Opaque: what was measured is an albedo. Principled Hair's colour is that of a whole head of hair, and single hairs
-    of it over light skin come out blond."""
+    Opaque: what was measured is an albedo. Principled Hair's colour is that of a whole head of hair, by which single
+    hairs over light skin look blond.
+    """
     existing = find(bpy.data.materials, name)
     if existing is not None and MATERIAL in existing:
         return existing
     material = bpy.data.materials.new(name)
     material[MATERIAL] = True
     material.diffuse_color = (*mean.tolist(), 1)
-    tree = node_trees.of(material)
-    shader = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
-    shader.inputs["Roughness"].default_value, shader.inputs["IOR"].default_value = ROUGHNESS, IOR
-    colour = tree.nodes.new('ShaderNodeAttribute')
-    colour.attribute_name, colour.location = captures.HAIR_COLOUR, (-260, 280)
-    tree.links.new(colour.outputs["Color"], shader.inputs["Base Color"])
+    shader, settings = (
+        node_trees.principled(material),
+        {"attribute_name": captures.HAIR_COLOUR, "location": (-260, 280)},
+    )
+    colour = node_trees.add(material.node_tree, 'ShaderNodeAttribute', **settings).outputs["Color"]
+    node_trees.feed(shader, {"Base Color": colour, "Roughness": ROUGHNESS, "IOR": IOR})
     return material
 
 
-def _attribute(data, name: str, kind: str, domain: str):
-    return data.attributes.get(name) or data.attributes.new(name, kind, domain)
+def _write(data, name: str, kind: str, domain: str, field: str, values: np.ndarray) -> None:
+    attribute = data.attributes.get(name) or data.attributes.new(name, kind, domain)
+    attribute.data.foreach_set(field, values.astype(np.float32).ravel())
 
 
 def _offsets(data) -> np.ndarray:
-    """Where each curve's points begin, and the end, [M + 1]."""
+    """Return where each curve's points begin, and the end, [M + 1]."""
     return read_field(data.curve_offset_data, "value", kind=np.int32)
 
 
@@ -235,9 +215,9 @@ def _read(attribute, field: str, width: int) -> np.ndarray:
 
 
 def _digest(data) -> str:
-    """Stands for how many curves and points there are, where, how thick, and in which colours."""
-    told = _offsets(data).tobytes()
+    """Hash the number of curves and points, their places, radii and colours."""
+    content = _offsets(data).tobytes()
     for name, field, width in (("position", "vector", 3), ("radius", "value", 1), (captures.HAIR_COLOUR, "color", 4)):
         if name in data.attributes:
-            told += _read(data.attributes[name], field, width).astype(np.float32).tobytes()
-    return hashlib.blake2b(told, digest_size=16).hexdigest()
+            content += read_field(data.attributes[name].data, field, width).tobytes()
+    return hashlib.blake2b(content, digest_size=16).hexdigest()

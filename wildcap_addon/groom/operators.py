@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: the hairs that the stage 4K Maps found come onto the head, and its skin shows what is below them."""
+"""Operator that puts the hairs of the stage 4K Maps onto the head, whose skin then shows what is below them."""
 
 import zipfile
 import zlib
@@ -17,8 +17,11 @@ from ..base_operator import HeadOperator
 from . import curves
 
 MOST_BYTES = 256 << 20
-"""A million hairs; more is no beard, and would take the memory before it is seen to be damaged."""
+"""Size of a million hairs: more is no beard, and would fill the memory before it is known to be damaged."""
 AGAIN = advise_again("upscale")
+
+Strands = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Points [M, K, 3] in the head's axes, radii [M, K], both in metres, and linear colours [M, 3]."""
 
 
 class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
@@ -49,30 +52,30 @@ class WILDCAP_OT_grow_hair(HeadOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        obj = captures.require_head(context, item)
-        strands = read_strands(captures.folder(item))
+        obj, capture = captures.require_head(context, item), captures.folder(item)
         combed = []
-        for part, (points, radius, colour) in strands.items():
-            kept = np.random.default_rng(0).permutation(len(points)) < round(self.share * len(points))
+        for part, (points, radius, colour) in read_strands(capture).items():
+            chosen = np.random.default_rng(0).permutation(len(points)) < round(self.share * len(points))
             factor = self.length
             if part == "beard":
                 factor = self.beard_mm / mean_length_mm(points) if self.beard_mm else 1.0
             points = points[:, :1] + factor * (points - points[:, :1])
-            if not curves.grow_part(context, obj, part, points[kept], self.thickness * radius[kept], colour[kept]):
+            if not curves.grow_part(
+                context, obj, part, points[chosen], self.thickness * radius[chosen], colour[chosen]
+            ):
                 combed.append(curves.TITLES[part])
-        show_skin_below(captures.folder(item))
+        show_skin_below(capture)
         if combed:
             self.report({'INFO'}, f"{', '.join(combed)}: left as you combed them; delete them to grow them anew")
 
 
 def mean_length_mm(points: np.ndarray) -> float:
-    """Of hairs [M, K, 3] in metres."""
+    """Return the mean length of hairs [M, K, 3] in metres."""
     return max(1000 * float(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1).mean()), 1e-3)
 
 
 def keep_up(obj, capture: Capture) -> None:
-    """A head that was assembled anew and has hair: the hair follows its shape, and its skin shows what is below.
-    `head.complete` asks."""
+    """Have the hair follow its head's new shape, and the skin show what is below (head.COMPLETERS)."""
     hairs = curves.of(obj)
     for hair in hairs:
         curves.follow(hair, obj)
@@ -81,14 +84,13 @@ def keep_up(obj, capture: Capture) -> None:
 
 
 def show_skin_below(capture: Capture) -> None:
-    """Has the head's skin show what is below its hair, where that is known and the skin is assembled."""
+    """Have the head's assembled skin show what is below its hair, if there is a map of it."""
     if find_newest_maps(capture)[0].with_name("clean_albedo.png").is_file() and bpy.ops.wildcap.compare.poll():
         bpy.ops.wildcap.compare(show='SKIN')
 
 
-def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Of each part that has hair: points [M, K, 3] in the head's axes (metres), radii [M, K] in metres, linear colours
-    [M, 3]. Raises Problem where there are none, or the file is damaged."""
+def read_strands(capture: Capture) -> dict[str, Strands]:
+    """Read the hairs of each part that has some. Raises Problem if there are none, or the file is damaged."""
     path = find_newest_maps(capture)[0].with_name(STRANDS)
     if not path.is_file():
         raise Problem(
@@ -104,26 +106,24 @@ def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np
                 for part in curves.TITLES
                 if f"{part}_points" in stored.files
             }
+        if not all(_is_sound(strands) for strands in hairs.values()):
+            raise ValueError("it holds no hair strands")
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise Problem(f"{path} is damaged ({error}).", AGAIN) from error
-    for points, radius, colour in hairs.values():
-        shape = points.shape
-        finite = all(np.isfinite(array).all() for array in (points, radius, colour))
-        if (
-            len(shape) != 3
-            or shape[1] < 2
-            or shape[2] != 3
-            or radius.shape != shape[:2]
-            or colour.shape != (shape[0], 3)
-            or not finite
-        ):
-            raise Problem(f"{path} is damaged (it holds no hair strands).", AGAIN)
     if not hairs:
         raise Problem(
             "No brows and no beard were found on this face.",
-            "Hair that is as light as the skin cannot be told from it: add curves of your own.",
+            "Hair as light as the skin cannot be detected: add curves of your own.",
         )
     return hairs
+
+
+def _is_sound(strands: Strands) -> bool:
+    points, radius, colour = strands
+    if points.ndim != 3 or points.shape[1] < 2 or points.shape[2] != 3:
+        return False
+    fitting = radius.shape == points.shape[:2] and colour.shape == (len(points), 3)
+    return fitting and all(np.isfinite(array).all() for array in strands)
 
 
 CLASSES = (WILDCAP_OT_grow_hair,)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: grow hair, and what there is of it."""
+"""Panel to grow hair, with the list of what was grown."""
 
 import bpy
 

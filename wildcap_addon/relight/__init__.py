@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The maps in a material, under a light, in a picture."""
+"""Relight: the maps in a material, under a light, in a picture."""
 
 import bpy
 

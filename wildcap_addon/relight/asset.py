@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""WildCap Skin as an asset: with tags, a preview and a catalogue, so that a file in an asset library offers it for
-other heads."""
+"""Mark WildCap Skin as an asset with tags, a preview and a catalogue, so that an asset library offers it."""
 
 import contextlib
 from pathlib import Path
@@ -16,24 +15,24 @@ CATALOGUE = "6c1f7a52-8e0d-4f6b-9b7e-3d5a0c94e217"
 LINE = f"{CATALOGUE}:WildCap/Skin:WildCap-Skin"
 FILE = "blender_assets.cats.txt"
 HEADER = "# This is an Asset Catalog Definition file for Blender.\n\nVERSION 1\n\n"
-SIDE_PX = 128  # of the preview
+SIDE_PX = 128
+"""Side of the preview."""
+DESCRIPTION = "Skin for solved heads: albedo, specular and normal in, a Principled BSDF with subsurface scattering out"
 
 
 def mark(group: bpy.types.NodeTree) -> None:
-    """Marks the group as an asset, once; an artist who clears the mark afterwards is not overruled. A library of the
-    preferences that the .blend lies in gets the catalogue's name."""
+    """Mark the group as an asset, once: an artist may clear the mark.
+
+    An asset library of the preferences that contains the .blend gets the catalogue.
+    """
     if not group.get("wildcap_asset"):
         group["wildcap_asset"] = True
         group.asset_mark()
         data = group.asset_data
-        data.description = (
-            "Skin for solved heads: albedo, specular and normal in, a Principled BSDF with subsurface scattering out"
-        )
-        data.author = "WildCap for Blender"
-        data.license = "GPL-3.0-or-later"
+        data.description, data.catalog_id = DESCRIPTION, CATALOGUE
+        data.author, data.license = "WildCap for Blender", "GPL-3.0-or-later"
         for tag in ("skin", "head", "relight"):
             data.tags.new(tag, skip_if_exists=True)
-        data.catalog_id = CATALOGUE
         preview = group.preview_ensure()
         preview.image_size = (SIDE_PX, SIDE_PX)
         preview.image_pixels_float.foreach_set(ball().ravel())
@@ -42,14 +41,16 @@ def mark(group: bpy.types.NodeTree) -> None:
 
 
 def ball() -> np.ndarray:
-    """The preview: a ball of skin under one lamp, sRGB with alpha, float32 [SIDE_PX, SIDE_PX, 4], rows from the bottom.
-    Drawn, as a window is not always there."""
+    """Draw the preview, as there is not always a window: a ball of skin under one lamp.
+
+    sRGB with alpha, float32 [SIDE_PX, SIDE_PX, 4], rows from the bottom.
+    """
     y, x = (np.mgrid[:SIDE_PX, :SIDE_PX] + 0.5) / SIDE_PX * 2.2 - 1.1
     inside = np.hypot(x, y)
     normal = np.stack([x, y, np.sqrt(np.clip(1 - inside**2, 0, None))], -1)
     lamp = np.array([-0.5, 0.6, 0.65]) / np.linalg.norm([-0.5, 0.6, 0.65])
     cosine = (normal @ lamp)[..., None]
-    wrap = np.array([0.35, 0.15, 0.08])  # light that came through the skin reddens the shadow's edge
+    wrap = np.array([0.35, 0.15, 0.08])  # subsurface light reddens the shadow's edge
     diffuse = np.array([0.58, 0.36, 0.27]) * (0.06 + 0.9 * np.clip((cosine + wrap) / (1 + wrap), 0, None))
     half = (lamp + [0, 0, 1]) / np.linalg.norm(lamp + [0, 0, 1])
     linear = np.clip(diffuse + 0.3 * np.clip(normal @ half, 0, 1)[..., None] ** 40, 0, 1)
@@ -58,14 +59,14 @@ def ball() -> np.ndarray:
 
 
 def _name_catalogue() -> None:
-    blend = Path(bpy.data.filepath)
+    if not bpy.data.filepath:
+        return
     for library in bpy.context.preferences.filepaths.asset_libraries:
-        root = Path(bpy.path.abspath(library.path))
-        if bpy.data.filepath and library.path and blend.is_relative_to(root):
-            file = root / FILE
+        file = Path(bpy.path.abspath(library.path)) / FILE
+        if library.path and Path(bpy.data.filepath).is_relative_to(file.parent):
             # a library that is read-only keeps the asset without a catalogue
             with contextlib.suppress(OSError, Problem, UnicodeDecodeError):
-                known = file.read_text(encoding="utf-8") if file.is_file() else HEADER
-                if CATALOGUE not in known:
+                catalogues = file.read_text(encoding="utf-8") if file.is_file() else HEADER
+                if CATALOGUE not in catalogues:
                     with replacing(file) as temporary:
-                        temporary.write_text(known.rstrip("\n") + f"\n{LINE}\n", encoding="utf-8")
+                        temporary.write_text(catalogues.rstrip("\n") + f"\n{LINE}\n", encoding="utf-8")

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: the skin as it was filmed, as it was delit, solved, or without its hair, in the same material under the
-same light and at the same exposure."""
+"""Operator that shows the skin as filmed, as delit, solved, or without hair, in one material at one exposure."""
 
 import bpy
 
@@ -57,7 +56,7 @@ class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
 
 
 def skin(context) -> bpy.types.Material | None:
-    """The assembled material of the active capture's head."""
+    """Return the assembled material of the active capture's head."""
     item = captures.active(context)
     obj = captures.head(context, item) if item is not None else None
     first = obj.data.materials[0] if obj is not None and obj.data.materials else None  # others are eyes and mouth
@@ -65,7 +64,7 @@ def skin(context) -> bpy.types.Material | None:
 
 
 def shown_picture(context) -> str:
-    """Which of SHOWN the head shows."""
+    """Return the key of SHOWN that the head shows."""
     skin_material = skin(context)
     image = skin_material.node_tree.nodes[ALBEDO].image if skin_material is not None else None
     name = bpy.path.basename(image.filepath) if image is not None else ""

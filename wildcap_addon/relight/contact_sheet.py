@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The contact sheet: a head in all light presets in one picture, each with its name, and below them how all of it is
-shown.
+"""Contact sheet: a head under all light presets in one picture, with their names and how it was rendered.
 
-    renders/contact_sheet.png, and the pictures it is made of as renders/PRESET.png and .exr
+Writes renders/contact_sheet.png, and the pictures it consists of as renders/PRESET.png and .exr.
 """
 
 from pathlib import Path
@@ -20,26 +19,13 @@ from . import captions, lights, output, picture, reel
 NAME = "contact_sheet.png"
 COLUMNS = 3
 GROUND_SRGB = 0.07
-"""Of the caption rows, sRGB"""
+"""Background of the captions, sRGB."""
 
 
 def render(obj: bpy.types.Object, folder: Path, wait: bool, settings: picture.RenderSettings) -> Path:
-    """Renders the head, as it is at the current frame, in every preset and joins the pictures.
+    """Render the head at the current frame under every preset and join the pictures; return the sheet's path.
 
-    Parameters
-    ----------
-    obj : the head
-    folder : of the pictures and the sheet
-    wait : False returns at once
-    settings : of each picture
-
-    Returns
-    -------
-    The sheet's path.
-
-    Raises
-    ------
-    Problem : when the folder cannot be written, or before frame 0
+    wait=False returns at once. Raises Problem if the folder cannot be written, and before frame 0.
     """
     presets = tuple(name for name, *_ in LIGHTS if name in lights.PRESETS)
     scene, first = reel.each_light(obj, presets, settings)
@@ -55,7 +41,7 @@ def render(obj: bpy.types.Object, folder: Path, wait: bool, settings: picture.Re
 
 
 def _joined(paths: list[Path], strips: list[np.ndarray], size: int) -> np.ndarray:
-    """[H, W, 3], rows from the bottom: rows of pictures, each over its captions, and the last strip."""
+    """Join rows of pictures, each over its captions, and the last strip: [H, W, 3], rows from the bottom."""
     strips = [GROUND_SRGB + (1 - GROUND_SRGB) * np.repeat(strip, 3, 2) for strip in strips]
     rows = []
     for i, strip in zip(range(0, len(paths), COLUMNS), strips, strict=False):

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lights for a first look at a head: six of lamps under a sky, or the surroundings of a picture. Built in a scene of
-their own, around a head of any place, turn and size.
+"""Lights for a first look at a head of any place, turn and size: six presets of lamps under a sky, or surroundings.
 
 Directions are the head's: +X its left, -Y where it looks, +Z up. Distances are in head radii, powers are for a head of
 the reference radius.
@@ -19,13 +18,14 @@ from ..hdri import Hdri, light_with
 from . import sky
 
 REFERENCE_RADIUS_M = 0.15
+SUN_ANGLE_RAD = radians(0.5)
 RIG = "WildCap Lights"
-"""The empty at the head's centre that carries the lamps: turning it turns the light."""
+"""Name of the empty at the head's centre that carries the lamps: turning it turns the light."""
 
 
 @dataclass(frozen=True)
 class Lamp:
-    """An area lamp (power in watts at the reference radius) or, without a size, a sun (power in W/m2)."""
+    """Area lamp (power in watts at the reference radius) or, without a size, a sun (power in W/m2)."""
 
     name: str
     direction: tuple[float, float, float]
@@ -33,13 +33,10 @@ class Lamp:
     colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
     size: float = 0.0  # side in head radii
     distance: float = 6.0  # in head radii
-    angle: float = 0.5  # of a sun, in degrees
 
 
 @dataclass(frozen=True)
 class LightingPreset:
-    """Lamps under a sky."""
-
     lamps: tuple[Lamp, ...]
     sky: sky.Sky
 
@@ -79,77 +76,58 @@ PRESETS = {
         sky.even((0.008, 0.007, 0.012)),
     ),
 }
-"""By the identifiers of properties.LIGHTS, which has their names and tooltips"""
+"""Presets by the identifiers of properties.LIGHTS, which has their names and tooltips."""
 NAMED_BEFORE = {"studio": "three_point"}
 
 
 def preset(name: str) -> LightingPreset:
-    """A preset by its identifier, or by the one it had before."""
+    """Return a preset by its present or former identifier."""
     return PRESETS[NAMED_BEFORE.get(name, name)]
 
 
-def build_light(
-    scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float, turn: float = 0.0
-) -> None:
-    """Replaces the lamps and the world of a scene.
+def build_light(scene: bpy.types.Scene, light: str | Hdri, frame: Matrix, radius: float, turn: float) -> None:
+    """Replace the lamps and the world of a scene by a preset, or by a picture of surroundings.
 
-    Parameters
-    ----------
-    scene : changed
-    light : a preset's name, or a picture of surroundings; None: dark
-    frame : [4, 4], the head's place without scale
-    radius : of the head, in scene units
-    turn : of the light about the head, in radians, counter-clockwise from above
+    frame, radius: the head's place without scale and its size in scene units (picture.frame_of); turn: of the light
+    about the head, in radians, counter-clockwise from above.
     """
     clear(scene)
     frame = frame @ Matrix.Rotation(turn, 4, 'Z')
     scene.world = sky.world()
     if isinstance(light, Hdri):
         light_with(scene.world, light, frame.to_euler().z)
-    elif light is not None:
+    else:
         add_lamps(scene, preset(light).lamps, frame, radius)
         sky.show(scene.world, preset(light).sky, frame)
 
 
 def clear(scene: bpy.types.Scene) -> None:
-    """Takes the lamps away, and what carried them."""
+    """Remove the lamps and their rig."""
     for obj in [o for o in scene.objects if o.type in ('LIGHT', 'EMPTY') and o.name.startswith("WildCap ")]:
         stop_animation(obj)
         if obj.data is not None:
-            bpy.data.lights.remove(obj.data)  # takes its object along
+            bpy.data.lights.remove(obj.data)  # and its object
         else:
             bpy.data.objects.remove(obj)
 
 
 def rig(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """What carries the scene's lamps."""
+    """Return what carries the scene's lamps."""
     return next((o for o in scene.objects if o.type == 'EMPTY' and o.name.startswith(RIG)), None)
 
 
 def add_lamps(scene: bpy.types.Scene, lamps: tuple[Lamp, ...], frame: Matrix, radius: float) -> list[bpy.types.Object]:
-    """Puts lamps around the head, carried by the scene's rig.
-
-    Parameters
-    ----------
-    scene : changed
-    lamps : of a preset
-    frame : [4, 4], the head's place without scale: where a rig that is not there yet is put
-    radius : of the head, in scene units
-
-    Returns
-    -------
-    The lamps' objects.
-    """
+    """Put lamps around the head, on the scene's rig, which is made at `frame` if need be; return their objects."""
     carrier = rig(scene)
     if carrier is None:
         carrier = bpy.data.objects.new(RIG, None)
         carrier.matrix_world = frame
         scene.collection.objects.link(carrier)
-    made = [_lamp(lamp, radius) for lamp in lamps]
-    for obj in made:
+    objects = [_lamp(lamp, radius) for lamp in lamps]
+    for obj in objects:
         scene.collection.objects.link(obj)
         obj.parent = carrier
-    return made
+    return objects
 
 
 def _lamp(lamp: Lamp, radius: float) -> bpy.types.Object:
@@ -160,7 +138,7 @@ def _lamp(lamp: Lamp, radius: float) -> bpy.types.Object:
         data.energy = lamp.power * (radius / REFERENCE_RADIUS_M) ** 2
     else:
         data.energy = lamp.power
-        data.angle = radians(lamp.angle)
+        data.angle = SUN_ANGLE_RAD
     obj = bpy.data.objects.new(data.name, data)
     direction = Vector(lamp.direction).normalized()
     place = Matrix.Translation(direction * lamp.distance * radius)

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Assemble Material: the capture's maps, each with its colour space, into WildCap Skin on the head. Again in place,
-keeping values.
+"""Assemble Material: put the capture's maps, each in its colour space, into WildCap Skin on the head, in place.
 
-    UV Map -> Albedo (sRGB), Specular (Non-Color), Normal (Non-Color) -> Normal Map -> WildCap Skin -> Material Output
-              Displacement (Non-Color, where the scan gave one) and the regions' attribute -> WildCap Skin
+UV Map -> Albedo (sRGB), Specular (Non-Color), Normal (Non-Color) -> Normal Map -> WildCap Skin -> Material Output
+          Displacement (Non-Color, if the scan gave one) and the regions' attribute -> WildCap Skin
 """
 
 from math import isclose
@@ -24,17 +23,19 @@ IMAGES = (
     ("WildCap Specular", "specular_albedo.png", True),
     ("WildCap Normal", "normal.png", True),
 )
-"""Node, its file, and whether that holds data, no colours."""
+"""Node, its file, and whether that holds data rather than colours."""
 DISPLACEMENT = ("WildCap Displacement", "displacement.exr", True)
 MADE = "wildcap_made"
-"""Where the material keeps what it was when it was assembled."""
+"""Custom property of the material: its fingerprint as it was assembled."""
 SET = "wildcap_set"
-"""Where the material keeps what was set by itself: a value that is another one now is the artist's"""
+"""Custom property of the material: the values that were set; one that differs now is the artist's."""
 
 
 def assemble(context, item) -> tuple[bpy.types.Material, str]:
-    """The skin material on the capture's head, from the 4K maps where they are of the last solve, else from the solved
-    ones; and what else belongs to a finished head, with what is to be told of that."""
+    """Put the newest solved maps on the capture's head and complete it; return its material and a notice.
+
+    Raises Problem if there are no maps.
+    """
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
     maps = find_newest_maps(capture)
@@ -42,28 +43,22 @@ def assemble(context, item) -> tuple[bpy.types.Material, str]:
     if missing:
         raise Problem(f"This capture has no {', '.join(missing)} yet.", "Click Solve first.")
     material = _material(obj)
-    before = _set_before(material)
+    before = material[SET].to_dict() if SET in material else {}
     regions.write(obj.data)
     height = capture.delivery / DISPLACEMENT[1]
     _build(material, {path.name: path for path in (*maps, height) if path.is_file()}, obj)
-    _set(
-        material,
-        {
-            "Specular Amount": _specular_amount(capture),
-            "Subsurface Scale": node_group.SCATTERING_M * data_blocks.scale_of(obj),
-        },
-        before,
-    )
+    scattering = node_group.SCATTERING_M * data_blocks.scale_of(obj)
+    _set(material, {"Specular Amount": _specular_amount(capture), "Subsurface Scale": scattering}, before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
     try:
-        told = head.complete(obj, capture)
+        notice = head.complete(obj, capture)
     finally:  # the maps are in, whatever is wrong with the rest of the head
         material[MADE] = node_trees.fingerprint(material, head.PREVIEW)
-    return material, told
+    return material, notice
 
 
 def is_edited(obj) -> bool:
-    """Whether the head's material is somebody's own, or not as Assemble Material left it."""
+    """Return whether the head's material is somebody's own, or was changed since it was assembled."""
     current = obj.data.materials[0] if obj.data.materials else None
     if current is None or _is_preview(current):
         return False
@@ -71,14 +66,16 @@ def is_edited(obj) -> bool:
 
 
 def _is_preview(material) -> bool:
-    """Whether it is what Bring In Head made to show the texture, as it made it."""
-    made = material.get(head.TEXTURE_KEY)
-    return KEY not in material and bool(made) and made == node_trees.fingerprint(material, head.PREVIEW)
+    """Return whether a material is the unchanged one by which Bring In Head shows the texture."""
+    digest = material.get(head.TEXTURE_KEY)
+    return KEY not in material and bool(digest) and digest == node_trees.fingerprint(material, head.PREVIEW)
 
 
 def _material(obj) -> bpy.types.Material:
-    """The head's skin material; somebody else's material in the first slot is replaced on this head only, never
-    changed. Of a skin that another face has, too, the head gets a copy, with all that was set in it."""
+    """Return the head's skin material, a new one in place of somebody else's, which is not changed.
+
+    If another face has the same skin, the head gets a copy with all that was set in it.
+    """
     slots = obj.data.materials
     current = slots[0] if slots else None
     if current is not None:
@@ -86,9 +83,9 @@ def _material(obj) -> bpy.types.Material:
             current = slots[0] = current.copy()
         if KEY in current or _is_preview(current):
             return current
-        current.use_fake_user = True  # it may have no other head
+        current.use_fake_user = True  # it may have no other user
     material = bpy.data.materials.new(f"{obj.name} Skin")
-    node_trees.of(material)  # for _build, which leaves a material that the artist switched to plain colours as it is
+    node_trees.of(material)  # _build does not switch nodes on, which an artist may have switched off
     if slots:
         slots[0] = material
     else:
@@ -105,15 +102,11 @@ def _is_another_face_s(material, obj) -> bool:
 
 
 def _build(material, paths: dict, obj) -> None:
+    """Add the nodes that are missing and link what is not linked; paths: file name -> map."""
     tree = material.node_tree
-    preview = tree.nodes.get(head.PREVIEW)  # the maps are here: what showed them on the way goes
-    if preview is not None:
-        image = preview.image
-        tree.nodes.remove(preview)
-        if image is not None and image.users == 0:
-            bpy.data.images.remove(image)
+    _remove_preview(tree)
     if KEY not in material:
-        tree.nodes.clear()  # ours and new: a preview of the texture, or Blender's default
+        tree.nodes.clear()  # new, or ours: a preview of the texture
     skin = _node(tree, "WildCap Skin", 'ShaderNodeGroup', (80, 0))
     group = node_group.skin_group()
     if skin.node_tree is None:
@@ -122,52 +115,65 @@ def _build(material, paths: dict, obj) -> None:
     asset.mark(group)
     uv = _node(tree, "WildCap UV", 'ShaderNodeUVMap', (-760, 0))
     uv.uv_map = obj.data.uv_layers[0].name
-    for row, (name, file_name, data) in enumerate((*IMAGES, DISPLACEMENT)):
-        if file_name not in paths:
-            if name in tree.nodes and not _has_picture(tree.nodes[name]):
-                tree.nodes.remove(tree.nodes[name])  # Cycles would take what is missing for a height of 0.3 m
-            continue
-        is_new = name not in tree.nodes
-        if file_name == DISPLACEMENT[1] and is_new:
-            material.displacement_method = 'DISPLACEMENT'  # the surface itself moves, once the socket says so
-        node = _node(tree, name, 'ShaderNodeTexImage', (-540, 300 - 300 * row))
-        node.image = head.load_image(paths[file_name], data)
-        if is_new:  # the map's upper and lower border are crown and neck, which are not to mix
-            node.interpolation, node.extension = 'Cubic', 'EXTEND'
-        _link(tree, uv.outputs["UV"], node.inputs["Vector"])
+    for row, image in enumerate((*IMAGES, DISPLACEMENT)):
+        _add_map(material, image, paths, uv, (-540, 300 - 300 * row))
     normal = _node(tree, "WildCap Normal Map", 'ShaderNodeNormalMap', (-200, -300))
-    normal.space = 'TANGENT'
-    normal.uv_map = obj.data.uv_layers[0].name
+    normal.space, normal.uv_map = 'TANGENT', uv.uv_map
     attribute = _node(tree, "WildCap Regions", 'ShaderNodeAttribute', (-200, -520))
     attribute.attribute_name = regions.ATTRIBUTE
     output = next((n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL'), None)
     output = output or _node(tree, "Material Output", 'ShaderNodeOutputMaterial', (340, 0))
-    for source, socket, target, name in (
+    factor = "Factor" if "Factor" in attribute.outputs else "Fac"  # its name before Blender 5
+    links = [
         ("WildCap Albedo", "Color", skin, "Albedo"),
         ("WildCap Specular", "Color", skin, "Specular"),
         ("WildCap Normal", "Color", normal, "Color"),
         ("WildCap Normal Map", "Normal", skin, "Normal"),
         ("WildCap Skin", "BSDF", output, "Surface"),
-        ("WildCap Regions", "Fac", skin, "Region"),
-        ("WildCap Displacement", "Color", skin, "Height"),
-        ("WildCap Skin", "Displacement", output, "Displacement"),
-    ):
-        if source in tree.nodes and (name != "Displacement" or "WildCap Displacement" in tree.nodes):
-            outputs = tree.nodes[source].outputs
-            # its name from Blender 5 on
-            _link(tree, outputs["Factor" if socket == "Fac" and "Factor" in outputs else socket], target.inputs[name])
+        ("WildCap Regions", factor, skin, "Region"),
+    ]
+    if DISPLACEMENT[0] in tree.nodes:
+        links += [(DISPLACEMENT[0], "Color", skin, "Height"), ("WildCap Skin", "Displacement", output, "Displacement")]
+    for source, socket, target, name in links:
+        if source in tree.nodes:
+            _link(tree, tree.nodes[source].outputs[socket], target.inputs[name])
     tree.nodes.active = tree.nodes["WildCap Albedo"]  # what Solid shading shows
     material[KEY] = True
 
 
+def _remove_preview(tree) -> None:
+    """Remove the picture by which a running solve is shown."""
+    preview = tree.nodes.get(head.PREVIEW)
+    if preview is not None:
+        image = preview.image
+        tree.nodes.remove(preview)
+        if image is not None and image.users == 0:
+            bpy.data.images.remove(image)
+
+
+def _add_map(material, image: tuple[str, str, bool], paths: dict, uv, location: tuple[float, float]) -> None:
+    """Add a map's node, or remove that of a map that is gone."""
+    tree, (name, file_name, is_data) = material.node_tree, image
+    if file_name not in paths:
+        if name in tree.nodes and not _has_picture(tree.nodes[name]):
+            tree.nodes.remove(tree.nodes[name])  # Cycles would read a missing picture as a height of 0.3 m
+        return
+    is_new = name not in tree.nodes
+    node = _node(tree, name, 'ShaderNodeTexImage', location)
+    node.image = head.load_image(paths[file_name], is_data)
+    if is_new:  # the map's upper and lower border are crown and neck, which must not mix
+        node.interpolation, node.extension = 'Cubic', 'EXTEND'
+        if image == DISPLACEMENT:
+            material.displacement_method = 'DISPLACEMENT'  # the surface itself moves, once the socket says so
+    _link(tree, uv.outputs["UV"], node.inputs["Vector"])
+
+
 def _has_picture(node) -> bool:
-    """Whether the picture of an image node is in the .blend or on the disk."""
+    """Return whether the picture of an image node is in the .blend or on the disk."""
     image = node.image
-    return image is not None and (
-        image.packed_file is not None
-        or image.source != 'FILE'
-        or Path(bpy.path.abspath(image.filepath, library=image.library)).is_file()
-    )
+    if image is None or image.packed_file is not None or image.source != 'FILE':
+        return image is not None
+    return Path(bpy.path.abspath(image.filepath, library=image.library)).is_file()
 
 
 def _node(tree, name: str, kind: str, location):
@@ -180,19 +186,13 @@ def _node(tree, name: str, kind: str, location):
 
 
 def _link(tree, output, socket) -> None:
-    """Connects what nothing is connected to: an artist's own nodes in between stay."""
+    """Connect a free socket: an artist's own nodes in between stay."""
     if not socket.is_linked:
         tree.links.new(output, socket)
 
 
-def _set_before(material) -> dict[str, float]:
-    """What Assemble Material set the last time; {} for a material that is new."""
-    return material[SET].to_dict() if SET in material else {}
-
-
 def _set(material, inputs: dict[str, float], before: dict[str, float]) -> None:
-    """Sets sockets of the skin to what this capture and the head's size ask for, but for those that the artist changed
-    since."""
+    """Set sockets of the skin, except those that the artist changed since they were set `before`."""
     sockets = material.node_tree.nodes["WildCap Skin"].inputs
     for name, value in inputs.items():
         if name not in before or isclose(sockets[name].default_value, before[name], rel_tol=1e-4):
@@ -201,6 +201,6 @@ def _set(material, inputs: dict[str, float], before: dict[str, float]) -> None:
 
 
 def _specular_amount(capture: Capture) -> float:
-    """What makes the mean of cheeks and forehead a Specular IOR Level of one half, by the worker's figure."""
+    """Return the factor that makes the mean of cheeks and forehead a Specular IOR Level of one half."""
     figures = capture.read()["stages"].get("upscale", {}).get("figures", {})
     return 0.5 / (figures.get("specular_mean") or node_group.TYPICAL_SPECULAR)

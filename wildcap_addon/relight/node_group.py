@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The node group WildCap Skin: a Principled BSDF set up as skin, with the few sockets an artist turns.
+"""Node group WildCap Skin: a Principled BSDF set up as skin, with the few sockets that an artist adjusts.
 
-    Albedo, what scattering loses of it given back -> Base Color
+    Albedo, compensated for what scattering loses -> Base Color
     Specular x Specular Amount, clamped -> Specular IOR Level        Roughness x (1 + Region) -> Roughness
     Oil, where Region is smoother than the cheeks -> Coat Weight
     Height, Midlevel, Displacement -> Displacement, in the object's own units
@@ -20,70 +20,52 @@ NAME = "WildCap Skin"
 VERSION = 4
 
 SCATTERING_M = 0.003
-"""Scale of the scattering, 3 mm, by which SCATTERING_RGB is multiplied"""
+"""Mean free path of red light."""
 SCATTERING_RGB = (1.0, 0.37, 0.19)
-"""Mean free paths of red, green and blue light over red's (Jensen et al. 2001, skin1: 3.67, 1.37 and 0.68 mm)"""
+"""Mean free paths relative to red's (Jensen et al. 2001, skin1: 3.67, 1.37 and 0.68 mm)."""
 GIVEN_BACK = (0.954, 0.932, 0.928)
-"""Share of its Base Color that skin gives back under even light by Cycles's *Random Walk (Skin)*, red, green, blue: the
-mean over six tones of `python -m research.benchmarks.even_light`. The other random walk gives back 0.78 to 0.91."""
+"""Share of its Base Color that skin reflects under even light by Cycles's *Random Walk (Skin)*: the mean over six tones
+of `python -m research.benchmarks.even_light`. The other random walk reflects 0.78 to 0.91."""
 TYPICAL_SPECULAR = 0.35
-"""Mean of the specular map on cheeks and forehead where nobody measured it. The map holds levels for an IOR of 1.5, of
-which 0.35 is skin's 2.8 percent"""
+"""Mean of an unmeasured specular map on cheeks and forehead. The map holds levels for an IOR of 1.5, of which 0.35 is
+skin's 2.8 percent."""
 OILY = skin_regions.ROUGHNESS["nose"]
-"""Region of the nose, where a full coat of Oil lies; the forehead has some two thirds of it, the cheeks none"""
+"""Region of the nose, which gets a full coat of Oil; the forehead gets about two thirds, the cheeks none."""
 SEBUM_IOR, SEBUM_ROUGHNESS = 1.47, 0.3
-"""The film's, of what skin secretes (squalene 1.49, triglycerides 1.46); smoother than the skin below, by eye"""
+"""Index of what skin secretes (squalene 1.49, triglycerides 1.46); smoother than the skin below, by eye."""
 
-# name, socket type, default, range, tooltip; what the maps feed comes first
+FLOAT = 'NodeSocketFloat'
 INPUTS = (
     ("Albedo", 'NodeSocketColor', (0.5, 0.35, 0.28, 1.0), None, "Diffuse albedo"),
-    ("Specular", 'NodeSocketFloat', 0.5, (0.0, 1.0), "Specular albedo, as solved"),
+    ("Specular", FLOAT, 0.5, (0.0, 1.0), "Specular albedo, as solved"),
     ("Normal", 'NodeSocketVector', (0.0, 0.0, 0.0), None, "The skin's relief"),
     (
         "Specular Amount",
-        'NodeSocketFloat',
+        FLOAT,
         0.5 / TYPICAL_SPECULAR,
         (0.0, 10.0),
         "Times the specular albedo: the Specular IOR Level, at most 1. Half over the map's mean on cheeks and forehead "
         "gives these the 2.8 percent of skin",
     ),
-    (
-        "Roughness",
-        'NodeSocketFloat',
-        0.45,
-        (0.0, 1.0),
-        "Roughness of the cheeks; the other regions follow in their proportions",
-    ),
-    ("IOR", 'NodeSocketFloat', 1.4, (1.0, 3.0), "Index of refraction; 1.4 reflects 2.8 percent at normal incidence"),
-    ("Subsurface", 'NodeSocketFloat', 1.0, (0.0, 1.0), "How much of the diffuse light goes through the skin"),
-    (
-        "Subsurface Scale",
-        'NodeSocketFloat',
-        SCATTERING_M,
-        (0.0, 10.0),
-        "Mean free path of red light: 3 mm at the head's size",
-    ),
-    ("Region", 'NodeSocketFloat', 0.0, (-1.0, 1.0), "How much rougher than the cheeks this region is, as a share"),
-    (
-        "Height",
-        'NodeSocketFloat',
-        0.0,
-        (-10.0, 10.0),
-        "How far the surface stands out, in metres of the head's own space",
-    ),
-    ("Displacement", 'NodeSocketFloat', 0.0, (0.0, 10.0), "Times the height; 1 is the scan's own relief, 0 is none"),
-    ("Midlevel", 'NodeSocketFloat', 0.0, (-10.0, 10.0), "Height that displaces nothing"),
+    ("Roughness", FLOAT, 0.45, (0.0, 1.0), "Roughness of the cheeks; the other regions follow in their proportions"),
+    ("IOR", FLOAT, 1.4, (1.0, 3.0), "Index of refraction; 1.4 reflects 2.8 percent at normal incidence"),
+    ("Subsurface", FLOAT, 1.0, (0.0, 1.0), "How much of the diffuse light goes through the skin"),
+    ("Subsurface Scale", FLOAT, SCATTERING_M, (0.0, 10.0), "Mean free path of red light: 3 mm at the head's size"),
+    ("Region", FLOAT, 0.0, (-1.0, 1.0), "How much rougher than the cheeks this region is, as a share"),
+    ("Height", FLOAT, 0.0, (-10.0, 10.0), "How far the surface stands out, in metres of the head's own space"),
+    ("Displacement", FLOAT, 0.0, (0.0, 10.0), "Times the height; 1 is the scan's own relief, 0 is none"),
+    ("Midlevel", FLOAT, 0.0, (-10.0, 10.0), "Height that displaces nothing"),
     (
         "Oil",
-        'NodeSocketFloat',
+        FLOAT,
         0.0,
         (0.0, 1.0),
         "A thin shining film on nose, forehead, lids and lips. No capture tells how much there is: 0 is none",
     ),
 )
+"""Name, socket type, default, range, tooltip; what the maps feed comes first."""
 OUTPUTS = (("BSDF", 'NodeSocketShader'), ("Displacement", 'NodeSocketVector'))
 
-# name, type, place
 NODES = (
     ("WildCap Input", 'NodeGroupInput', (-700, 0)),
     ("WildCap Given Back", 'ShaderNodeMix', (-400, 340)),
@@ -95,8 +77,15 @@ NODES = (
     ("WildCap Displacement", 'ShaderNodeDisplacement', (0, -420)),
     ("WildCap Output", 'NodeGroupOutput', (340, 0)),
 )
+"""Name, type, place."""
+OPERATIONS = {
+    "WildCap Specular Level": 'MULTIPLY',
+    "WildCap Regions": 'MULTIPLY_ADD',
+    "WildCap Oily": 'MULTIPLY',
+    "WildCap Coat": 'MULTIPLY',
+}
 MIX_FACTOR, MIX_A, MIX_B, MIX_RESULT = 0, 6, 7, 2
-"""Numbers of a Mix node's sockets for colours: its names are used several times."""
+"""Indices of a Mix node's sockets for colours: its names occur several times."""
 LINKS = (
     ("WildCap Input", "Specular", "WildCap Specular Level", 0),
     ("WildCap Input", "Specular Amount", "WildCap Specular Level", 1),
@@ -125,7 +114,7 @@ LINKS = (
 
 
 def skin_group() -> bpy.types.NodeTree:
-    """The group, made once per file; one of an older version is rebuilt inside."""
+    """Return the group, made once per file; one of an older version is rebuilt inside."""
     group = find(bpy.data.node_groups, NAME)
     if group is None:
         group = bpy.data.node_groups.new(NAME, 'ShaderNodeTree')
@@ -139,13 +128,13 @@ def skin_group() -> bpy.types.NodeTree:
 
 def _sockets(group) -> None:
     present = {(item.in_out, item.name): item for item in group.interface.items_tree if item.item_type == 'SOCKET'}
-    for name, kind, default, limits, what in INPUTS:
+    for name, kind, default, limits, tooltip in INPUTS:
         socket = present.get(('INPUT', name))
         if socket is None:
             socket = group.interface.new_socket(name, in_out='INPUT', socket_type=kind)
             socket.default_value = default
             socket.hide_value = name == "Normal"
-        socket.description = what
+        socket.description = tooltip
         if limits:
             socket.min_value, socket.max_value = limits
     for name, kind in OUTPUTS:
@@ -154,7 +143,7 @@ def _sockets(group) -> None:
 
 
 def _nodes(group) -> dict[str, bpy.types.Node]:
-    """Ours, by name."""
+    """Return our nodes by name, made where they are missing."""
     for name, kind, location in NODES:
         if name not in group.nodes:
             node = group.nodes.new(kind)
@@ -164,11 +153,9 @@ def _nodes(group) -> dict[str, bpy.types.Node]:
 
 
 def _set_up(nodes: dict[str, bpy.types.Node]) -> None:
-    nodes["WildCap Specular Level"].operation, nodes["WildCap Specular Level"].use_clamp = 'MULTIPLY', True
-    nodes["WildCap Regions"].operation, nodes["WildCap Regions"].use_clamp = 'MULTIPLY_ADD', True
-    nodes["WildCap Oily"].operation, nodes["WildCap Oily"].use_clamp = 'MULTIPLY', True
+    for name, operation in OPERATIONS.items():
+        nodes[name].operation, nodes[name].use_clamp = operation, name != "WildCap Coat"
     nodes["WildCap Oily"].inputs[1].default_value = 1 / OILY
-    nodes["WildCap Coat"].operation = 'MULTIPLY'
     shader = nodes["WildCap Principled"]
     if not _is_theirs(shader.inputs["Coat Weight"]):
         shader.inputs["Coat IOR"].default_value = SEBUM_IOR
@@ -178,13 +165,11 @@ def _set_up(nodes: dict[str, bpy.types.Node]) -> None:
     back = nodes["WildCap Given Back"]
     back.data_type, back.blend_type = 'RGBA', 'MULTIPLY'
     back.inputs[MIX_B].default_value = (*(1 / share for share in GIVEN_BACK), 1)
-    # heights are in the head's own units: they grow with the object's scale
-    nodes["WildCap Displacement"].space = 'OBJECT'
+    nodes["WildCap Displacement"].space = 'OBJECT'  # heights grow with the object's scale
 
 
 def _wire(group) -> None:
-    """Links ours with each other; where an artist's node feeds one of ours, or their own coat lies on it, it goes on
-    doing so."""
+    """Link our nodes with each other, except for inputs that are the artist's."""
     for source, output, target, socket in LINKS:
         into = group.nodes[target].inputs[socket]
         if not _is_theirs(into):
@@ -192,7 +177,7 @@ def _wire(group) -> None:
 
 
 def _is_theirs(socket) -> bool:
-    """Whether an artist's node feeds a socket of ours, or it is a coat of their own."""
+    """Return whether an artist's node feeds a socket of ours, or they gave the skin a coat."""
     if socket.is_linked:
         return socket.links[0].from_node.name not in {name for name, *_ in NODES}
     return socket.name == "Coat Weight" and socket.default_value > 0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: the maps into a material, and pictures under a light, all lights, or one that goes around."""
+"""Operators of the Relight panel: the material, and renders under one light, all lights, or once around."""
 
 import bpy
 
@@ -25,14 +25,14 @@ class WILDCAP_OT_assemble_material(HeadOperator, bpy.types.Operator):
         item = captures.require(context)
         if self.unless_edited and material.is_edited(captures.require_head(context, item)):
             return
-        skin, told = material.assemble(context, item)
-        if told:
-            self.report({'INFO'}, told)
+        skin, notice = material.assemble(context, item)
+        if notice:
+            self.report({'INFO'}, notice)
         self.warn(colours.missing(skin.node_tree.nodes[material.IMAGES[0][0]].image))
 
 
 class Render(BaseOperator):
-    """Mixin: renders the active head; Blender's render window shows it, and Esc there stops it."""
+    """Mixin: renders the active head in Blender's render window, where Esc stops it."""
 
     @classmethod
     def poll(cls, context):
@@ -84,7 +84,7 @@ class WILDCAP_OT_turntable(Render, bpy.types.Operator):
 
 
 def look(props) -> RenderSettings:
-    """What the scene's settings ask of a picture."""
+    """Return the scene's settings for a picture."""
     return RenderSettings(props.resolution, props.samples, props.hdri_rotation, props.view)
 
 

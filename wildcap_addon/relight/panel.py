@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: material, what is compared, light and renders."""
+"""Panel of material, comparison, light and renders."""
 
 import bpy
 
@@ -22,9 +22,8 @@ class WILDCAP_PT_relight(CapturePanel, bpy.types.Panel):
         buttons = side_by_side(layout, tight)
         now = compare.shown_picture(context)
         for kind, (label, _, _) in compare.SHOWN.items():
-            if kind == 'SKIN':  # stands with the hair
-                continue
-            buttons.operator("wildcap.compare", text=label, depress=kind == now).show = kind
+            if kind != 'SKIN':  # in the panel of the hair
+                buttons.operator("wildcap.compare", text=label, depress=kind == now).show = kind
         layout.prop(props, "light", text="" if tight else None)
         if props.light == 'hdri':
             layout.prop(props, "hdri", text="" if tight else None)
@@ -48,7 +47,7 @@ class WILDCAP_PT_relight(CapturePanel, bpy.types.Panel):
 
 
 def side_by_side(layout, tight: bool):
-    """Where buttons go that belong together: into a row, one below the other where it is too tight for that."""
+    """Return a row for buttons that belong together, a column if the sidebar is narrow."""
     return layout.column(align=True) if tight else layout.row(align=True)
 
 

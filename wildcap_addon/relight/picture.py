@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The relight scene: the head in a scene of its own with a camera and a light, for Cycles.
+"""Relight scene: the head in a scene of its own with a camera and a light, for Cycles.
 
-The artist's scene (camera, world, lights, render settings) is not touched.
+The artist's scene (camera, world, lights, render settings) stays as it is.
 """
 
 from dataclasses import dataclass
@@ -17,43 +17,36 @@ from ..hdri import Hdri
 from . import lights, output
 from .output import SCENE, view_label
 
-CAMERA_DIRECTION = (-0.28, -1.0, 0.05)  # from the head to the camera, in the head's axes
-FOCAL_LENGTH_MM = 85.0  # a portrait lens
+CAMERA_DIRECTION = (-0.28, -1.0, 0.05)
+"""Direction from the head, in its axes."""
+FOCAL_LENGTH_MM = 85.0
+"""Focal length of a portrait lens."""
 
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """How pictures are rendered: resolution, pixels of a side; samples of Cycles; turn: of the light about the head, in
-    radians; view: the view transform that they are shown by."""
-
-    resolution: int
+    resolution: int  # pixels of a side
     samples: int
-    turn: float = 0.0
-    view: str = colours.VIEWS[0]
+    turn: float = 0.0  # of the light about the head, radians
+    view: str = colours.VIEWS[0]  # view transform
 
     def scene(self, obj: bpy.types.Object, light: str | Hdri) -> bpy.types.Scene:
-        """The relight scene with this head."""
+        """Return the relight scene with this head."""
         return set_up_scene(obj, light, self.resolution, self.samples, self.turn, self.view)
 
 
 def set_up_scene(
     obj: bpy.types.Object,
-    light: str | Hdri | None,
+    light: str | Hdri,
     resolution: int,
     samples: int,
     turn: float = 0.0,
     view: str = colours.VIEWS[0],
 ) -> bpy.types.Scene:
-    """The relight scene with this head and what it wears alone in it, framed and lit.
+    """Return the relight scene with only this head and what it wears, framed and lit by a preset or a picture.
 
-    Parameters
-    ----------
-    obj : the head
-    light : a preset's name, or a picture of surroundings; None: dark
-    resolution : pixels of a side
-    samples : of Cycles
-    turn : of the light about the head, in radians, counter-clockwise from above
-    view : the view transform that the picture is shown by; its file says so
+    turn: of the light about the head, in radians, counter-clockwise from above; view: the view transform, which the
+    picture's file names.
     """
     scene = find(bpy.data.scenes, SCENE) or bpy.data.scenes.new(SCENE)
     output.let_go(scene)
@@ -64,11 +57,12 @@ def set_up_scene(
     _camera(scene, frame, radius)
     now, render = bpy.context.scene, scene.render
     render.frame_map_old = render.frame_map_new = 100
-    _show_moment(scene, now.frame_current_final)  # a head that is animated looks as it does there
+    moment = now.frame_current_final
+    scene.frame_set(floor(moment), subframe=moment - floor(moment))  # an animated head looks as it does there
     render.engine = 'CYCLES'
     render.resolution_x = render.resolution_y = resolution
     render.resolution_percentage = 100
-    render.use_lock_interface = True  # the views wait, so that no thread draws what another changes
+    render.use_lock_interface = True  # no thread draws what another changes
     scene.cycles.device = now.cycles.device  # the artist's choice; a file without one renders on the CPU
     render.threads_mode, render.threads = now.render.threads_mode, now.render.threads
     scene.cycles.samples = samples
@@ -78,12 +72,8 @@ def set_up_scene(
     return scene
 
 
-def _show_moment(scene, moment: float) -> None:
-    scene.frame_set(floor(moment), subframe=moment - floor(moment))
-
-
 def _label(scene) -> None:
-    """Frames' metadata name the view transform, and neither places nor persons."""
+    """Have the frames' metadata name the view transform, and neither places nor persons."""
     render = scene.render
     for name in (p.identifier for p in render.bl_rna.properties if p.identifier.startswith("use_stamp_")):
         setattr(render, name, name == "use_stamp_note")
@@ -92,8 +82,10 @@ def _label(scene) -> None:
 
 
 def frame_of(obj) -> tuple[Matrix, float]:
-    """Where the head is: a matrix without scale at its bounding box's centre, and its radius in scene units. A head
-    that is mirrored looks where it looks, with its left and right exchanged."""
+    """Return the head's place: a matrix without scale at its bounding box's centre, and its radius in scene units.
+
+    A mirrored head keeps the direction in which it looks, with left and right exchanged.
+    """
     corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
     centre = sum(corners, Vector()) / 8
     radius = max(abs((a - b)[axis]) for a in corners for b in corners for axis in range(3)) / 2
@@ -103,7 +95,7 @@ def frame_of(obj) -> tuple[Matrix, float]:
 
 
 def has_denoiser() -> bool:
-    """Whether this Blender was built with OpenImageDenoise; without it a render that asks for it fails."""
+    """Return whether this Blender has OpenImageDenoise: without it a render that asks for it fails."""
     try:
         import _cycles
     except ImportError:
@@ -122,9 +114,6 @@ def _camera(scene, frame: Matrix, radius: float) -> None:
     camera.data.lens = FOCAL_LENGTH_MM
     direction = Vector(CAMERA_DIRECTION).normalized()
     distance = radius * 1.12 / tan(camera.data.angle / 2)
-    camera.matrix_world = (
-        frame
-        @ Matrix.Translation(direction * (distance + radius * 0.2))
-        @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
-    )
+    place = Matrix.Translation(direction * (distance + radius * 0.2))
+    camera.matrix_world = frame @ place @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
     camera.data.clip_start, camera.data.clip_end = distance * 0.01, distance * 100

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several pictures in one render, which Esc stops as it does any of Blender's: each frame has a light of its own, or
-the head or the light turns.
+"""Several pictures in one render, which Esc stops: each frame has a light of its own, or the head or the light turns.
 
-Every frame has its key, so nothing lies in between; the head, which is the artist's object, has none of ours: where it
-turns, all else turns the other way, and where it is animated and is to stand still, time goes by slowly.
+Every frame has its key, so that nothing is interpolated. The head is the artist's object and gets no keys: for it to
+turn, all else turns the other way; for an animated one to stand still, time is slowed down.
 """
 
 from math import tau
@@ -17,14 +16,16 @@ from ..hdri import Hdri
 from . import lights, picture, sky
 
 SLOWEST = 64
-"""Frames to one of the artist's where time is to stand still: keys that lie closer than 1/100 replace each other."""
+"""Frames per frame of the artist's when time stands still: keys closer than 1/100 replace each other."""
 
 
 def each_light(
     obj: bpy.types.Object, presets: tuple[str, ...], settings: picture.RenderSettings
 ) -> tuple[bpy.types.Scene, int]:
-    """The relight scene in which the head is as it is now, and the first of the frames that have the lights `presets`
-    in turn. Raises Problem before frame 0, where Blender renders no row of frames."""
+    """Return the relight scene with the head as it is now, and the first of the frames that have a preset each.
+
+    Raises Problem before frame 0, where Blender renders no animation.
+    """
     scene = settings.scene(obj, presets[0])
     first, moments = _slow_down(scene, len(presets))
     lights.clear(scene)
@@ -43,13 +44,15 @@ def each_light(
 
 
 def _slow_down(scene: bpy.types.Scene, count: int) -> tuple[int, list[float]]:
-    """Lets time go by so slowly that all which is animated is seen as it is now in each of `count` frames; the first of
-    them, and the moments that they show. By a power of two, so that the first shows this very moment."""
+    """Slow time down so that `count` frames show everything as it is now; return the first and the times of all.
+
+    By a power of two, so that the first shows exactly the present time.
+    """
     now, last = scene.frame_current_final, scene.bl_rna.properties["frame_end"].hard_max
     if now < 0:
         raise Problem(
-            f"Frame {now:g} lies before frame 0, where Blender renders no row of pictures.",
-            "Go to frame 0 or a later one, or render one light after the other.",
+            f"Frame {now:g} is before frame 0, where Blender cannot render several pictures at once.",
+            "Go to frame 0 or a later one, or render the lights one by one.",
         )
     steps = SLOWEST
     while steps > 1 and now * steps + count > last:
@@ -62,24 +65,14 @@ def _slow_down(scene: bpy.types.Scene, count: int) -> tuple[int, list[float]]:
 def animate_turn(
     obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int, settings: picture.RenderSettings
 ) -> bpy.types.Scene:
-    """The relight scene in which the head or the light goes once around, counter-clockwise from above.
-
-    Parameters
-    ----------
-    obj : the head
-    light : a preset's name, or a picture of surroundings
-    turns : 'HEAD' or 'LIGHT'
-    frames : of the whole turn, from 1 on
-    settings : of each frame
-    """
+    """Return the relight scene in which 'HEAD' or 'LIGHT' turns once counter-clockwise from above, from frame 1 on."""
     scene = settings.scene(obj, light)
     frame, _ = picture.frame_of(obj)
     rig, camera = lights.rig(scene), scene.camera
     moved = [o for o in (rig, camera if turns == 'HEAD' else None) if o is not None]
     start = {o: o.matrix_world.copy() for o in moved}
-    mapping = (
-        next((n for n in scene.world.node_tree.nodes if n.type == 'MAPPING'), None) if isinstance(light, Hdri) else None
-    )
+    nodes = scene.world.node_tree.nodes if isinstance(light, Hdri) else ()
+    mapping = next((n for n in nodes if n.type == 'MAPPING'), None)
     first = mapping.inputs["Rotation"].default_value[2] if mapping else 0.0
     for i in range(frames):
         angle = tau * i / frames * (-1 if turns == 'HEAD' else 1)
@@ -95,7 +88,7 @@ def animate_turn(
 
 
 def as_film(scene: bpy.types.Scene, frames_per_second: int) -> None:
-    """Frames go into one MP4 (H.264)."""
+    """Have the frames written to one MP4 (H.264)."""
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):  # Blender 5
         settings.media_type = 'VIDEO'
@@ -106,5 +99,5 @@ def as_film(scene: bpy.types.Scene, frames_per_second: int) -> None:
 
 
 def can_film() -> bool:
-    """Whether this Blender was built with FFmpeg."""
+    """Return whether this Blender was built with FFmpeg."""
     return bool(bpy.app.build_options.codec_ffmpeg)

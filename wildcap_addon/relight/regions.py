@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How rough each region of the head is against the cheeks, as a vertex attribute: no map, and it stays with the
-mesh."""
+"""Roughness of the head's regions relative to the cheeks, as a vertex attribute, which stays with the mesh."""
 
 from functools import cache
 from pathlib import Path
@@ -15,14 +14,13 @@ from ..data_blocks import load_pixels, read_field
 ATTRIBUTE = "wildcap_roughness"
 MASKS = Path(__file__).resolve().parents[2] / "core" / "assets" / "masks"
 STEP_TEXELS = 4
-"""Every fourth texel of the masks' 1024 is finer than the mesh"""
+"""Every fourth texel of the masks' 1024 is finer than the mesh."""
 SHARES = skin_regions.ROUGHNESS
-"""Region -> how much rougher than the cheeks, as a share; later ones win where they meet"""
+"""Region -> roughness relative to the cheeks, minus 1; later ones win where they meet."""
 
 
 def write(mesh: bpy.types.Mesh) -> None:
-    """Writes the attribute: 0 is the cheeks' roughness, -0.2 a fifth less. The mesh has the built-in head's UVs; what
-    has none of its own stays 0."""
+    """Write the attribute of a mesh with the built-in head's UVs: 0 is the cheeks' roughness, -0.2 a fifth less."""
     shares = _shares()
     uvs = read_field(mesh.uv_layers[0].data, "uv", 2)
     texel = np.clip((uvs * len(shares)).astype(int), 0, len(shares) - 1)
@@ -39,15 +37,14 @@ def write(mesh: bpy.types.Mesh) -> None:
 
 @cache
 def _shares() -> np.ndarray:
-    """[S, S], rows from the bottom as v goes."""
+    """Return the attribute as a map [S, S], rows from the bottom as v goes."""
     masks = {
         name: load_pixels(MASKS / f"{name}.png")[::STEP_TEXELS, ::STEP_TEXELS, 0]
         for name in ("face", "brows", "neck", "ears", "scalp", "nose", "eyes", "lips")
     }
     rows = np.arange(len(masks["face"]))
-    above = np.clip(
-        (rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max()) / (skin_regions.FOREHEAD_FADE * len(rows)), 0, 1
-    )
+    brows_end = np.flatnonzero(masks["brows"].max(1) > 0.5).max()
+    above = np.clip((rows - brows_end) / (skin_regions.FOREHEAD_FADE * len(rows)), 0, 1)
     masks["forehead"] = masks["face"] * above[:, None]
     result = np.zeros_like(masks["face"])
     for name, share in SHARES.items():

@@ -4,16 +4,13 @@
 shadow mask, Solve, Assemble Material, Render, each by its own button. Clicks and minutes are counted in the same
 manner."""
 
-import sys
-from pathlib import Path
-
+import addon
 import bpy
+import driver as d
+import own_head
+import painting
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import own_head  # noqa: E402
-import painting  # noqa: E402
+LIMIT_S = 1700
 
 
 def flow():
@@ -40,6 +37,3 @@ def flow():
     yield from d.lead("wildcap.render")
     yield from own_head.lit_face(root)
     own_head.count("button_by_button", started)
-
-
-d.play(flow(), limit_s=1700)

@@ -5,14 +5,13 @@
 
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
+LIMIT_S = 300
 
 PANELS = ("stages", "capture", "frames", "reconstruct", "delighter", "solve", "relight")
 STEPS, TURNS, TABS_PX = 14, 4, 22
@@ -25,7 +24,6 @@ def flow():
     shutil.copytree(addon.CHECKOUT / ".demo" / "sample.wildcap", capture)
     addon.unfold(*(f"WILDCAP_PT_{name}" for name in PANELS))
     yield from d.open_tab("WildCap")
-    yield from d.park()
     addon.use_solver()
     bpy.ops.wildcap.open_capture(directory=str(capture))
     bpy.ops.wildcap.bring_in_head()
@@ -67,6 +65,3 @@ def shot(name: str):
     inside = f"{sidebar.width - TABS_PX}x{sidebar.height}+{sidebar.x}+{top}"
     subprocess.run(["convert", str(path), "-crop", inside, "+repage", str(path)], check=True, timeout=60)
     return path
-
-
-d.play(flow(), limit_s=300)

@@ -4,15 +4,14 @@
 back. The photographs are of a synthetic person with open eyes; photographed.py made them."""
 
 import shutil
-import sys
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
+import own_head
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import own_head  # noqa: E402
+LIMIT_S = 1700
 
 PHOTOGRAPHS = Path(__file__).resolve().parents[1] / "photographs"
 
@@ -22,12 +21,7 @@ def flow():
     addon.use_solver()
     root = yield from drop(Path.home() / "Documents" / "face")
     quick()
-    yield from own_head.begin("wildcap.make_my_head", root)
-    yield from d.until(lambda: own_head.head() is not None or addon.job(root) is None, "the head in the scene", 1200)
-    assert addon.job(root) is not None, addon.problem(root)
-    d.say("the head comes in while it is solved")
-    yield from own_head.ended("wildcap.make_my_head", root)
-    assert addon.problem(root).startswith("Your head is ready."), addon.problem(root)
+    yield from own_head.make(root)
     yield from own_head.lit_face(root)
     looks_back()
     d.screenshot("photographs_3_rendered")
@@ -63,6 +57,3 @@ def looks_back() -> None:
     assert min(keys[f"eyesOpen{side}"].value for side in ("Left", "Right")) > 0.9, "the lids are closed"
     materials = [material.name for material in head.data.materials if material]
     assert any("Eyes" in name for name in materials), "there are no eyes behind the lids"
-
-
-d.play(flow(), limit_s=1700)

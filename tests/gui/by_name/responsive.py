@@ -8,17 +8,16 @@ docs.
 """
 
 import json
-import sys
 import time
-from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 import numpy as np
+import painting
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import driver as d  # noqa: E402
+LIMIT_S = 1700
 
-CHECKOUT = Path(__file__).resolve().parents[3]
 PERIOD_S = 0.01
 LIMIT_P99_MS, LIMIT_GAP_MS, SHARE = 50, 250, 0.8
 """How late the main thread may be, how long two redraws may lie apart, and which part of the idle redraw rate must
@@ -55,21 +54,15 @@ class Watch:
 
 
 def flow():
-    yield from d.open_tab("WildCap")
-    yield from d.park()
-    yield from d.press("wildcap.open_sample_head")
-    yield from d.until(lambda: "sample_head" in bpy.data.objects, "the sample head", 20)
-    bpy.ops.wildcap.use_python(filepath=str(CHECKOUT / ".venv"))
-    settings = bpy.context.scene.wildcap.captures[0]
-    # it takes all cores at any size
-    settings.solve.size, settings.solve.steps, settings.solve.checkpoint_every = 512, 60, 2
-    root = module("captures").root(settings)
-    jobs = module("jobs")
+    root = yield from addon.open_sample_head()
+    addon.use_solver()
+    solve = addon.settings().solve
+    solve.size, solve.steps, solve.checkpoint_every = 512, 60, 2  # it takes all cores at any size
     watch = Watch()
     yield 2.0
 
     yield from d.press("wildcap.paint_mask")
-    yield from d.until(lambda: bpy.context.mode == 'PAINT_TEXTURE', "texture painting", 10)
+    yield from painting.in_hand()
     yield from paint(1)  # brush and shaders are warm
     idle = yield from measured(watch)
     d.say("idle", json.dumps(idle))
@@ -79,16 +72,16 @@ def flow():
     yield 2.0
     bpy.ops.wildcap.solve()
     yield from d.until(
-        lambda: jobs.of(root) is None or jobs.of(root).progress is not None and jobs.of(root).progress.done >= 1,
+        lambda: addon.job(root) is None or addon.job(root).progress and addon.job(root).progress.done >= 1,
         "the first step",
         600,
     )
-    assert jobs.of(root) is not None, str(module("problems").of(root))
+    assert addon.job(root) is not None, addon.problem(root)
     bpy.ops.wildcap.paint_mask()
     yield 1.0
     yield from paint(1)
     busy = yield from measured(watch)
-    assert jobs.of(root) is not None, "the solver ran all the time"
+    assert addon.job(root) is not None, "the solver ran all the time"
     d.screenshot("responsive")
     d.say("solving", json.dumps(busy))
     d.say(
@@ -98,26 +91,25 @@ def flow():
 
     bpy.ops.wildcap.finish_mask()
     yield 1.0
-    material = bpy.data.objects["sample_head"].active_material
+    material = addon.head().active_material
     seen = set()
     for _ in range(600):
         node = material.node_tree.nodes.get("WildCap Preview")
-        if jobs.of(root) is not None and node is not None and material.node_tree.nodes.active == node:
+        if addon.job(root) is not None and node is not None and material.node_tree.nodes.active == node:
             seen.add(tuple(np.round(node.image.pixels[0:400000][::997], 3)))
             if len(seen) in (1, 2) and not (d.OUT / f"live_{len(seen)}.png").is_file():
                 yield 0.5
                 d.screenshot(f"live_{len(seen)}")
-        if len(seen) > 1 or jobs.of(root) is None:
+        if len(seen) > 1 or addon.job(root) is None:
             break
         yield 0.5
     assert len(seen) > 1, "two different pictures are seen on the head before the end"
     started = time.monotonic()
     yield from d.lead("wildcap.cancel")
-    yield from d.until(lambda: jobs.of(root) is None, "the end after Cancel", 10)
+    yield from d.until(lambda: addon.job(root) is None, "the end after Cancel", 10)
     d.say(f"cancelled after {time.monotonic() - started:.1f} s with the clicking")
     yield 1.5
-    step = module("next_step").next_step(module("panel").gather(bpy.context, settings))
-    assert step.label == "Solve", step  # not Continue: the mask is another one by now
+    assert addon.next_step().label == "Solve", addon.next_step()  # not Continue: the mask is another one by now
     assert busy["redraws_per_s"] > SHARE * idle["redraws_per_s"], (idle, busy)
     assert busy["late_p99_ms"] < max(LIMIT_P99_MS, SLACK * idle["late_p99_ms"]), (idle, busy)
     assert busy["worst_redraw_gap_ms"] < max(LIMIT_GAP_MS, SLACK * idle["worst_redraw_gap_ms"]), (idle, busy)
@@ -134,10 +126,3 @@ def paint(strokes: int):
     x, y = d.middle()
     for i in range(strokes):
         yield from d.stroke([(x - 90 + 5 * k, y - 60 + 12 * i) for k in range(36)], ctrl=i % 2 == 1)
-
-
-def module(name: str):
-    return sys.modules[f"bl_ext.user_default.wildcap.wildcap_addon.{name}"]
-
-
-d.play(flow(), limit_s=1700)

@@ -7,15 +7,14 @@ Downloads 0.5 GB and takes minutes. Packages come from where pip is set up to lo
 the paths of WILDCAP_MOUNTS, colons between them (resolv.conf, certificates, an index on the disk).
 """
 
-import sys
 import time
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
+LIMIT_S = 1700
 
 
 def flow():
@@ -24,7 +23,6 @@ def flow():
     preferences.environment, preferences.packages, preferences.compute = str(folder), 'pip', 'cpu'
     bpy.context.preferences.system.use_online_access = True
     yield from d.open_tab("WildCap")
-    yield from d.park()
     yield from d.lead("wildcap.install_solver")
     yield from d.until(lambda: addon.job("") is None, "the index's answer", 300)
     assert addon.problem() == "", addon.problem()
@@ -79,6 +77,3 @@ def confirmed(picture: str):
     d.screenshot(picture)
     yield from d.key('RET')
     yield from d.until(lambda: addon.job("") is not None, "the start after the dialog", 10)
-
-
-d.play(flow(), limit_s=1700)

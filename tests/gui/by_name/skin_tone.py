@@ -4,15 +4,14 @@
 with a grey card drawn into its frames: click on the card in a frame, estimate, choose by hand."""
 
 import shutil
-import sys
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
+LIMIT_S = 1000
 
 CARD = 0.5, 0.12  # u and v of its middle in a frame
 GREY = 117 / 255  # sRGB of 18 percent under a light of 1
@@ -24,7 +23,6 @@ def flow():
     draw_card(capture / "frames")
     addon.unfold("WILDCAP_PT_solve")
     yield from d.open_tab("WildCap")
-    yield from d.park()
     addon.use_solver()
     bpy.ops.wildcap.open_capture(directory=str(capture))
     bpy.ops.wildcap.bring_in_head()
@@ -70,6 +68,3 @@ def draw_card(frames: Path) -> None:
         image.file_format = 'JPEG'
         image.save(filepath=str(path))
         bpy.data.images.remove(image)
-
-
-d.play(flow(), limit_s=1000)

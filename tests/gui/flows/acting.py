@@ -3,14 +3,11 @@
 """Face units by clicks: added in the panel, lids and jaw opened, back by Rest; hair grown, taken back by Ctrl-Z, and
 grown again; eyes and mouth for a close-up, and a render of all of it."""
 
-import sys
 from pathlib import Path
 
+import addon
 import bpy
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
+import driver as d
 
 SIDE, SAMPLES = 160, 16
 END = 40
@@ -91,6 +88,3 @@ def hair() -> list:
 
 def keys():
     return addon.head().data.shape_keys
-
-
-d.play(flow(), limit_s=600)

@@ -4,25 +4,23 @@
 at work, gets the first result, and stops it."""
 
 import shutil
-import sys
 import tempfile
 import time
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 import numpy as np
+import painting
+import second
 
-HERE = Path(__file__).resolve()
-sys.path[:0] = [str(HERE.parents[1]), str(HERE.parents[3])]
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import painting  # noqa: E402
-import second  # noqa: E402
+from core.batch import record
+from core.capture import sample_head
+from core.settings.settings import from_json, preset
+from tests.fixtures import batch_faces
 
-from core.batch import record  # noqa: E402
-from core.capture import sample_head  # noqa: E402
-from core.settings.settings import from_json, preset  # noqa: E402
-from tests.fixtures import batch_faces  # noqa: E402
+LIMIT_S = 900
 
 NAMES = ("anna", "bert")
 QUICK = {
@@ -99,6 +97,3 @@ def stopped(pid: int):
     yield from d.until(lambda: not batch_faces.alive(pid), "the end of the batch", 10, every_s=d.TICK_S)
     d.say(f"cancelled {time.monotonic() - clicked:.1f} s after the click")
     assert time.monotonic() - clicked < 4, "2 s on a machine of its own"
-
-
-d.play(flow(), limit_s=900)

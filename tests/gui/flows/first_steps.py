@@ -5,15 +5,15 @@ with one Ctrl-Z; Save As keeps the links, and folders that were moved are found 
 browser."""
 
 import shutil
-import sys
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parents[2])]
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import standin  # noqa: E402
+from tests.fixtures import standin
+
+LIMIT_S = 500
 
 UNFOLDED = ("WILDCAP_PT_capture", "WILDCAP_PT_reconstruct")
 
@@ -162,6 +162,3 @@ def seen_in_view() -> set[str]:
 
 def names() -> set[str]:
     return {thing.name for thing in bpy.context.scene.objects}
-
-
-d.play(flow(), limit_s=500)

@@ -6,16 +6,15 @@ killed from outside, with what the tab then says."""
 
 import os
 import signal
-import sys
 import tempfile
 import time
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
+LIMIT_S = 900
 
 CANCEL_LIMIT_S = 2.0
 """By the promise, from the click. Of up to four, for other programs may hold one up."""
@@ -138,7 +137,6 @@ def disable(root: Path):
     yield 1.0
     addon.use_solver()  # the preferences of an add-on go when it is disabled
     yield from d.open_tab("WildCap")
-    yield from d.park()
     d.screenshot("jobs_7_enabled_again")
     while True:
         yield from addon.continued(root)
@@ -172,6 +170,3 @@ def stepped(root: Path, steps: int):
     yield from d.until(lambda: step() >= 0, "the first step", addon.START_LIMIT_S)
     first = step()
     yield from d.until(lambda: step() >= first + steps, f"{steps} more steps", addon.START_LIMIT_S)
-
-
-d.play(flow(), limit_s=900)

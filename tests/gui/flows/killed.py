@@ -3,18 +3,19 @@
 """A Blender that is killed, or closed, while its solver runs and its mask is painted: no stroke is lost, no worker
 outlives it, and another Blender goes on."""
 
-import sys
 import tempfile
 import time
 from pathlib import Path
 
+import addon
+import driver as d
 import numpy as np
+import painting
+import second
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import painting  # noqa: E402
-import second  # noqa: E402
+from tests.fixtures import batch_faces
+
+LIMIT_S = 900
 
 LATER_S = 6.0
 """By the issue: this long after a stroke a kill loses nothing."""
@@ -76,19 +77,9 @@ def killed_while_solving(root: Path, folder: Path):
 def ended(pid: int):
     """The worker hears by the end of its stdin that its Blender is gone."""
     started = time.monotonic()
-    yield from d.until(lambda: not alive(pid), f"the end of the worker {pid}", 5)
+    yield from d.until(lambda: not batch_faces.alive(pid), f"the end of the worker {pid}", 5)
     d.say(f"the worker ended within {time.monotonic() - started:.1f} s")
-
-
-def alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(") ", 1)[1][0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False
 
 
 def same(root: Path, folder: Path):
     yield from painting.kept(root / "shadow_mask.png", np.load(folder / "stroke.npy"), 1)
-
-
-d.play(flow(), limit_s=900)

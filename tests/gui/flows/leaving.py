@@ -5,17 +5,14 @@ and six seconds after a stroke it is on the disk, where another Blender finds it
 
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import painting  # noqa: E402
+import painting
 
 FIND = """
 import bpy, sys
@@ -168,6 +165,3 @@ def killed(root: Path):
     )
     assert np.abs(np.load(f"{found}.npy") - painting.mask()).max() < 0.01
     d.say("six seconds after a stroke another Blender finds it")
-
-
-d.play(flow(), limit_s=600)

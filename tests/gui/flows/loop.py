@@ -8,20 +8,17 @@ Nothing is called that an artist could not click, except where a file browser wo
 
 import shutil
 import subprocess
-import sys
 import time
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 import numpy as np
+import painting
+from addon import head
 from mathutils import Vector
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import painting  # noqa: E402
-from addon import head  # noqa: E402
-from painting import mask, on_disk  # noqa: E402
+from painting import mask, on_disk
 
 CHEEK = Vector((0.3, -1.0, -0.1))
 """Where the person's left cheek is, right on the screen, seen from the middle of the head."""
@@ -32,6 +29,8 @@ import sys
 import numpy as np
 from pathlib import Path
 from core.imaging import images
+
+LIMIT_S = 1700
 root, u, v, radius, left = Path(sys.argv[1]), *map(float, sys.argv[2:])
 texture = images.read_linear(root / "texture.exr")
 rows, columns = np.mgrid[:len(texture), :len(texture)] + 0.5
@@ -54,7 +53,6 @@ def flow():
 def open_sample_head():
     """From an empty profile to a head that can be relit, within ten seconds."""
     yield from d.open_tab("WildCap")
-    yield from d.park()
     d.screenshot("1_new")
     position = yield from d.find("wildcap.open_sample_head")
     started = time.monotonic()
@@ -83,11 +81,7 @@ def paint(root: Path):
     they were painted."""
     addon.unsolved(root)
     brushes = {b.name for b in bpy.data.brushes}
-    shading = (
-        d.view().spaces.active.shading.type,
-        d.view().spaces.active.shading.light,
-        d.view().spaces.active.shading.color_type,
-    )
+    shading = view_shading()
     yield 1.5
     yield from d.press("wildcap.paint_mask")
     yield from painting.in_hand()
@@ -135,16 +129,17 @@ def paint(root: Path):
     yield from d.until(lambda: bpy.context.mode == 'OBJECT', "leaving", 5)
     saved = on_disk(root / "shadow_mask.png")
     assert np.abs(saved - painted).max() < 0.01
-    assert (
-        d.view().spaces.active.shading.type,
-        d.view().spaces.active.shading.light,
-        d.view().spaces.active.shading.color_type,
-    ) == shading
+    assert view_shading() == shading
     # where Blender has a library of brushes, it links one as it enters the mode
     own = bpy.context.scene.tool_settings.image_paint.brush
     assert {b.name for b in bpy.data.brushes} == brushes | ({own.name} if own is not None else set())
     assert "WildCap Mask Sheet" not in bpy.data.objects
     d.say("shadow_mask.png holds both strokes")
+
+
+def view_shading() -> tuple[str, str, str]:
+    shading = d.view().spaces.active.shading
+    return shading.type, shading.light, shading.color_type
 
 
 def solve(root: Path):
@@ -200,6 +195,3 @@ def relight(root: Path):
     yield 2.0
     d.screenshot("8_rendered")
     shutil.copyfile(root / "renders" / "three_point.png", d.OUT / "9_three_point.png")
-
-
-d.play(flow(), limit_s=1700)

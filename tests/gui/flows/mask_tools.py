@@ -3,16 +3,15 @@
 """Strokes and buttons on the mask, on the head and on the sheet, in any order: Ctrl-Z goes back through all of them,
 one by one, and Ctrl-Shift-Z forward again."""
 
-import sys
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 import numpy as np
+from painting import dab, in_hand, mask
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-from painting import dab, in_hand, mask  # noqa: E402
+LIMIT_S = 500
 
 
 def flow():
@@ -114,6 +113,3 @@ def stroke(x, y, on: str = ''):
 def button(kind):
     yield from d.press("wildcap.edit_mask", kind)
     yield 0.3
-
-
-d.play(flow(), limit_s=500)

@@ -4,32 +4,19 @@
 painted; clicks and minutes are counted. by_name/button_by_button.py goes there by the single buttons.
 """
 
-import sys
-from pathlib import Path
+import driver as d
+import own_head
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import own_head  # noqa: E402
+LIMIT_S = 1700
 
 
 def flow():
     started = yield from own_head.drag_in_zip()
     yield from own_head.choose_python()
     root = yield from own_head.choose_video()
-    yield from own_head.begin("wildcap.make_my_head", root)
-    yield 12.0
-    d.screenshot("walk_3_making")
-    yield from d.until(lambda: own_head.head() is not None or addon.job(root) is None, "the head in the scene", 1200)
-    assert addon.job(root) is not None, addon.problem(root)
-    d.say("the head comes in while it is solved")
-    yield from own_head.ended("wildcap.make_my_head", root)
+    yield from own_head.make(root, "walk_3_making")
     yield from own_head.lit_face(root)
     own_head.count("one_button", started)
     d.screenshot("walk_4_rendered")
     assert "wildcap_skin" in own_head.head().data.materials[0], "the material came in by itself"
     assert not (root / "shadow_mask.png").is_file(), "nobody painted"
-    assert addon.problem(root).startswith("Your head is ready."), addon.problem(root)
-
-
-d.play(flow(), limit_s=1700)

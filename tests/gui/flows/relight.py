@@ -4,16 +4,12 @@
 stopped by Esc."""
 
 import ctypes
-import os
 import subprocess
-import sys
 from pathlib import Path
 
+import addon
 import bpy
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
+import driver as d
 
 OUTLINE_PX = 8
 """How far inside of its region the sidebar's outline lies, which the mouse drags"""
@@ -77,19 +73,9 @@ def turntable(root: Path):
 
 def from_a_terminal(root: Path) -> None:
     (root / "renders" / "window.png").unlink()
-    command = [
-        "blender",
-        "--command",
-        "wildcap",
-        "relight",
-        str(root),
-        "window",
-        "--resolution",
-        "32",
-        "--samples",
-        "1",
-    ]
-    done = subprocess.run(command, env=os.environ, capture_output=True, text=True, timeout=180)
+    options = ("window", "--resolution", "32", "--samples", "1")
+    command = ["blender", "--command", "wildcap", "relight", root, *options]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=180)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     assert (root / "renders" / "window.png").is_file(), done.stdout[-2000:]
     d.say("blender --command wildcap relight")
@@ -124,6 +110,3 @@ def escape() -> None:
     for pressed in (1, 0):
         test.XTestFakeKeyEvent(display, x11.XKeysymToKeycode(display, ESCAPE), pressed, ctypes.c_ulong(0))
     x11.XCloseDisplay(display)
-
-
-d.play(flow(), limit_s=600)

@@ -5,20 +5,18 @@ that then sends two frames to a server on this machine, once."""
 
 import os
 import struct
-import sys
 import time
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
+from core.capture import switchlight_api
+from tests.fixtures import standin
+from tests.fixtures.switchlight_server import KEY, Service
 
-from core.capture import switchlight_api  # noqa: E402
-from tests.fixtures import standin  # noqa: E402
-from tests.fixtures.switchlight_server import KEY, Service  # noqa: E402
+LIMIT_S = 900
 
 
 def flow():
@@ -31,7 +29,6 @@ def artist(server: Service):
     addon.unfold("WILDCAP_PT_reconstruct", "WILDCAP_PT_delighter")
     bpy.context.preferences.system.use_online_access = True
     yield from d.open_tab("WildCap")
-    yield from d.park()
     addon.use_solver()
     root = Path.home() / "WildCap" / "Zoë.wildcap"
     make(root)
@@ -46,9 +43,9 @@ def artist(server: Service):
     yield 1.5
     yield from d.park()
     d.screenshot("sending_2_asks")
-    yield from turn(30)
+    yield from d.scroll(30)
     d.screenshot("sending_3_card")
-    yield from turn(-60)
+    yield from d.scroll(-60)
     addon.module("preferences").get().switchlight_key = KEY
     yield from d.lead("wildcap.allow_sending")
     yield 1.0
@@ -73,23 +70,11 @@ def artist(server: Service):
     assert set(server.charged.values()) == {1} and {call["key"] for call in server.calls} == {KEY}
     yield 2.5
     yield from d.park()
-    yield from turn(30)
+    yield from d.scroll(30)
     d.screenshot("sending_6_answered")
     bpy.ops.wm.save_as_mainfile(filepath=str(root.parent / "face.blend"), compress=False)
     left = [path for path in root.parent.rglob("*") if path.is_file()]
     assert len(left) > 10 and not [path for path in left if KEY.encode() in path.read_bytes()], "the key is nowhere"
-
-
-def turn(steps: int):
-    """Turns the wheel over the sidebar, down where `steps` is positive."""
-    sidebar = d.region('UI')
-    position = sidebar.x + sidebar.width // 2, sidebar.y + sidebar.height // 2
-    yield from d.move(position)
-    for _ in range(abs(steps)):
-        d.event('WHEELDOWNMOUSE' if steps > 0 else 'WHEELUPMOUSE', 'PRESS', position)
-        yield 0.02
-    yield from d.park()
-    yield 0.7
 
 
 def known():
@@ -117,6 +102,3 @@ def registered(root: Path, item) -> None:
     capture.set_source(root.parent / "face.mp4")
     for stage in stages.STAGES[: stages.NAMES.index("delight")]:
         capture.finish(stage, capture.conditions(stage, settings), 1.0, settings, {}, "0.2.0")
-
-
-d.play(flow(), limit_s=900)

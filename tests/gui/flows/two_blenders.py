@@ -2,18 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Two Blenders at one capture: the second one's Solve is refused by name, and of what both paint nothing is lost."""
 
-import sys
 import tempfile
 from pathlib import Path
 
+import addon
 import bpy
+import driver as d
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import addon  # noqa: E402
-import driver as d  # noqa: E402
-import painting  # noqa: E402
-import second  # noqa: E402
+import painting
+import second
 
 
 def flow():
@@ -73,6 +70,3 @@ def in_history(root: Path, mask: np.ndarray) -> bool:
     return any(
         np.abs(painting.on_disk(path) - mask).max() < 0.01 for path in (root / "mask_history").glob("shadow_mask_*.png")
     )
-
-
-d.play(flow(), limit_s=600)

@@ -1,28 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an artist made on the built-in head's mesh is still there when the mesh is cut open for its face units, by the
-button or by Assemble Material."""
+"""What an artist made on the built-in head's mesh is still there when the mesh is cut open for its face units."""
 
 import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from tests.wildcap_addon.acting.test_acting import (  # noqa: E402, F401  (open_eyed is a fixture)
-    COPIES,
-    HEAD,
-    open_eyed,
-    write_head,
-)
+from tests.fixtures.acting_heads import COPIES, HEAD, TRIANGLES, coordinates, values, write_head  # noqa: E402
 
-TRIANGLES = 24356
-HATTED = 500  # of its triangles wear another material
-
-
-def values(data, field: str, width: int, kind=np.float32) -> np.ndarray:
-    found = np.empty(width * len(data), kind)
-    data.foreach_get(field, found)
-    return found.reshape(-1, width)
+HATTED = 500
+"""Triangles that wear another material."""
 
 
 @pytest.fixture
@@ -52,27 +40,25 @@ def worked_on(capture):
 
 
 def seams(mesh) -> set:
-    """Both ends of each edge that is one, as places."""
-    ends = values(mesh.edges, "vertices", 2, np.int32)[values(mesh.edges, "use_seam", 1, bool)[:, 0]]
-    places = values(mesh.vertices, "co", 3)[ends].round(6)
-    return {tuple(sorted(map(tuple, pair))) for pair in places.tolist()}
+    """Return both ends of each seam, as places."""
+    ends = values(mesh.edges, "vertices", 2, np.int32)[values(mesh.edges, "use_seam", kind=bool)]
+    return {tuple(sorted(map(tuple, pair))) for pair in coordinates(mesh.vertices)[ends].round(6).tolist()}
 
 
-@pytest.mark.parametrize("by", ["the button", "Assemble Material"])
-def test_weights_uv_maps_attributes_slots_and_seams_stay_on_a_head_that_is_cut_open(by, addon, request, worked_on):
+def made(mesh) -> tuple[np.ndarray, ...]:
+    """Return what is kept for the first elements of each kind."""
+    return (
+        values(mesh.uv_layers["Mine"].data, "uv", 2),
+        values(mesh.attributes["wear"].data, "color", 4),
+        values(mesh.attributes["flag"].data, "value", kind=bool),
+        values(mesh.attributes["group"].data, "value", kind=np.int32),
+    )
+
+
+def test_weights_uv_maps_attributes_slots_and_seams_stay_on_a_head_that_is_cut_open(addon, worked_on, few_units):
     obj, mesh = worked_on, worked_on.data
-    before = {
-        "Mine": values(mesh.uv_layers["Mine"].data, "uv", 2),
-        "seams": seams(mesh),
-        "wear": values(mesh.attributes["wear"].data, "color", 4),
-        "flag": values(mesh.attributes["flag"].data, "value", 1, bool),
-    }
-    name, skin = mesh.name, mesh.materials[0]
-    if by == "Assemble Material":
-        request.getfixturevalue("open_eyed")
-        bpy.ops.wildcap.assemble_material()
-    else:
-        bpy.ops.wildcap.add_face_units()
+    before, seams_before, name, skin = made(mesh), seams(mesh), mesh.name, mesh.materials[0].name
+    bpy.ops.wildcap.add_face_units()
     asset, mesh = addon("acting.asset").load(), obj.data
     assert addon("acting.mesh").has(obj) and mesh.name == name and mesh["rig_id"] == "abc"
     assert [group.name for group in obj.vertex_groups] == ["Jaw", "Empty"] and obj.vertex_groups["Jaw"].lock_weight
@@ -83,21 +69,12 @@ def test_weights_uv_maps_attributes_slots_and_seams_stay_on_a_head_that_is_cut_o
     assert not weights[HEAD + COPIES :].any()
     assert [layer.name for layer in mesh.uv_layers] == ["UVMap", "Mine"] and mesh.uv_layers.active_index == 1
     assert mesh.uv_layers["UVMap"].active_render
-    for kept, known in (
-        (values(mesh.uv_layers["Mine"].data, "uv", 2), before["Mine"]),
-        (values(mesh.attributes["wear"].data, "color", 4), before["wear"]),
-        (values(mesh.attributes["flag"].data, "value", 1, bool), before["flag"]),
-    ):
-        assert np.array_equal(kept[: len(known)], known) and known.any()
-    assert not values(mesh.uv_layers["Mine"].data, "uv", 2)[3 * TRIANGLES :].any()
-    group = values(mesh.attributes["group"].data, "value", 1, np.int32)[:, 0]
-    assert np.array_equal(group[:TRIANGLES], np.arange(TRIANGLES)) and not group[TRIANGLES:].any()
-    assert not seams(mesh) ^ before["seams"] and len(before["seams"]) > 1000
-    assert [material.name for material in mesh.materials] == [
-        skin.name,
-        *(f"{obj.name} {inside}" for inside in ("Eyes", "Mouth", "Teeth")),
-        "Beanie",
-    ]
-    slots = values(mesh.polygons, "material_index", 1, np.int32)[:, 0]
+    for kept, old in zip(made(mesh), before, strict=True):
+        assert np.array_equal(kept[: len(old)], old) and old.any()
+    assert not made(mesh)[0][3 * TRIANGLES :].any() and not made(mesh)[3][TRIANGLES:].any()
+    assert seams(mesh) == seams_before and len(seams_before) > 1000
+    inside = [f"{obj.name} {part}" for part in ("Eyes", "Mouth", "Teeth")]
+    assert [material.name for material in mesh.materials] == [skin, *inside, "Beanie"]
+    slots = values(mesh.polygons, "material_index", kind=np.int32)
     assert (slots[:HATTED] == 4).all() and (slots[HATTED:TRIANGLES] == 0).all() and slots[TRIANGLES:].max() == 3
     assert list(obj.modifiers.keys()) == ["Sub"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
-from tests.fixtures import flat_patch, node_text  # noqa: E402
+from tests.fixtures import node_text  # noqa: E402
 from tests.fixtures.flat_patch import assembled, height_map, paint, seen, sockets, white_world  # noqa: E402
 
 EXPECTED = """
@@ -65,12 +65,6 @@ WildCap UV.UV -> WildCap Displacement.Vector
 WildCap UV.UV -> WildCap Normal.Vector
 WildCap UV.UV -> WildCap Specular.Vector
 """
-
-
-@pytest.fixture
-def patch(addon, tmp_path):
-    """An open capture whose head is a flat square."""
-    return flat_patch.make(tmp_path / "patch.wildcap")
 
 
 def test_the_material_as_text(patch):
@@ -132,11 +126,8 @@ def test_saved_moved_and_opened_again_it_gives_the_same_pixels(patch, tmp_path):
     patch.rename(folder / "patch.wildcap")
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.ops.wildcap.open_capture(directory=str(folder / "patch.wildcap"))
-    paint(
-        folder / "patch.wildcap",
-        "diffuse_albedo.png",
-        [[(0.8, 0.5, 0.3), (0.2, 0.3, 0.4)], [(0.5, 0.5, 0.5), (0.9, 0.1, 0.2)]],
-    )
+    rows = [[(0.8, 0.5, 0.3), (0.2, 0.3, 0.4)], [(0.5, 0.5, 0.5), (0.9, 0.1, 0.2)]]
+    paint(folder / "patch.wildcap", "diffuse_albedo.png", rows)
     sockets(assembled())["Roughness"].default_value = 0.33
     white_world()
     before = seen(tmp_path / "shot.exr")
@@ -146,11 +137,8 @@ def test_saved_moved_and_opened_again_it_gives_the_same_pixels(patch, tmp_path):
     material = bpy.data.objects["patch"].active_material
     images = {node.name: node.image for node in material.node_tree.nodes if node.bl_idname == 'ShaderNodeTexImage'}
     assert all(bpy.path.abspath(image.filepath).startswith(str(tmp_path / "after")) for image in images.values())
-    assert [images[f"WildCap {name}"].colorspace_settings.name for name in ("Albedo", "Specular", "Normal")] == [
-        "sRGB",
-        "Non-Color",
-        "Non-Color",
-    ]
+    spaces = [images[f"WildCap {name}"].colorspace_settings.name for name in ("Albedo", "Specular", "Normal")]
+    assert spaces == ["sRGB", "Non-Color", "Non-Color"]
     assert np.array_equal(seen(tmp_path / "shot.exr"), before) and before.std() > 0.01
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether somebody modelled on an object of the close-up since it was made: a digest of its mesh tells."""
+"""Detect by a digest of its mesh whether somebody modelled on an object of the close-up since it was made."""
 
 import hashlib
 
@@ -9,13 +9,13 @@ import numpy as np
 from ...data_blocks import read_field
 
 MADE = "wildcap_made"
-"""Custom property of such an object: the digest of it as it was made."""
+"""Custom property of such an object: its digest as it was made."""
 BLENDERS_OWN = ("material_index", "sharp_face", "sharp_edge", "custom_normal")
-"""Attributes that come and go by themselves."""
+"""Attributes that Blender adds and removes by itself."""
 
 
 def note(thing) -> None:
-    """To be called once it is made."""
+    """Record an object as made."""
     thing[MADE] = _digest(thing)
 
 
@@ -24,19 +24,11 @@ def is_modelled(thing) -> bool:
 
 
 def _digest(thing) -> str:
-    """Stands for where it lies, its vertices, faces, UVs and shape keys, and the names of its groups and
-    attributes."""
+    """Hash its location, vertices, faces, UVs and shape keys, and the names of its groups and attributes."""
     mesh = thing.data
     keys = mesh.shape_keys.key_blocks if mesh.shape_keys else ()
-    names = (
-        [key.name for key in keys],
-        [group.name for group in thing.vertex_groups],
-        sorted(
-            attribute.name
-            for attribute in mesh.attributes
-            if not attribute.is_internal and attribute.name not in BLENDERS_OWN
-        ),
-    )
+    attributes = {attribute.name for attribute in mesh.attributes if not attribute.is_internal} - {*BLENDERS_OWN}
+    names = [key.name for key in keys], [group.name for group in thing.vertex_groups], sorted(attributes)
     arrays = [
         np.array(thing.location, np.float32),
         read_field(mesh.vertices, "co", 3),
@@ -44,5 +36,5 @@ def _digest(thing) -> str:
         *(read_field(layer.data, "uv", 2) for layer in mesh.uv_layers),
         *(read_field(key.data, "co", 3) for key in keys),
     ]
-    told = repr(names).encode() + b"".join(array.tobytes() for array in arrays)
-    return hashlib.blake2b(told, digest_size=16).hexdigest()
+    content = repr(names).encode() + b"".join(array.tobytes() for array in arrays)
+    return hashlib.blake2b(content, digest_size=16).hexdigest()

@@ -1,37 +1,42 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of an iris and of a white without their colours, once around the gaze in each row: packed into the file, one
-pair for all heads in it."""
+"""Pictures of an iris and of a white without their colours, each row once around the gaze.
+
+Packed into the file, one pair for all heads in it.
+"""
 
 import bpy
 import numpy as np
 
-from ... import colours
 from ...data_blocks import find
+from ..materials import pack_image
 
 IRIS, WHITE = "WildCap Iris", "WildCap White"
 IRIS_SIZE, WHITE_SIZE = (384, 1536), (640, 2048)  # rows from the pupil, or from the limbus, outwards; columns around
 VESSELS = 34
 CORNER_RAD = 0.9
-"""Radians about the horizontal within which most vessels come in: those of the corners."""
+"""Angle about the horizontal within which most vessels enter: those of the corners."""
 LONGEST_STEPS = 900
-"""Steps of a pixel after which a vessel ends, wherever it is."""
+"""Steps of a pixel after which a vessel ends in any case."""
 SEED = 11
 
 
 def iris() -> bpy.types.Image:
-    """Red: half of the brightness, 0.5 is the iris' colour itself; green: height; blue: where it is warmer."""
+    """Return half of the brightness in red (0.5 is the iris' colour itself), height in green, warmth in blue."""
     return _image(IRIS, iris_pattern)
 
 
 def white() -> bpy.types.Image:
-    """Red: vessels; green: how pink the white is; blue: height."""
+    """Return vessels in red, pinkness in green, height in blue."""
     return _image(WHITE, white_pattern)
 
 
 def iris_pattern() -> np.ndarray:
-    """[rows, columns, 3]: strands of the stroma from the collarette outwards, the sphincter within, crypts between
-    them, furrows, a dark limbal ring."""
+    """Draw an iris [rows, columns, 3].
+
+    Strands of the stroma from the collarette outwards, the sphincter within, crypts between them, furrows, a dark
+    limbal ring.
+    """
     rows, columns = IRIS_SIZE
     rng = np.random.default_rng(SEED)
     out = (np.arange(rows) + 0.5)[:, None] / rows
@@ -56,8 +61,7 @@ def iris_pattern() -> np.ndarray:
 
 
 def white_pattern() -> np.ndarray:
-    """[rows, columns, 3]: vessels that come in from the corners and branch towards the limbus, where a fine net ends
-    them."""
+    """Draw a white [rows, columns, 3]: vessels that enter from the corners and branch towards the limbus."""
     rows, columns = WHITE_SIZE
     rng = np.random.default_rng(SEED)
     dots: tuple[list, list] = ([], [])
@@ -73,16 +77,14 @@ def white_pattern() -> np.ndarray:
     inner = (0.12 + 0.88 * np.abs(np.cos(turn)) ** 1.5) * _smooth(out, 0.06, 0.6) * (0.6 + 0.8 * mottled)
     pink = inner + 0.12 * np.exp(-(((out - 0.13) / 0.07) ** 2))
     red = np.clip(0.9 * _blur(vessels, 0.6) + 0.45 * deep, 0, 1)
-    return np.stack(
-        [red, np.clip(pink, 0, 1), np.clip(0.5 + 0.3 * red + 0.06 * _noise(rng, WHITE_SIZE, 20, 60), 0, 1)], -1
-    )
+    height = np.clip(0.5 + 0.3 * red + 0.06 * _noise(rng, WHITE_SIZE, 20, 60), 0, 1)
+    return np.stack([red, np.clip(pink, 0, 1), height], -1)
 
 
 def _vessel(
     rng: np.random.Generator, around: float, row: float, width: float, ends: float
 ) -> list[tuple[float, float, float]]:
-    """Column, row and width in pixels of the dots along a vessel from a row inwards to where it ends, winding, with
-    branches."""
+    """Return column, row and width in pixels of the dots along a winding vessel with branches, from a row inwards."""
     rows, columns = WHITE_SIZE
     dots, inwards = [], -np.pi / 2
     pending = [(around * columns / (2 * np.pi), row, inwards + rng.normal(0, 0.25), width, ends)]
@@ -103,7 +105,7 @@ def _vessel(
 
 
 def _drawn(dots: list[tuple[float, float, float]]) -> np.ndarray:
-    """Dots as a picture of WHITE_SIZE, 1 at most, soft to a pixel; where they overlap the darkest counts."""
+    """Draw soft dots in a picture of WHITE_SIZE, 1 at most; where they overlap the darkest counts."""
     rows, columns = WHITE_SIZE
     picture = np.zeros(WHITE_SIZE)
     x, y, width = np.array(dots).T
@@ -117,7 +119,7 @@ def _drawn(dots: list[tuple[float, float, float]]) -> np.ndarray:
 
 
 def _noise(rng: np.random.Generator, size: tuple[int, int], rows: float, columns: float) -> np.ndarray:
-    """Smooth noise of about `rows` waves along a column and `columns` around, mean 0 and spread 1; it closes around."""
+    """Return smooth noise, periodic around, with that many waves along a column and around; mean 0, spread 1."""
     white = np.fft.rfft2(rng.normal(size=(2 * size[0], size[1])))
     down, round_ = np.fft.fftfreq(2 * size[0])[:, None] * size[0], np.fft.rfftfreq(size[1])[None] * size[1]
     soft = np.exp(-0.5 * ((down / rows) ** 2 + (round_ / columns) ** 2)) * (round_ > 0)
@@ -126,12 +128,11 @@ def _noise(rng: np.random.Generator, size: tuple[int, int], rows: float, columns
 
 
 def _blur(picture: np.ndarray, sigma: float) -> np.ndarray:
-    """Gaussian, of a sigma in pixels; closed around, mirrored at the ends."""
+    """Blur by a Gaussian of a sigma in pixels; periodic around, mirrored at the ends."""
     twice = np.concatenate([picture, picture[::-1]])
     down, round_ = np.fft.fftfreq(len(twice))[:, None], np.fft.rfftfreq(picture.shape[1])[None]
-    return np.fft.irfft2(
-        np.fft.rfft2(twice) * np.exp(-2 * (np.pi * sigma) ** 2 * (down**2 + round_**2)), s=twice.shape
-    )[: len(picture)]
+    kernel = np.exp(-2 * (np.pi * sigma) ** 2 * (down**2 + round_**2))
+    return np.fft.irfft2(np.fft.rfft2(twice) * kernel, s=twice.shape)[: len(picture)]
 
 
 def _smooth(x: np.ndarray, low: np.ndarray | float, high: np.ndarray | float) -> np.ndarray:
@@ -144,10 +145,4 @@ def _image(name: str, pattern) -> bpy.types.Image:
     if image is not None and image.packed_file is not None:
         return image
     pixels = pattern()
-    rows, columns = pixels.shape[:2]
-    image = bpy.data.images.new(name, columns, rows, is_data=True)
-    colours.as_data(image)
-    image.pixels.foreach_set(np.concatenate([pixels, np.ones((rows, columns, 1))], 2).astype(np.float32).ravel())
-    image.update()
-    image.pack()
-    return image
+    return pack_image(name, np.concatenate([pixels, np.ones_like(pixels[..., :1])], 2), is_data=True)

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the close-up's tongue lies: within the lower teeth, with which it goes wherever the jaw does, and down
-between them when the mouth is open.
+"""Place the close-up's tongue: within the lower teeth wherever the jaw goes, and down between them in an open mouth.
 
-Behind closed lips a tongue reaches up to the palate. Its tip keeps to the jaw, its root to the hyoid bone: an opening
-jaw does not turn the whole tongue along, or its back would stand before the throat. Lengths in metres.
+Behind closed lips a tongue reaches up to the palate. Its tip follows the jaw, its root the hyoid bone: an opening jaw
+does not turn the whole tongue, or its back would stand in front of the throat. Lengths in metres.
 """
 
 from __future__ import annotations
@@ -19,38 +18,35 @@ from .mouth_shapes import Mouth, lower_arch
 
 OPEN, OUT = "jawOpen", "tongueOut"
 OVER, DOWN = "tongueOver", "tongueDown"
-"""Keys that are no units: the rise of the tip on its way out, and what lays the tongue down as the jaw opens."""
+"""Keys that are no units: the rise of the tip on its way out, and the descent as the jaw opens."""
 OUT_BY = f"min({OUT}, {OPEN})"
-"""Through closed lips no tongue comes: it goes as far as the jaw is open."""
+"""Share by which the tongue comes out: closed lips stop it."""
 LED_BY = {
     OUT: OUT_BY,
     OVER: f"4 * {OUT_BY} * (1 - {OUT_BY})",
     DOWN: f"min({OPEN}, 1) * (2 - min({OPEN}, 1)) * (1 - min(4 * {OUT}, 1))",
 }
-"""Expressions of units that drive these keys. The tongue leaves the palate as the jaw begins to open: three quarters of
-the way down are done when the jaw is half open. One that is put out rises first, over the lower teeth."""
+"""Expressions of units that drive these keys. Three quarters of the descent are done when the jaw is half open; a
+tongue that is put out rises first, over the lower teeth."""
 RISE_M, OVER_M = 0.004, 0.006
-"""How much higher than by the unit the tip lies when the tongue is out, and how far it rises on its way: over the lower
-teeth and the lip."""
+"""Height of the tip above the unit's when the tongue is out, and on its way over lower teeth and lip."""
 SHARE = 0.5
-"""How high the back of the tongue lies when the jaw is fully open: of the way from the edges of the lower front teeth
-to those of the upper ones."""
+"""Height of the tongue's back with the jaw fully open, between the edges of the lower and the upper front teeth."""
 CLEAR_M = 0.0007
-"""Between the tongue and what it lies on or beside: lower teeth, their gums and the mouth's floor."""
+"""Gap between the tongue and lower teeth, gums and floor."""
 DEEPEST = 0.85
-"""The most of the way to the mouth's floor that a vertex goes down: so the tongue keeps some of its thickness where the
-floor is high."""
+"""Largest share of the way to the floor that a vertex goes, so that the tongue keeps some thickness."""
 WIDTHS = np.linspace(1, 0.6, 9)
-"""Shares of its width that the tongue may have where the floor's sides are high."""
+"""Shares of its width that the tongue may take where the floor's sides are high."""
 NEAR_M = 0.003
-"""Teeth and gums are beside a vertex that is as near along the arch and in height, and vertices above each other that
-are as near along the tongue: less than a tooth is wide."""
+"""Distance, along the arch or the tongue and in height, within which points count as beside or above each other: less
+than the width of a tooth."""
 BEHIND_M = 0.010
-"""Over this way behind the last teeth the tongue becomes as wide as it was."""
+"""Distance behind the last teeth over which the tongue regains its width."""
 
 
 def lay_tongue(obj, jaws: Jaws, shape: Mouth) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """The tongue's vertices at rest in a head [N, 3], and what each key adds to them [N, 3]."""
+    """Return the tongue's vertices at rest in a head [N, 3], and what each key adds to them [N, 3]."""
     asset = jaws.asset
     at_rest = jaws.placed(_within_teeth(asset, shape, asset.parts[jaws.tongue]))
     moves = {name: jaws.turned(name, at_rest) for name in jaws.moves} | _out(jaws.moves[OUT][jaws.tongue])
@@ -64,14 +60,14 @@ def lay_tongue(obj, jaws: Jaws, shape: Mouth) -> tuple[np.ndarray, dict[str, np.
 
 
 def _out(moved: np.ndarray) -> dict[str, np.ndarray]:
-    """The keys that put the tongue out, of what the unit adds to it [N, 3]; the second one is there half way alone."""
+    """Return the keys that put the tongue out, from what the unit adds [N, 3]; OVER acts half way only."""
     ahead = np.clip(-moved[:, 1:2], 0, None)
     up = ahead / ahead.max() * [0, 0, 1.0]
     return {OUT: moved + RISE_M * up, OVER: OVER_M * up}
 
 
 def _within_teeth(asset: FaceUnits, shape: Mouth, points: np.ndarray) -> np.ndarray:
-    """Points [N, 3] of the tongue, drawn in where they are in lower teeth or gums; all in the template's axes."""
+    """Draw points [N, 3] of the tongue in where they touch lower teeth or gums, in the template's axes."""
     arch, teeth = lower_arch(asset), shape.vertices[shape.lower]
     along, inwards, behind, out = arch.beside(points)
     teeth_along, teeth_inwards, _, _ = arch.beside(teeth)
@@ -82,13 +78,13 @@ def _within_teeth(asset: FaceUnits, shape: Mouth, points: np.ndarray) -> np.ndar
 
 
 def _laid_down(opened: np.ndarray, edges: tuple[float, float], floor: BVHTree) -> np.ndarray:
-    """Places [N, 3] of a tongue when the jaw is fully open.
+    """Return the places [N, 3] of a tongue with the jaw fully open.
 
-    opened: where it would be if it went with the jaw as the teeth do; edges: heights of the upper front teeth's edges
-    and of the lower ones' then; floor: the mouth's lining then.
+    opened: where it would be if it followed the jaw as the teeth do; edges: heights of the upper and the lower front
+    teeth's edges; floor: the mouth's lining.
     """
     upper, lower = edges
-    column = np.abs(opened[:, None, 1] - opened[None, :, 1]) < NEAR_M  # [N, N] which stand above each other
+    column = np.abs(opened[:, None, 1] - opened[None, :, 1]) < NEAR_M  # [N, N] above each other
     back = np.where(column, opened[None, :, 2], -np.inf).max(1)
     height = np.clip(back - lower, 0, None)
     by = height * np.clip(1 - SHARE * (upper - lower) / max(height.max(), CLEAR_M), 0, 1)
@@ -98,7 +94,7 @@ def _laid_down(opened: np.ndarray, edges: tuple[float, float], floor: BVHTree) -
 
 
 def _narrowed(places: np.ndarray, column: np.ndarray, most: np.ndarray, floor: BVHTree) -> np.ndarray:
-    """Places [N, 3] with their sides drawn in to where the floor is no higher than `most` [N]."""
+    """Draw the sides of places [N, 3] in to where the floor is below `most` [N]."""
     middle, offset = places.mean(0) * [1, 0, 0], places - places.mean(0) * [1, 0, 0]
     fits = np.array([_heights(floor, middle + offset * [share, 1, 1]) < most for share in WIDTHS])  # [W, N]
     fits = (fits[:, None] | ~column).all(2)
@@ -108,14 +104,14 @@ def _narrowed(places: np.ndarray, column: np.ndarray, most: np.ndarray, floor: B
 
 
 def _heights(floor: BVHTree, places: np.ndarray) -> np.ndarray:
-    """Of the floor below places [N, 3]; -inf where there is none."""
+    """Return the floor's height below places [N, 3]; -inf where there is none."""
     hits = [floor.ray_cast(place, (0, 0, -1))[0] for place in places.tolist()]
     return np.array([-np.inf if hit is None else hit.z for hit in hits])
 
 
 def _lining(asset: FaceUnits, places: np.ndarray) -> BVHTree:
-    """The insides of the cheeks and the mouth's floor, of a head's places [V + C + P, 3]."""
-    inside = np.zeros(len(places), bool)
-    inside[len(asset.template) + len(asset.copies) + lining(asset)] = True
-    faces = asset.faces[inside[asset.faces[:, :3]].any(1)].tolist()
-    return BVHTree.FromPolygons(places.tolist(), [[corner for corner in face if corner >= 0] for face in faces])
+    """Return the insides of the cheeks and the mouth's floor, for a head's vertices [V + C + P, 3]."""
+    rows = asset.first_inner + lining(asset)
+    inside = np.isin(asset.faces[:, :3], rows).any(1)
+    faces = [face for face, is_inside in zip(asset.inner_faces(), inside, strict=True) if is_inside]
+    return BVHTree.FromPolygons(places.tolist(), faces)
