@@ -14,8 +14,9 @@ from core.face import template
 from core.geometry import meshes
 from core.imaging import images
 from core.stages import solve
-from tests.core.stages.solve.test_prior_layout import SIZE, capture, seen_layouts, settings  # noqa: F401
+from tests.fixtures.authors_prior import seen_layouts, settings
 from tests.fixtures.own_heads import check_fitted, lay_over, person
+from tests.fixtures.painted_skin import SIZE, make
 
 SHARED = Path(__file__).resolve().parents[5] / "shared"
 FACEKIT = SHARED / "data" / "ict_facekit"
@@ -33,10 +34,11 @@ def test_ict_facekit_is_laid_over_ours(ict_fitted):
     check_fitted(FACEKIT, *ict_fitted, shapes=11, median=0.15, p95=1.2)
 
 
-def test_on_ict_facekit_with_random_weights_of_the_released_shape(capture, ict_fitted, monkeypatch):  # noqa: F811
+def test_on_ict_facekit_with_random_weights_of_the_released_shape(tmp_path, ict_fitted, monkeypatch):
     weights = SHARED / "vectors" / "prior_v1_coord"
     if not weights.is_dir():
         pytest.skip(f"{weights} is missing")
+    capture = make(tmp_path / "face.wildcap", (0.6, 0.5), 0.06)
     meshes.write_obj(capture.head, person()[0])
     for theirs, ours in (
         (ict_fitted[0].own_head, capture.own_head),
