@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The constants of the method, and the named sets of them: ours, the paper's and the authors' released code's.
+"""The constants of the method (paper, section 4.1 and supplement), as three recipes.
 
-All three run through one implementation; what a name changes stands in RECIPES at the end of this file, side by side,
-and nowhere else.
+They are ours, the paper's, and that of the authors' released code. All run through one implementation; RECIPES at the
+end of this file lists side by side what each changes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Recipe:
-    """Every choice the solver makes. The defaults are ours; equation numbers are the paper's."""
+    """Every choice of the solver. The defaults are ours; equation numbers are the paper's."""
 
     # the walk
     steps: int = 20
@@ -142,10 +142,10 @@ RECIPES = {
 
 
 def settle_recipe(recipe: Recipe) -> Recipe:
-    """Where the split has told gamma^g: it stays, V alone moves."""
+    """Keep gamma^g as the split found it: V alone moves."""
     return replace(recipe, phases=tuple(("grid", begin, end) for _, begin, end in recipe.phases), refit=0.0)
 
 
 def free_recipe(recipe: Recipe) -> Recipe:
-    """Where it has not: all light moves as the phases say."""
+    """Let every light parameter be optimised, as the phases say."""
     return replace(recipe, linear=0.0)
