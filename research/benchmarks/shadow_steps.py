@@ -22,10 +22,10 @@ import numpy as np
 from core.face.head import read_filmed_head
 from core.imaging import images
 from core.settings.settings import Settings
-from core.solver import start as initial
 from core.solver.evidence import REFERENCE_TEXELS
 from core.solver.extensions import border
 from core.solver.recipes import OURS
+from core.solver.start import find_remaining_light, start_solve
 from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.head_cells import make_head_cells
 from core.stages.solve.prior_files import load
@@ -65,7 +65,7 @@ def measure(filmed: Filmed) -> dict:
     evidence = read_evidence(capture, read_filmed_head(capture), REFERENCE_TEXELS)
     tone = read_given_tone(people.skin_tone(filmed.truth))
     cell = evidence.cell_side(Settings().solve.grid_cells)
-    begun = initial.start_solve(load(), evidence, tone.tensor, cell, OURS, make_head_cells)
+    begun = start_solve(load(), evidence, tone.tensor, cell, OURS, make_head_cells)
     luminance = {
         name: np.log(
             np.maximum(
@@ -79,7 +79,7 @@ def measure(filmed: Filmed) -> dict:
             ("true", filmed.answer(TRUE)),
         )
     }
-    seen = np.log(initial.find_remaining_light(evidence, begun).numpy().clip(0.05, 4)).mean(0)
+    seen = np.log(find_remaining_light(evidence, begun).numpy().clip(0.05, 4)).mean(0)
     weight = (evidence.weight * evidence.trust * evidence.skin).numpy()
     kinds = {
         "removed": luminance["filmed"] - luminance["delit"],

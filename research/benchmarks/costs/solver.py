@@ -32,11 +32,11 @@ from core.capture.capture import Capture
 from core.capture.messages import Reporter
 from core.face.head import read_head
 from core.settings.settings import from_json
-from core.solver import start as initial
 from core.solver.prior import network, network_blocks
 from core.solver.prior.prior import Prior, ReleasedPrior, build_network
 from core.solver.recipes import OURS
 from core.solver.sampler import Sampler, seed_noise
+from core.solver.start import start_solve
 from core.stages import shadow_mask, solve
 from core.stages.solve import prior_files
 from core.stages.solve.capture_evidence import read_evidence
@@ -200,7 +200,7 @@ def single_steps(row: SolverVariant, capture: Capture, options: argparse.Namespa
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
     evidence = read_evidence(capture, read_head(capture), options.size)
     tone = read_given_tone(TONE).tensor
-    begun = initial.start_solve(prior, evidence, tone, evidence.cell_side(96), recipe, make_head_cells)
+    begun = start_solve(prior, evidence, tone, evidence.cell_side(96), recipe, make_head_cells)
     short = replace(begun.recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
     if options.compile:
         prior.network = torch.compile(prior.network)
