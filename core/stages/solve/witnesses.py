@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the pictures that the texture was made of show a mark, each by itself: what one view alone saw (a highlight's
-gap, an eyelash) is none of the skin's."""
+"""Confirm marks by the pictures that the texture was made of.
+
+What one view alone shows (a highlight's gap, an eyelash) is not the skin's.
+"""
 
 from __future__ import annotations
 
@@ -23,24 +25,19 @@ MIN_VIEWS = 2  # views; where fewer saw it the texture alone decides
 
 
 def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
-    """The marks that the delit views agree on.
+    """Return the marks, in texels of a map of `size`, that the delit views agree on.
 
-    Parameters
-    ----------
-    capture : with cameras and delit views; without them all marks stay
-    head : in the capture
-    marks : in texels of a map
-    size : of that map, in texels along a side
+    Without cameras and delit views all marks stay.
     """
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return marks
     covered = head.raster(size)[0] >= 0
     points, normals = (head.interpolate(vectors, size) for vectors in (head.mesh.vertices, head.normals))
     at = tuple(np.round([[mark.row, mark.column] for mark in marks]).astype(int).clip(0, size - 1).T)
-    there = points[at], normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
+    unit = normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
     seen, agreed = np.zeros(len(marks), int), np.zeros(len(marks), int)
     for view, path in delit_views(capture):
-        shown = find_visible(view, head.caster, *there) & covered[at]
+        shown = find_visible(view, head.caster, points[at], unit) & covered[at]
         if not shown.any():
             continue
         picture = np.log(np.maximum(images.read_linear(path), 1e-3)).mean(-1)
@@ -52,19 +49,7 @@ def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) ->
 
 
 def find_visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Which points of a surface a view sees.
-
-    Parameters
-    ----------
-    view : the camera
-    caster : of the surface
-    points : [N, 3], in metres
-    normals : [N, 3], unit
-
-    Returns
-    -------
-    bool [N].
-    """
+    """Return bool [N]: points [N, 3] in metres with unit normals [N, 3] of the caster's surface that a view sees."""
     towards = view.centre - points
     facing = (towards * normals).sum(1) > MIN_FACING_COSINE * np.linalg.norm(towards, axis=1)
     pixels, _ = view.project(points)
@@ -73,8 +58,10 @@ def find_visible(view: View, caster: raster.RayCaster, points: np.ndarray, norma
 
 
 def _contrast(view: View, picture: np.ndarray, points: np.ndarray, covered: np.ndarray, mark: Mark) -> float | None:
-    """How much darker than what is around it a view's picture (log [H, W]) is at the mark or within a radius of it, as
-    views and head may be off by that much; None where the view's frame ends there."""
+    """Return how much darker a view's picture (log [H, W]) is at a mark than around it; None if its frame ends there.
+
+    It may be within a radius of the mark, as views and head may be off by that much.
+    """
     reach = int(np.ceil(3.5 * mark.radius + 1))
     row, column = round(mark.row), round(mark.column)
     window = slice(max(row - reach, 0), row + reach + 1), slice(max(column - reach, 0), column + reach + 1)
