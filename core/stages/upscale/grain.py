@@ -48,7 +48,8 @@ def measure(channels: np.ndarray, slopes: np.ndarray, weight: np.ndarray, surfac
     """
     where = weight > 0.99
     texel = float(np.median(surface.texel[where])) if where.any() else 1.0
-    covariances, of_slopes = ([_covariance(band, where) for band in bands(p, weight, texel)] for p in (channels, slopes))
+    covariances = [_covariance(band, where) for band in bands(channels, weight, texel)]
+    of_slopes = [_covariance(band, where) for band in bands(slopes, weight, texel)]
     answer, answer_slope = _answers(surface, where, texel, np.random.default_rng([seed, 1]))
     mix, tie = np.zeros((len(WAVELENGTHS_MM), 4, 4)), np.ones(len(WAVELENGTHS_MM))
     strength = np.stack([nnls(answer, [cov[i, i] for cov in covariances])[0] for i in range(4)], 1)  # [K, 4] variances
@@ -84,7 +85,7 @@ def paint(grain: Grain, surface: HeadSurface, mask: np.ndarray, seed: int = 0) -
 
 
 def bands(picture: np.ndarray, weight: np.ndarray, texel: float) -> list[np.ndarray]:
-    """Return the bands [S, S, C] of a picture, fine to coarse, under the weights [S, S] of its texels, `texel` mm wide."""
+    """Return the bands [S, S, C] of a picture, fine to coarse, under weights [S, S] of its texels of that many mm."""
     levels, finer = [], picture
     for sigma in SIGMAS_MM:
         coarser = blurred(picture, weight, sigma / texel)
@@ -102,7 +103,10 @@ def blurred(picture: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray
 def _answers(
     surface: HeadSurface, mask: np.ndarray, texel: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the variances [band, wavelength] in the map's bands of a noise of deviation 1, and of the slopes of such a height."""
+    """Return the variances [band, wavelength] in the map's bands of a noise, and of the slopes of such a height.
+
+    The noise has a deviation of 1.
+    """
     side = int(min(np.sqrt(SAMPLE_TEXELS), surface.size))
     top, left = (
         int(np.clip(np.median(at) - side / 2, 0, surface.size - side)) if len(at) else 0 for at in np.nonzero(mask)
@@ -116,7 +120,8 @@ def _answers(
     for k, wavelength in enumerate(WAVELENGTHS_MM):
         seed = int(rng.integers(1 << 31))
         height, aside = (
-            noise(at, wavelength, np.random.default_rng(seed)) for at in (points, points + np.float32(STEP_MM) * tangent)
+            noise(at, wavelength, np.random.default_rng(seed))
+            for at in (points, points + np.float32(STEP_MM) * tangent)
         )
         both = np.stack([height, (aside - height) / STEP_MM], 1).reshape(side, side, 2)
         for b, band in enumerate(bands(both, inner, texel)):

@@ -69,7 +69,7 @@ class HeadSurface:
         )
 
     def smooth(self, field: np.ndarray, weight: np.ndarray, reach: float, tolerance: float | None = None) -> np.ndarray:
-        """Return the map, float32 [S, S, C], that follows a field [S, S, C] under its weight [S, S], and is else as even as can be.
+        """Return the map, float32 [S, S, C], that follows a field [S, S, C] under its weight [S, S], and is else even.
 
         It minimises the integral of weight (x - field)^2 + reach^2 |grad x|^2 over the surface, with a weak pull to the
         mean where there is no weight; `reach` is in mm. Values that lie by more than about `tolerance` off a broader

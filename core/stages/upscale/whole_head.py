@@ -98,7 +98,7 @@ def seen_well(seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
 
 
 def _scalp_share(confidence: np.ndarray, seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
-    """Return [S, S] in [0, 1]: 1 off the scalp, and on it where its surroundings were seen about as well as usual skin."""
+    """Return [S, S]: 1 off the scalp, and on it where its surroundings were seen about as well as usual skin."""
     usual = float(np.median(confidence[seen == 1])) if (seen == 1).any() else 1.0
     around = surface.smooth(confidence[..., None], np.ones_like(confidence), SURROUNDINGS_MM)[..., 0]
     kept = _smoothstep((around / max(usual, 1e-6) - GLANCED_SHARE) / (WATCHED_SHARE - GLANCED_SHARE))
