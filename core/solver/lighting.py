@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texel grid lighting model Gamma_theta (paper, section 3.3, equations 2 to 4).
+"""Texel grid lighting model Gamma_theta (paper, section 3.3, equations 2 to 4).
 
 A global light gamma^g of second-order spherical harmonics shades the face, and a grid V of local ones inside the shadow
 mask M:

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """theta_{t-1} = theta_t - eta_t grad_theta (L_pho + L_reg): the light's cost and steps (paper, equation 9).
 
-L_reg = 0.1 L_TV + L_neg is the supplement's; the gradient steps are Adam's, as in the authors' code.
+L_reg = 0.1 L_TV + L_neg is the supplement's (equations 10 to 12); the gradient steps are Adam's, as in the authors'
+code.
 """
 
 from __future__ import annotations
@@ -79,8 +80,8 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
         restraint, missing = (
             value[shader.box] if isinstance(value, torch.Tensor) else value for value in (o.restraint, o.missing)
         )
-        gone = missing * shader.box_alpha * shader.main(lights)[box].detach()
-        loss = loss + recipe.faint * brightness * (restraint * (local + gone) ** 2).sum()
+        loss_of_light = missing * shader.box_alpha * shader.main(lights)[box].detach()
+        loss = loss + recipe.faint * brightness * (restraint * (local + loss_of_light) ** 2).sum()
     if recipe.smooth:
         # a shadow's own edge is in M and costs nothing
         free = shader.unmodulated(lights) if recipe.sharp_edges else local

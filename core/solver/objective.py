@@ -14,7 +14,7 @@ from .lighting import Lights, OnDevice, Shader
 
 @dataclass(frozen=True)
 class Observation(OnDevice):
-    """The map as it was observed, at one size.
+    """Map as it was observed, at one size.
 
     texture I_UV [3, H, W], scaled so that its shading is about one; weight [H, W] in [0, 1]: how much a texel's
     observation counts; trust [H, W] in [0, 1]: how much of it light may explain (less for brows, lips and hair); coords
@@ -37,7 +37,7 @@ class Observation(OnDevice):
 
 @dataclass
 class State(OnDevice):
-    r"""The sampling before step `step`.
+    r"""State of the sampling before step `step`.
 
     x: x_t [1, 7, H, W]; denoised: \hat x of the step before, x_0^ref at first; lights: theta; moments: Adam's, of
     theta.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The constants of the method (paper, section 4.1 and supplement), as three recipes.
+"""Constants of the method (paper, section 4.1 and supplement), as three recipes.
 
 They are ours, the paper's, and that of the authors' released code. All run through one implementation; RECIPES at the
 end of this file lists side by side what each changes.

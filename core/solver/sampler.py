@@ -41,7 +41,7 @@ def seed_noise(seed: int, device: torch.device | str = "cpu") -> Callable[[int],
 
 @dataclass(frozen=True)
 class Sampler:
-    """The method, whatever is observed of the map.
+    """Sampling method, whatever is observed of the map.
 
     denoiser(x, sigma, coords) is the prior; noise is `seed_noise`'s, of the observations' device; impose_known(x,
     sigma, draw) puts into x_t what is certain of the map (window.py); fit moves theta after each step (`update_lights`,
@@ -74,8 +74,8 @@ class Sampler:
                 clean = _resized(state.denoised, *o.weight.shape)
                 state.x = clean + s * draw(*clean.shape)
                 # the lights' cost is a sum over texels, and Adam's memory of its gradient is longer than a size lasts
-                grown = o.weight.numel() / state.denoised[0, 0].numel()
-                state.moments = [moment * grown ** (1 + k % 2) for k, moment in enumerate(state.moments)]
+                growth = o.weight.numel() / state.denoised[0, 0].numel()
+                state.moments = [moment * growth ** (1 + k % 2) for k, moment in enumerate(state.moments)]
             self.step(o, state, (s, sigmas[i + 1]), steps, draw)
             if not state.x.abs().max() <= 1e3 * (1 + s):  # nor where it is no number
                 raise DivergedError(f"The solver diverged at step {i + 1} of {steps}.")

@@ -104,8 +104,8 @@ def start_solve(
             lights.glob = fit_around_constant(light, torch.ones_like(light), basis, skin, 1e-3)
         else:
             recipe = free_recipe(recipe)
-    begun = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
-    return _lay_out(prior, evidence, begun, cell, callbacks)
+    start = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
+    return _lay_out(prior, evidence, start, cell, callbacks)
 
 
 def start_again(
@@ -125,22 +125,22 @@ def start_again(
     x_ref = make_reference(prior, earlier.tone, evidence, recipe.reference)
     recipe = settle_recipe(recipe) if earlier.settled else free_recipe(recipe)
     state = State(0, None, earlier.denoised, earlier.lights)
-    begun = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {}, state, local=earlier.local)
-    return _lay_out(prior, evidence, begun, cell, callbacks, lambda alpha: torch.lerp(earlier.alpha, alpha, near))
+    start = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {}, state, local=earlier.local)
+    return _lay_out(prior, evidence, start, cell, callbacks, lambda alpha: torch.lerp(earlier.alpha, alpha, near))
 
 
 def _lay_out(
     prior: Prior,
     evidence: Evidence,
-    begun: Start,
+    start: Start,
     cell: float,
     callbacks: Callbacks,
     mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha,
 ) -> Start:
     """Complete a start with M as it is used, the marks that light must not explain, and the observations under both."""
-    recipe = begun.recipe
-    evidence = replace(evidence, texture=evidence.texture / enlarge_field(begun.local, evidence.size).exp())
-    light = find_remaining_light(evidence, begun)
+    recipe = start.recipe
+    evidence = replace(evidence, texture=evidence.texture / enlarge_field(start.local, evidence.size).exp())
+    light = find_remaining_light(evidence, start)
     if recipe.sharp_edges:
         trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
         evidence = snap_to_edges(evidence, light, trusted, callbacks.check)
@@ -151,25 +151,25 @@ def _lay_out(
     marks: list[Mark] = []
     if recipe.protect_marks:
         evidence, marks = protect_marks(evidence, callbacks.witness)
-    observations = make_observations(evidence, begun.exposure, cell, prior.multiple, recipe)
-    return replace(begun, alpha=evidence.alpha, marks=tuple(marks), observations=observations)
+    observations = make_observations(evidence, start.exposure, cell, prior.multiple, recipe)
+    return replace(start, alpha=evidence.alpha, marks=tuple(marks), observations=observations)
 
 
-def find_remaining_light(evidence: Evidence, begun: Start) -> torch.Tensor:
+def find_remaining_light(evidence: Evidence, start: Start) -> torch.Tensor:
     """Return the texture over the reference face in its global light [3, S, S], linear.
 
     It is about 1, and less where light is missing or the skin is darker.
     """
-    shading = shade(begun.state.lights.glob, shading_basis(evidence.normal))
-    return evidence.texture * begun.exposure / (shading * albedo_of(begun.reference).clamp_min(1e-3)).clamp_min(1e-3)
+    shading = shade(start.state.lights.glob, shading_basis(evidence.normal))
+    return evidence.texture * start.exposure / (shading * albedo_of(start.reference).clamp_min(1e-3)).clamp_min(1e-3)
 
 
 def weigh_lit_skin(evidence: Evidence) -> torch.Tensor:
     """Return weights [S, S] of facial skin in the light, 0 in shadows. Raises NoSkinError."""
-    seen = evidence.skin * evidence.weight
-    lit = seen * (1 - evidence.alpha)
+    skin = evidence.skin * evidence.weight
+    lit = skin * (1 - evidence.alpha)
     if lit.sum() < 1:  # everything on the face is masked: fall back to all observed skin
-        lit = seen
+        lit = skin
     if lit.sum() < 1:
         raise NoSkinError("No facial skin was seen in the texture.")
     return lit

@@ -107,7 +107,7 @@ class Split:
 
 @dataclass(frozen=True)
 class HeadCells:
-    """The map's C x C cells on a head, alike for all captures.
+    """C x C cells of the map on a head, alike for all captures.
 
     covered bool [C, C]: the N of them that lie on it; places [N, 3], in metres, x towards one side of the face and 0 in
     its middle; varied [N]: deviation of skins from their mean there, over the face's own mean; nearest int [C, C]: the
@@ -179,8 +179,8 @@ def split_captures(
     fewer = len(captures) ** -0.5
     most = captures[0].weight.shape[0] // MIN_CELL_TEXELS
     on_head = head_cells(round(min(FIRST_CELLS, most) * fewer))
-    seen, ratios = join_seen([average_cells(shapes, on_head) for shapes in captures])
-    scales = find_scales(model_covariances(seen, seen), ratios, typical, check)
+    observed, ratios = join_seen([average_cells(shapes, on_head) for shapes in captures])
+    scales = find_scales(model_covariances(observed, observed), ratios, typical, check)
     on_head = head_cells(round(min(CELLS, most) * fewer))
     return infer_split([average_cells(shapes, on_head) for shapes in captures], scales)
 
@@ -195,8 +195,8 @@ def average_cells(shapes: Shapes, on_head: HeadCells) -> Cells:
     mean = resize_maps(ratio.transpose(1, 2, 0) * weight[..., None], count) / np.maximum(share, 1e-4)[..., None]
     normal = resize_maps(shapes.normal.numpy().transpose(1, 2, 0), count)[covered].astype(np.float64)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
-    seen = np.flatnonzero(share[covered] > MIN_SEEN_SHARE)
-    return Cells(on_head, normal, seen, mean[covered][seen].astype(np.float64) @ COLOUR_AXES.T)
+    observed = np.flatnonzero(share[covered] > MIN_SEEN_SHARE)
+    return Cells(on_head, normal, observed, mean[covered][observed].astype(np.float64) @ COLOUR_AXES.T)
 
 
 def join_seen(captures: list[Cells]) -> tuple[Places, np.ndarray]:
@@ -234,16 +234,16 @@ def find_scales(
     """Find the most probable scales by a search along one after the other; `check` may raise to cancel."""
     best, most = typical, log_probability(together, log_ratio, typical, typical)
     for step in (2.0, 1.4, 1.2):
-        moved = True
-        while moved:
-            moved = False
+        improved = True
+        while improved:
+            improved = False
             for name in (field.name for field in fields(Scales)):
                 for factor in (step, 1 / step):
                     check()
-                    tried = replace(best, **{name: getattr(best, name) * factor})
-                    probable = log_probability(together, log_ratio, tried, typical)
-                    if probable > most:
-                        best, most, moved = tried, probable, True
+                    candidate = replace(best, **{name: getattr(best, name) * factor})
+                    probability = log_probability(together, log_ratio, candidate, typical)
+                    if probability > most:
+                        best, most, improved = candidate, probability, True
     return best
 
 
@@ -266,10 +266,10 @@ def log_probability(
 
 def infer_split(captures: list[Cells], scales: Scales) -> Split:
     """Return the posterior mean of each part of the first capture, under the scales."""
-    first, (seen, ratios) = captures[0], join_seen(captures)
-    among = model_covariances(seen, seen)
+    first, (observed, ratios) = captures[0], join_seen(captures)
+    among = model_covariances(observed, observed)
     on_head, count = first.on_head, len(first.normal)
-    beyond = model_covariances(Places(on_head.places, first.normal, on_head.varied, np.zeros(count, int)), seen)
+    beyond = model_covariances(Places(on_head.places, first.normal, on_head.varied, np.zeros(count, int)), observed)
     basis = SH_SCALE * sh_basis(first.normal[first.observed])
     traits, local, coefficients = np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, 9))
     for axis, size in enumerate(AXIS_DEVIATIONS):
@@ -277,7 +277,7 @@ def infer_split(captures: list[Cells], scales: Scales) -> Split:
         traits[axis] = (scales.traits * size) ** 2 * beyond.traits @ weights
         local[axis] = (scales.local * size) ** 2 * beyond.local @ weights
         prior = (scales.light * size * ORDER_DEVIATIONS) ** 2 + LEVEL_DEVIATION**2 * (ORDER_DEVIATIONS == 0)
-        coefficients[axis] = SH_SCALE * prior * (basis.T @ weights[seen.own == 0])
+        coefficients[axis] = SH_SCALE * prior * (basis.T @ weights[observed.own == 0])
     maps = (_spread(COLOUR_AXES.T @ field, on_head) for field in (traits, local))
     return Split(COLOUR_AXES.T @ coefficients, *maps, scales)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""The prior's network, epsilon of the paper: a U-Net of modulated residual blocks in EDM's preconditioning.
+r"""Network of the prior, epsilon of the paper: a U-Net of modulated residual blocks in EDM's preconditioning.
 
 That makes its output \hat x_t (equation 6; Karras et al. 2022). Parameter names and arithmetic are those of the
 authors' `image_v1` models, so their state dict loads as it is. One choice is ours: `norm: pixel` normalises each texel

@@ -23,8 +23,8 @@ def run_layers(blocks: nn.ModuleList, x: torch.Tensor, mapped: torch.Tensor, low
     `low_memory` keeps only the layers' inputs for the gradient, and computes what is inside them a second time.
     """
     for layer in blocks:
-        given = (x, mapped) if isinstance(layer, Residual | SelfAttention) else (x,)
-        x = checkpoint(layer, *given, use_reentrant=False) if low_memory and x.requires_grad else layer(*given)
+        inputs = (x, mapped) if isinstance(layer, Residual | SelfAttention) else (x,)
+        x = checkpoint(layer, *inputs, use_reentrant=False) if low_memory and x.requires_grad else layer(*inputs)
     return x
 
 

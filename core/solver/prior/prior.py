@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""The diffusion prior of facial reflectance: prior.of_tone(tone)(x, sigma, coords) is \hat x_t (paper, equation 6).
+r"""Diffusion prior of facial reflectance: prior.of_tone(tone)(x, sigma, coords) is \hat x_t (paper, equation 6).
 
 x is [N, 7, H, W]: 2 * diffuse_linear - 1 (3), tangent-space normal xyz (3), 2 * specular - 1 (1), plus noise of
 standard deviation sigma. A prior is ours, or one that the method's authors release (`ReleasedPrior`).
@@ -19,7 +19,7 @@ BLIND_SIGMA, CLEAR_SIGMA = 80.0, 0.01  # noise levels of a channel that is unkno
 
 
 class MissingMapError(ValueError):
-    """The fixed random map that a prior is conditioned on is missing."""
+    """Missing random map that a prior is conditioned on."""
 
 
 class Prior:
@@ -65,9 +65,9 @@ class Prior:
 
     def with_face(self, mean_face: torch.Tensor) -> Prior:
         """Return the prior with a mean face to start from."""
-        given = copy.copy(self)
-        given.mean_face = mean_face.to(self.device)
-        return given
+        prior = copy.copy(self)
+        prior.mean_face = mean_face.to(self.device)
+        return prior
 
     def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> Condition:
         """Return `denoise`'s condition of maps at coords [N, 2, H, W] of skins of tone [1, 3]."""
@@ -88,7 +88,7 @@ class Prior:
 
 
 class ConditionedPrior:
-    """The sampler's denoiser: a prior, which stays as it is, and a skin tone.
+    """Denoiser of the sampler: a prior, which stays as it is, and a skin tone.
 
     The tone is linear [1, 3], or None if the prior takes none.
     """

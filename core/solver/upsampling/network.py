@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The super-resolution network U (paper, supplement): RCAN, with seven channels in and out, four times as large.
+"""Super-resolution network U (paper, supplement): RCAN, with seven channels in and out, four times as large.
 
 Zhang et al. 2018, "Image Super-Resolution Using Very Deep Residual Channel Attention Networks". It adds to bicubic
 resampling what that misses, so with a tail of zeros it is bicubic resampling. Channels: sRGB-coded diffuse albedo (3),

@@ -40,10 +40,10 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
             "No texel of the texture was seen by any frame.",
             "Run the stage Cameras again and those after it, and look at the report.",
         )
-    seen = resize_maps(confidence, size)
+    visibility = resize_maps(confidence, size)
     bearded = np.maximum(resize_maps(beard.seen_in(texture, confidence), size), read_hidden_skin(capture, size))
     # unseen texels must not darken their neighbours
-    texture = resize_maps(texture * confidence[..., None], size) / np.maximum(seen, 1e-4)[..., None]
+    texture = resize_maps(texture * confidence[..., None], size) / np.maximum(visibility, 1e-4)[..., None]
     covered = head.raster(size)[0] >= 0
     normal = raster.bleed(head.interpolate(head.normals, size), covered)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
@@ -54,7 +54,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     alpha = soften_mask(mask) * (1 - protected)
     skin = template.mask("skin", size) * template.mask("face", size)
     skin = skin * (1 - template.mask("eyes", size)) * (1 - bearded)
-    weight = np.where(covered, np.clip(seen / FULL_CONFIDENCE, 0, 1), 0)
+    weight = np.where(covered, np.clip(visibility / FULL_CONFIDENCE, 0, 1), 0)
     features = np.maximum.reduce([template.mask(name, size) for name in FEATURES])
     trust = np.minimum(1 - (1 - FEATURE_TRUST) * features, 1 - (1 - BEARD_TRUST) * bearded)
     maps = {

@@ -57,7 +57,7 @@ def prove() -> Proof:
 def list_devices() -> list[str]:
     """List the devices that PyTorch names, beside the CPU."""
     available = {"cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
-    return [name for name, there in available.items() if there]
+    return [name for name, is_available in available.items() if is_available]
 
 
 def run_pass(device: str) -> tuple[torch.Tensor, float]:

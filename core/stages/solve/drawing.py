@@ -23,17 +23,18 @@ def draw_edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[M
     """
     side = min(evidence.size, REFERENCE_TEXELS // 2)
     texture = images.resize(np.ascontiguousarray(evidence.texture.permute(1, 2, 0).numpy()), side, side)
-    seen = texture[images.resize(evidence.weight.numpy(), side, side) > 0.5]
-    shown = images.linear_to_srgb(texture * (0.8 / max(float(np.percentile(seen, 99)) if seen.size else 1.0, 1e-6)))
+    visible = texture[images.resize(evidence.weight.numpy(), side, side) > 0.5]
+    brightest = float(np.percentile(visible, 99)) if visible.size else 1.0
+    picture = images.linear_to_srgb(texture * (0.8 / max(brightest, 1e-6)))
     small = images.resize(alpha.numpy(), side, side)
     for mask, colour in ((images.resize(evidence.alpha.numpy(), side, side), PAINTED_RGB), (small, LAID_RGB)):
         contours, _ = cv2.findContours((mask > 0.5).astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(shown, contours, -1, colour, 1)
+        cv2.drawContours(picture, contours, -1, colour, 1)
     scale = side / evidence.size
     for mark in marks:
         middle, radius = (round(mark.column * scale), round(mark.row * scale)), round(2.2 * mark.radius * scale)
-        cv2.circle(shown, middle, max(4, radius), MARK_RGB, 1)
-    return np.hstack([shown, np.repeat(np.clip(small, 0, 1)[..., None], 3, 2)])
+        cv2.circle(picture, middle, max(4, radius), MARK_RGB, 1)
+    return np.hstack([picture, np.repeat(np.clip(small, 0, 1)[..., None], 3, 2)])
 
 
 def draw_loss_curve(losses: list[tuple[int, float]], steps: int) -> np.ndarray:

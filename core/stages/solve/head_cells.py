@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built-in head's cells for the split of skin and light (split.py), with how far skins differ there."""
+"""Cells of the built-in head for the split of skin and light (split.py), with how far skins differ there."""
 
 from __future__ import annotations
 

@@ -147,8 +147,8 @@ def _measure_in_frame(
     if len(at) < MIN_POINTS or len(rows) < MIN_POINTS:
         return None
     pixels = view.project(head.mesh.vertices[skin[at]])[0] * shrink
-    kept = raster.sample(frame.max(-1), pixels) < BURNT_SRGB
-    if kept.sum() < MIN_POINTS:
+    usable = raster.sample(frame.max(-1), pixels) < BURNT_SRGB
+    if usable.sum() < MIN_POINTS:
         return None
-    light = np.median(raster.sample(linear, pixels[kept]) / skin_albedo[at][kept], axis=0)
+    light = np.median(raster.sample(linear, pixels[usable]) / skin_albedo[at][usable], axis=0)
     return np.median(linear[rows, columns], axis=0) / np.maximum(light, 1e-6)

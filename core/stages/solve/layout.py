@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The UVs that a released prior was trained in, to which evidence goes and from which solved maps come back.
+"""UVs that a released prior was trained in, to which evidence goes and from which solved maps come back.
 
 The artist's own fitted mesh brings these UVs; nothing here knows which mesh it is. The released code works on a window
 of the map, and the bounds of its masks lie in it (their soft shapes are not at hand).
@@ -89,7 +89,7 @@ class Layout:
         mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone[None])[0]
         light = shade(lights.glob, shading_basis(e.normal)).clamp_min(1e-2)
         light = light / exposure / solved.gain[:, None, None]
-        seen = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(MIN_ALBEDO, 1)
+        albedo = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(MIN_ALBEDO, 1)
 
         def join(baked: np.ndarray, beyond: np.ndarray) -> np.ndarray:
             share = inside.reshape(inside.shape + (1,) * (baked.ndim - 2))
@@ -100,7 +100,7 @@ class Layout:
         confidence = np.where(self.back.known, inside * baking.bake(solved.confidence, self.back), 0)
         return replace(
             solved,
-            diffuse=join(baking.bake(solved.diffuse, self.back), to_picture(seen)),
+            diffuse=join(baking.bake(solved.diffuse, self.back), to_picture(albedo)),
             normal=(normal / 2 + 0.5).astype(np.float32),
             specular=join(baking.bake(solved.specular, self.back), ((mean[6] + 1) / 2).numpy()),
             shading=join(baking.bake(solved.shading, self.back), to_picture(light)),

@@ -79,15 +79,15 @@ def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter
     mesh, normals = head.mesh, head.normals
     weight = raster.sample_uv(weigh_skin(512, shadow), vertex_uvs(mesh))
     points = np.flatnonzero(weight > 0.05)
-    seen = np.full((len(views), len(points), 3), np.nan)
+    colours = np.full((len(views), len(points), 3), np.nan)
     for i, view in enumerate(views):
         report.progress(0, len(views), f"looking at the skin in frame {i + 1} of {len(views)}")
-        seen[i] = _read_colours(view, head.caster, mesh.vertices[points], normals[points])
-    often = np.isfinite(seen[..., 0]).sum(0) >= min(2, len(views))
+        colours[i] = _read_colours(view, head.caster, mesh.vertices[points], normals[points])
+    often = np.isfinite(colours[..., 0]).sum(0) >= min(2, len(views))
     if often.sum() < MIN_SKIN_POINTS:
         return None
     points = points[often]
-    return summarise_look(_low_quantile(seen[:, often]), normals[points], weight[points])
+    return summarise_look(_low_quantile(colours[:, often]), normals[points], weight[points])
 
 
 def weigh_skin(size: int, shadow: np.ndarray) -> np.ndarray:
@@ -109,17 +109,17 @@ def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) 
     A light of second-order spherical harmonics is fitted to the skin that turns that way.
     """
     weight = weight * np.clip(normals @ FRONT, 0, None)
-    basis, there = sh_basis(normals), sh_basis(FRONT)
-    kept = np.ones(len(colours))
+    basis, front = sh_basis(normals), sh_basis(FRONT)
+    inliers = np.ones(len(colours))
     for _ in range(5):
-        weighted = basis * (weight * kept)[:, None]
-        ridge = np.diag(SH_RIDGE) * (weight * kept).sum()
+        weighted = basis * (weight * inliers)[:, None]
+        ridge = np.diag(SH_RIDGE) * (weight * inliers).sum()
         light = np.linalg.solve(basis.T @ weighted + ridge, weighted.T @ colours)
         ratio = (colours @ LUMINANCE_WEIGHTS) / np.maximum(basis @ light @ LUMINANCE_WEIGHTS, 1e-6)
-        kept = ((ratio > LIKE_RATIOS[0]) & (ratio < LIKE_RATIOS[1])).astype(float)
-        if (weight * kept).sum() < 0.1 * weight.sum():
+        inliers = ((ratio > LIKE_RATIOS[0]) & (ratio < LIKE_RATIOS[1])).astype(float)
+        if (weight * inliers).sum() < 0.1 * weight.sum():
             break
-    return np.maximum(there @ light, 1e-4)
+    return np.maximum(front @ light, 1e-4)
 
 
 def _read_colours(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -51,21 +51,21 @@ def finish_maps(state: State, evidence: Evidence, start: Start, gain: torch.Tens
     term of the likelihood constrains.
     """
     shader = start.observations[1].shader
-    seen = evidence.weight.sqrt()
-    x = torch.lerp(start.reference, state.denoised, seen)[0]
+    share = evidence.weight.sqrt()
+    x = torch.lerp(start.reference, state.denoised, share)[0]
     with torch.no_grad():
         beside = enlarge_field(start.local, evidence.size).exp() / start.exposure
         shading = shader.total(state.lights).clamp_min(1e-3) * beside
     diffuse = albedo(x[None])
     if start.marks:  # they are the skin's, however unlikely under the prior
-        kept = torch.from_numpy(draw_cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
-        diffuse = torch.lerp(diffuse, evidence.texture / shading, kept)
+        cover = torch.from_numpy(draw_cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
+        diffuse = torch.lerp(diffuse, evidence.texture / shading, cover)
     diffuse = diffuse.clamp_min(MIN_ALBEDO)
     if gain is None:
         gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, start.recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
-    gains = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], seen)  # the mean face is of the tone already
+    gains = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], share)  # the mean face is of the tone already
     delivered = to_picture((diffuse * gains).clamp(MIN_ALBEDO, 1))
     return Maps(
         delivered,

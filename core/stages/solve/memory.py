@@ -42,12 +42,12 @@ def sample_within_memory(
     The denoiser is a ConditionedPrior; `log` gets a message about the fallback. Raises Problem if the low-memory mode
     does not fit either.
     """
-    begun = _copy(state)
+    last = _copy(state)
 
     def keep(state: State, steps: int) -> None:
-        nonlocal begun
+        nonlocal last
         on_step(state, steps)
-        begun = _copy(state)
+        last = _copy(state)
 
     try:
         return sampler.sample(observations, state, keep)
@@ -56,14 +56,14 @@ def sample_within_memory(
             raise
         if sampler.denoiser.network.low_memory:
             raise Problem(
-                f"There was not enough memory for step {begun.step + 1} of {sampler.recipe.steps}, even in "
+                f"There was not enough memory for step {last.step + 1} of {sampler.recipe.steps}, even in "
                 "the low-memory mode.",
                 "Close other programs, choose a smaller map size for the solve, or the quality draft.",
             ) from error
     # outside of the except block, which holds on to all that the step had computed
-    log(RETRY_MESSAGE.format(begun.step + 1, sampler.recipe.steps))
+    log(RETRY_MESSAGE.format(last.step + 1, sampler.recipe.steps))
     spare_memory(sampler.denoiser)
-    return sample_within_memory(sampler, observations, begun, on_step, log)
+    return sample_within_memory(sampler, observations, last, on_step, log)
 
 
 def spare_memory(prior: Prior | ConditionedPrior) -> None:

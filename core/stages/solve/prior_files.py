@@ -77,7 +77,7 @@ def _load_released(folder: Path) -> ReleasedPrior:
             f"{folder / 'ckpt.pth'} does not fit the config.json beside it ({first[0].strip()}).", released.CHOOSE
         ) from error
     model, cond = config["model"], config["cond"]
-    known = {"sigma_min", "sigma_max"} <= set(model)
-    sigmas = (float(model["sigma_min"]), float(model["sigma_max"])) if known else None
+    has_sigmas = {"sigma_min", "sigma_max"} <= set(model)
+    sigmas = (float(model["sigma_min"]), float(model["sigma_max"])) if has_sigmas else None
     octaves = cond["pos_enc_freq"] if cond["type"] == "posenc" else 0
     return ReleasedPrior(network, cond["type"], octaves, sigmas, released.read_noise(folder))

@@ -35,7 +35,7 @@ def read_config(folder: Path) -> dict:
     path = folder / "config.json"
     try:
         config = read_json(path)
-        given, cond = dict(config["model"]), dict(config.get("cond") or {})
+        entries, cond = dict(config["model"]), dict(config.get("cond") or {})
         model = {
             "type": "image_v1",
             "patch_size": 1,
@@ -45,7 +45,7 @@ def read_config(folder: Path) -> dict:
             "cross_cond_dim": 0,
             "has_variance": False,
             "sigma_data": 1.0,
-            **given,
+            **entries,
         }
         if model["type"] != "image_v1":
             raise Problem(

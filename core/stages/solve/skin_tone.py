@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin tone as a value, read once from the settings or estimated once."""
+"""Skin tone as a value, read once from the settings or estimated once."""
 
 from __future__ import annotations
 
@@ -58,5 +58,5 @@ class SkinTone:
 
 def read_given_tone(setting: str) -> SkinTone | None:
     """Return the tone of settings.solve.skin_tone, None for auto. Raises Problem if it is not a colour."""
-    given = colour_values.parse_skin_tone(setting)
-    return None if given is None else SkinTone.from_srgb(given, GIVEN)
+    srgb = colour_values.parse_skin_tone(setting)
+    return None if srgb is None else SkinTone.from_srgb(srgb, GIVEN)

@@ -94,17 +94,17 @@ def solve_inside(
     """
     device, denoised, lights = prior.device, earlier.denoised, earlier.lights
     cropped = {factor: crop_observation(o, window, factor).to(device) for factor, o in observations.items()}
-    known = denoised[(..., *window.context)].to(device)
+    context = denoised[(..., *window.context)].to(device)
     grid = lights.grid[(..., *window.cells)].to(device)
-    begun = Lights(lights.glob.clone().to(device), grid.clone(), lights.chroma.clone().to(device))
-    state = State(0, None, known.clone(), begun)
-    moving, inside = window.moving.to(device), torch.zeros(known.shape[-2:], device=device)
+    start_lights = Lights(lights.glob.clone().to(device), grid.clone(), lights.chroma.clone().to(device))
+    state = State(0, None, context.clone(), start_lights)
+    moving, inside = window.moving.to(device), torch.zeros(context.shape[-2:], device=device)
     spans = zip(window.inside, window.context, strict=True)
     inside[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in spans)] = 1
 
     def impose_known(x: torch.Tensor, s: float, draw: Callable) -> torch.Tensor:
-        factor = known.shape[-1] // x.shape[-1]
-        clean, within = functional.avg_pool2d(known, factor), functional.avg_pool2d(inside[None, None], factor)
+        factor = context.shape[-1] // x.shape[-1]
+        clean, within = functional.avg_pool2d(context, factor), functional.avg_pool2d(inside[None, None], factor)
         return torch.where(within > 0.5, x, clean + s * draw(*x.shape))
 
     def keep_frozen(state: State, steps: int) -> None:
@@ -116,10 +116,10 @@ def solve_inside(
     sampler = Sampler(prior, local, seed_noise(seed, device), impose_known)
     state = sample_within_memory(sampler, cropped, state, keep_frozen, report.log)
     restored = restore_maps(prior, state.denoised, observations[1].coords.to(device), seed, window.context)
-    solved, moved = denoised.clone(), lights.grid.clone()
-    moved[(..., *window.cells)] = state.lights.grid.cpu()
-    solved[(..., *window.context)] = torch.where(inside > 0, restored, known).cpu()
-    return solved, Lights(lights.glob, moved, lights.chroma)
+    solved, moved_grid = denoised.clone(), lights.grid.clone()
+    moved_grid[(..., *window.cells)] = state.lights.grid.cpu()
+    solved[(..., *window.context)] = torch.where(inside > 0, restored, context).cpu()
+    return solved, Lights(lights.glob, moved_grid, lights.chroma)
 
 
 def crop_observation(o: Observation, window: Window, factor: int) -> Observation:

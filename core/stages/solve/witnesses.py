@@ -35,7 +35,7 @@ def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) ->
     points, normals = (head.interpolate(vectors, size) for vectors in (head.mesh.vertices, head.normals))
     at = tuple(np.round([[mark.row, mark.column] for mark in marks]).astype(int).clip(0, size - 1).T)
     unit = normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
-    seen, agreed = np.zeros(len(marks), int), np.zeros(len(marks), int)
+    views, agreeing = np.zeros(len(marks), int), np.zeros(len(marks), int)
     for view, path in delit_views(capture):
         shown = find_visible(view, head.caster, points[at], unit) & covered[at]
         if not shown.any():
@@ -43,9 +43,10 @@ def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) ->
         picture = np.log(np.maximum(images.read_linear(path), 1e-3)).mean(-1)
         for k in np.flatnonzero(shown):
             contrast = _contrast(view, picture, points, covered, marks[k])
-            seen[k] += contrast is not None
-            agreed[k] += contrast is not None and contrast > MIN_SHOWN_SHARE * marks[k].contrast
-    return [mark for mark, s, a in zip(marks, seen, agreed, strict=True) if s < MIN_VIEWS or a >= MIN_AGREED_SHARE * s]
+            views[k] += contrast is not None
+            agreeing[k] += contrast is not None and contrast > MIN_SHOWN_SHARE * marks[k].contrast
+    confirmed = (views < MIN_VIEWS) | (agreeing >= MIN_AGREED_SHARE * views)
+    return [mark for mark, keep in zip(marks, confirmed, strict=True) if keep]
 
 
 def find_visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:

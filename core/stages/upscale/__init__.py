@@ -93,8 +93,8 @@ def _complete_head(
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse), report.check)
     if options.whole_head:
         report.progress(0, 1, "completing neck, ears and scalp")
-        seen, maps = maps, complete(maps, surface, report, settings.seed)
-        picture = drawing.draw_turned(surface, [seen, maps])
+        before, maps = maps, complete(maps, surface, report, settings.seed)
+        picture = drawing.draw_turned(surface, [before, maps])
         images.write_srgb(capture.picture("upscale", "before_and_after_completion"), picture)
     if not options.hair:
         return maps, None, {}

@@ -113,9 +113,9 @@ def _answers(
     )
     window = np.s_[top : top + side, left : left + side]
     points, inner = surface.position[window].reshape(-1, 3), np.ones((side, side), np.float32)
-    there = np.zeros(surface.covered.shape, bool)
-    there[window] = True
-    tangent = surface.frames(there)[0].astype(np.float32)
+    sampled = np.zeros(surface.covered.shape, bool)
+    sampled[window] = True
+    tangent = surface.frames(sampled)[0].astype(np.float32)
     variances = np.zeros((2, len(SIGMAS_MM), len(WAVELENGTHS_MM)))
     for k, wavelength in enumerate(WAVELENGTHS_MM):
         seed = int(rng.integers(1 << 31))

@@ -94,11 +94,11 @@ def groom(
         if where.sum() < FEWEST_TEXELS:
             continue
         texels, texel = strokes.lay_texels(surface, where), float(np.median(surface.texel[where]))
-        seen = 1 - hair.hidden  # hair before a brow is no stroke of it, and not its colour
-        tensors = strokes.measure_tensors(maps.diffuse, texels, texel) * seen[where][:, None, None]
+        visible = 1 - hair.hidden  # hair before a brow is no stroke of it, and not its colour
+        tensors = strokes.measure_tensors(maps.diffuse, texels, texel) * visible[where][:, None, None]
         usual = ways.usual(kind.name, texels.position, landmarks)
         way = strokes.choose_ways(tensors, texels, usual, trust)
-        colours = _unmix(maps.diffuse, cleaned, cover * where * seen, COLOUR_REACH_MM / texel)[where]
+        colours = _unmix(maps.diffuse, cleaned, cover * where * visible, COLOUR_REACH_MM / texel)[where]
         check()
         if kind.name == "beard" and not _covers(maps.diffuse[where], cleaned[where], kind):
             light = np.log(np.maximum(maps.diffuse, DARKEST_LINEAR)).mean(-1).astype(np.float32)

@@ -168,8 +168,8 @@ def _cover(darker: np.ndarray, zone: np.ndarray, usual: float) -> np.ndarray:
 
     It is linear between the grain of bare skin and the darkest hairs.
     """
-    there = zone > 0.5
-    full = float(np.percentile(darker[there], 99)) if there.sum() > 20 else 0.0
+    growing = zone > 0.5
+    full = float(np.percentile(darker[growing], 99)) if growing.sum() > 20 else 0.0
     if full < max(LEAST_HAIR_LOG, 4 * usual):
         return np.zeros_like(zone)
     least, most = (1 - np.exp(-x) for x in (2 * usual, full))

@@ -25,7 +25,7 @@ AROUND_MM = 1.5  # over which neighbouring hairs lie alike, and their strokes ar
 
 @dataclass(frozen=True)
 class HairTexels:
-    """The N texels on which hair grows, row by row.
+    """N texels on which hair grows, row by row.
 
     mask bool [S, S]; position [N, 3] in mm; normal, tangent and bitangent [N, 3], unit.
     """

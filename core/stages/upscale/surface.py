@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head's surface under its maps: the place of each texel, and smooth fields over it.
+"""Surface of the head under its maps: the place of each texel, and smooth fields over it.
 
 Fields that are computed at points of the surface, by its distances, do not depend on the UV layout: where the map is
 cut open, its two edges meet.
