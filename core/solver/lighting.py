@@ -41,10 +41,7 @@ def _move(value, device: torch.device | str):
 
 
 def shading_basis(normal: torch.Tensor) -> torch.Tensor:
-    """Return B_l Y_lm / pi of normals [3, ...] as [9, ...].
-
-    Normals that are not unit enter the polynomials as they are.
-    """
+    """Return B_l Y_lm / pi of normals [3, ...], of any length, as [9, ...]."""
     return sh_basis(normal, GAMMA_BANDS, axis=0)
 
 
@@ -180,10 +177,7 @@ def fit_around(
     weight: torch.Tensor,
     ridge: float,
 ) -> torch.Tensor:
-    """Return `fit_global`'s light, drawn to the light `even` [3, 9] instead of to none.
-
-    That is where no normal sees a coefficient, or `ridge` holds it back.
-    """
+    """Return `fit_global`'s light, but with coefficients drawn to the light `even` [3, 9] instead of to zero."""
     return even + fit_global(texture - albedo * shade(even, basis), albedo, basis, weight, ridge)
 
 

@@ -58,10 +58,7 @@ def albedo(denoised: torch.Tensor) -> torch.Tensor:
 def photometric_loss(
     denoised: torch.Tensor, shading: torch.Tensor, o: Observation, weight: torch.Tensor, blur: bool = False
 ) -> torch.Tensor:
-    """Return L_pho (equation 1) of a map [1, 7, H, W] under a linear shading [3, H, W] and a weight [H, W].
-
-    `blur` puts the rendering through a small Gaussian.
-    """
+    """Return L_pho (equation 1) of a map [1, 7, H, W] under a shading [3, H, W], its rendering blurred by `blur`."""
     rendered = albedo(denoised) * shading
     return ((weight * ((blur_maps(rendered) if blur else rendered) - o.texture)) ** 2).sum()
 

@@ -156,10 +156,7 @@ def _lay_out(
 
 
 def find_remaining_light(evidence: Evidence, start: Start) -> torch.Tensor:
-    """Return the texture over the reference face in its global light [3, S, S], linear.
-
-    It is about 1, and less where light is missing or the skin is darker.
-    """
+    """Return the texture over the lit reference face [3, S, S]: about 1, less where light is missing."""
     shading = shade(start.state.lights.glob, shading_basis(evidence.normal))
     return evidence.texture * start.exposure / (shading * albedo_of(start.reference).clamp_min(1e-3)).clamp_min(1e-3)
 
@@ -218,10 +215,7 @@ def make_reference(prior: Prior, tone: torch.Tensor, evidence: Evidence, kind: s
 
 
 def tint_face(face: torch.Tensor, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
-    """Return a face [7, R, R] as x [1, 7, S, S], the mean of its skin [S, S] brought to a linear tone [3].
-
-    The face has the form of the prior's mean face.
-    """
+    """Return a face [7, R, R] in the mean face's form as x [1, 7, S, S], its skin's mean brought to a tone [3]."""
     size = skin.shape[0]
     out = mean_at(face.to(tone.device), make_coordinates(size, slice(0, size), slice(0, size)), tone[None])
     albedo = albedo_of(out)

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""M laid on the shadow's edges before the first step, by core/light/shadow_edges.py.
-
-A sharp edge of the shadow can live in M alone.
-"""
+"""M laid on the shadow's edges before the first step: a sharp edge of the shadow can live in M alone."""
 
 from __future__ import annotations
 

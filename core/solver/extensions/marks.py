@@ -35,10 +35,7 @@ FEATURE_MARGIN_TEXELS = 12.0  # distance to brows, lips, lids, nostrils and scal
 
 @dataclass(frozen=True)
 class Mark:
-    """Mark at row and column, with a radius, in texels of the map.
-
-    change [3]: of the logarithm of R, G, B against the surroundings.
-    """
+    """Mark, with row, column and radius in texels of the map; change [3]: ln R, G, B against the surroundings."""
 
     row: float
     column: float
@@ -64,10 +61,7 @@ class _Blob:
 def protect_marks(
     evidence: Evidence, witness: Callable[[list[Mark]], list[Mark]] = list
 ) -> tuple[Evidence, list[Mark]]:
-    """Return the evidence without trust in the marks inside M, and those marks.
-
-    `witness` returns the ones that the views confirm.
-    """
+    """Return the evidence without trust in the marks inside M that `witness` confirms, and those marks."""
     if not (evidence.alpha > 0).any():
         return evidence, []
     feature = cv2.blur(1 - evidence.trust.numpy(), (2 * round(FEATURE_MARGIN_TEXELS / evidence.texel) + 1,) * 2)

@@ -54,10 +54,7 @@ MIN_SEEN_SHARE = 0.5  # share of a cell that has to be seen skin outside of M
 
 @dataclass(frozen=True)
 class Scales:
-    """Deviations in natural log along the axis of brightness, 1 / sqrt(3) of which each channel has.
-
-    They are of the traits, of a first-order coefficient of the global light, of local light, and of noise.
-    """
+    """Deviations in ln brightness: traits, a first-order coefficient of the global light, local light, noise."""
 
     traits: float
     light: float
@@ -122,10 +119,9 @@ class HeadCells:
 
 @dataclass(frozen=True)
 class Cells:
-    """A capture on the cells of a head.
+    """A capture on the cells of a head: normal [N, 3]; observed [K]: indices of those that show skin.
 
-    normal [N, 3]; observed [K]: indices of those that show skin; log_ratio [K, 3]: log(texture / reference) there,
-    along COLOUR_AXES.
+    log_ratio [K, 3]: log(texture / reference) of these, along COLOUR_AXES.
     """
 
     on_head: HeadCells
@@ -136,10 +132,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class Places:
-    """N places on the head.
-
-    at [N, 3] in metres, normal [N, 3], varied [N] as in HeadCells, own [N]: number of the capture.
-    """
+    """N places: at [N, 3] on the head in metres, normal [N, 3], varied [N] as in HeadCells, own [N]: which capture."""
 
     at: np.ndarray
     normal: np.ndarray

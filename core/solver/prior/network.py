@@ -56,8 +56,6 @@ def denoise(
 class UNetLayout:
     """Depths, channels and attention per level, finest first (attention None: nowhere).
 
-    The input is [N, data + condition, H, W], the output [N, data, H, W].
-
     With `patch_size` p the network works on p x p blocks of texels. The first `skip_stages` levels exist but are left
     out, and the next one takes the map as it is (progressive growing). With `has_variance` the last channel estimates
     the loss, which sampling does not need.

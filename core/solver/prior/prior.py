@@ -88,10 +88,7 @@ class Prior:
 
 
 class ConditionedPrior:
-    """Denoiser of the sampler: a prior, which stays as it is, and a skin tone.
-
-    The tone is linear [1, 3], or None if the prior takes none.
-    """
+    """Denoiser of the sampler: a prior, which stays as it is, and a linear skin tone [1, 3], None if it takes none."""
 
     def __init__(self, prior: Prior, tone: torch.Tensor | None):
         self.prior, self.tone, self.network, self.device = prior, tone, prior.network, prior.device
@@ -100,10 +97,7 @@ class ConditionedPrior:
         self._condition: Condition | None = None
 
     def __call__(self, x: torch.Tensor, sigma: float, coords: torch.Tensor) -> torch.Tensor:
-        """Return the expected clean map of x at noise level sigma.
-
-        coords [N, 2, H, W] come from `make_coordinates`, one texel apart in the map's own scale.
-        """
+        """Return the expected clean map of x at noise level sigma; coords [N, 2, H, W] are `make_coordinates`'s."""
         if self._coords is not coords:
             condition = self.prior.condition_at(coords, self.tone)
             if condition.mean is not None:  # it goes in as it is: kept in the network's type, at half the memory
@@ -122,10 +116,7 @@ class ConditionedPrior:
 
 
 class ReleasedPrior(Prior):
-    """A prior of the authors', in the UV layout it was trained in, conditioned on a `kind`: coord, posenc or noise.
-
-    The fixed random map `noise` [1, 3, S, S] of the last is not in their checkpoint.
-    """
+    """A prior of the authors', in its own UVs; kind: coord, posenc or noise, then with a random map [1, 3, S, S]."""
 
     centred, one_scale = False, True
 

@@ -71,19 +71,13 @@ class Rcan(nn.Module):
         nn.init.zeros_(self.tail.weight)
 
     def forward(self, maps: torch.Tensor, depth: int | None = None) -> torch.Tensor:
-        """Return what bicubic resampling misses [N, 7, 4H, 4W] of maps [N, 7, H, W].
-
-        `depth` is how many blocks of each group are used.
-        """
+        """Return what bicubic resampling misses of maps [N, 7, H, W], by `depth` blocks a group: [N, 7, 4H, 4W]."""
         return self.details(self.features(maps, depth))
 
     def features(
         self, maps: torch.Tensor, depth: int | None = None, tick: Callable[[float], None] = lambda share: None
     ) -> torch.Tensor:
-        """Run the body, [N, 7, H, W] -> [N, width, H, W], on the whole map, for its attention looks at all of it.
-
-        `tick` gets the share done.
-        """
+        """Run the body, [N, 7, H, W] -> [N, width, H, W]: its attention needs the whole map. `tick` gets the share done."""
         begun = self.head((maps - _channels(CHANNEL_MEANS, maps)) / _channels(CHANNEL_DEVIATIONS, maps))
         x = begun
         for i, (group, join) in enumerate(zip(self.groups, self.joins, strict=True)):
@@ -96,10 +90,7 @@ class Rcan(nn.Module):
         return begun + self.join(x)
 
     def details(self, features: torch.Tensor) -> torch.Tensor:
-        """Run the tail, [N, width, H, W] -> [N, 7, 4H, 4W].
-
-        Strips with HALO_TEXELS texels around them give the same as the whole.
-        """
+        """Run the tail, [N, width, H, W] -> [N, 7, 4H, 4W], on the whole or on strips with HALO_TEXELS around."""
         x = features
         for widen in self.widen:
             x = functional.pixel_shuffle(widen(x), 2)

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage solve: I_UV and the shadow mask become reflectance maps (paper, section 3).
-
-The result is a clean albedo under a global light, and under local dark ones where the mask is.
-"""
+"""Stage solve: I_UV and the shadow mask become reflectance maps, the light of the mask taken out (paper, section 3)."""
 
 from __future__ import annotations
 
@@ -97,10 +94,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 
 def recipe_of(settings: Settings, prior: Prior) -> Recipe:
-    """Return the chosen recipe on the noise levels of the prior.
-
-    Ours takes the number of steps and the guidance from the settings; the others bring their own.
-    """
+    """Return the chosen recipe at the prior's noise levels; ours has its steps and guidance from the settings."""
     recipe = RECIPES[settings.solve.recipe]
     if prior.one_scale:
         recipe = replace(recipe, coarse=())
@@ -141,7 +135,7 @@ def _start(
     recipe: Recipe,
     report: Reporter,
 ) -> Start:
-    """Start the solve, and report the marks and M's border. The views confirm the marks on `head`, if there is one."""
+    """Start the solve, and report the marks, which the views confirm on `head` if there is one, and M's border."""
     others = read_others(capture, settings, report)
     report.progress(0, recipe.steps, "telling skin from light and laying the mask on the shadow's edges")
     witness = list if head is None else (lambda marks: confirm_marks(capture, head, marks, evidence.size))
@@ -167,10 +161,7 @@ def _sample(
     key: str,
     report: Reporter,
 ) -> State:
-    """Return the last state of the walk, on the processor.
-
-    It goes on from the checkpoint `stored` if that belongs to this run, which `key` stands for.
-    """
+    """Return the walk's last state, on the processor, going on from the checkpoint `stored` if that has `key`."""
     observations = {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
     state = checkpoint.read_state(stored, key)
     if state is not None:

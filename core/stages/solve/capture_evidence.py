@@ -75,10 +75,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
 
 
 def _brightness(capture: Capture, texture: np.ndarray, skin: np.ndarray) -> np.ndarray:
-    """Return the frames' brightness [S, S] over its median on bool [S, S] `skin`.
-
-    It is the delit texture's where no other is there.
-    """
+    """Return the brightness [S, S] of the frames, or of the delit texture, over its median on bool [S, S] `skin`."""
     if capture.texture_filmed.is_file():
         texture = resize_maps(images.read_linear(capture.texture_filmed), len(skin))
     brightness = texture.mean(2)
@@ -88,8 +85,7 @@ def _brightness(capture: Capture, texture: np.ndarray, skin: np.ndarray) -> np.n
 def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Read M [S, S] in [0, 1], the artist's before the proposal, and what the artist added to the proposal.
 
-    An addition says more than a proposal, which takes dark skin and beards along: there the light need not be held
-    back.
+    A proposal takes dark skin and beards along; where the artist added to it the light need not be held back.
     """
     painted, proposed = capture.shadow_mask.is_file(), capture.shadow_mask_auto.is_file()
     mask = resize_maps(images.read_mask(capture.shadow_mask if painted else capture.shadow_mask_auto), size)

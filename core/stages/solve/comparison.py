@@ -17,8 +17,7 @@ LUMINANCE_WEIGHTS = np.float32([0.2126, 0.7152, 0.0722])  # of linear sRGB (Rec.
 def write_comparison(capture: Capture, evidence: Evidence, albedo: np.ndarray) -> None:
     """Write comparison/ with delit.png, and filmed.png if there is one: 8-bit sRGB of the texture's size.
 
-    `albedo` is linear [S, S, 3]. One gain for all channels brings the mean luminance of the facial skin that was seen
-    to the albedo's.
+    One gain brings the mean luminance of the facial skin that was seen to that of the linear albedo [S, S, 3].
     """
     weight = (evidence.skin * evidence.weight).numpy()
     goal = _mean(albedo, weight)

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Choose the device of the networks by a pass of the shipped one, not because PyTorch names it.
-
-A graphics card may be too old for PyTorch's kernels, out of memory, or slower than the processor.
-"""
+"""Choose the device of the networks by a pass of the shipped one: a card may be too old, too small or too slow."""
 
 from __future__ import annotations
 
@@ -61,10 +58,7 @@ def list_devices() -> list[str]:
 
 
 def run_pass(device: str) -> tuple[torch.Tensor, float]:
-    """Run the shipped prior over a fixed map and back to its input; return both, on the CPU, and the seconds.
-
-    The result is [1, 14, TRIAL_TEXELS, TRIAL_TEXELS]. The second of two passes is timed.
-    """
+    """Run the shipped prior over a map and back; return [1, 14, S, S] on the CPU, and a second pass's seconds."""
     generator = torch.Generator().manual_seed(0)
     prior = load(WEIGHTS, device).of_tone(torch.tensor([0.45, 0.3, 0.22]))
     noisy, weights = (torch.randn(1, 7, TRIAL_TEXELS, TRIAL_TEXELS, generator=generator).to(device) for _ in range(2))

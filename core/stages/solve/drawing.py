@@ -17,10 +17,7 @@ PAINTED_RGB, LAID_RGB, MARK_RGB = (1.0, 1.0, 1.0), (1.0, 0.45, 0.0), (0.1, 0.9, 
 
 
 def draw_edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, ...]) -> np.ndarray:
-    """Return sRGB [H, 2 H, 3]: the texture, and M as it is used beside it.
-
-    On the texture the painted contour is white, M's border as it is used orange, and the marks are ringed in green.
-    """
+    """Return sRGB [H, 2 H, 3]: the texture with the painted contour white, M's orange, marks green; beside it M."""
     side = min(evidence.size, REFERENCE_TEXELS // 2)
     texture = images.resize(np.ascontiguousarray(evidence.texture.permute(1, 2, 0).numpy()), side, side)
     visible = texture[images.resize(evidence.weight.numpy(), side, side) > 0.5]
@@ -38,10 +35,7 @@ def draw_edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[M
 
 
 def draw_loss_curve(losses: list[tuple[int, float]], steps: int) -> np.ndarray:
-    """Return sRGB [h, w, 3] of (step, loss) over all steps of the run, on a logarithmic scale.
-
-    It reaches from the largest to the smallest loss so far, with a line at every tenfold.
-    """
+    """Return sRGB [h, w, 3] of (step, loss) over all steps, on a logarithmic scale with a line at every tenfold."""
     height, width = CURVE_PX
     picture = np.full((height, width, 3), 0.12, np.float32)
     log_losses = np.log10(np.maximum([loss for _, loss in losses], 1e-6))

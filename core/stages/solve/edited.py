@@ -28,10 +28,7 @@ from .witnesses import confirm_marks
 def solve_edited(
     capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, report: Reporter
 ) -> tuple[maps.Maps, SkinTone] | None:
-    """Return the maps with the edited part new, as they are now in maps/, and the skin tone.
-
-    Without an edit the maps stay as they are. None, and the reason in the log, if the whole map has to be solved.
-    """
+    """Return the maps as they are now in maps/, and the skin tone; None, and the reason in the log, if not possible."""
     cell = evidence.cell_side(settings.solve.grid_cells)
     conditions, obstacle = mask_edit.conditions(capture, settings), mask_edit.obstacle(capture, settings)
     earlier = None if obstacle else checkpoint.read_solution(capture.solved, conditions)

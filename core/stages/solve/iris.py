@@ -39,10 +39,7 @@ ODD_HUES_LOG = 1.2
 
 
 def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) -> None:
-    """Write maps/irises.json, or none if the eyes were closed or no frame shows them well.
-
-    The albedo [S, S, 3] is linear and in the head's UVs. Raises Problem for damaged records.
-    """
+    """Write maps/irises.json by a linear albedo [S, S, 3]; none if no frame shows the eyes well. Raises Problem."""
     remove_file(capture.irises)
     if not (capture.eyes.is_file() and capture.frames_json.is_file() and capture.cameras.is_dir()):
         return
@@ -58,20 +55,14 @@ def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Rep
 def measure_both_irises(
     views: list[View], head: Head, eyes: tuple[Eyeball, Eyeball], albedo: np.ndarray, report: Reporter
 ) -> tuple[Colour, Colour] | None:
-    """Return the linear albedo of the left and the right iris, or None if no frame shows either.
-
-    The head is as fitted, its albedo [S, S, 3] linear.
-    """
+    """Return the linear albedo of the left and the right iris, or None if no frame shows either."""
     colours = [measure_iris_colour(views, head, side, eye, albedo, report) for side, eye in enumerate(eyes)]
     colours = [colour for colour in colours if colour is not None]
     return even_colours(colours[0], colours[-1]) if colours else None
 
 
 def even_colours(left: Colour, right: Colour) -> tuple[Colour, Colour]:
-    """Return both irises in the geometric mean of their linear colours, for what shades an eye is a factor.
-
-    Irises of two colours stay as they are.
-    """
+    """Return both irises in their geometric mean, for what shades an eye is a factor, but for irises of two colours."""
     logs = np.log([left, right])
     hues = logs[:, 2] - logs[:, 0]
     if abs(hues[1] - hues[0]) > ODD_HUES_LOG:
@@ -106,11 +97,7 @@ def measure_iris_colour(
 def find_iris_pixels(
     view: View, eye: Eyeball, shares: EyeShares, shape: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows and columns [N] of the pixels that show the iris between pupil and rim.
-
-    They lie inside the eyeball's iris and where the reader saw it. `shape` is the picture's; `shares` are in its
-    pixels.
-    """
+    """Return rows and columns [N] between pupil and rim of the eyeball's iris that the reader calls iris."""
     shrink = np.array([shape[1] / view.width, shape[0] / view.height])
     (middle,), (depth,) = view.project(np.array(eye.centre)[None])
     reach = 1.5 * eye.radius * view.camera.mean_focal_length() / depth

@@ -60,10 +60,7 @@ class Layout:
         return _planes(np.dstack([albedo, normal, specular]))
 
     def evidence(self, e: Evidence, boxes: bool) -> Evidence:
-        """Return the evidence in the window.
-
-        With `boxes` the tone, the texture and M count within the released masks' bounds alone.
-        """
+        """Return the evidence in the window; `boxes` bounds the tone, the texture and M as the released masks do."""
         weight = self._there(e.weight) * torch.from_numpy(self.there.known)
         changes = {name: self._there(maps) for name, maps in vars(e).items() if isinstance(maps, torch.Tensor)}
         changes |= {
@@ -108,10 +105,7 @@ class Layout:
         )
 
     def _inside(self) -> np.ndarray:
-        """Return [S, S]: 1 within the window's reach, falling to 0 at its border.
-
-        Small holes, as in the folds of lids and lips, are no border: they are bled over.
-        """
+        """Return [S, S]: 1 within the window's reach, falling to 0 at its border. Small holes are no border."""
         texel = len(self.back.known) / REFERENCE_TEXELS
         missing = (self.back.covered & ~self.back.known).astype(np.uint8)
         disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(FADE_TEXELS / 2 * texel) + 1,) * 2)
@@ -141,10 +135,7 @@ class Layout:
 
 
 def round_size(size: int, multiple: int) -> int:
-    """Return the largest size up to `size`, but at least one step.
-
-    The window is a whole number of the network's `multiple` of texels.
-    """
+    """Return the largest size up to `size` whose window is a whole number of `multiple` texels; at least one step."""
     step = 16 * multiple // math.gcd(12, multiple)
     return max(size // step, 1) * step
 

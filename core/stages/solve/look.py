@@ -41,20 +41,14 @@ BEARD_TOP_V = 0.42  # v of the texture below which a beard may grow, whose colou
 
 @dataclass(frozen=True)
 class Look:
-    """Linear colours [3] as the camera shows them.
-
-    best: skin in the best light; front: skin whose normal is -Y, the way the face looks.
-    """
+    """Linear colours [3] of skin as the camera shows them: in the best light, and facing -Y, the way the face looks."""
 
     best: np.ndarray
     front: np.ndarray
 
 
 def summarise_look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> Look:
-    """Return the look of facial skin by its points: linear colours [N, 3], and unit normals [N, 3] in the head's axes.
-
-    The weight [N] in [0, 1] is 0 in shadow and off the skin.
-    """
+    """Return the look of skin points: linear colours [N, 3], unit normals [N, 3] in the head's axes, weights [N]."""
     return Look(mean_best_lit(colours, weight), _facing_front(colours, normals, weight))
 
 
@@ -69,7 +63,7 @@ def mean_best_lit(colours: np.ndarray, weight: np.ndarray) -> np.ndarray:
 def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter) -> Look | None:
     """Return the look of the selected frames, as they were filmed; None without frames, cameras or enough skin.
 
-    shadow [S, S] in [0, 1] is the soft mask in the head's UVs.
+    shadow [S, S] is the soft mask in the head's UVs.
     """
     if not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return None
@@ -91,10 +85,7 @@ def read_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter
 
 
 def weigh_skin(size: int, shadow: np.ndarray) -> np.ndarray:
-    """Return weights [size, size] of facial skin outside of the `shadow` [S, S].
-
-    Lips, brows, eyes, nostrils and where a beard may grow are left out.
-    """
+    """Return weights [size, size] of plain facial skin out of the `shadow` [S, S] and out of a beard's reach."""
     skin = template.mask("skin", size) * template.mask("face", size)
     for name in ("lips", "brows", "eyes", "nostrils"):
         skin = skin * (1 - template.mask(name, size))
@@ -104,10 +95,7 @@ def weigh_skin(size: int, shadow: np.ndarray) -> np.ndarray:
 
 
 def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the colour [3] of skin whose normal is FRONT.
-
-    A light of second-order spherical harmonics is fitted to the skin that turns that way.
-    """
+    """Return the colour [3] of skin whose normal is FRONT, by second-order spherical harmonics fitted to the skin."""
     weight = weight * np.clip(normals @ FRONT, 0, None)
     basis, front = sh_basis(normals), sh_basis(FRONT)
     inliers = np.ones(len(colours))
@@ -135,10 +123,7 @@ def _read_colours(view: View, caster: raster.RayCaster, points: np.ndarray, norm
 
 
 def _low_quantile(colours: np.ndarray) -> np.ndarray:
-    """Return the VIEW_QUANTILE [N, 3] over the views of [V, N, 3], whose nan do not count.
-
-    Each point has at least one value.
-    """
+    """Return the VIEW_QUANTILE [N, 3] over the views of [V, N, 3], of which each point has a value that is not nan."""
     count = np.isfinite(colours[..., 0]).sum(0)
     at = np.floor(VIEW_QUANTILE * (count - 1)).astype(int)
     return np.take_along_axis(np.sort(colours, 0), at[None, :, None], 0)[0]  # sort puts nan last

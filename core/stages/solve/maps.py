@@ -78,10 +78,7 @@ def finish_maps(state: State, evidence: Evidence, start: Start, gain: torch.Tens
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
-    """Return linear factors [3] that bring the mean under `weight` to `tone` [3].
-
-    It is the mean of linear values, or ("srgb") of values to the power 1 / 2.2.
-    """
+    """Return linear factors [3] that bring the mean, of linear or ("srgb") of encoded values, to `tone` [3]."""
     if rescale == "none":
         return torch.ones(3)
     gamma = 1.0 if rescale == "linear" else 2.2
@@ -95,10 +92,7 @@ def write_maps(
     conditions: dict[str, str],
     only: tuple[slice, slice] | None = None,
 ) -> None:
-    """Write maps/, whole or not at all, with what a later solve of a part goes on from.
-
-    `conditions` are mask_edit's. With `only`, rows and columns, all other texels keep the values of their files.
-    """
+    """Write maps/, whole or not at all, and the solution; with `only`, rows and columns, the other texels stay."""
 
     def put(write: Callable, name: str, image: np.ndarray, **options) -> None:
         if only is not None:

@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sample where memory is short: a step that did not fit, and all after it, again in the network's low-memory mode.
-
-That mode keeps only the inputs of the network's layers for the gradient and computes the rest a second time: the result
-is the same.
-"""
+"""Sample where memory is short: a step that did not fit, and all after it, again in the network's low-memory mode."""
 
 from __future__ import annotations
 

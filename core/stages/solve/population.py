@@ -64,20 +64,14 @@ BEST_ROWS, OVER_WHITE_ROWS = slice(0, 3), slice(3, 6)  # rows of the model
 
 
 def estimate_from_scene(best: np.ndarray, source: str) -> SkinTone:
-    """Return the tone behind the colour of the best lit skin, linear [3].
-
-    Its deviation is at least what the colour of skin leaves open under a known light: no frame reveals the exposure.
-    """
+    """Return the tone behind the best lit skin, linear [3], no surer than its colour is: no frame reveals exposure."""
     people = read_population()
     weight = _posterior(people, people.share, BEST_ROWS, to_coordinates(best))
     return _expect(people.tones, weight, source, people.colour_sigma_l)
 
 
 def estimate_from_white(front: np.ndarray, white: np.ndarray) -> SkinTone:
-    """Return the tone behind the colour of skin that faces the front, linear [3], by a measured white [3].
-
-    That is the colour of a white surface that faces as the face does.
-    """
+    """Return the tone behind skin that faces the front, linear [3], by the colour [3] of a white surface there."""
     people = read_population()
     coordinates = to_coordinates(front) - to_coordinates(white)
     weight = _posterior(people, people.even, OVER_WHITE_ROWS, coordinates, np.square(MEASURED_SIGMA_LOG))
@@ -87,10 +81,7 @@ def estimate_from_white(front: np.ndarray, white: np.ndarray) -> SkinTone:
 def _posterior(
     people: Population, prior: np.ndarray, rows: slice, coordinates: np.ndarray, variance: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Return the probability [N] of each tone under a prior [N] if these rows of the model show `coordinates` [3].
-
-    `variance` [3] is added to the model's own.
-    """
+    """Return the probability [N] of tones of prior [N] if rows of the model show `coordinates` [3] +- `variance`."""
     of_tones = to_coordinates(people.tones + SHEEN_REFLECTANCE)
     away = coordinates - of_tones @ people.slope[rows].T - people.offset[rows]  # [N, 3]
     # on dark skin sheen is much of what is seen

@@ -22,10 +22,9 @@ WEIGHTS = Path(__file__).parents[2] / DATA_FILES[0]
 
 
 def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = None) -> Prior:
-    """Load our prior, or the authors' if `path` is a folder with config.json and ckpt.pth.
+    """Load our prior, or the authors' if `path` is a folder with config.json and ckpt.pth. Raises Problem.
 
-    Map-sized work runs in `dtype`, by default bfloat16 if the processor has it. Raises Problem for files that are
-    missing or of another kind.
+    Map-sized work runs in `dtype`, by default bfloat16 if the processor has it.
     """
     path = Path(path)
     if path.suffix != WEIGHTS.suffix:

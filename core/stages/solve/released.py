@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Read the files of a prior as the method's authors release theirs: a folder's config.json and ckpt.pth.
-
-ckpt.pth is read as weights only: nothing in it is ever run.
-"""
+"""Read the authors' config.json and ckpt.pth, which is read as weights only: nothing in it is ever run."""
 
 from __future__ import annotations
 
@@ -28,10 +25,7 @@ CHOOSE = (
 
 
 def read_config(folder: Path) -> dict:
-    """Read config.json, completed by the entries that may be left out, as {"model": ..., "cond": ...}.
-
-    Raises Problem for a prior that cannot be run here.
-    """
+    """Read config.json as {"model": ..., "cond": ...}, completed. Raises Problem for one that cannot be run."""
     path = folder / "config.json"
     try:
         config = read_json(path)
@@ -79,10 +73,7 @@ def read_config(folder: Path) -> dict:
 
 
 def read_weights(folder: Path) -> dict[str, torch.Tensor]:
-    """Read the entry model_ema of ckpt.pth, or the file itself if it is a plain state dict: name -> float32 tensor.
-
-    Raises Problem for any other file.
-    """
+    """Read model_ema of ckpt.pth, or the file as a plain state dict: name -> float32 tensor. Raises Problem."""
     path = folder / "ckpt.pth"
     try:
         with torch.serialization.safe_globals(_harmless()):
@@ -104,10 +95,7 @@ def read_weights(folder: Path) -> dict[str, torch.Tensor]:
 
 
 def read_noise(folder: Path) -> torch.Tensor | None:
-    """Read the fixed random map [1, 3, S, S] that a prior of condition `noise` was trained with; None if there is none.
-
-    Raises Problem for a damaged file.
-    """
+    """Read the fixed random map [1, 3, S, S] of a prior of condition `noise`; None without one. Raises Problem."""
     path = folder / NOISE_FILE
     if not path.is_file():
         return None

@@ -24,10 +24,7 @@ MAX_DEVIATIONS = 6  # below the mean score: every device draws other noise, and 
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Leave the figures score_db, expected_db and seconds of a copy of the sample head, solved anew in its place.
-
-    Raises Problem for a score that no sound machine has.
-    """
+    """Leave the figures score_db, expected_db and seconds of a copy of the sample head, solved anew. Raises Problem."""
     expected = json.loads(EXPECTED_FILE.read_text(encoding="utf-8"))
     least = expected["mean_db"] - MAX_DEVIATIONS * expected["deviation_db"]
     score, seconds = measure(capture, settings, report)
@@ -49,10 +46,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 
 def measure(capture: Capture, settings: Settings, report: Reporter) -> tuple[float, float]:
-    """Solve a copy of the sample head; return the PSNR in dB of its albedo against the shipped one, and the seconds.
-
-    The PSNR is of facial skin in sRGB.
-    """
+    """Solve a copy of the sample head; return the PSNR in dB of its facial albedo to the shipped one, and seconds."""
     started = time.monotonic()
     solve.run(capture, settings, report)
     seconds = time.monotonic() - started

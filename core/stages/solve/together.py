@@ -16,11 +16,7 @@ SIDE_TEXELS = 512  # of the maps that are read, which have to resolve a cell of 
 
 
 def read_others(capture: Capture, settings: Settings, report: Reporter) -> list[Evidence]:
-    """Read the evidence of the captures that settings.solve.together names; none without it.
-
-    A folder of several may hold this capture, too. Raises Problem if there is no other, and for one that has no texture
-    yet or whose head is damaged.
-    """
+    """Read the captures that settings.solve.together names, but for this one. Raises Problem if one is unusable."""
     named = captures_in(settings.solve.together)
     roots = [root for root in named if root.resolve() != capture.root.resolve()]
     if named and not roots:

@@ -36,20 +36,14 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 def resolve_skin_tone(
     capture: Capture, head: Head, settings: Settings, evidence: Evidence, report: Reporter
 ) -> SkinTone:
-    """Return the artist's tone, or the estimate. The evidence is in the built-in UVs.
-
-    Raises Problem for a setting that is not a colour, NoSkinError if no facial skin was seen.
-    """
+    """Return the artist's tone, or the estimate. Raises Problem for a setting that is not a colour, and NoSkinError."""
     return read_given_tone(settings.solve.skin_tone) or estimate_skin_tone(capture, head, settings, evidence, report)
 
 
 def estimate_skin_tone(
     capture: Capture, head: Head, settings: Settings, evidence: Evidence, report: Reporter
 ) -> SkinTone:
-    """Estimate the tone from the frames, under the measured white point if there is one, or from the texture.
-
-    Raises NoSkinError.
-    """
+    """Estimate the tone from the frames, by a measured white point if there is one, or from the texture."""
     look = read_look(capture, head, evidence.alpha.numpy(), report)
     if look is None:
         return estimate_from_texture(evidence)

@@ -27,10 +27,7 @@ MAX_STRAY_LOG = 0.15  # deviation in log units within a card
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Leave the figures white_point (linear R, G, B) and white_point_frame.
-
-    Raises Problem if no frame shows a ColorChecker.
-    """
+    """Leave the figures white_point (linear R, G, B) and white_point_frame. Raises Problem without a ColorChecker."""
     frames = sorted(capture.frames.glob("*.jpg"))
     frames = frames[:: max(1, len(frames) // MAX_FRAMES)]
     whites = {}

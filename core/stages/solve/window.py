@@ -35,11 +35,7 @@ MAX_SHARE = 0.5  # of the map: more is better solved whole
 
 @dataclass(frozen=True)
 class Window:
-    """Rows and columns of the whole map.
-
-    inside: sampled again; context: what the network sees; cells of V that belong to it, and of these `moving` [h, w]
-    may change.
-    """
+    """Rows and columns to sample again (inside) and to show the network (context), its `cells` of V, some moving."""
 
     inside: tuple[slice, slice]
     context: tuple[slice, slice]
@@ -88,10 +84,7 @@ def solve_inside(
     seed: int,
     report: Reporter,
 ) -> tuple[torch.Tensor, Lights]:
-    """Return the map [1, 7, S, S] and theta of an earlier solve with a window of it sampled anew, on the processor.
-
-    The earlier solve's recipe is walked with at most MAX_STEPS steps; the solution itself stays as it is.
-    """
+    """Return the map [1, 7, S, S] and theta of an earlier solve with a window sampled anew."""
     device, denoised, lights = prior.device, earlier.denoised, earlier.lights
     cropped = {factor: crop_observation(o, window, factor).to(device) for factor, o in observations.items()}
     context = denoised[(..., *window.context)].to(device)

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Confirm marks by the pictures that the texture was made of.
-
-What one view alone shows (a highlight's gap, an eyelash) is not the skin's.
-"""
+"""Confirm marks by the views: what one view alone shows (a highlight's gap, an eyelash) is not the skin's."""
 
 from __future__ import annotations
 
@@ -25,10 +22,7 @@ MIN_VIEWS = 2  # views; where fewer saw it the texture alone decides
 
 
 def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
-    """Return the marks, in texels of a map of `size`, that the delit views agree on.
-
-    Without cameras and delit views all marks stay.
-    """
+    """Return the marks of a map of `size` texels that the delit views agree on; all of them without views."""
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return marks
     covered = head.raster(size)[0] >= 0
@@ -59,10 +53,7 @@ def find_visible(view: View, caster: raster.RayCaster, points: np.ndarray, norma
 
 
 def _contrast(view: View, picture: np.ndarray, points: np.ndarray, covered: np.ndarray, mark: Mark) -> float | None:
-    """Return how much darker a view's picture (log [H, W]) is at a mark than around it; None if its frame ends there.
-
-    It may be within a radius of the mark, as views and head may be off by that much.
-    """
+    """Return how much darker a view (log [H, W]) is at a mark than around it; None if its frame ends there."""
     reach = int(np.ceil(3.5 * mark.radius + 1))
     row, column = round(mark.row), round(mark.column)
     window = slice(max(row - reach, 0), row + reach + 1), slice(max(column - reach, 0), column + reach + 1)

@@ -123,8 +123,7 @@ def _complete_head(
 def enlarged(maps: HeadMaps, size: int, method: str, device: str, progress) -> np.ndarray:
     """Return diffuse (sRGB), unit normal and specular at another size: float32 [size, size, 7].
 
-    The network makes four times as many texels of a side; more or fewer than that are resampled. `progress` gets the
-    share done.
+    The network makes four times as many texels of a side; more or fewer are resampled. `progress` gets the share done.
     """
     if method == "network" and size > len(maps.diffuse):
         from .enlarge import enlarge  # torch is only needed here
@@ -149,20 +148,14 @@ def _join(diffuse: np.ndarray, normal: np.ndarray, specular: np.ndarray, size: i
 
 
 def _resampled(image: np.ndarray, size: int) -> np.ndarray:
-    """Resample [H, W(, C)] to [size, size(, C)], within the range of `image`.
-
-    Lanczos overshoots at hard edges, and no albedo is negative.
-    """
+    """Resample [H, W(, C)] to [size, size(, C)], within the range of `image`, which Lanczos overshoots at edges."""
     if image.shape[:2] == (size, size):
         return image
     return np.clip(images.resize(image, size, size), image.min(), image.max())
 
 
 def _write_together(writes: list[Callable[[], None]], tick: Callable[[float], None]) -> None:
-    """Run all of them, WRITERS at a time.
-
-    `tick` gets the share done several times a second, and may raise to cancel, as each of them may.
-    """
+    """Run all of them, WRITERS at a time. `tick` gets the share done, and may raise to cancel, as each of them may."""
     with ThreadPoolExecutor(WRITERS) as pool:
         running = [pool.submit(write) for write in writes]
         try:

@@ -48,10 +48,7 @@ def draw_turned(surface: HeadSurface, several: list[HeadMaps], side: int = 240) 
 
 
 def draw_masks(diffuse: np.ndarray, hair: Hair, cleaned: np.ndarray, side: int = 400) -> np.ndarray:
-    """Return sRGB [side, 3 side, 3] of the face.
-
-    It is the linear albedo [S, S, 3], the same with brows red, lashes green and beard blue, and the skin below.
-    """
+    """Return sRGB [side, 3 side, 3]: the face's albedo, its brows red, lashes green and beard blue, the skin below."""
     tinted = images.linear_to_srgb(diffuse) * 0.6
     for name, tint in TINTS.items():
         cover = getattr(hair, name)[..., None]
@@ -71,10 +68,7 @@ def _axes(direction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _lit(maps: HeadMaps, texel: np.ndarray, axes, eye) -> np.ndarray:
-    """Return linear colours [N, 3] at texels [N, 2] (x, y) with tangent frames `axes`.
-
-    They are Lambert's, with Blinn's highlights: a picture, not a measurement.
-    """
+    """Return linear colours [N, 3] at texels [N, 2] with tangent frames `axes`, by Lambert with Blinn's highlights."""
     albedo, tilted, level = (raster.sample(picture, texel) for picture in (maps.diffuse, maps.normal, maps.specular))
     normal = sum(tilted[:, i : i + 1] * axis for i, axis in enumerate(axes))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measure how glossy the solved skin is.
-
-Materials take the specular map relative to its mean on cheeks and forehead, which is skin's 2.8 percent.
-"""
+"""Measure how glossy the solved skin is: materials divide the specular map by its mean on cheeks and forehead."""
 
 from __future__ import annotations
 
@@ -15,10 +12,7 @@ WITHOUT = ("nose", "eyes", "brows", "lips", "nostrils")
 
 
 def on_cheeks_and_forehead(specular: np.ndarray, confidence: np.ndarray) -> float:
-    """Return the mean of the specular albedo [S, S] there, under the confidence [S, S] in [0, 1].
-
-    It is over all of the region if nothing there was seen.
-    """
+    """Return the mean specular albedo there under a confidence [S, S], or over all of it if nothing was seen."""
     size = len(specular)
     where = template.mask("skin", size) > 0.5
     for name in WITHOUT:

@@ -103,10 +103,7 @@ def blurred(picture: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray
 def _answers(
     surface: HeadSurface, mask: np.ndarray, texel: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the variances [band, wavelength] in the map's bands of a noise, and of the slopes of such a height.
-
-    The noise has a deviation of 1.
-    """
+    """Return the variances [band, wavelength] in the map's bands of a noise of deviation 1, and of its slopes."""
     side = int(min(np.sqrt(SAMPLE_TEXELS), surface.size))
     top, left = (
         int(np.clip(np.median(at) - side / 2, 0, surface.size - side)) if len(at) else 0 for at in np.nonzero(mask)

@@ -114,11 +114,7 @@ def groom(
 
 
 def write(path: Path, strands_of: dict[str, Strands]) -> None:
-    """Write an .npz of each PART: points, radius and colour.
-
-    PART_points is float32 [M, K, 3] metres, in the axes of head.obj, from root to tip; PART_radius [M, K] metres;
-    PART_colour [M, 3] linear albedo.
-    """
+    """Write an .npz: PART_points [M, K, 3], root to tip, and PART_radius [M, K] in metres, linear PART_colour [M, 3]."""
     arrays = {}
     for part, hairs in strands_of.items():
         arrays |= {f"{part}_points": hairs.points, f"{part}_radius": hairs.taper(), f"{part}_colour": hairs.colour}
@@ -127,10 +123,7 @@ def write(path: Path, strands_of: dict[str, Strands]) -> None:
 
 
 def _covers(albedo: np.ndarray, skin: np.ndarray, kind: HairKind) -> bool:
-    """Return true if a beard takes more blue from the skin [N, 3] than its shade and stubble together can.
-
-    The albedo with the beard is [N, 3].
-    """
+    """Return true if a beard takes more blue from the skin [N, 3] than its shade and stubble together can."""
     taken = 1 - float(albedo[:, 2].mean() / max(skin[:, 2].mean(), 1e-6))
     stubble = 1 - np.exp(-STUBBLE.most * STUBBLE_MM * TAPER * kind.diameter)
     return taken > 1 - (1 - SHADE_BLUE_SHARE) * (1 - stubble)
@@ -178,10 +171,7 @@ def _grow(
 
 
 def _strew(expected: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return texels [M], each as often as is `expected` [N] of it, without the clumps of chance.
-
-    There is one hair in each of M equal shares of the sum.
-    """
+    """Return texels [M], each as often as is `expected` [N]: one in each of M equal shares of the sum."""
     total = np.cumsum(expected)
     count = round(total[-1])
     shares = (np.arange(count) + rng.uniform(size=count)) / max(count, 1)
@@ -191,10 +181,7 @@ def _strew(expected: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def _walk(
     start: np.ndarray, sign: int, far: np.ndarray, texels: HairTexels, way: np.ndarray, tree: cKDTree, beyond: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return texels [M] `far` mm [M] along the ways, against them for sign -1, and how far those are.
-
-    A hair ends where no texel with hair is within `beyond` mm.
-    """
+    """Return texels [M] up to `far` mm along (1) or against (-1) the ways, `beyond` mm from hair at most, and how far."""
     at, gone = start.copy(), np.zeros(len(start))
     walking = np.ones(len(start), bool)
     step = far / WALK_STEPS
@@ -226,10 +213,7 @@ def _unmix(albedo: np.ndarray, skin: np.ndarray, cover: np.ndarray, reach: float
 
 
 def _grow_lashes(brows: np.ndarray, vertices: np.ndarray, rng: np.random.Generator) -> Strands:
-    """Grow lashes along the edges of the lids, as they lie when these are closed: no texture shows them one by one.
-
-    brows [3] is their colour, vertices [V, 3] are the head's, in metres.
-    """
+    """Grow lashes of a colour [3] along the edges of the closed lids of a head's vertices [V, 3], in metres."""
     rows = [
         _lash_row(lids.closed_edge(vertices, side, number, OFF_SEAM_M)[::-1], lid, rng)
         for side in (0, 1)
@@ -242,10 +226,7 @@ def _grow_lashes(brows: np.ndarray, vertices: np.ndarray, rng: np.random.Generat
 
 
 def _lash_row(edge: np.ndarray, lid: str, rng: np.random.Generator) -> np.ndarray:
-    """Return points [M, POINTS_PER_HAIR, 3] in metres of the lashes of a closed lid.
-
-    Its edge [n, 3] runs from the inner to the outer corner.
-    """
+    """Return points [M, POINTS_PER_HAIR, 3] in metres of the lashes on a lid's edge [n, 3], inner corner first."""
     count, length = LASH[lid]
     up, outwards = 1 if lid == "upper" else -1, np.sign(edge[-1, 0])
     t = np.sort(rng.uniform(0.12, 0.96, count))

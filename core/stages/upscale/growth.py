@@ -77,11 +77,7 @@ def find(
 
 
 def _likely(name: str, part_shares: np.ndarray, power: dict[str, np.ndarray]) -> np.ndarray:
-    """Return the probability of that hair [S, S], by Bayes' rule.
-
-    The prior is the parser's shares; strokes are as much likelier on hair of any kind as their power is over that of
-    bare skin's grain.
-    """
+    """Return the probability of that hair [S, S] by Bayes' rule, from the parser's shares and the strokes' power."""
     hairy = part_shares.sum(-1)
     there = part_shares[..., GROWTHS.index(name)] * power[name]
     return there / np.maximum(hairy * power[name] + np.clip(1 - hairy, 0, 1), 1e-6)
@@ -110,10 +106,7 @@ def _over_usual(bearded: np.ndarray) -> np.ndarray:
 
 
 def _bearable(zone: np.ndarray) -> np.ndarray:
-    """Return where the parser may see a beard, [S, S] in [0, 1].
-
-    That is on the face, and as far down the neck as beards usually go: there a collar has its edge.
-    """
+    """Return where the parser may see a beard, [S, S]: on the face, and down the neck as far as beards usually go."""
     bar = np.maximum.reduce([template.mask(name, len(zone)) for name in ("lips", "ears", "nostrils", "nose", "eyes")])
     return np.maximum(zone, template.mask("face", len(zone))) * (1 - bar)
 

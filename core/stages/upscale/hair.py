@@ -34,10 +34,7 @@ USUAL_COVER, USUAL_COVER_SIGMA = {"brows": 0.5, "beard": 0.5}, 0.25
 
 @dataclass(frozen=True)
 class Hair:
-    """Share of each texel that hair covers, float32 [S, S] in [0, 1].
-
-    hidden: probability that hair of the head lay before it in the frames.
-    """
+    """Share of each texel that hair covers, [S, S]; hidden: probability that hair of the head lay before it."""
 
     brows: np.ndarray
     lashes: np.ndarray
@@ -164,10 +161,7 @@ def _skin(
 
 
 def _cover(darker: np.ndarray, zone: np.ndarray, usual: float) -> np.ndarray:
-    """Return the share of hair [S, S] by how much darker (in log albedo) than its skin a texel is.
-
-    It is linear between the grain of bare skin and the darkest hairs.
-    """
+    """Return the share of hair [S, S], linear from the grain of bare skin to the darkest hairs, by log darkness."""
     growing = zone > 0.5
     full = float(np.percentile(darker[growing], 99)) if growing.sum() > 20 else 0.0
     if full < max(LEAST_HAIR_LOG, 4 * usual):
@@ -198,10 +192,7 @@ def _parsed_cover(
 
 
 def _behind(brows: np.ndarray, grown: Growth, surface: HeadSurface) -> np.ndarray:
-    """Return the brows with those that lie behind hair of the head.
-
-    They are as the other brow is, if that is seen, and as brows usually are if neither is.
-    """
+    """Return the brows with those behind hair of the head: like the other one if that is seen, or as usual."""
     other, hidden = brows[:, ::-1], grown.head[:, ::-1]  # the template's two sides mirror each other on the map
     usual = USUAL_COVER["brows"] * template.mask("brows", surface.size)
     return brows * (1 - grown.head) + grown.head * (other * (1 - hidden) + usual * hidden)

@@ -33,9 +33,8 @@ class HeadMaps:
 
 
 def read_maps(folder: Path, texture_confidence: Path) -> HeadMaps:
-    """Read the solver's maps, and how well the texture saw each texel.
+    """Read the solver's maps, and how well the texture saw each texel: not at all without confidence.
 
-    That is not at all where the solver's confidence is 0, and the confidence itself if the texture's file is gone.
     Raises Problem if a map is damaged or of another size than the others.
     """
     paths = {

@@ -41,10 +41,7 @@ def measure_stroke_length(light: np.ndarray, texels: HairTexels, way: np.ndarray
 
 
 def _away_from_border(mask: np.ndarray, texels: float) -> np.ndarray:
-    """Return the part of a mask [S, S] that lies so far within it, or all of a mask that is nowhere so wide.
-
-    Nearer, what is beside the hair is among the patches, and the edge of a lip would be a long stroke.
-    """
+    """Return the part of a mask [S, S] so far within it, or all of a mask that is nowhere so wide."""
     inside = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
     deep = inside > texels
     return deep if deep.any() else mask

@@ -25,10 +25,7 @@ AROUND_MM = 1.5  # over which neighbouring hairs lie alike, and their strokes ar
 
 @dataclass(frozen=True)
 class HairTexels:
-    """N texels on which hair grows, row by row.
-
-    mask bool [S, S]; position [N, 3] in mm; normal, tangent and bitangent [N, 3], unit.
-    """
+    """N texels on which hair grows, row by row: mask bool [S, S]; position [N, 3] in mm; unit vectors [N, 3]."""
 
     mask: np.ndarray
     position: np.ndarray
@@ -55,11 +52,7 @@ def lay_texels(surface: HeadSurface, mask: np.ndarray) -> HairTexels:
 
 
 def measure_tensors(albedo: np.ndarray, texels: HairTexels, texel: float) -> np.ndarray:
-    """Return structure tensors [N, 2, 2] of a linear albedo's strokes [S, S, 3] in the tangent plane, over AROUND_MM.
-
-    They have trace 1 (0 without detail), and are large across the strokes, small along them. `texel` is its width in
-    mm.
-    """
+    """Return tensors [N, 2, 2] of trace 1, large across a linear albedo's strokes, small along them; `texel` in mm."""
     grey = images.linear_to_srgb(albedo).mean(2)
     fine = cv2.GaussianBlur(grey - cv2.GaussianBlur(grey, (0, 0), COARSEST_MM / texel), (0, 0), 0.7)
     right, down = (cv2.Scharr(fine, cv2.CV_32F, *axis, scale=1 / 32) for axis in ((1, 0), (0, 1)))

@@ -27,10 +27,7 @@ FAR_MM = 25.0
 
 @dataclass(frozen=True)
 class HeadSurface:
-    """Surface of a head under maps of a size S.
-
-    mesh: in mm, its open edges sewn; face int32 [S, S]: the triangle of a texel (-1: none); bary float32 [S, S, 3].
-    """
+    """Surface of a head, mesh in mm, under maps of a size S: each texel's triangle (-1: none) and bary [S, S(, 3)]."""
 
     mesh: Mesh
     size: int
@@ -111,10 +108,7 @@ class HeadSurface:
 
     @cached_property
     def _stiffness(self) -> sparse.csr_matrix:
-        """Cotangent Laplacian [V, V] (Pinkall and Polthier 1993), positive semi-definite.
-
-        Obtuse corners count as nothing.
-        """
+        """Cotangent Laplacian [V, V] (Pinkall and Polthier 1993), positive semi-definite, without obtuse corners."""
         corners, count = self.mesh.vertices[self.mesh.faces], len(self.mesh.vertices)
         rows, columns, weights = [], [], []
         for i in range(3):

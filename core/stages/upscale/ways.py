@@ -17,10 +17,7 @@ NOSE_BASE, MOUTH_CORNER = 2, 291
 
 
 def usual(growth: str, position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
-    """Return directions from root to tip [N, 3] at positions [N, 3] mm, by landmarks [468, 3] mm.
-
-    They have any length, and do not yet lie along the skin.
-    """
+    """Return directions from root to tip [N, 3], not yet along the skin, by landmarks [468, 3]; all in mm."""
     return _brows(position, landmarks) if growth == "brows" else _beard(position, landmarks)
 
 

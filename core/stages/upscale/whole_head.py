@@ -124,10 +124,7 @@ def apart(maps: HeadMaps) -> tuple[np.ndarray, np.ndarray]:
 
 
 def joined(maps: HeadMaps, mask: np.ndarray, channels: np.ndarray, slopes: np.ndarray | None = None) -> HeadMaps:
-    """Return maps with new values at the N texels of bool [S, S].
-
-    channels [N, 4] and slopes [N, 2] are as `apart` makes them.
-    """
+    """Return maps with new channels [N, 4] and slopes [N, 2], as `apart` makes them, at the N texels of bool [S, S]."""
     diffuse, specular, normal = maps.diffuse.copy(), maps.specular.copy(), maps.normal.copy()
     diffuse[mask] = np.clip(np.exp(channels[:, :3]), DARKEST_LINEAR, 1)
     specular[mask] = np.clip(channels[:, 3], 0, 1)
@@ -142,10 +139,7 @@ def _features(size: int) -> np.ndarray:
 
 
 def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: int) -> np.ndarray:
-    """Return log albedo and specular [S, S, 4] of the whole head, without detail.
-
-    Bare skin goes on over the scalp too, unless enough of the scalp was seen: then it has a field of its own.
-    """
+    """Return log albedo and specular [S, S, 4] without detail; a scalp that was hardly seen is bare skin."""
     scalp, usual = template.mask("scalp", surface.size), usual_skin(surface.size)
     bare = trust * (1 - _features(surface.size))
     bald = surface.smooth(usual, (1 - _features(surface.size)) * (1 - scalp) ** 4, REACH_MM)
@@ -161,10 +155,7 @@ def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: i
 
 
 def usual_skin(size: int) -> np.ndarray:
-    """Return the prior's mean face in the form of `apart`'s channels [S, S, 4], its albedo over the skin tone.
-
-    Necks are paler than cheeks, ears redder.
-    """
+    """Return the prior's mean face in the form of `apart`'s channels [S, S, 4], its albedo over the skin tone."""
     shipped_files.require_whole(MEAN_FACE)
     with safe_open(MEAN_FACE, "numpy") as file:
         mean = file.get_tensor("mean_face").astype(np.float32).transpose(1, 2, 0)
