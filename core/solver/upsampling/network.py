@@ -77,7 +77,7 @@ class Rcan(nn.Module):
     def features(
         self, maps: torch.Tensor, depth: int | None = None, tick: Callable[[float], None] = lambda share: None
     ) -> torch.Tensor:
-        """Run the body, [N, 7, H, W] -> [N, width, H, W]: its attention needs the whole map. `tick` gets the share done."""
+        """Run the body, [N, 7, H, W] -> [N, width, H, W], on a whole map for its attention; `tick` gets the share."""
         begun = self.head((maps - _channels(CHANNEL_MEANS, maps)) / _channels(CHANNEL_DEVIATIONS, maps))
         x = begun
         for i, (group, join) in enumerate(zip(self.groups, self.joins, strict=True)):

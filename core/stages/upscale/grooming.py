@@ -114,7 +114,7 @@ def groom(
 
 
 def write(path: Path, strands_of: dict[str, Strands]) -> None:
-    """Write an .npz: PART_points [M, K, 3], root to tip, and PART_radius [M, K] in metres, linear PART_colour [M, 3]."""
+    """Write an .npz: PART_points [M, K, 3] from the root and PART_radius [M, K], metres; linear PART_colour [M, 3]."""
     arrays = {}
     for part, hairs in strands_of.items():
         arrays |= {f"{part}_points": hairs.points, f"{part}_radius": hairs.taper(), f"{part}_colour": hairs.colour}
@@ -181,7 +181,7 @@ def _strew(expected: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def _walk(
     start: np.ndarray, sign: int, far: np.ndarray, texels: HairTexels, way: np.ndarray, tree: cKDTree, beyond: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return texels [M] up to `far` mm along (1) or against (-1) the ways, `beyond` mm from hair at most, and how far."""
+    """Return texels [M] up to `far` mm along (1) or against (-1) the ways, while `beyond` mm from hair, and the way."""
     at, gone = start.copy(), np.zeros(len(start))
     walking = np.ones(len(start), bool)
     step = far / WALK_STEPS
