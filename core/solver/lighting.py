@@ -25,7 +25,7 @@ from ..light.spherical_harmonics import GAMMA_BANDS, sh_basis
 
 
 class OnDevice:
-    """Base of what holds tensors, and lists or objects of them, and can be had on another device."""
+    """Base of objects that hold tensors, or lists or other such objects of them."""
 
     def to(self, device: torch.device | str):
         """Return a copy whose tensors are on a device."""

@@ -87,25 +87,36 @@ def start_solve(
     lights = fit_first_lights(texture, albedo, evidence.normal, weight, grid_cells(cell), recipe)
     local = torch.zeros(3, 1, 1)
     if recipe.linear:
-        shapes = [
-            make_shapes(each, albedo_of(make_reference(prior, tone, each, recipe.reference)))
-            for each in (evidence, *other_captures)
-        ]
-        split = split_captures(shapes, head_cells, check=callbacks.check)
+        captures = (evidence, *other_captures)
+        references = [albedo_of(make_reference(prior, tone, each, recipe.reference)) for each in captures]
+        split = split_captures(list(map(make_shapes, captures, references)), head_cells, check=callbacks.check)
         light = split.light(evidence.normal)
         if weighted_deviation(light.log(), lit) < recipe.linear:
-            recipe = settle_recipe(recipe)
             if other_captures:  # one capture alone cannot tell a light of this form from a trait
                 local = torch.from_numpy(split.local)
-            # to the split the light's level and the traits' mean look alike; but the tone is the mean of the skin
-            beneath = texture / (light * enlarge_field(local, evidence.size).exp())
-            light = light * (mean_tone(beneath, lit) / mean_tone(albedo, lit))[:, None, None]
-            basis, skin = shading_basis(evidence.normal), evidence.skin * evidence.weight
-            lights.glob = fit_around_constant(light, torch.ones_like(light), basis, skin, 1e-3)
+            recipe, lights.glob = settle_recipe(recipe), _fit_split(light, local, texture, albedo, evidence, lit)
         else:
             recipe = free_recipe(recipe)
     start = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
     return _lay_out(prior, evidence, start, cell, callbacks)
+
+
+def _fit_split(
+    light: torch.Tensor,
+    local: torch.Tensor,
+    texture: torch.Tensor,
+    albedo: torch.Tensor,
+    evidence: Evidence,
+    lit: torch.Tensor,
+) -> torch.Tensor:
+    """Return the gamma^g [3, 9] of the split's light [3, S, S] at the level under which the lit skin has the tone.
+
+    To the split the light's level and the traits' mean look alike, but the tone is the mean of the skin.
+    """
+    beneath = texture / (light * enlarge_field(local, evidence.size).exp())
+    light = light * (mean_tone(beneath, lit) / mean_tone(albedo, lit))[:, None, None]
+    basis, skin = shading_basis(evidence.normal), evidence.skin * evidence.weight
+    return fit_around_constant(light, torch.ones_like(light), basis, skin, 1e-3)
 
 
 def start_again(

@@ -92,7 +92,10 @@ def write_maps(
     conditions: dict[str, str],
     only: tuple[slice, slice] | None = None,
 ) -> None:
-    """Write maps/, whole or not at all, and the solution; with `only`, rows and columns, the other texels stay."""
+    """Write maps/, whole or not at all, with the solution that a later solve of a part goes on from.
+
+    `conditions` are mask_edit's. With `only`, rows and columns, all other texels keep the values of their files.
+    """
 
     def put(write: Callable, name: str, image: np.ndarray, **options) -> None:
         if only is not None:

@@ -16,7 +16,7 @@ SIDE_TEXELS = 512  # of the maps that are read, which have to resolve a cell of 
 
 
 def read_others(capture: Capture, settings: Settings, report: Reporter) -> list[Evidence]:
-    """Read the captures that settings.solve.together names, but for this one. Raises Problem if one is unusable."""
+    """Read the captures that settings.solve.together names, but for this one. Raises Problem for unusable ones."""
     named = captures_in(settings.solve.together)
     roots = [root for root in named if root.resolve() != capture.root.resolve()]
     if named and not roots:

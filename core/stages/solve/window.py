@@ -35,7 +35,11 @@ MAX_SHARE = 0.5  # of the map: more is better solved whole
 
 @dataclass(frozen=True)
 class Window:
-    """Rows and columns to sample again (inside) and to show the network (context), its `cells` of V, some moving."""
+    """Rows and columns of the whole map, and cells of V.
+
+    inside: sampled again; context: what the network sees; cells: of V, in the context; moving [h, w]: which of them may
+    change.
+    """
 
     inside: tuple[slice, slice]
     context: tuple[slice, slice]
@@ -84,7 +88,7 @@ def solve_inside(
     seed: int,
     report: Reporter,
 ) -> tuple[torch.Tensor, Lights]:
-    """Return the map [1, 7, S, S] and theta of an earlier solve with a window sampled anew."""
+    """Return the map [1, 7, S, S] and theta of an earlier solve with a window sampled anew, in a short walk."""
     device, denoised, lights = prior.device, earlier.denoised, earlier.lights
     cropped = {factor: crop_observation(o, window, factor).to(device) for factor, o in observations.items()}
     context = denoised[(..., *window.context)].to(device)
