@@ -28,9 +28,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     expected = json.loads(EXPECTED_FILE.read_text(encoding="utf-8"))
     least = expected["mean_db"] - MAX_DEVIATIONS * expected["deviation_db"]
     score, seconds = measure(capture, settings, report)
-    report.figure("score_db", round(score, 2))
-    report.figure("expected_db", round(least, 2))
-    report.figure("seconds", round(seconds, 1))
+    figures = {"score_db": round(score, 2), "expected_db": round(least, 2), "seconds": round(seconds, 1)}
+    for name, value in figures.items():
+        report.figure(name, value)
     where = settings.compute_device
     if not score >= least:
         raise Problem(
