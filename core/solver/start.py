@@ -33,7 +33,7 @@ class NoSkinError(ValueError):
 class Start:
     """Start of a run.
 
-    tone: the skin's, linear RGB [3]; recipe: the one asked for, as this capture's light lets it be used; reference:
+    tone: the skin's, linear RGB [3]; recipe: the chosen one, adapted to this capture's light; reference:
     x_0^ref [1, 7, S, S]; exposure: factor of the texture in `observations` (by coarsening factor), so that its shading
     is about one; alpha [S, S]: M as it is used; state: before the first step; marks: the skin's own, kept from the
     light; local [3, C, C], natural log: light that other captures of the person reveal beside theta, zeros without any.

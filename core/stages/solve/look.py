@@ -91,7 +91,7 @@ def weigh_skin(size: int, shadow: np.ndarray) -> np.ndarray:
         skin = skin * (1 - template.mask(name, size))
     skin[round(size * (1 - BEARD_TOP_V)) :] = 0
     shadow = cv2.dilate(images.resize(shadow.astype(np.float32), size, size), np.ones((3, 3)))
-    return skin * np.clip(1 - 3 * shadow, 0, 1)  # half a shadow is none of the skin's own brightness either
+    return skin * np.clip(1 - 3 * shadow, 0, 1)  # half a shadow darkens skin, too
 
 
 def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> np.ndarray:
