@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper as a library of tensors: it reads no file and knows no capture."""
+"""Paper as a library of tensors: it reads no file and knows no capture."""

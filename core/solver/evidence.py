@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the solver is told of a face: texture, confidence, normals and masks at the size it solves, and the same again
-for its coarser maps."""
+"""Input of the solver: texture I_UV, confidence, normals N_c and masks, at the size of the solve and coarser."""
 
 from __future__ import annotations
 
@@ -24,9 +23,11 @@ FACE_CROP_TEXELS = 768
 
 @dataclass(frozen=True)
 class Extent:
-    """Which part of the UV square the maps cover, in texels of REFERENCE_TEXELS: `side` rows from `top` on and as many
-    columns from `left` on. The prior is told the coordinates of texel centres, or of their upper left corners (not
-    `centred`), and knows maps that are coarser by `factors`."""
+    """Part of the UV square that the maps cover, in texels of REFERENCE_TEXELS.
+
+    It has `side` rows from `top` on and as many columns from `left` on. The prior takes the coordinates of texel
+    centres, or (not `centred`) of their upper left corners, and knows maps that are coarser by `factors`.
+    """
 
     top: int = 0
     left: int = 0
@@ -37,13 +38,15 @@ class Extent:
 
 @dataclass(frozen=True)
 class Evidence:
-    """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow
-    mask M; normal [3, S, S], unit, world space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin
-    without lips, brows, eyes and hair; bare [S, S]: that of neck and ears as well; trust [S, S]: 1, less where a
-    texel's colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's
-    border lies on a shadow's edge that is seen; shadow_colour [3]: the colour of what shadows take of the light, over
-    its mean, zeros where that is not known; added [S, S]: how far the artist added to the proposal for M; missing [S,
-    S]: the share of the light that M's border says is missing, None where nobody asked it."""
+    """Maps [S, S] in [0, 1] of one capture, if not said otherwise.
+
+    texture [3, S, S] linear; weight: how much it counts, 0 if unseen; alpha: the soft shadow mask M; normal [3, S, S],
+    unit, world space, N_c; covered bool: texels of the head; skin: facial skin without lips, brows, eyes and hair;
+    bare: skin of neck and ears as well; trust: less than 1 if a texel's colour says little of the light; protected:
+    what the artist keeps out of M; edge: how far M's border lies on a visible shadow edge; filmed: brightness in the
+    frames over usual skin's; added: what the artist added to the proposal for M; shadow_colour [3]: of what shadows
+    take of the light, over its mean, zeros if unknown; missing: the share of the light that M's border says is missing.
+    """
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -71,14 +74,12 @@ class Evidence:
         return self.extent.side / self.size
 
     def cell_side(self, grid_cells: int) -> float:
-        """The side of a cell of V, in texels where the whole map has REFERENCE_TEXELS, when `grid_cells` of them are
-        asked for across the face."""
+        """Return a cell's side for so many cells across the face, in texels of a whole map of REFERENCE_TEXELS."""
         return FACE_CROP_TEXELS / grid_cells * REFERENCE_TEXELS / self.extent.side
 
 
 def soften_mask(mask: np.ndarray) -> np.ndarray:
-    """A mask [S, S] in [0, 1] whose hard borders fade over a few texels, as the light's do; faint remains become
-    zero."""
+    """Fade the hard borders of a mask [S, S] over a few texels, as light does; faint remains become zero."""
     faded = cv2.GaussianBlur(mask, (0, 0), max(MASK_FADE_TEXELS * len(mask) / REFERENCE_TEXELS, 0.3))
     return np.clip((faded - 0.02) / 0.96, 0, 1)
 
@@ -86,16 +87,11 @@ def soften_mask(mask: np.ndarray) -> np.ndarray:
 def make_observations(
     evidence: Evidence, exposure: float, cell: float, multiple: int, recipe: Recipe
 ) -> dict[int, Observation]:
-    """The evidence as the sampler takes it, per coarsening factor. Maps coarser than a quarter of REFERENCE_TEXELS are
-    left out: the prior has not seen them.
+    """Return the sampler's observations by coarsening factor.
 
-    Parameters
-    ----------
-    evidence : of the capture
-    exposure : factor that the texture is multiplied by
-    cell : side of a grid cell where the map has REFERENCE_TEXELS texels
-    multiple : of which the network takes sides, in texels
-    recipe : of the solve
+    Maps coarser than a quarter of REFERENCE_TEXELS are left out: the prior has not seen them. `exposure` multiplies the
+    texture, `cell` is a grid cell's side in texels of REFERENCE_TEXELS, the network takes sides of a `multiple` of
+    texels.
     """
     cells, extent = grid_cells(cell), evidence.extent
     levels = {}
@@ -103,11 +99,11 @@ def make_observations(
         size = evidence.size // factor
         if factor > 1 and (size < REFERENCE_TEXELS // 4 or size % multiple or evidence.size % factor):
             continue
-        maps = (evidence.weight, evidence.alpha, evidence.trust, evidence.edge, evidence.protected)
-        weight, alpha, trust, edge, protected = (torch.from_numpy(resize_maps(a.numpy(), size)) for a in maps)
-        texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
+        names = "weight", "alpha", "trust", "edge", "protected", "added"
+        weight, alpha, trust, edge, protected, added = (_resized(getattr(evidence, name), size) for name in names)
+        texture = _resized(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
         texture = blur_maps(texture) if recipe.blur else texture
-        normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)
+        normal = torch.nn.functional.normalize(_resized(evidence.normal, size), dim=0)
         inside = (alpha > (0.5 if recipe.hard_mask else 0)).numpy().astype(np.uint8)
         support = cv2.dilate(inside, np.ones((5, 5)))  # M and two texels around it
         ring = (support > 0) & ((inside == 0) if recipe.hard_mask else (alpha.numpy() < 0.5))
@@ -121,22 +117,21 @@ def make_observations(
         top, left = (start * whole // REFERENCE_TEXELS for start in (extent.top, extent.left))
         coords = make_coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
-        restraint = 1 - torch.from_numpy(resize_maps(evidence.added.numpy(), size))
-        missing = 0.0 if evidence.missing is None else torch.from_numpy(resize_maps(evidence.missing.numpy(), size))
+        missing = 0.0 if evidence.missing is None else _resized(evidence.missing, size)
         levels[factor] = Observation(
-            texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, restraint, missing
+            texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, 1 - added, missing
         )
     return levels
 
 
 def grid_cells(cell: float) -> tuple[int, int]:
-    """Cells (rows, columns) of the light grid over the whole map."""
+    """Return the rows and columns of the light grid over the whole map."""
     count = max(1, round(REFERENCE_TEXELS / cell))
     return count, count
 
 
 def resize_maps(image: np.ndarray, size: int) -> np.ndarray:
-    """A map [S, S(, C)] as [size, size(, C)]: areas averaged to shrink, bilinear to enlarge."""
+    """Resize a map [S, S(, C)] to [size, size(, C)]: areas averaged to shrink, bilinear to enlarge."""
     if image.shape[:2] == (size, size):
         return image
     shrinks = size < image.shape[0]
@@ -145,6 +140,8 @@ def resize_maps(image: np.ndarray, size: int) -> np.ndarray:
     )
 
 
-def _shrunk(maps: torch.Tensor, size: int) -> torch.Tensor:
-    """[C, S, S] -> [C, size, size]."""
+def _resized(maps: torch.Tensor, size: int) -> torch.Tensor:
+    """Resize a map [S, S] or [C, S, S]."""
+    if maps.dim() == 2:
+        return torch.from_numpy(resize_maps(maps.numpy(), size))
     return torch.from_numpy(np.ascontiguousarray(resize_maps(maps.permute(1, 2, 0).numpy(), size).transpose(2, 0, 1)))

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The constants of the method, and the named sets of them: ours, the paper's and the authors' released code's.
+"""Constants of the method (paper, section 4.1 and supplement), as three recipes.
 
-All three run through one implementation; what a name changes stands in RECIPES at the end of this file, side by side,
-and nowhere else.
+They are ours, the paper's, and that of the authors' released code. All run through one implementation; RECIPES at the
+end of this file lists side by side what each changes.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Recipe:
-    """Every choice the solver makes. The defaults are ours; equation numbers are the paper's."""
+    """Every choice of the solver. The defaults are ours; equation numbers are the paper's."""
 
     # the walk
     steps: int = 20
-    start: float = 0.6  # T_init / T: the share of the noise schedule that is walked
+    start: float = 0.6  # T_init / T: share of the noise schedule that is walked
     sigma_min: float = 0.01
     sigma_max: float = 80.0
     # (factor, sigma): above this noise the map is sampled at 1 / factor of its size
@@ -35,30 +35,26 @@ class Recipe:
     clip: str = "texel"
     limit: float = 0.1  # largest guidance of one texel
     blur: bool = False  # rendering and texture are compared through a 3 x 3 Gaussian
-    candidates: int = 1  # of so many draws of a step's noise the one nearest to the texture is taken
-    residual: float = 0.02  # proximal: the photometric error that is taken for noise
+    candidates: int = 1  # draws of a step's noise, of which the one nearest to the texture is used
+    residual: float = 0.02  # proximal: photometric error that counts as noise
 
     # the lights
-    # M is 0 or 1 and lights also the ring around it; else a soft alpha that fades over a few texels
-    hard_mask: bool = False
-    # how far the texel grid reaches outside of M; above 0 it takes away shadows that nobody masked, and more
-    open: float = 0.0
+    hard_mask: bool = False  # M is 0 or 1, with the ring around it; else a soft alpha that fades over a few texels
+    open: float = 0.0  # weight of the texel grid outside of M; above 0 it removes unmasked shadows, and more
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell
     bilinear: bool = False  # how a texel reads V; else cubic
-    # gamma^g is what the split of skin and light says (split.py), and stays, where that light's logarithm deviates by
-    # less: to there exp(x) is 1 + x within 3 %. A stronger light, as of frames that no delighter saw, is free, and all
-    # light is with 0
+    # deviation of the split's log light (split.py) up to which gamma^g is that light, and stays: so far exp(x) is 1 + x
+    # within 3 %. A stronger light, as in frames without a delighter, is optimised, and with 0 all light is
     linear: float = 0.25
     # gamma^g starts from a least-squares fit to x_0^ref; else from the even light that gives the texture's mean
     fitted: bool = True
-    # M's border is laid on the shadow's edge where the texture shows one, and there light may step
-    sharp_edges: bool = True
-    protect_marks: bool = True  # moles and round scars inside M tell nothing of the light
+    sharp_edges: bool = True  # M's border is laid on the shadow's edge if the texture shows one, where light may step
+    protect_marks: bool = True  # light must not explain moles and round scars inside M
     trusting: bool = False  # light may explain brows, lips and hair as freely as skin
     # (which lights, from, to): shares of the steps; frozen outside of them
     phases: tuple[tuple[str, float, float], ...] = (("both", 0.0, 0.5),)
     refit: float = 0.0  # share of the steps at which gamma^g is fitted outside of M in closed form
-    updates: int = 300  # of each phase, spread over its steps; one a step is the least
+    updates: int = 300  # of each phase, spread over its steps, at least one a step
     rate: float = 0.01  # of Adam ...
     decay: float = 0.995  # ... and its factor per update of a phase
     tv: float = 0.0
@@ -72,13 +68,12 @@ class Recipe:
     # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a
     # shadow is
     smooth: float = 1.0
-    # pull of s^V towards the share of the main light that M's border says is missing, per mean squared albedo; not
-    # where the artist added to the proposal for M
+    # pull of s^V towards the share of the main light that is missing by M's border, per mean squared albedo; not where
+    # the artist added to the proposal for M
     faint: float = 0.0
 
     # the end
-    # with the authors' prior the tone is that of their box, and texture and M count within the bounds of their masks
-    # alone
+    # with the authors' prior the tone is that of their box, and their masks' bounds limit texture and M
     released_boxes: bool = False
     # the mean of the facial skin is brought to the skin tone, in linear light; "srgb": in sRGB values; "none"
     rescale: str = "linear"
@@ -142,10 +137,10 @@ RECIPES = {
 
 
 def settle_recipe(recipe: Recipe) -> Recipe:
-    """Where the split has told gamma^g: it stays, V alone moves."""
+    """Keep gamma^g as the split found it: V alone moves."""
     return replace(recipe, phases=tuple(("grid", begin, end) for _, begin, end in recipe.phases), refit=0.0)
 
 
 def free_recipe(recipe: Recipe) -> Recipe:
-    """Where it has not: all light moves as the phases say."""
+    """Let every light parameter be optimised, as the phases say."""
     return replace(recipe, linear=0.0)

@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Joint sampling of reflectance and light (paper, section 3.4, "Jointly Sample A and Update Gamma").
+r"""Joint sampling of reflectance and light (paper, section 3.4, equations 5 to 8).
 
-The paper writes DDPM; here the same process stands in the variance-exploding form of EDM: x = x_0 + sigma z, one
-ancestral step of which is the DDPM posterior step (equation 5), and the denoiser's output is \\hat x_t (equation 6).
-Everything is float32 and linear light; x is [1, 7, H, W].
+The paper writes DDPM; here the same process has the variance-exploding form of EDM: x = x_0 + sigma z, one ancestral
+step of which is the DDPM posterior step (equation 5), and the denoiser's output is \hat x_t (equation 6). Everything is
+float32 and linear light; x is [1, 7, H, W].
 
-A step stays on the device that the state, the observations and the prior lie on: it neither asks that device for a
-number nor sends it one.
+A step stays on the device of the state, the observations and the prior: it neither reads a number back nor sends one.
 """
 
 from __future__ import annotations
@@ -24,12 +23,14 @@ from .recipes import Recipe
 
 
 class DivergedError(ArithmeticError):
-    """The numbers of a walk left all bounds, or are none."""
+    """Sampling diverged."""
 
 
 def seed_noise(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Callable]:
-    """The noise of a run: step -> draw(*shape), standard normal, drawn on the device. It depends on (seed, step,
-    device) alone, so a run continued from a stored state gives the same bytes."""
+    """Return a run's noise: step -> draw(*shape), standard normal, drawn on the device.
+
+    It depends on (seed, step, device) alone, so a run continued from a stored state gives the same bytes.
+    """
 
     def of_step(step: int) -> Callable:
         generator = torch.Generator(device).manual_seed(1_000_003 * seed + step)
@@ -40,11 +41,11 @@ def seed_noise(seed: int, device: torch.device | str = "cpu") -> Callable[[int],
 
 @dataclass(frozen=True)
 class Sampler:
-    """How a map is sampled, whatever is observed of it.
+    """Sampling method, whatever is observed of the map.
 
     denoiser(x, sigma, coords) is the prior; noise is `seed_noise`'s, of the observations' device; impose_known(x,
-    sigma, draw) puts what is known of the map for sure into x_t (window.py); fit moves theta after each step
-    (light_fit.update_lights, or another light model's).
+    sigma, draw) puts into x_t what is certain of the map (window.py); fit moves theta after each step (`update_lights`,
+    or another light model's).
     """
 
     denoiser: Callable
@@ -59,10 +60,9 @@ class Sampler:
         state: State,
         on_step: Callable[[State, int], None] = lambda state, steps: None,
     ) -> State:
-        """Samples from `state` to the end and returns the final state; `denoised` is the solved map, `lights` theta.
+        """Sample from `state` to the end and return the final state: `denoised` is the solved map, `lights` theta.
 
-        `observations` maps a coarsening factor to what is known at that size. Raises DivergedError when the numbers
-        leave all bounds.
+        `observations` maps a coarsening factor to what was observed at that size. Raises DivergedError.
         """
         sigmas = noise_schedule(self.recipe)
         steps = len(sigmas) - 1
@@ -74,8 +74,8 @@ class Sampler:
                 clean = _resized(state.denoised, *o.weight.shape)
                 state.x = clean + s * draw(*clean.shape)
                 # the lights' cost is a sum over texels, and Adam's memory of its gradient is longer than a size lasts
-                grown = o.weight.numel() / state.denoised[0, 0].numel()
-                state.moments = [moment * grown ** (1 + k % 2) for k, moment in enumerate(state.moments)]
+                growth = o.weight.numel() / state.denoised[0, 0].numel()
+                state.moments = [moment * growth ** (1 + k % 2) for k, moment in enumerate(state.moments)]
             self.step(o, state, (s, sigmas[i + 1]), steps, draw)
             if not state.x.abs().max() <= 1e3 * (1 + s):  # nor where it is no number
                 raise DivergedError(f"The solver diverged at step {i + 1} of {steps}.")
@@ -83,16 +83,9 @@ class Sampler:
         return state
 
     def step(self, o: Observation, state: State, levels: tuple[float, float], steps: int, draw: Callable) -> None:
-        """One step of `sample`, in place, between two noise levels: x_t becomes x_{t-1}, theta follows, all on their
-        device.
+        """Take one step of `steps` in place: x_t becomes x_{t-1}, theta follows.
 
-        Parameters
-        ----------
-        o : what is known of the map at the size of the state's x
-        state : [1, 7, H, W] maps and theta; changed
-        levels : sigma before and after the step, the second one smaller
-        steps : how many the whole walk has
-        draw : draw(*shape), the step's standard normal noise
+        `o` has the size of the state's x, `levels` is sigma before and after the step, draw(*shape) is its noise.
         """
         (s, s_next), recipe = levels, self.recipe
         x = self.impose_known(state.x, s, draw).requires_grad_(recipe.guidance == "dps")
@@ -125,9 +118,11 @@ class Sampler:
         lights: Lights,
         draw: Callable,
     ) -> torch.Tensor:
-        """x_{t-1}: the mean with fresh noise; of several draws the one whose rendering is nearest to where x_t's should
-        go (diffusion proximal posterior sampling, as in the released code). shares: the level of the fresh noise, and
-        the share of x_t's noise that the step keeps."""
+        """Return x_{t-1}, the mean with fresh noise; `shares` are its level and the share of x_t's noise that is kept.
+
+        Of several draws the one counts whose rendering is nearest to where x_t's should go (diffusion proximal
+        posterior sampling, as in the released code).
+        """
         s_up, kept = shares
         if self.recipe.candidates == 1:
             return mean + s_up * draw(*mean.shape)
@@ -142,29 +137,26 @@ class Sampler:
 
 
 def noise_schedule(recipe: Recipe) -> list[float]:
-    """Noise levels: the last `steps` of Karras' sequence (rho 7) whose length makes them the share `start` of it, then
-    0."""
+    """Return the last `steps` noise levels of a Karras sequence of which they are the share `start`, then 0."""
     count = max(recipe.steps, round(recipe.steps / recipe.start))
     return karras_sigmas(count, recipe.sigma_min, recipe.sigma_max)[-recipe.steps - 1 :]
 
 
 def karras_sigmas(count: int, sigma_min: float, sigma_max: float) -> list[float]:
-    """`count` noise levels from sigma_max to sigma_min and a final 0 (Karras et al. 2022, equation 5, rho 7)."""
+    """Return `count` noise levels from sigma_max to sigma_min and a final 0 (Karras et al. 2022, equation 5, rho 7)."""
     low, high = sigma_min ** (1 / 7), sigma_max ** (1 / 7)
     ramp = torch.linspace(0, 1, count, dtype=torch.float64)
     return [*((high + ramp * (low - high)) ** 7).tolist(), 0.0]
 
 
 def ancestral_sigmas(s: float, s_next: float) -> tuple[float, float]:
-    """(s_down, s_up) of a step that keeps the process's variance: down to s_down without noise, then s_up of fresh
-    noise."""
+    """Return (s_down, s_up): a step down to s_down and s_up of fresh noise keep the process's variance."""
     s_up = min(s_next, (s_next**2 * (s**2 - s_next**2) / s**2) ** 0.5)
     return (s_next**2 - s_up**2) ** 0.5, s_up
 
 
 def clip_gradient(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
-    """The guidance [1, 7, H, W] within the recipe's limit: texel by texel, so that one bad texel does not hold up the
-    others, or all of it at once."""
+    """Limit the guidance [1, 7, H, W] texel by texel, so that one bad texel does not hold up the others, or as one."""
     if recipe.clip == "texel":
         return gradient * (recipe.limit / gradient.abs().amax(1, keepdim=True).clamp_min(recipe.limit))
     if recipe.clip == "decade":
@@ -176,19 +168,9 @@ def clip_gradient(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
 def proximal_step(
     denoised: torch.Tensor, shading: torch.Tensor, o: Observation, s: float, residual: float
 ) -> torch.Tensor:
-    """The map nearest to `denoised` that explains the texture: per texel, in closed form (Zhu et al. 2023).
+    """Return the map nearest to `denoised` that explains the texture: per texel, in closed form (Zhu et al. 2023).
 
-    Parameters
-    ----------
-    denoised : [1, 7, H, W] in the network's range, of spread `s`
-    shading : [3, H, W], linear
-    o : holds the texture [3, H, W], linear, and its weight [H, W]
-    s : the noise level sigma of the step
-    residual : spread of the texture about its explanation, linear
-
-    Returns
-    -------
-    As `denoised`; normals and specular are its.
+    The map [1, 7, H, W] has the deviation `s`, the texture `residual` about its explanation. Normals and specular stay.
     """
     half = shading / 2 * o.weight
     ratio = (residual / s) ** 2

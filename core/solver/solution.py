@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a solve found, for a later one of a part to go on from."""
+"""Result of a solve, from which a later one of a part goes on."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from .lighting import Lights
 
 @dataclass(frozen=True)
 class Solution:
-    """What a solve ended with, all of the whole map: denoised x_0 [1, 7, S, S] before the maps' own gain, lights, the
-    mask as `painted` [S, S] and as it was used (`alpha`), the skin's tone, linear [3], gain [3] of the albedo, exposure
-    of the texture; local [3, C, C]: initial.Start's; settled: whether the split told the global light."""
+    """End of a solve of the whole map.
+
+    denoised: x_0 [1, 7, S, S] before the maps' own gain; painted, alpha [S, S]: the mask as it was painted and as it
+    was used; tone: of the skin, linear [3]; gain [3] of the albedo; exposure of the texture; local [3, C, C]: as in
+    start.Start; settled: true if the split found the global light.
+    """
 
     denoised: torch.Tensor
     lights: Lights

@@ -38,11 +38,11 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 from core.capture.capture import Capture
 from core.face.head import read_head
 from core.imaging import images
-from core.solver import start as initial
 from core.solver.lights import total_variation, update_lights
 from core.solver.objective import State, albedo, photometric_loss
 from core.solver.recipes import OURS, RECIPES, Recipe
 from core.solver.sampler import Sampler, seed_noise
+from core.solver.start import Start, start_solve
 from core.stages.solve import maps
 from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.head_cells import make_head_cells
@@ -243,7 +243,7 @@ def solve_problem(
             mask={"painted": uv_problem.mask, "empty": 0 * uv_problem.mask, "full": 0 * uv_problem.mask + 1}[mask],
         ).write(capture)
         evidence = read_evidence(capture, read_head(capture), size)
-    start = initial.start_solve(prior, evidence, tone.tensor, FACE_CROP / cells, recipe, make_head_cells)
+    start = start_solve(prior, evidence, tone.tensor, FACE_CROP / cells, recipe, make_head_cells)
     if with_prior:
         sampler = Sampler(prior.of_tone(start.tone), start.recipe, seed_noise(seed))
         state = sampler.sample(start.observations, start.state)
@@ -253,7 +253,7 @@ def solve_problem(
 
 
 def fit_texels(
-    start: initial.Start,
+    start: Start,
     recipe: Recipe,
     updates: int = 600,
     fit: Callable[..., None] = update_lights,

@@ -41,9 +41,9 @@ from core.capture.files import replacing_folder, write_json
 from core.face.head import read_head
 from core.imaging import images
 from core.settings.settings import Settings, from_json, preset
-from core.solver import start as initial
 from core.solver.evidence import Evidence
 from core.solver.sampler import Sampler, seed_noise
+from core.solver.start import Callbacks, start_solve
 from core.stages.solve import maps, recipe_of
 from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.head_cells import make_head_cells
@@ -181,14 +181,14 @@ def solve_by_method(
     prior = _prior()
     cell = evidence.cell_side(settings.solve.grid_cells)
     tone = read_given_tone(settings.solve.skin_tone)
-    start = initial.start_solve(
+    start = start_solve(
         prior,
         evidence,
         tone.tensor,
         cell,
         recipe_of(settings, prior),
         make_head_cells,
-        callbacks=initial.Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size)),
+        callbacks=Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size)),
     )
     fit, recipe = {}, start.recipe
     if method in LIGHTS:

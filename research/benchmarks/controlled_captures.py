@@ -20,8 +20,8 @@ from core.face import template
 from core.face.head import read_head
 from core.imaging import images
 from core.settings.settings import Settings, from_json
-from core.solver import start as initial
 from core.solver.sampler import Sampler, seed_noise
+from core.solver.start import start_solve
 from core.stages.solve import maps, recipe_of
 from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.head_cells import make_head_cells
@@ -52,7 +52,7 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     began, prior = time.monotonic(), _prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
-    start = initial.start_solve(
+    start = start_solve(
         prior,
         evidence,
         read_given_tone(settings.solve.skin_tone).tensor,

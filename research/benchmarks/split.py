@@ -29,9 +29,9 @@ from core.capture.capture import Capture
 from core.capture.messages import Problem
 from core.face.head import read_filmed_head
 from core.imaging import images
-from core.solver import start as initial
 from core.solver.extensions import split
 from core.solver.objective import albedo
+from core.solver.start import make_reference, make_shapes
 from core.stages.solve import confidence
 from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.head_cells import make_head_cells
@@ -172,7 +172,7 @@ def shapes_of(filmed: Filmed) -> split.Shapes:
     tone = read_given_tone(people.skin_tone(filmed.truth))
     if tone is None:
         raise Problem(f"{filmed.truth} has no skin tone.", "Give it a skin_tone.txt with sRGB R,G,B.")
-    return initial.make_shapes(evidence, albedo(initial.make_reference(prior(), tone.tensor, evidence, "mean")))
+    return make_shapes(evidence, albedo(make_reference(prior(), tone.tensor, evidence, "mean")))
 
 
 def divided(shapes: split.Shapes, fitted: split.Split, local: bool) -> np.ndarray:

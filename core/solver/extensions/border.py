@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much light is missing inside of M, as its border tells: a shadow's edge crosses the skin at random, so what
-differs on its two sides is light.
+"""Share of the light that is missing inside of M, measured at its border.
 
-Inside a shadow a darker skin and a lesser light look the same; at its edge they do not. What the steps along the border
-say holds for some way inwards, less the farther in and the shorter the border is that says it.
+A shadow's edge crosses the skin at random, so what differs on its two sides is light. Inside a shadow darker skin and
+less light look the same; at its edge they do not. The steps along the border hold for some way inwards, less the
+farther in and the shorter that border is.
 
-But a border may run along a beard, whose steps are of all sizes. Those that a delighter left differ along a border by
-LEFT_LOG, whatever the capture; what they differ by more than that is skin's own, and with both taken for Gaussians the
-light's share of each step is LEFT_LOG^2 over the variance (Wiener 1949).
+But a border may run along a beard, whose steps are of all sizes. Steps that a delighter left deviate by LEFT_LOG along
+a border, whatever the capture; any more is the skin's own. With both taken for Gaussians the light's share of each step
+is LEFT_LOG^2 over the variance (Wiener 1949).
 """
 
 from __future__ import annotations
@@ -34,19 +34,11 @@ LEFT_LOG = 0.14
 
 
 def measure_missing_light(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texel: float) -> torch.Tensor:
-    """The share of the light that is missing under M = 1, by the steps along M's border.
+    """Return the share of the light [S, S] that is missing under M = 1, 0 where no border is near.
 
-    Parameters
-    ----------
-    light : [3, S, S], texture over (reference albedo x global shading), linear, about 1 where lit
-    alpha : [S, S] in [0, 1], M
-    weight : [S, S] in [0, 1], how far a texel tells of light; 0 off the facial skin, so that the outline of the face is
-        no border
-    texel : side of a texel in texels of a 1024 map
-
-    Returns
-    -------
-    [S, S] in [0, MAX_MISSING_SHARE]; 0 where no border is near.
+    light [3, S, S]: texture over (reference albedo x global shading), linear, about 1 where lit; alpha [S, S]: M;
+    weight [S, S]: how much a texel reveals of the light, 0 off the facial skin, whose outline is no border; texel: its
+    side in texels of a 1024 map.
     """
     value = np.log(np.clip(light.numpy(), 0.05, 4)).mean(0).astype(np.float32)
     steps, sure = measure_border_steps(value, alpha.numpy(), weight.numpy(), texel)
@@ -58,38 +50,32 @@ def measure_missing_light(light: torch.Tensor, alpha: torch.Tensor, weight: torc
 def measure_border_steps(
     log_light: np.ndarray, alpha: np.ndarray, weight: np.ndarray, texel: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """By how much the light's logarithm is larger inside of M than outside, at the places of M's border.
+    """Return the steps [S, S] of the light's logarithm from outside of M to inside, and their certainty [S, S].
 
-    Parameters
-    ----------
-    log_light : [S, S], natural log, mean of the channels
-    alpha, weight, texel : as in `measure_missing_light`
-
-    Returns
-    -------
-    The steps [S, S] and how surely each is known [S, S] in [0, 1], 0 away from the border.
+    log_light [S, S] is the mean of the channels; the rest is as in `measure_missing_light`. The certainty is 0 away
+    from the border.
     """
     inside = alpha > 0.5
     if not inside.any() or inside.all():
         return np.zeros_like(log_light), np.zeros_like(log_light)
     depth = signed_distance(inside) * texel  # negative inside
     near = weight * np.clip(1.5 - np.abs(np.abs(depth) - SIDE_TEXELS) / BAND_TEXELS, 0, 1) * (np.abs(depth) > 2)
-    sides, known = [], []
+    means, shares = [], []
     for side in (depth < 0, depth > 0):
         share = _blurred(near * side, WINDOW_TEXELS / texel)
-        sides.append(_blurred(near * side * log_light, WINDOW_TEXELS / texel) / np.maximum(share, 1e-4))
-        known.append(share)
-    sure = np.minimum(*known) * (np.abs(depth) < REACH_TEXELS)
-    return sides[0] - sides[1], np.where(sure > 0.02, sure / max(float(sure.max()), 1e-6), 0)
+        means.append(_blurred(near * side * log_light, WINDOW_TEXELS / texel) / np.maximum(share, 1e-4))
+        shares.append(share)
+    sure = np.minimum(*shares) * (np.abs(depth) < REACH_TEXELS)
+    return means[0] - means[1], np.where(sure > 0.02, sure / max(float(sure.max()), 1e-6), 0)
 
 
 def estimate_light_share(steps: np.ndarray, sure: np.ndarray) -> float:
-    """The share in (0, 1] of the steps of `measure_border_steps` that is light, and no skin."""
+    """Return the share in (0, 1] of `measure_border_steps`'s steps that is light and not skin."""
     return LEFT_LOG**2 / max(mean_and_deviation(steps, sure)[1] ** 2, LEFT_LOG**2)
 
 
 def mean_and_deviation(samples: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
-    """Mean and deviation of samples [S, S] under a weight [S, S]; zeros without any."""
+    """Return the mean and deviation of samples [S, S] under a weight [S, S]; zeros without any."""
     total = max(float(weight.sum()), 1e-6)
     mean = float((weight * samples).sum()) / total
     return mean, (float((weight * (samples - mean) ** 2).sum()) / total) ** 0.5

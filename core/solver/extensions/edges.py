@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""M laid on the shadow's edges before the first step (core/light/shadow_edges.py says how): a sharp edge of the shadow
-can live in M alone."""
+"""M laid on the shadow's edges before the first step: a sharp edge of the shadow can live in M alone."""
 
 from __future__ import annotations
 
@@ -17,23 +16,12 @@ from ..evidence import Evidence
 def snap_to_edges(
     evidence: Evidence, light: torch.Tensor, weight: torch.Tensor, check: Callable[[], None] = lambda: None
 ) -> Evidence:
-    """The evidence with `place`'s alpha for its own. What is protected stays out of M.
+    """Return the evidence with M on the edges of a linear light [3, S, S]; what is protected stays out of M.
 
-    Parameters
-    ----------
-    evidence : of the capture
-    light : [3, S, S], linear, as `place` takes it but for the order of its axes
-    weight : [S, S] in [0, 1], how far a texel tells of light
-    check : may raise to cancel
+    weight [S, S] is how much a texel reveals of the light; `check` may raise to cancel.
     """
-    edge = place(
-        light.permute(1, 2, 0).numpy(),
-        evidence.alpha.numpy(),
-        (weight * evidence.covered).numpy(),
-        evidence.texel,
-        check,
-    )
+    weight = (weight * evidence.covered).numpy()
+    edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), weight, evidence.texel, check)
     alpha = torch.from_numpy(edge.alpha) * (1 - evidence.protected) * evidence.covered
-    return replace(
-        evidence, alpha=alpha, edge=torch.from_numpy(edge.on_edge), shadow_colour=tuple(edge.colour.tolist())
-    )
+    colour = tuple(edge.colour.tolist())
+    return replace(evidence, alpha=alpha, edge=torch.from_numpy(edge.on_edge), shadow_colour=colour)

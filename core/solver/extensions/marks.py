@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moles and round scars in the texture, which a grid of small lights would take for shadow (paper, supplement, "nevus
-... close to the grid size").
+"""Moles and round scars in the texture, which a grid of small lights would take for shadow.
 
-Blobs of the Laplacian's scale space (Lindeberg 1998) that are compact, darker than everything around them, alone, and
-of another colour than the shadow: melanin and blood take blue and green, a shadow takes what the sun gave. Longer scars
-are not found. Lengths are texels of a 1024 map.
+The paper's supplement has the case: "nevus ... close to the grid size". They are blobs of the Laplacian's scale space
+(Lindeberg 1998) that are compact, darker than everything around them, alone, and of another colour than the shadow:
+melanin and blood absorb blue and green, a shadow lacks what the sun gave. Longer scars are not found. Lengths are
+texels of a 1024 map.
 """
 
 from __future__ import annotations
@@ -35,8 +35,7 @@ FEATURE_MARGIN_TEXELS = 12.0  # distance to brows, lips, lids, nostrils and scal
 
 @dataclass(frozen=True)
 class Mark:
-    """row, column and radius in texels of the map; change [3]: of the logarithm of R, G, B against what is around
-    it."""
+    """Mark, with row, column and radius in texels of the map; change [3]: ln R, G, B against the surroundings."""
 
     row: float
     column: float
@@ -50,7 +49,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class _Blob:
-    """A maximum of the scale space, in texels of the map; strength: the contrast it would have as a disc."""
+    """Maximum of the scale space, in texels of the map; strength: the contrast it would have as a disc."""
 
     row: int
     column: int
@@ -62,47 +61,39 @@ class _Blob:
 def protect_marks(
     evidence: Evidence, witness: Callable[[list[Mark]], list[Mark]] = list
 ) -> tuple[Evidence, list[Mark]]:
-    """The evidence with no trust in what the marks inside M say of light, and those marks; `witness` leaves the ones
-    that the views confirm."""
+    """Return the evidence without trust in the marks inside M that `witness` confirms, and those marks."""
     if not (evidence.alpha > 0).any():
         return evidence, []
     feature = cv2.blur(1 - evidence.trust.numpy(), (2 * round(FEATURE_MARGIN_TEXELS / evidence.texel) + 1,) * 2)
     where = (evidence.skin.numpy() > 0.5) & (evidence.weight.numpy() > 0.5) & (feature < 0.02)
-    alpha, taken = evidence.alpha.numpy(), np.array(evidence.shadow_colour)
-    marks = [
-        mark
-        for mark in find_marks(evidence.texture.permute(1, 2, 0).numpy(), where, evidence.texel)
-        if alpha[round(mark.row), round(mark.column)] > 0.05 and is_unlike_shadow(mark, taken)
-    ]
-    marks = witness(marks)
+    alpha, colour = evidence.alpha.numpy(), np.array(evidence.shadow_colour)
+    marks = find_marks(evidence.texture.permute(1, 2, 0).numpy(), where, evidence.texel)
+    in_shadow = [mark for mark in marks if alpha[round(mark.row), round(mark.column)] > 0.05]
+    marks = witness([mark for mark in in_shadow if is_unlike_shadow(mark, colour)])
     cover = torch.from_numpy(draw_cover(marks, evidence.size, evidence.texel))
     return replace(evidence, trust=evidence.trust * (1 - cover)), marks
 
 
 def find_marks(texture: np.ndarray, skin: np.ndarray, texel: float) -> list[Mark]:
-    """The marks of a linear texture [S, S, 3] on the texels `skin` bool [S, S]: seen skin without lips, brows and
-    lids. Darkest first."""
+    """Find the marks of a linear texture [S, S, 3] on bool [S, S] seen skin without features, darkest first."""
     if not skin.any():
         return []
     log = np.log(np.maximum(texture, 1e-3)).astype(np.float32)
     log = _bled(log, skin)  # so that the border of what is not skin is no blob
-    candidates = _blobs(log.mean(-1), skin, texel)
-    measured = [
-        mark
-        for blob in candidates
-        if blob.stands_out and (mark := _measured(log, blob.row, blob.column, blob.radius)) is not None
-    ]
-    measured.sort(key=lambda mark: -mark.contrast)
+    blobs = _find_blobs(log.mean(-1), skin, texel)
+    measured = [_measure(log, blob) for blob in blobs if blob.stands_out]
     kept: list[Mark] = []
-    for mark in measured:
-        if all(_apart(mark, other) > mark.radius + other.radius for other in kept):
+    for mark in sorted(filter(None, measured), key=lambda mark: -mark.contrast):
+        if all(_distance(mark, other) > mark.radius + other.radius for other in kept):
             kept.append(mark)
-    return [mark for mark in kept if _alone(mark, candidates, NEIGHBOUR_REACH_TEXELS / texel)]
+    return [mark for mark in kept if _is_alone(mark, blobs, NEIGHBOUR_REACH_TEXELS / texel)]
 
 
 def is_unlike_shadow(mark: Mark, shadow_colour: np.ndarray) -> bool:
-    """Whether a mark has another colour than a shadow that dark; shadow_colour [3]: the light's share that shadows
-    take, over its mean (zeros: not known, grey)."""
+    """Return true if a mark has another colour than a shadow that dark.
+
+    shadow_colour [3] is the light's share that shadows take, over its mean (zeros: unknown, taken for grey).
+    """
     shadow_colour = shadow_colour if np.any(shadow_colour) else np.ones(3)
     change = np.array(mark.change)
     share = 1 - np.exp(change.mean())
@@ -112,7 +103,7 @@ def is_unlike_shadow(mark: Mark, shadow_colour: np.ndarray) -> bool:
 
 
 def draw_cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
-    """[size, size] in [0, 1]: 1 on the marks and a little around them, fading over a texel or two."""
+    """Draw [size, size]: 1 on the marks and a little around them, fading over a texel or two."""
     out = np.zeros((size, size), np.float32)
     row, column = np.mgrid[:size, :size]
     for mark in marks:
@@ -123,28 +114,27 @@ def draw_cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
 
 
 def _bled(image: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """[S, S, C] with every texel that is not `known` bool [S, S] given the value of the nearest that is; one is."""
+    """Give every texel of [S, S, C] that is not `known` the value of the nearest that is."""
     _, labels = cv2.distanceTransformWithLabels(
         (~known).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
     return image[known][labels - 1]  # known texels are numbered from 1, row by row
 
 
-def _blobs(log_luminance: np.ndarray, skin: np.ndarray, texel: float) -> list[_Blob]:
-    """Dark blobs: maxima of the normalised Laplacian over place and scale with two like curvatures. log_luminance
-    [S, S]."""
+def _find_blobs(log_luminance: np.ndarray, skin: np.ndarray, texel: float) -> list[_Blob]:
+    """Find dark blobs of [S, S]: maxima of the normalised Laplacian over place and scale with two like curvatures."""
     radii = [r / texel for r in RADII_TEXELS if r / texel >= 0.9]
     responses, compact, usual = [], [], []
-    known = skin.astype(np.float32)
-    reach = STANDING_OUT_TEXELS / texel
-    share = np.maximum(_usual(known, reach), 1e-3)
+    inside, window = skin.astype(np.float32), (2 * round(STANDING_OUT_TEXELS / texel) + 1,) * 2
+    share = np.maximum(cv2.blur(inside, window, borderType=cv2.BORDER_REPLICATE), 1e-3)
     for radius in radii:
         sigma = radius / 2**0.5
         smooth = cv2.GaussianBlur(log_luminance, (0, 0), sigma)
         xx, yy, xy = (cv2.filter2D(smooth, -1, kernel) for kernel in _CURVATURES)
         mean, spread = (xx + yy) / 2, np.sqrt(((xx - yy) / 2) ** 2 + xy**2)
         responses.append(sigma**2 * (xx + yy) / DISC_RESPONSE)
-        usual.append(np.sqrt(np.maximum(_usual(known * responses[-1] ** 2, reach), 0) / share))
+        power = cv2.blur(inside * responses[-1] ** 2, window, borderType=cv2.BORDER_REPLICATE)
+        usual.append(np.sqrt(np.maximum(power, 0) / share))
         compact.append((mean - spread) / np.maximum(mean + spread, 1e-9))
     stack = np.stack(responses)
     highest = np.stack([cv2.dilate(r, np.ones((3, 3))) for r in responses])
@@ -160,11 +150,6 @@ def _blobs(log_luminance: np.ndarray, skin: np.ndarray, texel: float) -> list[_B
     ]
 
 
-def _usual(image: np.ndarray, reach: float) -> np.ndarray:
-    """The mean of [S, S] over a square window: fast at any size."""
-    return cv2.blur(image, (2 * round(reach) + 1,) * 2, borderType=cv2.BORDER_REPLICATE)
-
-
 _CURVATURES = tuple(
     np.array(k, np.float32)
     for k in (
@@ -175,8 +160,9 @@ _CURVATURES = tuple(
 )
 
 
-def _measured(log: np.ndarray, row: int, column: int, radius: float) -> Mark | None:
-    """The mark at a blob of the map's logarithm [S, S, 3], or None where some direction around it is as dark."""
+def _measure(log: np.ndarray, blob: _Blob) -> Mark | None:
+    """Return the mark at a blob of the map's logarithm [S, S, 3]; None if some direction around it is as dark."""
+    row, column, radius = blob.row, blob.column, blob.radius
     reach = int(np.ceil(2.7 * radius + 1))
     if min(row, column) < reach or max(row, column) >= len(log) - reach:
         return None
@@ -185,9 +171,8 @@ def _measured(log: np.ndarray, row: int, column: int, radius: float) -> Mark | N
     distance, sector = np.hypot(x, y), np.floor((np.arctan2(y, x) / (2 * np.pi) % 1) * SECTORS).astype(int)
     disc = np.median(patch[distance <= max(0.6 * radius, 0.5)], 0)
     ring = (distance > 1.5 * radius + 0.5) & (distance <= max(2.5 * radius, 1.5 * radius + 2))
-    sides = np.stack(
-        [np.median(patch[ring & (sector == k)], 0) for k in range(SECTORS) if (ring & (sector == k)).any()]
-    )
+    parts = [patch[ring & (sector == k)] for k in range(SECTORS)]
+    sides = np.stack([np.median(part, 0) for part in parts if len(part)])
     change = disc - np.median(sides, 0)
     contrast = -change.mean()
     if contrast < MIN_CONTRAST_LOG or (sides.mean(-1) - disc.mean()).min() < MIN_SURROUNDED_SHARE * contrast:
@@ -195,16 +180,11 @@ def _measured(log: np.ndarray, row: int, column: int, radius: float) -> Mark | N
     return Mark(float(row), float(column), float(radius), tuple(float(v) for v in change))
 
 
-def _apart(a: Mark, b: Mark | _Blob) -> float:
+def _distance(a: Mark, b: Mark | _Blob) -> float:
     return float(np.hypot(a.row - b.row, a.column - b.column))
 
 
-def _alone(mark: Mark, blobs: list[_Blob], reach: float) -> bool:
-    """Not one of a crowd."""
-    return (
-        sum(
-            2 * mark.radius < _apart(mark, other) < reach and other.strength > LIKE_SHARE * mark.contrast
-            for other in blobs
-        )
-        <= MAX_NEIGHBOURS
-    )
+def _is_alone(mark: Mark, blobs: list[_Blob], reach: float) -> bool:
+    """Return true if few similar blobs are nearby."""
+    near = [blob for blob in blobs if 2 * mark.radius < _distance(mark, blob) < reach]
+    return sum(blob.strength > LIKE_SHARE * mark.contrast for blob in near) <= MAX_NEIGHBOURS

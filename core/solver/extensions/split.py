@@ -1,66 +1,60 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin or light: the large shapes of a texture, split into what is this person's and what light is left.
+"""Split of a texture's large shapes into the person's traits and the light that is left.
 
-In the logarithm a texture is the mean face of the tone, plus this person's traits, plus light, plus noise, and each of
-these is taken for a Gaussian:
+In the logarithm a texture is the mean face of the tone, plus this person's traits, plus light, plus noise, each of them
+a Gaussian:
 
     traits: broad (TRAIT_REACH_M) and mostly alike on the face's two sides (MIRROR_CORRELATION), whichever way the skin
       faces; larger where skins differ more (HeadCells.varied)
     global light: second-order spherical harmonics of the normal, their level free
-    local light: what a light leaves that the normal does not tell (a soft shadow, a delighter's mistake), about as
-      broad as traits, but of one side
+    local light: light that the normal does not predict (a soft shadow, a delighter's mistake), about as broad as
+      traits, but of one side
     noise: narrow; fine detail, and what the frames' registration leaves of it
 
-So the split is linear algebra (Gaussian process regression; Rasmussen and Williams 2006, chapter 2). How large each of
-the four is on this face is not known: the most probable scales are taken, by the evidence of the texture itself (ibid.,
-section 5.4) and by what they usually are (TYPICAL_SCALES). No delighter is asked for by name: where one leaves much
-light, much of its texture is explained by light. Of several captures of a person the traits are the same and the lights
-are not, which tells them apart far better, local light included. research/benchmarks/split.py measures the constants
-and the outcome."""
+So the split is Gaussian process regression (Rasmussen and Williams 2006, chapter 2). The scales of the four are the
+most probable ones, by the evidence of the texture (ibid., section 5.4) and a prior (TYPICAL_SCALES): where a delighter
+left much light, much of its texture is explained by light. Several captures of a person share the traits but not the
+lights, which separates them far better, local light included. research/benchmarks/split.py measures the constants and
+the outcome.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
-import cv2
 import numpy as np
 import torch
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 
 from ...light.spherical_harmonics import sh_basis
+from ..evidence import resize_maps
 
+# cells along the map's side for the split, and for finding the scales: some 4 and 8 mm of the face each
 CELLS, FIRST_CELLS = 48, 24
-"""Cells along the map's side by which a capture is split, and by which the scales are found: some 4 and 8 mm of the
-face each."""
-MIN_CELL_TEXELS = 8
-"""Fewest texels along a cell's side: a small map has fewer cells."""
+MIN_CELL_TEXELS = 8  # along a cell's side: a small map has fewer cells
+# distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of
+# painted skins, midway between taking what light is painted into them for traits and taking it out
+# (research/benchmarks/traits.py)
 TRAIT_REACH_M, MIRROR_CORRELATION = 0.016, 0.72
-"""Distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of
-painted skins, midway between taking what light is painted into them for traits and taking it out
-(research/benchmarks/traits.py)."""
 LOCAL_REACH_M, NOISE_REACH_M = 0.020, 0.005
+# axes of a log colour along which the parts are independent: brightness, red against blue, green against both; and
+# deviations along them over that of brightness, of skins and of light alike
 COLOUR_AXES = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
-"""Axes of a log colour along which the parts are taken for independent: brightness, red against blue, green against
-both."""
 AXIS_DEVIATIONS = np.array([1.0, 0.3, 0.1])
-"""Deviations along these axes over that of brightness, of skins and of light alike."""
+# deviations of the global light's coefficients over that of a first-order one; the level has its own, for exposure is
+# free
 ORDER_DEVIATIONS = np.array([0.0, 1, 1, 1, 0.6, 0.6, 0.6, 0.6, 0.6])
-"""Deviations of the global light's coefficients over that of a first-order one; the level's own is LEVEL_DEVIATION:
-exposure is free."""
 LEVEL_DEVIATION = 0.5
-SH_SCALE = np.sqrt(4 * np.pi)
-"""The functions of the normal are scaled to a mean square of one over the sphere."""
+SH_SCALE = np.sqrt(4 * np.pi)  # to a mean square of one over the sphere
 MIN_LINEAR = 1e-3
-MIN_SEEN_SHARE = 0.5
-"""Share of a cell that has to be seen skin outside of M."""
+MIN_SEEN_SHARE = 0.5  # share of a cell that has to be seen skin outside of M
 
 
 @dataclass(frozen=True)
 class Scales:
-    """Deviations in natural log along the axis of brightness, 1 / sqrt(3) of which each channel has: of the traits, of
-    a first-order coefficient of the global light, of local light, of noise."""
+    """Deviations in ln brightness: traits, a first-order coefficient of the global light, local light, noise."""
 
     traits: float
     light: float
@@ -71,14 +65,17 @@ class Scales:
         return (getattr(self, field.name) for field in fields(self))
 
 
+# the scales' own prior: log-normal about these, with this deviation of the logarithm
 TYPICAL_SCALES, SCALES_DEVIATION = Scales(0.20, 0.08, 0.08, 0.07), 0.6
-"""The scales' own prior: log-normal about these, with this deviation of the logarithm."""
 
 
 @dataclass(frozen=True)
 class Shapes:
-    """What is split of a capture. texture and reference albedo [3, S, S] linear, in the head's UVs; normal [3, S, S],
-    unit, in any axes; weight [S, S] in [0, 1]: how far a texel tells of skin, 0 in M."""
+    """Input of a capture, in the UVs of the head.
+
+    texture and reference albedo [3, S, S], linear; normal [3, S, S], unit, in any axes; weight [S, S] in [0, 1]: how
+    much a texel reveals of the skin, 0 in M.
+    """
 
     texture: torch.Tensor
     reference: torch.Tensor
@@ -88,8 +85,11 @@ class Shapes:
 
 @dataclass(frozen=True)
 class Split:
-    """Of the capture that is asked about. coefficients [3, 9]: the global light's logarithm, on orthonormal functions
-    of the normal; traits and local [3, C, C]: natural log, over the whole head; scales as they were found."""
+    """Split of a capture.
+
+    coefficients [3, 9]: of the global light's logarithm, on orthonormal functions of the normal; traits and local light
+    [3, C, C], natural log, over the whole head; scales: those that were found.
+    """
 
     coefficients: np.ndarray
     traits: np.ndarray
@@ -97,16 +97,19 @@ class Split:
     scales: Scales
 
     def light(self, normal: torch.Tensor) -> torch.Tensor:
-        """The global light [3, S, S] at normals [3, S, S], linear: a factor of the albedo."""
+        """Return the global light [3, S, S] at normals [3, S, S], linear: a factor of the albedo."""
         basis = sh_basis(normal.numpy().astype(np.float64), axis=0)
         return torch.from_numpy(np.exp(np.tensordot(self.coefficients, basis, 1))).float()
 
 
 @dataclass(frozen=True)
 class HeadCells:
-    """The map's C x C cells on a head, alike for all captures. covered bool [C, C]: the N of them that lie on it;
-    places [N, 3], in metres, x towards one side of the face and 0 in its middle; varied [N]: how far skins differ from
-    their mean there, over the face's own mean; nearest int [C, C]: which of the N is nearest to a cell."""
+    """C x C cells of the map on a head, alike for all captures.
+
+    covered bool [C, C]: the N of them that lie on it; places [N, 3], in metres, x towards one side of the face and 0 in
+    its middle; varied [N]: deviation of skins from their mean there, over the face's own mean; nearest int [C, C]: the
+    nearest of the N to a cell.
+    """
 
     covered: np.ndarray
     places: np.ndarray
@@ -116,8 +119,10 @@ class HeadCells:
 
 @dataclass(frozen=True)
 class Cells:
-    """A capture on the cells of a head: normal [N, 3]; observed [K]: which of them tell of the skin; log_ratio [K, 3]
-    there: log(texture / reference) along COLOUR_AXES."""
+    """A capture on the cells of a head: normal [N, 3]; observed [K]: indices of those that show skin.
+
+    log_ratio [K, 3]: log(texture / reference) of these, along COLOUR_AXES.
+    """
 
     on_head: HeadCells
     normal: np.ndarray
@@ -127,8 +132,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class Places:
-    """at [N, 3] in metres on the head, normal [N, 3], varied [N] as of HeadCells, and own [N]: the number of the
-    capture."""
+    """N places: at [N, 3] on the head in metres, normal [N, 3], varied [N] as in HeadCells, own [N]: which capture."""
 
     at: np.ndarray
     normal: np.ndarray
@@ -138,7 +142,7 @@ class Places:
 
 @dataclass(frozen=True)
 class Covariances:
-    """The covariances of places with others, without their scales, each [N, M]; level: 1 for two of one capture."""
+    """Covariances of places with others, without their scales, each [N, M]; level: 1 for two of one capture."""
 
     traits: np.ndarray
     light: np.ndarray
@@ -147,13 +151,11 @@ class Covariances:
     level: np.ndarray
 
     def covariance(self, scales: Scales, axis: int) -> np.ndarray:
-        """Of all parts together, along an axis."""
+        """Return that of all parts together, along an axis."""
         sizes = np.square(AXIS_DEVIATIONS[axis] * np.array(tuple(scales)))
-        parts = sum(
-            size * component
-            for size, component in zip(sizes, (self.traits, self.light, self.local, self.noise), strict=True)
-        )
-        return parts + LEVEL_DEVIATION**2 * self.level + 1e-6 * np.eye(*self.level.shape)
+        parts = self.traits, self.light, self.local, self.noise
+        total = sum(size * part for size, part in zip(sizes, parts, strict=True))
+        return total + LEVEL_DEVIATION**2 * self.level + 1e-6 * np.eye(*self.level.shape)
 
 
 def split_captures(
@@ -162,52 +164,45 @@ def split_captures(
     typical: Scales = TYPICAL_SCALES,
     check: Callable[[], None] = lambda: None,
 ) -> Split:
-    """Splits the first capture, beside others of the same person where there are any.
+    """Split the first capture, beside others of the same person, all in the UVs of one head.
 
-    Parameters
-    ----------
-    captures : in the UVs of one head
-    head_cells : C -> the C x C cells of that head
-    typical : the middle of the scales' prior
-    check : may raise to cancel
+    `head_cells` returns the C x C cells of that head, `typical` is the middle of the scales' prior, `check` may raise
+    to cancel.
     """
     fewer = len(captures) ** -0.5
     most = captures[0].weight.shape[0] // MIN_CELL_TEXELS
     on_head = head_cells(round(min(FIRST_CELLS, most) * fewer))
-    seen, ratios = join_seen([average_cells(shapes, on_head) for shapes in captures])
-    scales = find_scales(model_covariances(seen, seen), ratios, typical, check)
+    observed, ratios = join_seen([average_cells(shapes, on_head) for shapes in captures])
+    scales = find_scales(model_covariances(observed, observed), ratios, typical, check)
     on_head = head_cells(round(min(CELLS, most) * fewer))
     return infer_split([average_cells(shapes, on_head) for shapes in captures], scales)
 
 
 def average_cells(shapes: Shapes, on_head: HeadCells) -> Cells:
-    """A capture on the cells of a head."""
+    """Average a capture over the cells of a head."""
     covered, count = on_head.covered, len(on_head.covered)
     weight = shapes.weight.numpy().astype(np.float32)
     texture, reference = (np.log(np.maximum(image.numpy(), MIN_LINEAR)) for image in (shapes.texture, shapes.reference))
     ratio = texture - reference
-    share = _shrunk(weight, count)
-    mean = _shrunk(ratio.transpose(1, 2, 0) * weight[..., None], count) / np.maximum(share, 1e-4)[..., None]
-    normal = _shrunk(shapes.normal.numpy().transpose(1, 2, 0), count)[covered].astype(np.float64)
+    share = resize_maps(weight, count)
+    mean = resize_maps(ratio.transpose(1, 2, 0) * weight[..., None], count) / np.maximum(share, 1e-4)[..., None]
+    normal = resize_maps(shapes.normal.numpy().transpose(1, 2, 0), count)[covered].astype(np.float64)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
-    seen = np.flatnonzero(share[covered] > MIN_SEEN_SHARE)
-    return Cells(on_head, normal, seen, mean[covered][seen].astype(np.float64) @ COLOUR_AXES.T)
+    observed = np.flatnonzero(share[covered] > MIN_SEEN_SHARE)
+    return Cells(on_head, normal, observed, mean[covered][observed].astype(np.float64) @ COLOUR_AXES.T)
 
 
 def join_seen(captures: list[Cells]) -> tuple[Places, np.ndarray]:
-    """All cells that were observed, and their values [K, 3]."""
+    """Return the observed cells of all captures, and their values [K, 3]."""
     own = np.repeat(np.arange(len(captures)), [len(cells.observed) for cells in captures])
-    seen = [
-        (cells.on_head.places[cells.observed], cells.normal[cells.observed], cells.on_head.varied[cells.observed])
-        for cells in captures
-    ]
-    return Places(*map(np.concatenate, zip(*seen, strict=True)), own), np.concatenate(
-        [cells.log_ratio for cells in captures]
-    )
+    at = np.concatenate([cells.on_head.places[cells.observed] for cells in captures])
+    normal = np.concatenate([cells.normal[cells.observed] for cells in captures])
+    varied = np.concatenate([cells.on_head.varied[cells.observed] for cells in captures])
+    return Places(at, normal, varied, own), np.concatenate([cells.log_ratio for cells in captures])
 
 
 def model_covariances(rows: Places, columns: Places) -> Covariances:
-    """The covariances of places with others; each capture has a light of its own."""
+    """Return the covariances of places with others; each capture has a light of its own."""
     same = (rows.own[:, None] == columns.own[None]).astype(np.float64)
     apart = np.linalg.norm(rows.at[:, None] - columns.at[None], axis=-1)
     mirrored = np.linalg.norm(rows.at[:, None] * [-1, 1, 1] - columns.at[None], axis=-1)
@@ -229,43 +224,32 @@ def find_scales(
     typical: Scales = TYPICAL_SCALES,
     check: Callable[[], None] = lambda: None,
 ) -> Scales:
-    """The most probable scales, by a search along one of them after the other.
-
-    Parameters
-    ----------
-    together, log_ratio, typical : as in `log_probability`
-    check : may raise to cancel
-    """
+    """Find the most probable scales by a search along one after the other; `check` may raise to cancel."""
     best, most = typical, log_probability(together, log_ratio, typical, typical)
     for step in (2.0, 1.4, 1.2):
-        moved = True
-        while moved:
-            moved = False
+        improved = True
+        while improved:
+            improved = False
             for name in (field.name for field in fields(Scales)):
                 for factor in (step, 1 / step):
                     check()
-                    tried = replace(best, **{name: getattr(best, name) * factor})
-                    probable = log_probability(together, log_ratio, tried, typical)
-                    if probable > most:
-                        best, most, moved = tried, probable, True
+                    candidate = replace(best, **{name: getattr(best, name) * factor})
+                    probability = log_probability(together, log_ratio, candidate, typical)
+                    if probability > most:
+                        best, most, improved = candidate, probability, True
     return best
 
 
 def log_probability(
     together: Covariances, log_ratio: np.ndarray, scales: Scales, typical: Scales = TYPICAL_SCALES
 ) -> float:
-    """Of the observed ratios under the scales, and of the scales themselves, but for a constant.
+    """Return the log probability of the observed ratios and of the scales, but for a constant.
 
-    Parameters
-    ----------
-    together : the covariances of the K places with each other
-    log_ratio : [K, 3], natural log of texture / reference along COLOUR_AXES
-    scales : that are judged
-    typical : about which scales are expected to lie
+    log_ratio [K, 3] is as in Cells, `together` holds the covariances of its K places with each other, and the scales
+    lie about `typical`.
     """
-    total = -0.5 * sum(
-        (np.log(scale / usual) / SCALES_DEVIATION) ** 2 for scale, usual in zip(scales, typical, strict=True)
-    )
+    off = [np.log(scale / usual) / SCALES_DEVIATION for scale, usual in zip(scales, typical, strict=True)]
+    total = -0.5 * sum(each**2 for each in off)
     for axis in range(3):
         lower, column = cholesky(together.covariance(scales, axis), lower=True), log_ratio[:, axis]
         white = solve_triangular(lower, column, lower=True)
@@ -274,32 +258,28 @@ def log_probability(
 
 
 def infer_split(captures: list[Cells], scales: Scales) -> Split:
-    """The posterior mean of each part of the first capture, under the scales."""
-    first, (seen, ratios) = captures[0], join_seen(captures)
-    among = model_covariances(seen, seen)
+    """Return the posterior mean of each part of the first capture, under the scales."""
+    first, (observed, ratios) = captures[0], join_seen(captures)
+    among = model_covariances(observed, observed)
     on_head, count = first.on_head, len(first.normal)
-    beyond = model_covariances(Places(on_head.places, first.normal, on_head.varied, np.zeros(count, int)), seen)
+    beyond = model_covariances(Places(on_head.places, first.normal, on_head.varied, np.zeros(count, int)), observed)
     basis = SH_SCALE * sh_basis(first.normal[first.observed])
     traits, local, coefficients = np.zeros((3, count)), np.zeros((3, count)), np.zeros((3, 9))
     for axis, size in enumerate(AXIS_DEVIATIONS):
-        told = cho_solve(cho_factor(among.covariance(scales, axis)), ratios[:, axis])
-        traits[axis] = (scales.traits * size) ** 2 * beyond.traits @ told
-        local[axis] = (scales.local * size) ** 2 * beyond.local @ told
+        weights = cho_solve(cho_factor(among.covariance(scales, axis)), ratios[:, axis])
+        traits[axis] = (scales.traits * size) ** 2 * beyond.traits @ weights
+        local[axis] = (scales.local * size) ** 2 * beyond.local @ weights
         prior = (scales.light * size * ORDER_DEVIATIONS) ** 2 + LEVEL_DEVIATION**2 * (ORDER_DEVIATIONS == 0)
-        coefficients[axis] = SH_SCALE * prior * (basis.T @ told[seen.own == 0])
+        coefficients[axis] = SH_SCALE * prior * (basis.T @ weights[observed.own == 0])
     maps = (_spread(COLOUR_AXES.T @ field, on_head) for field in (traits, local))
     return Split(COLOUR_AXES.T @ coefficients, *maps, scales)
 
 
 def enlarge_field(field: torch.Tensor, size: int) -> torch.Tensor:
-    """A field [3, C, C] at size x size."""
+    """Enlarge a field [3, C, C] to size x size."""
     return torch.nn.functional.interpolate(field[None], (size, size), mode="bicubic", align_corners=False)[0]
 
 
 def _spread(field: np.ndarray, on_head: HeadCells) -> np.ndarray:
-    """[3, N] of the covered cells as maps [3, C, C]; what is off the head takes its neighbours' values."""
+    """Return [3, N] of the covered cells as maps [3, C, C]; cells off the head take their neighbours' values."""
     return np.ascontiguousarray(field.T, np.float32)[on_head.nearest].transpose(2, 0, 1)
-
-
-def _shrunk(image: np.ndarray, count: int) -> np.ndarray:
-    return cv2.resize(np.ascontiguousarray(image, np.float32), (count, count), interpolation=cv2.INTER_AREA)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The prior's network: a U-Net of modulated residual blocks, and EDM's preconditioning around it (Karras et al. 2022).
+r"""Network of the prior, epsilon of the paper: a U-Net of modulated residual blocks in EDM's preconditioning.
 
-Parameter names and arithmetic are those of the `image_v1` models the method's authors trained, so their state dict
-loads as it is. One choice is ours: `norm: pixel` normalises each texel over its channels, so that a patch and a whole
-map are treated alike.
+That makes its output \hat x_t (equation 6; Karras et al. 2022). Parameter names and arithmetic are those of the
+authors' `image_v1` models, so their state dict loads as it is. One choice is ours: `norm: pixel` normalises each texel
+over its channels, so that a patch and a whole map are treated alike.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from .network_blocks import MEMORY_FORMAT, Down, Fourier, Residual, SelfAttentio
 
 @dataclass(frozen=True)
 class Condition:
-    """What the network is told of maps [N, C, H, W]: of each texel `texels` [N, K, H, W], of each whole map `mapping`
-    [N, D], where it takes that.
+    """Conditions of maps [N, C, H, W]: `texels` [N, K, H, W], and per map `mapping` [N, D] if the network takes it.
 
     The released priors take data of mean 0 and deviation sigma_data, and scale `texels`, which are not noised, by c_in
     like the data. With `mean` [N, C, H, W] and `spread` [N, C, 1, 1] the network sees what differs from the mean in
@@ -37,20 +36,10 @@ class Condition:
 def denoise(
     network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: Condition, levels: torch.Tensor | None = None
 ) -> torch.Tensor:
-    """D(x; sigma): the preconditioned denoiser. Only the network itself runs in low precision.
+    """Return D(x; sigma), the expected clean maps of noised ones: float32 [N, C, H, W], sigma [N].
 
-    Parameters
-    ----------
-    network : F
-    x : float32 [N, C, H, W], noised maps
-    sigma : [N], the noise level that the network is told
-    condition : with a mean and a spread D is the best estimate of a Gaussian of these where the network has nothing to
-        say
-    levels : [N, C, 1, 1], the noise levels of the channels where they differ
-
-    Returns
-    -------
-    The expected clean maps [N, C, H, W].
+    levels [N, C, 1, 1] are the noise levels of the channels where they differ. For a condition with a mean and a spread
+    a network of zeros gives the best estimate under a Gaussian of these. Only the network runs in low precision.
     """
     s = sigma.reshape(-1, 1, 1, 1) if levels is None else levels
     texels, mean, spread = condition.texels, condition.mean, condition.spread
@@ -65,8 +54,7 @@ def denoise(
 
 @dataclass(frozen=True)
 class UNetLayout:
-    """Depths and channels per level, finest first; which levels have attention, None: no one. Input [N, data +
-    condition, H, W], output [N, data, H, W].
+    """Depths, channels and attention per level, finest first (attention None: nowhere).
 
     With `patch_size` p the network works on p x p blocks of texels. The first `skip_stages` levels exist but are left
     out, and the next one takes the map as it is (progressive growing). With `has_variance` the last channel estimates
@@ -96,7 +84,7 @@ class UNet(nn.Module):
         depths, channels, attention = layout.depths, layout.channels, layout.attention or [False] * len(layout.depths)
         self.patch_size, self.skip_stages = patch_size, skip_stages
         self.sigma_data, self.has_variance = layout.sigma_data, layout.has_variance
-        self.low_memory = False  # keeps a fifth of what the gradient needs, and computes the rest again
+        self.low_memory = False  # True: keep a fifth of what the gradient needs, and compute the rest again
         self.multiple = patch_size * 2 ** (len(depths) - 1 - skip_stages)
         self.timestep_embed = Fourier(mapping_out)
         self.mapping_cond = (
@@ -113,31 +101,16 @@ class UNet(nn.Module):
         down, up = [], []
         for level, (depth, width) in enumerate(zip(depths, channels, strict=True)):
             above = channels[max(0, level - 1)]
-            deepest, halved = level == len(depths) - 1, level > skip_stages
-            down.append(
-                _block(
-                    layout,
-                    [above] + [width] * (depth - 1),
-                    width,
-                    width,
-                    attention[level],
-                    first=Down() if halved else nn.Identity(),
-                )
-            )
-            up.append(
-                _block(
-                    layout,
-                    [width if deepest else 2 * width] + [width] * (depth - 1),
-                    width,
-                    above,
-                    attention[level],
-                    last=Up() if halved else nn.Identity(),
-                )
-            )
+            halved, inner = level > skip_stages, [width] * (depth - 1)
+            below = width if level == len(depths) - 1 else 2 * width  # but for the deepest level a skip comes in
+            blocks = _blocks(layout, [above, *inner], [*inner, width], width, attention[level])
+            down.append(nn.ModuleList([Down() if halved else nn.Identity(), *blocks]))
+            blocks = _blocks(layout, [below, *inner], [*inner, above], width, attention[level])
+            up.append(nn.ModuleList([*blocks, Up() if halved else nn.Identity()]))
         self.u_net = nn.ModuleDict({"d_blocks": nn.ModuleList(down), "u_blocks": nn.ModuleList(up[::-1])})
 
     def lower(self, dtype: torch.dtype) -> UNet:
-        """Everything that works on maps in `dtype`, channels last; the noise level's few numbers stay as they are."""
+        """Convert what works on maps to `dtype`, channels last; the noise level's few numbers stay as they are."""
         for module in (self.proj_in, self.proj_out, self.u_net):
             module.to(dtype=dtype, memory_format=MEMORY_FORMAT)
         return self
@@ -169,30 +142,18 @@ class UNet(nn.Module):
         return functional.pixel_shuffle(x, self.patch_size) if self.patch_size > 1 else x
 
 
-def _block(
-    layout: UNetLayout,
-    inputs: list[int],
-    width: int,
-    out: int,
-    attention: bool,
-    first: nn.Module | None = None,
-    last: nn.Module | None = None,
-) -> nn.ModuleList:
-    """Residual blocks (inputs[i] -> width, the last one -> out), each followed by attention if asked for; resampling
-    first or last."""
-    mapping, norm = layout.mapping_out, layout.norm
-    layers = [] if first is None else [first]
-    for i, c_in in enumerate(inputs):
-        c_out = out if last is not None and i == len(inputs) - 1 else width
+def _blocks(layout: UNetLayout, inputs: list[int], outputs: list[int], width: int, attention: bool) -> list[nn.Module]:
+    """Return residual blocks of these input and output channels, each followed by attention if it has some."""
+    mapping, norm, layers = layout.mapping_out, layout.norm, []
+    for c_in, c_out in zip(inputs, outputs, strict=True):
         layers.append(Residual(mapping, c_in, width, c_out, norm))
         if attention:
             layers.append(SelfAttention(mapping, c_out, norm))
-    return nn.ModuleList(layers if last is None else [*layers, last])
+    return layers
 
 
 def from_state(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """A released state dict's weights under our names: no wrappers' prefixes, however many, and no constant resampling
-    kernels."""
+    """Return a released state dict under our names: without wrappers' prefixes and constant resampling kernels."""
     while state and all(name.startswith("inner_model.") for name in state):
         state = {name.removeprefix("inner_model."): value for name, value in state.items()}
     return {name: value for name, value in state.items() if not name.endswith(".kernel")}

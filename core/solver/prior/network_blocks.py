@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the prior's network is made of: modulated residual blocks, attention, and the filters between its levels."""
+"""Layers of the prior's network: modulated residual blocks, attention, and the filters between its levels."""
 
 from __future__ import annotations
 
@@ -11,36 +11,25 @@ from torch import nn
 from torch.nn import functional
 from torch.utils.checkpoint import checkpoint
 
+# of all maps inside the network: channels first takes longer, in convolutions and in this normalisation
+# (research/benchmarks/costs/solver.py)
 MEMORY_FORMAT = torch.channels_last
-"""Of all maps inside the network: channels first takes longer, in convolutions and in this normalisation
-(research/benchmarks/costs/solver.py)."""
-
-STRIP_ROWS = 64
-"""Rows of a map inside the network that are shaped at once where that can be done in pieces."""
+STRIP_ROWS = 64  # rows of a map inside the network that are shaped at once, where that can be done in pieces
 
 
 def run_layers(blocks: nn.ModuleList, x: torch.Tensor, mapped: torch.Tensor, low_memory: bool) -> torch.Tensor:
-    """The layers one after the other.
+    """Run layers on x [N, C, H, W]; mapped [N, M] is the mapped noise level and conditions, which some take.
 
-    Parameters
-    ----------
-    blocks : the layers
-    x : [N, C, H, W], what goes in
-    mapped : [N, M], the mapped noise level and conditions, which some layers take
-    low_memory : keeps only the layers' inputs for the gradient, and computes what is inside them a second time
-
-    Returns
-    -------
-    [N, C', H', W'].
+    `low_memory` keeps only the layers' inputs for the gradient, and computes what is inside them a second time.
     """
     for layer in blocks:
-        given = (x, mapped) if isinstance(layer, Residual | SelfAttention) else (x,)
-        x = checkpoint(layer, *given, use_reentrant=False) if low_memory and x.requires_grad else layer(*given)
+        inputs = (x, mapped) if isinstance(layer, Residual | SelfAttention) else (x,)
+        x = checkpoint(layer, *inputs, use_reentrant=False) if low_memory and x.requires_grad else layer(*inputs)
     return x
 
 
 class Residual(nn.Module):
-    """norm, GELU, conv 3x3, norm, GELU, conv 3x3, plus the input."""
+    """Residual block: norm, GELU, conv 3x3, norm, GELU, conv 3x3, plus the input."""
 
     def __init__(self, mapping: int, c_in: int, width: int, c_out: int, norm: str):
         super().__init__()
@@ -62,38 +51,21 @@ class Residual(nn.Module):
 
 
 class Shaped(torch.autograd.Function):
-    """convolution(gelu(norm(x))) of a network that does not learn: of all that is worked out only x is kept for the
-    gradient, for the convolution's own input is not needed and the rest, which is cheap, is worked out a second time,
-    in strips where texels do not depend on each other. The same numbers in less than half the memory."""
+    """convolution(gelu(norm(x))) of a frozen network, in less than half the memory, to the same numbers.
+
+    Only x is kept for the gradient: the convolution's input is not needed, and the rest, which is cheap, is computed a
+    second time, in strips where texels do not depend on each other.
+    """
 
     @staticmethod
     def convolve(norm: Norm, convolution: nn.Conv2d, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
-        """convolution(gelu(norm(x))), in whichever way is to be had.
-
-        Parameters
-        ----------
-        norm, convolution : the layers
-        x : [N, C, H, W]
-        mapped : [N, M], the mapped noise level and conditions
-
-        Returns
-        -------
-        [N, C', H, W].
-        """
-        # it learns, or nobody asks for a gradient
+        """Return convolution(gelu(norm(x))) of x [N, C, H, W], by autograd's own gradient if the network learns."""
         if mapped.requires_grad or convolution.weight.requires_grad or not x.requires_grad:
             return convolution(functional.gelu(norm(x, mapped)))
         return Shaped.apply(x, mapped, norm, convolution)
 
     @staticmethod
     def forward(ctx, x: torch.Tensor, mapped: torch.Tensor, norm: Norm, convolution: nn.Conv2d) -> torch.Tensor:
-        """What torch.autograd.Function asks for.
-
-        Parameters
-        ----------
-        ctx : keeps what `backward` needs
-        x, mapped, norm, convolution : as in `convolve`
-        """
         ctx.save_for_backward(x, mapped)
         ctx.layers = norm, convolution
         inner = torch.empty_like(x)
@@ -104,20 +76,9 @@ class Shaped(torch.autograd.Function):
     @staticmethod
     def backward(ctx, gradient: torch.Tensor) -> tuple:
         (x, mapped), (norm, convolution) = ctx.saved_tensors, ctx.layers
-        # of its input only the shape counts, which is x's
-        input_gradient, *_ = torch.ops.aten.convolution_backward(
-            gradient,
-            x,
-            convolution.weight,
-            None,
-            convolution.stride,
-            convolution.padding,
-            convolution.dilation,
-            False,
-            [0, 0],
-            1,
-            [True, False, False],
-        )
+        options = convolution.stride, convolution.padding, convolution.dilation, False, [0, 0], 1, [True, False, False]
+        # of the convolution's input only the shape counts, which is x's
+        input_gradient, *_ = torch.ops.aten.convolution_backward(gradient, x, convolution.weight, None, *options)
         for rows in norm.strips(x):
             with torch.enable_grad():
                 strip = x[:, :, rows].detach().requires_grad_()
@@ -146,7 +107,7 @@ class Norm(nn.Module):
         return torch.addcmul(bias, x, 1 + weight)
 
     def strips(self, x: torch.Tensor) -> list[slice]:
-        """The rows of x that can be normalised at once without the others."""
+        """Return the rows of x that can be normalised at once without the others."""
         step = STRIP_ROWS if self.kind == "pixel" else x.shape[2]
         return [slice(row, row + step) for row in range(0, x.shape[2], step)]
 
@@ -181,7 +142,7 @@ class Fourier(nn.Module):
 
 
 class Down(nn.Module):
-    """Half the size by the separable kernel [1, 3, 3, 1] / 8, reflected at the border: the triangle filter."""
+    """Triangle filter to half the size: the separable kernel [1, 3, 3, 1] / 8, reflected at the border."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=MEMORY_FORMAT)
@@ -192,7 +153,7 @@ class Down(nn.Module):
 
 
 class Up(nn.Module):
-    """Twice the size by the same kernel transposed, which is bilinear interpolation; reflected at the border."""
+    """Bilinear interpolation to twice the size, which is the same kernel transposed; reflected at the border."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=MEMORY_FORMAT)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""RCAN (Zhang et al. 2018, "Image Super-Resolution Using Very Deep Residual Channel Attention Networks") with seven
-channels in and out, four times as large (paper, supplement "Super-Resolution Network"). It adds to bicubic resampling
-what that misses, so with a tail of zeros it is bicubic resampling.
+"""Super-resolution network U (paper, supplement): RCAN, with seven channels in and out, four times as large.
 
-Channels: sRGB-coded diffuse albedo (3), tangent-space normal xyz (3), specular level (1).
+Zhang et al. 2018, "Image Super-Resolution Using Very Deep Residual Channel Attention Networks". It adds to bicubic
+resampling what that misses, so with a tail of zeros it is bicubic resampling. Channels: sRGB-coded diffuse albedo (3),
+tangent-space normal xyz (3), specular level (1).
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from torch.nn import functional
 
 FACTOR = 4  # of the sides
 CHANNELS = 7  # albedo, normal, specular
+# approximate mean and deviation of a channel, by which the input is centred and scaled
 CHANNEL_MEANS = (0.5, 0.5, 0.5, 0.0, 0.0, 1.0, 0.35)
 CHANNEL_DEVIATIONS = (0.2, 0.2, 0.2, 0.15, 0.15, 0.05, 0.15)
-"""Of a channel's values, about: what the network reads is centred and scaled by them."""
+# approximate error of bicubic resampling in a channel: the unit of the network's output, and of its loss
 BICUBIC_ERRORS = (0.012, 0.012, 0.012, 0.05, 0.05, 0.015, 0.012)
-"""How far bicubic resampling is off in a channel, about: the unit of what the network answers, and of its loss."""
+# texels of the small map that the tail reads around a strip: 1 + 1/2 + 1/4 by three 3 x 3 convolutions on ever finer
+# grids, two by the bicubic kernel
 HALO_TEXELS = 2
-"""Texels of the small map that the tail reads around a strip: 1 + 1/2 + 1/4 by three 3 x 3 convolutions on ever finer
-grids, two by the bicubic kernel."""
 
 
 class ChannelAttention(nn.Module):
-    """Scales each channel by what its mean over the map says."""
+    """Scales of the channels, predicted from their means over the map."""
 
     def __init__(self, width: int, squeeze: int):
         super().__init__()
@@ -44,11 +44,8 @@ class ChannelAttentionBlock(nn.Module):
 
     def __init__(self, width: int, squeeze: int):
         super().__init__()
-        self.first, self.second, self.attention = (
-            nn.Conv2d(width, width, 3, padding=1),
-            nn.Conv2d(width, width, 3, padding=1),
-            ChannelAttention(width, squeeze),
-        )
+        self.first, self.second = (nn.Conv2d(width, width, 3, padding=1) for _ in range(2))
+        self.attention = ChannelAttention(width, squeeze)
         nn.init.zeros_(self.second.weight)
         nn.init.zeros_(self.second.bias)
 
@@ -57,7 +54,7 @@ class ChannelAttentionBlock(nn.Module):
 
 
 class Rcan(nn.Module):
-    """`groups` residual groups of `blocks` blocks of `width` features. The paper's has 10 of 20."""
+    """RCAN of `groups` residual groups of `blocks` blocks of `width` features; the original has 10 of 20."""
 
     def __init__(self, groups: int, blocks: int, width: int, squeeze: int = 16):
         super().__init__()
@@ -74,15 +71,13 @@ class Rcan(nn.Module):
         nn.init.zeros_(self.tail.weight)
 
     def forward(self, maps: torch.Tensor, depth: int | None = None) -> torch.Tensor:
-        """maps [N, 7, H, W] -> what bicubic resampling misses [N, 7, 4H, 4W], in the channels' own units. `depth`:
-        blocks used of each group."""
+        """Return what bicubic resampling misses of maps [N, 7, H, W], by `depth` blocks a group: [N, 7, 4H, 4W]."""
         return self.details(self.features(maps, depth))
 
     def features(
         self, maps: torch.Tensor, depth: int | None = None, tick: Callable[[float], None] = lambda share: None
     ) -> torch.Tensor:
-        """The body: [N, 7, H, W] -> [N, width, H, W]. Its attention looks at the whole map, so it cannot be had in
-        pieces. `tick` hears the share done."""
+        """Run the body, [N, 7, H, W] -> [N, width, H, W], on a whole map for its attention; `tick` gets the share."""
         begun = self.head((maps - _channels(CHANNEL_MEANS, maps)) / _channels(CHANNEL_DEVIATIONS, maps))
         x = begun
         for i, (group, join) in enumerate(zip(self.groups, self.joins, strict=True)):
@@ -95,8 +90,7 @@ class Rcan(nn.Module):
         return begun + self.join(x)
 
     def details(self, features: torch.Tensor) -> torch.Tensor:
-        """The tail: [N, width, H, W] -> [N, 7, 4H, 4W]. Local: strips with HALO_TEXELS texels around them give the same
-        as the whole."""
+        """Run the tail, [N, width, H, W] -> [N, 7, 4H, 4W], on the whole or on strips with HALO_TEXELS around."""
         x = features
         for widen in self.widen:
             x = functional.pixel_shuffle(widen(x), 2)
@@ -104,7 +98,7 @@ class Rcan(nn.Module):
 
 
 def bicubic(maps: torch.Tensor) -> torch.Tensor:
-    """[N, 7, H, W] -> [N, 7, 4H, 4W], the albedo resampled in linear light."""
+    """Resample [N, 7, H, W] to [N, 7, 4H, 4W], the albedo in linear light."""
     linear = torch.cat([srgb_to_linear(maps[:, :3]), maps[:, 3:]], 1)
     large = functional.interpolate(linear, scale_factor=FACTOR, mode="bicubic", align_corners=False)
     return torch.cat([linear_to_srgb(large[:, :3].clamp(0, 1)), large[:, 3:]], 1)

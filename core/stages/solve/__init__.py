@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""I_UV and shadow mask -> reflectance maps: a clean albedo under a global light, and local dark ones where the mask is
-(paper, section 3).
-
-The stage reads the evidence, starts from a reference face of the subject's tone, samples reflectance and light jointly,
-and writes the maps.
-"""
+"""Stage solve: I_UV and the shadow mask become reflectance maps, the light of the mask taken out (paper, section 3)."""
 
 from __future__ import annotations
 
@@ -22,10 +17,9 @@ from ...capture.capture import Capture
 from ...capture.code_key import code_key
 from ...capture.hashes import hash_tree
 from ...capture.messages import Reporter
-from ...face.head import read_filmed_head
+from ...face.head import Head, read_filmed_head
 from ...imaging import images
 from ...settings.settings import Settings, result_settings
-from ...solver import start as initial
 from ...solver.evidence import REFERENCE_TEXELS, Evidence
 from ...solver.extensions.draft import restore_maps
 from ...solver.objective import State, rms_residual
@@ -33,6 +27,7 @@ from ...solver.prior.prior import ConditionedPrior, Prior
 from ...solver.recipes import RECIPES, Recipe, free_recipe
 from ...solver.sampler import Sampler, seed_noise
 from ...solver.solution import Solution
+from ...solver.start import Callbacks, Start, start_solve
 from . import checkpoint, comparison, drawing, iris, layout, maps
 from .capture_evidence import read_evidence
 from .edited import solve_edited
@@ -44,133 +39,62 @@ from .together import read_others
 from .tone import resolve_skin_tone, tell_skin_tone
 from .witnesses import confirm_marks
 
+# after any delighter little of a shadow is left, and dark skin and beards that M takes along are not to be explained by
+# local light (Recipe.faint)
 FAINT_WEIGHT = 1.4
-"""After any delighter little of a shadow is left, and what M takes along of dark skin and beards is not to be explained
-by local light (Recipe.faint)."""
 
 
 @tell_refusals()
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """texture, confidence, head and masks -> maps/ (see maps.py for their colour spaces), comparison/, preview/, and
-    two pictures for the report.
+    """Write maps/ (maps.py has their colour spaces), comparison/, preview/, and two pictures for the report.
 
     The artist's mask wins over the proposal. Continues from its own checkpoint. With settings.edited_part only what a
-    mask edit touched is solved again, where that can be done (edited.py). Raises Problem for unusable inputs and for
+    mask edit touched is solved again, where that is possible (edited.py). Raises Problem for unusable inputs and for
     divergence.
     """
-    options = settings.solve
     prior = load_chosen(settings)
-    if options.low_memory:
+    if settings.solve.low_memory:
         spare_memory(prior)
     recipe = recipe_of(settings, prior)
     report.progress(0, recipe.steps, "reading the texture, the head and the masks")
-    # the network halves the map several times
-    size = layout.round_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32
     head = read_filmed_head(capture)
-    known = evidence = read_evidence(capture, head, size)
-    elsewhere = None
-    if options.prior:  # the authors' prior speaks of maps in other UVs
-        elsewhere, prior = layout.fit_layout(capture, head, known, prior, report)
-        # the split knows its places on the built-in head
-        evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), free_recipe(recipe)
+    filmed = evidence = read_evidence(capture, head, _map_size(settings, prior))
+    other_uvs = None
+    if settings.solve.prior:  # the authors' prior works in other UVs, and the split on the built-in head alone
+        other_uvs, prior = layout.fit_layout(capture, head, filmed, prior, report)
+        evidence, recipe = other_uvs.evidence(filmed, recipe.released_boxes), free_recipe(recipe)
     _check_often(prior, report)
-    edited = (
-        solve_edited(capture, head, settings, recipe, prior, evidence, report)
-        if settings.edited_part and elsewhere is None
-        else None
-    )
-    if edited is not None:
-        iris.measure_irises(capture, head, edited[0].diffuse, report)
-        tell_skin_tone(edited[1], settings, report)
-        _leave_figures(capture, evidence, edited[0], report)
-        return
+
+    if settings.edited_part and other_uvs is None:
+        edited = solve_edited(capture, head, settings, recipe, prior, evidence, report)
+        if edited is not None:
+            solved, tone = edited
+            iris.measure_irises(capture, head, solved.diffuse, report)
+            tell_skin_tone(tone, settings, report)
+            _report_maps(capture, evidence, solved, report)
+            return
+
     conditions = mask_edit.conditions(capture, settings)
-    witness = (lambda marks: confirm_marks(capture, head, marks, evidence.size)) if elsewhere is None else list
-    tone = resolve_skin_tone(capture, head, settings, known, report)
+    tone = resolve_skin_tone(capture, head, settings, filmed, report)
     tell_skin_tone(tone, settings, report)
-    others = read_others(capture, settings, report)
-    report.progress(0, recipe.steps, "telling skin from light and laying the mask on the shadow's edges")
-    start = initial.start_solve(
-        prior,
-        evidence,
-        tone.tensor,
-        evidence.cell_side(options.grid_cells),
-        recipe,
-        make_head_cells,
-        others,
-        initial.Callbacks(witness, report.check),
-    )
-    if others and not start.recipe.linear:
-        report.log(
-            "The other captures were not used: they help where a delighter has left a faint light, on the "
-            "built-in head, by the default recipe."
-        )
-    denoiser = prior.of_tone(start.tone)
-    report.figure("marks_kept_from_light", len(start.marks))
-    images.write_srgb(
-        capture.picture("solve", "edges_and_marks"), drawing.draw_edges_and_marks(evidence, start.alpha, start.marks)
-    )
+    start = _start(capture, None if other_uvs else head, settings, prior, evidence, tone.tensor, recipe, report)
     stored = capture.checkpoints / "solve.safetensors"
-    state = _sampled(capture, settings, start, denoiser, stored, _key(evidence, settings, start), report)
-    result = maps.finish_maps(state, evidence, start)
-    solution = Solution(
-        state.denoised,
-        state.lights,
-        evidence.alpha,
-        start.alpha,
-        start.tone,
-        result.gain,
-        start.exposure,
-        start.local,
-        start.recipe.linear > 0,
-    )
-    delivered = (
-        result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
-    )
-    maps.write_maps(capture, delivered, solution, conditions)
+    key = _run_key(evidence, settings, start)
+    state = _sample(capture, settings, start, prior.of_tone(start.tone), stored, key, report)
+
+    solved = delivered = maps.finish_maps(state, evidence, start)
+    if other_uvs is not None:
+        delivered = other_uvs.returned(solved, filmed, state.lights, start.exposure, start.tone)
+    maps.write_maps(capture, delivered, _solution(state, evidence, start, solved.gain), conditions)
     iris.measure_irises(capture, head, delivered.diffuse, report)
-    comparison.write_comparison(capture, known, delivered.diffuse)
+    comparison.write_comparison(capture, filmed, delivered.diffuse)
     maps.write_preview(capture, state, start.observations, report)
-    _leave_figures(capture, evidence, result, report)
+    _report_maps(capture, evidence, solved, report)
     stored.unlink(missing_ok=True)
 
 
-def _sampled(
-    capture: Capture,
-    settings: Settings,
-    start: initial.Start,
-    denoiser: ConditionedPrior,
-    stored: Path,
-    key: str,
-    report: Reporter,
-) -> State:
-    """The last state of the walk, on the processor; goes on from the checkpoint `stored` where that is of this run,
-    which `key` stands for."""
-    state, seen = start.state, {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
-    stopped = checkpoint.read_state(stored, key)
-    if stopped is not None:
-        report.log(f"Going on after step {stopped.step} of {start.recipe.steps}.")
-        state = stopped
-    losses: list[tuple[int, float]] = []
-
-    def on_step(state: State, steps: int) -> None:
-        report.progress(state.step, steps, f"sampling, step {state.step} of {steps}")
-        losses.append((state.step, rms_residual(state, seen)))
-        if state.step % settings.solve.checkpoint_every == 0:
-            checkpoint.write_state(stored, state, key)
-            maps.write_preview(capture, state, seen, report)
-            images.write_srgb(capture.preview / "loss.png", drawing.draw_loss_curve(losses, steps))
-            report.preview("preview/loss.png")
-
-    sampler = Sampler(denoiser, start.recipe, seed_noise(settings.seed, denoiser.device))
-    state = sample_within_memory(sampler, seen, state.to(denoiser.device), on_step, report.log)
-    state.denoised = restore_maps(denoiser, state.denoised, seen[1].coords, settings.seed)
-    return state.to("cpu")
-
-
 def recipe_of(settings: Settings, prior: Prior) -> Recipe:
-    """The chosen recipe on the noise levels that the prior knows. Ours takes the number of steps and the guidance from
-    the settings; the others come with their own."""
+    """Return the chosen recipe at the prior's noise levels; ours has its steps and guidance from the settings."""
     recipe = RECIPES[settings.solve.recipe]
     if prior.one_scale:
         recipe = replace(recipe, coarse=())
@@ -182,9 +106,14 @@ def recipe_of(settings: Settings, prior: Prior) -> Recipe:
     return replace(recipe, steps=settings.solve.steps, guidance=settings.solve.guidance, faint=faint)
 
 
+def _map_size(settings: Settings, prior: Prior) -> int:
+    """Return the size of the maps, which the network halves several times."""
+    size = settings.solve.size
+    return layout.round_size(size, prior.multiple) if settings.solve.prior else max(size // 32, 4) * 32
+
+
 def _check_often(prior: Prior, report: Reporter) -> None:
-    """Lets a cancel stop the run between two blocks of the network, forward and backward: one step on a large map takes
-    seconds."""
+    """Let a cancel stop the run between two blocks of the network, forward and backward: a step can take seconds."""
 
     def after(module, inputs, output):
         report.check()
@@ -196,24 +125,71 @@ def _check_often(prior: Prior, report: Reporter) -> None:
             layer.register_forward_hook(after)
 
 
-def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
-    """Stands for everything a run's bytes depend on."""
+def _start(
+    capture: Capture,
+    head: Head | None,
+    settings: Settings,
+    prior: Prior,
+    evidence: Evidence,
+    tone: torch.Tensor,
+    recipe: Recipe,
+    report: Reporter,
+) -> Start:
+    """Start the solve, and report the marks, which the views confirm on `head` if there is one, and M's border."""
+    others = read_others(capture, settings, report)
+    report.progress(0, recipe.steps, "telling skin from light and laying the mask on the shadow's edges")
+    witness = list if head is None else (lambda marks: confirm_marks(capture, head, marks, evidence.size))
+    cell, callbacks = evidence.cell_side(settings.solve.grid_cells), Callbacks(witness, report.check)
+    start = start_solve(prior, evidence, tone, cell, recipe, make_head_cells, others, callbacks)
+    if others and not start.recipe.linear:
+        report.log(
+            "The other captures were not used: they help where a delighter has left a faint light, on the "
+            "built-in head, by the default recipe."
+        )
+    report.figure("marks_kept_from_light", len(start.marks))
+    picture = drawing.draw_edges_and_marks(evidence, start.alpha, start.marks)
+    images.write_srgb(capture.picture("solve", "edges_and_marks"), picture)
+    return start
+
+
+def _sample(
+    capture: Capture,
+    settings: Settings,
+    start: Start,
+    denoiser: ConditionedPrior,
+    stored: Path,
+    key: str,
+    report: Reporter,
+) -> State:
+    """Return the walk's last state, on the processor, going on from the checkpoint `stored` if that has `key`."""
+    observations = {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
+    state = checkpoint.read_state(stored, key)
+    if state is not None:
+        report.log(f"Going on after step {state.step} of {start.recipe.steps}.")
+    losses: list[tuple[int, float]] = []
+
+    def on_step(state: State, steps: int) -> None:
+        report.progress(state.step, steps, f"sampling, step {state.step} of {steps}")
+        losses.append((state.step, rms_residual(state, observations)))
+        if state.step % settings.solve.checkpoint_every == 0:
+            checkpoint.write_state(stored, state, key)
+            maps.write_preview(capture, state, observations, report)
+            images.write_srgb(capture.preview / "loss.png", drawing.draw_loss_curve(losses, steps))
+            report.preview("preview/loss.png")
+
+    sampler = Sampler(denoiser, start.recipe, seed_noise(settings.seed, denoiser.device))
+    state = (state or start.state).to(denoiser.device)
+    state = sample_within_memory(sampler, observations, state, on_step, report.log)
+    state.denoised = restore_maps(denoiser, state.denoised, observations[1].coords, settings.seed)
+    return state.to("cpu")
+
+
+def _run_key(evidence: Evidence, settings: Settings, start: Start) -> str:
+    """Return a hash of everything that a run's bytes depend on."""
     digest, o = hashlib.blake2b(digest_size=16), start.observations[1]
-    for values in (
-        evidence.texture,
-        evidence.weight,
-        evidence.alpha,
-        evidence.normal,
-        start.tone,
-        start.state.lights.glob,
-        start.local,
-        start.reference,
-        start.alpha,
-        o.texture,
-        o.trust,
-        o.restraint,
-        o.missing,
-    ):
+    tensors = [evidence.texture, evidence.weight, evidence.alpha, evidence.normal]
+    tensors += [start.tone, start.state.lights.glob, start.local, start.reference, start.alpha]
+    for values in (*tensors, o.texture, o.trust, o.restraint, o.missing):
         digest.update(torch.as_tensor(values).numpy().tobytes())
     digest.update(repr(start.recipe).encode())
     digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.compute_device]).encode())
@@ -223,30 +199,36 @@ def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
     return digest.hexdigest()
 
 
-def _leave_figures(capture: Capture, evidence: Evidence, solved_maps: maps.Maps, report: Reporter) -> None:
+def _solution(state: State, evidence: Evidence, start: Start, gain: torch.Tensor) -> Solution:
+    return Solution(
+        state.denoised,
+        state.lights,
+        painted=evidence.alpha,
+        alpha=start.alpha,
+        tone=start.tone,
+        gain=gain,
+        exposure=start.exposure,
+        local=start.local,
+        settled=start.recipe.linear > 0,
+    )
+
+
+def _report_maps(capture: Capture, evidence: Evidence, solved: maps.Maps, report: Reporter) -> None:
     texture, weight = evidence.texture.numpy(), evidence.weight.numpy()
-    explained = (solved_maps.diffuse * solved_maps.shading).transpose(2, 0, 1)
+    explained = (solved.diffuse * solved.shading).transpose(2, 0, 1)
     error = images.linear_to_srgb(explained) - images.linear_to_srgb(texture)
     mean_square = float((error**2 * weight).sum() / max(3 * weight.sum(), 1e-6))
     report.figure("residual_psnr_db", round(-10 * np.log10(max(mean_square, 1e-10)), 1))
-    report.figure(
-        "mask_share_of_face_percent",
-        round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1),
-    )
+    share = float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum())
+    report.figure("mask_share_of_face_percent", round(100 * share, 1))
     side = min(evidence.size, REFERENCE_TEXELS // 2)
-    small = [
-        images.resize(image, side, side)
-        for image in (texture.transpose(1, 2, 0), solved_maps.diffuse, solved_maps.shading)
-    ]
-    small[0] = small[0] * (small[1].mean() / max(small[0].mean(), 1e-6))
-    small[2] = small[2] * (0.6 / max(np.percentile(small[2], 95), 1e-6))
-    images.write_srgb(capture.picture("solve", "texture_albedo_shading"), images.linear_to_srgb(np.hstack(small)))
-    aux = [
-        solved_maps.normal,
-        np.repeat(solved_maps.specular[..., None], 3, 2),
-        np.repeat(solved_maps.confidence[..., None], 3, 2),
-    ]
-    images.write_srgb(
-        capture.picture("solve", "normal_specular_confidence"),
-        np.hstack([images.resize(image, side, side) for image in aux]),
+    filmed, albedo, shading = (
+        images.resize(image, side, side) for image in (texture.transpose(1, 2, 0), solved.diffuse, solved.shading)
     )
+    filmed = filmed * (albedo.mean() / max(filmed.mean(), 1e-6))
+    shading = shading * (0.6 / max(np.percentile(shading, 95), 1e-6))
+    picture = images.linear_to_srgb(np.hstack([filmed, albedo, shading]))
+    images.write_srgb(capture.picture("solve", "texture_albedo_shading"), picture)
+    grey = [np.repeat(plane[..., None], 3, 2) for plane in (solved.specular, solved.confidence)]
+    picture = np.hstack([images.resize(image, side, side) for image in (solved.normal, *grey)])
+    images.write_srgb(capture.picture("solve", "normal_specular_confidence"), picture)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the solve is compared with: the texture as it was filmed and as it was delit, each at the albedo's exposure, so
-that only the light differs."""
+"""Write the texture as it was filmed and as it was delit, each at the albedo's exposure, for comparison."""
 
 from __future__ import annotations
 
@@ -12,16 +11,13 @@ from ...capture.files import replacing_folder
 from ...imaging import images
 from ...solver.evidence import Evidence
 
-LUMINANCE_WEIGHTS = np.float32([0.2126, 0.7152, 0.0722])
-"""Of linear sRGB (Rec. 709)."""
+LUMINANCE_WEIGHTS = np.float32([0.2126, 0.7152, 0.0722])  # of linear sRGB (Rec. 709)
 
 
 def write_comparison(capture: Capture, evidence: Evidence, albedo: np.ndarray) -> None:
-    """The folder comparison/ with delit.png, and filmed.png where the texture stage left one: 8-bit sRGB of the
-    texture's size.
+    """Write comparison/ with delit.png, and filmed.png if there is one: 8-bit sRGB of the texture's size.
 
-    `albedo` is linear [S, S, 3]. One gain for all channels brings the mean luminance of the facial skin that was seen
-    to the albedo's.
+    One gain brings the mean luminance of the facial skin that was seen to that of the linear albedo [S, S, 3].
     """
     weight = (evidence.skin * evidence.weight).numpy()
     goal = _mean(albedo, weight)
@@ -29,12 +25,10 @@ def write_comparison(capture: Capture, evidence: Evidence, albedo: np.ndarray) -
         for path, name in ((capture.texture, "delit.png"), (capture.texture_filmed, "filmed.png")):
             if path.is_file():
                 texture = images.read_linear(path)
-                small = images.resize(texture, evidence.size, evidence.size)
-                images.write_srgb(
-                    folder / name, images.linear_to_srgb(texture * (goal / max(_mean(small, weight), 1e-6)))
-                )
+                mean = _mean(images.resize(texture, evidence.size, evidence.size), weight)
+                images.write_srgb(folder / name, images.linear_to_srgb(texture * (goal / max(mean, 1e-6))))
 
 
 def _mean(linear: np.ndarray, weight: np.ndarray) -> float:
-    """Mean luminance of [S, S, 3] under the weights [S, S]."""
+    """Return the mean luminance of [S, S, 3] under weights [S, S]."""
     return float(np.average(linear @ LUMINANCE_WEIGHTS, weights=weight + 1e-9))

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which device the networks run on: proven by a pass of the shipped one, not taken for granted because PyTorch names
-it.
-
-A graphics card may be too old for PyTorch's kernels, out of memory, or slower than the processor: each is found out
-here, once, and said.
-"""
+"""Choose the device of the networks by a pass of the shipped one: a card may be too old, too small or too slow."""
 
 from __future__ import annotations
 
@@ -18,17 +13,13 @@ import torch
 from ...solver.prior.prior import make_coordinates
 from .prior_files import WEIGHTS, load
 
-TRIAL_TEXELS = 128
-"""Side of the map that is tried, in texels: small enough for any card, and large enough that a card shows what it can
-do."""
-MAX_DIFFERENCE = 0.05
-"""The largest difference between two devices' results, in units of the map's range; bfloat16 differs from float32 by
-0.01."""
+TRIAL_TEXELS = 128  # side of the map that is tried: small enough for any card, and large enough to show its speed
+MAX_DIFFERENCE = 0.05  # between two devices' results, in units of the map's range; bfloat16 is off by 0.01
 
 
 @dataclass(frozen=True)
 class Proof:
-    """The device ('cpu', 'cuda' or 'mps'), and why that one: a sentence."""
+    """Device ('cpu', 'cuda' or 'mps') and the reason for it, a sentence."""
 
     device: str
     reason: str
@@ -36,7 +27,7 @@ class Proof:
 
 @cache
 def prove() -> Proof:
-    """The first device that computes what the CPU computes, and faster; the CPU where none does."""
+    """Return the first device that computes what the CPU computes, and faster; else the CPU."""
     devices = list_devices()
     if not devices:
         return Proof("cpu", "PyTorch finds no graphics card that it can use.")
@@ -46,10 +37,8 @@ def prove() -> Proof:
         try:
             result, seconds = run_pass(device)
         except Exception as error:  # whatever a driver says: the CPU is there
-            reasons.append(
-                f"{device} does not run the network ({type(error).__name__}: "
-                f"{str(error).partition(chr(10))[0][:120].rstrip('.')})."
-            )
+            message = str(error).partition("\n")[0][:120].rstrip(".")
+            reasons.append(f"{device} does not run the network ({type(error).__name__}: {message}).")
             continue
         if not torch.isfinite(result).all() or (result - expected).abs().max() > MAX_DIFFERENCE:
             reasons.append(f"{device} computes something else than the CPU.")
@@ -63,24 +52,20 @@ def prove() -> Proof:
 
 
 def list_devices() -> list[str]:
-    """The devices that PyTorch names, beside the CPU."""
-    return [
-        name
-        for name, there in (("cuda", torch.cuda.is_available()), ("mps", torch.backends.mps.is_available()))
-        if there
-    ]
+    """List the devices that PyTorch names, beside the CPU."""
+    available = {"cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
+    return [name for name, is_available in available.items() if is_available]
 
 
 def run_pass(device: str) -> tuple[torch.Tensor, float]:
-    """A pass of the shipped prior over a fixed map [1, 7, TRIAL_TEXELS, TRIAL_TEXELS] and back to its input, twice: the
-    gradient, on the CPU, and the second one's seconds."""
+    """Run the shipped prior over a map and back; return [1, 14, S, S] on the CPU, and a second pass's seconds."""
     generator = torch.Generator().manual_seed(0)
     prior = load(WEIGHTS, device).of_tone(torch.tensor([0.45, 0.3, 0.22]))
     noisy, weights = (torch.randn(1, 7, TRIAL_TEXELS, TRIAL_TEXELS, generator=generator).to(device) for _ in range(2))
     weights = weights / (7 * TRIAL_TEXELS * TRIAL_TEXELS) ** 0.5
     middle = slice(512 - TRIAL_TEXELS // 2, 512 + TRIAL_TEXELS // 2)
     coords = make_coordinates(1024, middle, middle).to(device)
-    for _ in range(2):  # the first one brings kernels and memory
+    for _ in range(2):  # the first pass loads kernels and memory
         started = time.perf_counter()
         x = noisy.clone().requires_grad_(True)
         denoised = prior(x, 1.0, coords)

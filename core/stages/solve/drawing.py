@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver's own pictures: how its loss falls; for the report, where the mask was painted, where its border was laid,
-and which marks are kept from light."""
+"""Draw the solver's own pictures: its loss, and for the report the mask, its border and the marks."""
 
 from __future__ import annotations
 
@@ -18,31 +17,25 @@ PAINTED_RGB, LAID_RGB, MARK_RGB = (1.0, 1.0, 1.0), (1.0, 0.45, 0.0), (0.1, 0.9, 
 
 
 def draw_edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, ...]) -> np.ndarray:
-    """sRGB [H, 2 H, 3]: the texture with the painted contour in white, M's border as it is used in orange, the marks
-    ringed in green; M itself beside it."""
+    """Return sRGB [H, 2 H, 3]: the texture with the painted contour white, M's orange, marks green; beside it M."""
     side = min(evidence.size, REFERENCE_TEXELS // 2)
     texture = images.resize(np.ascontiguousarray(evidence.texture.permute(1, 2, 0).numpy()), side, side)
-    seen = texture[images.resize(evidence.weight.numpy(), side, side) > 0.5]
-    shown = images.linear_to_srgb(texture * (0.8 / max(float(np.percentile(seen, 99)) if seen.size else 1.0, 1e-6)))
+    visible = texture[images.resize(evidence.weight.numpy(), side, side) > 0.5]
+    brightest = float(np.percentile(visible, 99)) if visible.size else 1.0
+    picture = images.linear_to_srgb(texture * (0.8 / max(brightest, 1e-6)))
     small = images.resize(alpha.numpy(), side, side)
     for mask, colour in ((images.resize(evidence.alpha.numpy(), side, side), PAINTED_RGB), (small, LAID_RGB)):
         contours, _ = cv2.findContours((mask > 0.5).astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(shown, contours, -1, colour, 1)
+        cv2.drawContours(picture, contours, -1, colour, 1)
     scale = side / evidence.size
     for mark in marks:
-        cv2.circle(
-            shown,
-            (round(mark.column * scale), round(mark.row * scale)),
-            max(4, round(2.2 * mark.radius * scale)),
-            MARK_RGB,
-            1,
-        )
-    return np.hstack([shown, np.repeat(np.clip(small, 0, 1)[..., None], 3, 2)])
+        middle, radius = (round(mark.column * scale), round(mark.row * scale)), round(2.2 * mark.radius * scale)
+        cv2.circle(picture, middle, max(4, radius), MARK_RGB, 1)
+    return np.hstack([picture, np.repeat(np.clip(small, 0, 1)[..., None], 3, 2)])
 
 
 def draw_loss_curve(losses: list[tuple[int, float]], steps: int) -> np.ndarray:
-    """sRGB [h, w, 3] of (step, loss) over all steps of the run, on a logarithmic scale from the largest to the smallest
-    so far; a line at every tenfold."""
+    """Return sRGB [h, w, 3] of (step, loss) over all steps, on a logarithmic scale with a line at every tenfold."""
     height, width = CURVE_PX
     picture = np.full((height, width, 3), 0.12, np.float32)
     log_losses = np.log10(np.maximum([loss for _, loss in losses], 1e-6))

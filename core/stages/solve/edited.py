@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""After a mask edit: the touched part of the maps solved again and put into the maps of the last solve; everything else
-of them stays, bit by bit."""
+"""Solve again what a mask edit touched, and put it into the maps of the last solve, which stay else bit by bit."""
 
 from __future__ import annotations
 
@@ -15,36 +14,21 @@ from ...capture.capture import Capture
 from ...capture.messages import Reporter
 from ...face.head import Head
 from ...settings.settings import Settings
-from ...solver import start as initial
 from ...solver.evidence import REFERENCE_TEXELS, Evidence, grid_cells
 from ...solver.objective import State
-from ...solver.prior.prior import ConditionedPrior, Prior
+from ...solver.prior.prior import Prior
 from ...solver.recipes import Recipe
-from ...solver.solution import Solution
+from ...solver.start import Callbacks, start_again
 from . import checkpoint, maps
 from .skin_tone import EARLIER, SkinTone
-from .window import Window, find_window, solve_inside
+from .window import find_window, solve_inside
 from .witnesses import confirm_marks
 
 
 def solve_edited(
     capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, report: Reporter
 ) -> tuple[maps.Maps, SkinTone] | None:
-    """The maps with the edited part new, as they are now in maps/, and the skin tone. Without an edit the maps stay as
-    they are.
-
-    Parameters
-    ----------
-    capture : that was solved before
-    head : in the capture
-    settings : of the solve
-    recipe, prior, evidence : as for a whole solve
-    report : hears of progress
-
-    Returns
-    -------
-    None, and the reason in the log, where the whole map is to be solved.
-    """
+    """Return the maps as they are now in maps/, and the skin tone; None, and the reason in the log, if not possible."""
     cell = evidence.cell_side(settings.solve.grid_cells)
     conditions, obstacle = mask_edit.conditions(capture, settings), mask_edit.obstacle(capture, settings)
     earlier = None if obstacle else checkpoint.read_solution(capture.solved, conditions)
@@ -59,40 +43,20 @@ def solve_edited(
     near = torch.zeros_like(evidence.alpha)
     if window is not None:
         near[window.inside] = 1
-    start = initial.start_again(
-        prior,
-        evidence,
-        earlier,
-        cell,
-        recipe,
-        near,
-        initial.Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size), report.check),
-    )
-    solution = (
-        earlier
-        if window is None
-        else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, window, report)
-    )
+    callbacks = Callbacks(lambda marks: confirm_marks(capture, head, marks, evidence.size), report.check)
+    start = start_again(prior, evidence, earlier, cell, recipe, near, callbacks)
+    solution = earlier
+    if window is not None:
+        denoiser, seed = prior.of_tone(earlier.tone), settings.seed
+        denoised, lights = solve_inside(denoiser, start.observations, earlier, window, start.recipe, seed, report)
+        solution = replace(earlier, denoised=denoised, lights=lights, painted=evidence.alpha, alpha=start.alpha)
     state = State(0, None, solution.denoised, solution.lights)
-    result = maps.finish_maps(state, evidence, start, solution.gain)
+    solved = maps.finish_maps(state, evidence, start, solution.gain)
     if window is None:
         report.log("The mask is the last solve's: nothing was solved again.")
     else:
-        maps.write_maps(capture, result, solution, conditions, window.inside)
+        maps.write_maps(capture, solved, solution, conditions, window.inside)
         maps.write_preview(capture, state, start.observations, report)
         height, width = (s.stop - s.start for s in window.inside)
         report.log(f"{width} x {height} texels were solved again in {time.monotonic() - began:.1f} s.")
-    return result, SkinTone.from_linear(earlier.tone, EARLIER)
-
-
-def _sampled(
-    settings: Settings,
-    prior: ConditionedPrior,
-    evidence: Evidence,
-    earlier: Solution,
-    start: initial.Start,
-    window: Window,
-    report: Reporter,
-) -> Solution:
-    denoised, lights = solve_inside(prior, start.observations, earlier, window, start.recipe, settings.seed, report)
-    return replace(earlier, denoised=denoised, lights=lights, painted=evidence.alpha, alpha=start.alpha)
+    return solved, SkinTone.from_linear(earlier.tone, EARLIER)

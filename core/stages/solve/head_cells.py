@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built-in head as the split of skin and light knows it (split.py): where its map's cells lie, and how far skins
-differ there."""
+"""Cells of the built-in head for the split of skin and light (split.py), with how far skins differ there."""
 
 from __future__ import annotations
 
@@ -22,7 +21,7 @@ TRAITS_FILE = Path(__file__).parents[2] / DATA_FILES[0]
 
 @cache
 def make_head_cells(count: int) -> HeadCells:
-    """The built-in map's count x count cells."""
+    """Return the built-in map's count x count cells."""
     places, covered = place_cells(count)
     variation = np.ascontiguousarray(read_variation(), np.float32)
     varied = cv2.resize(variation, (count, count), interpolation=cv2.INTER_AREA)[covered].astype(np.float64)
@@ -33,13 +32,13 @@ def make_head_cells(count: int) -> HeadCells:
 
 @cache
 def read_variation() -> np.ndarray:
-    """[C, C]: how far skins differ from their mean at places of the built-in map, over the face's own mean."""
+    """Read the deviation of skins from their mean at places of the built-in map [C, C], over the face's own mean."""
     return np.array(json.loads(TRAITS_FILE.read_text(encoding="utf-8"))["deviation"])
 
 
 @cache
 def place_cells(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of count x count cells: where on the built-in head they lie [N, 3], and which of them do [count, count]."""
+    """Return the places [N, 3] of count x count cells on the built-in head, and which of them lie on it."""
     mesh = template.load()
     face, bary = raster.rasterize_uv(mesh, count)
     return raster.interpolate(mesh.vertices, mesh.faces, face, bary)[face >= 0], face >= 0

@@ -1,13 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colour of eyes that were open: what a frame shows of an iris, over what it shows of the skin around that eye,
-whose albedo the solve has found.
+"""Measure the colour of open eyes: an iris in a frame over the skin around that eye, whose albedo the solve has found.
 
 So the white point, the exposure and most of the light divide out, frame by frame. The iris is what the eye reader sees
-of it where the fitted eyeball has it. What is a highlight, a lash's shadow or a blink in some frames, or in a part of
-the iris, the median leaves out. What lies on an eye in all frames (a shadow of the lid or the brow, the sky in the
-cornea) is seldom the same on the other one: people's two irises are of one colour, and have the middle of what was
-measured.
+of it inside the fitted eyeball. A highlight, a lash's shadow or a blink in some frames, or in a part of the iris, is
+left out by the median. A shadow of the lid or the brow, or the sky in the cornea, lies on an eye in all frames, but is
+seldom the same on the other one: people's two irises are of one colour, and get the middle of both.
 """
 
 from __future__ import annotations
@@ -28,39 +26,20 @@ from ...imaging import images
 from .look import BURNT_SRGB, weigh_skin
 from .witnesses import find_visible
 
-RING_SHARES = 0.55, 0.85
-"""Shares of the iris' radius between which it is iris: a pupil is seldom wider than half, and the rim is darker."""
-MIN_FACING_COSINE = 0.75
-"""Least cosine between the gaze and the way to the camera: beyond 40 degrees the cornea's edge bends what is behind
-it."""
-MIN_IRIS_SHARE = 0.8
-"""Share of the iris in a pixel from which it is nothing else."""
-REACH_RADII = 2.6
-"""Radii of the eyeball within which skin is lit as the eye is."""
-MIN_SKIN_COSINE = 0.5
-"""Least cosine between the normals of such skin and the gaze."""
+RING_SHARES = 0.55, 0.85  # of the iris' radius: a pupil is seldom wider than half, and the rim is darker
+MIN_FACING_COSINE = 0.75  # of gaze and way to the camera: beyond 40 degrees the cornea's edge bends what is behind it
+MIN_IRIS_SHARE = 0.8  # of the iris in a pixel
+REACH_RADII = 2.6  # of the eyeball, within which skin is lit as the eye is
+MIN_SKIN_COSINE = 0.5  # between the normals of such skin and the gaze
 MIN_POINTS = 12  # points of skin, or pixels of the iris, that a frame must show
 MAX_VIEWS = 10  # those that face the eye most
+# least difference of two irises' ln blue / red to be irises of two colours, as few people have them: half of what parts
+# a brown iris from a blue one
 ODD_HUES_LOG = 1.2
-"""By how much two irises' blue over red, as a logarithm, must differ to be irises of two colours, as few people have
-them: half of what parts a brown iris from a blue one."""
 
 
 def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) -> None:
-    """Writes maps/irises.json; none where the eyes were closed or no frame shows them well.
-
-    Parameters
-    ----------
-    capture : with its frames
-    head : in the capture
-    albedo : [S, S, 3], linear, in the head's UVs
-    report : takes the colours
-
-    Raises
-    ------
-    Problem
-        For damaged records.
-    """
+    """Write maps/irises.json by a linear albedo [S, S, 3]; none if no frame shows the eyes well. Raises Problem."""
     remove_file(capture.irises)
     if not (capture.eyes.is_file() and capture.frames_json.is_file() and capture.cameras.is_dir()):
         return
@@ -76,24 +55,14 @@ def measure_irises(capture: Capture, head: Head, albedo: np.ndarray, report: Rep
 def measure_both_irises(
     views: list[View], head: Head, eyes: tuple[Eyeball, Eyeball], albedo: np.ndarray, report: Reporter
 ) -> tuple[Colour, Colour] | None:
-    """The linear albedo of the left and of the right iris; None where no frame shows either.
-
-    Parameters
-    ----------
-    views : with their pictures
-    head : as fitted, in metres
-    eyes : the left and the right one
-    albedo : [S, S, 3], linear, of the head
-    report : hears whether it is cancelled
-    """
+    """Return the linear albedo of the left and the right iris, or None if no frame shows either."""
     colours = [measure_iris_colour(views, head, side, eye, albedo, report) for side, eye in enumerate(eyes)]
-    known = [colour for colour in colours if colour is not None]
-    return even_colours(known[0], known[-1]) if known else None
+    colours = [colour for colour in colours if colour is not None]
+    return even_colours(colours[0], colours[-1]) if colours else None
 
 
 def even_colours(left: Colour, right: Colour) -> tuple[Colour, Colour]:
-    """Both irises in the middle of their linear colours, a geometric mean: what shades an eye is a factor. As they are
-    where they are irises of two colours."""
+    """Return both irises in their geometric mean, for what shades an eye is a factor, but for irises of two colours."""
     logs = np.log([left, right])
     hues = logs[:, 2] - logs[:, 0]
     if abs(hues[1] - hues[0]) > ODD_HUES_LOG:
@@ -105,22 +74,12 @@ def even_colours(left: Colour, right: Colour) -> tuple[Colour, Colour]:
 def measure_iris_colour(
     views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray, report: Reporter
 ) -> Colour | None:
-    """The albedo of an iris, by the median over it and the frames that face it most.
+    """Return an iris' linear albedo [3] by the median over it and the frames that face it most; None if none shows it.
 
-    Parameters
-    ----------
-    views : with their pictures
-    head : as fitted, in metres
-    side : 0 for the left eye, 1 for the right
-    eye : of that side
-    albedo : [S, S, 3], linear, of the head: what the skin around tells the frame's light by
-    report : hears whether it is cancelled
-
-    Returns
-    -------
-    Linear [3] in [0.001, 1]; None where no frame shows it.
+    side is 0 for the left eye, 1 for the right. The head's linear albedo [S, S, 3] around the eye reveals the frame's
+    light.
     """
-    skin, known = _skin_around(head, eye, albedo)
+    skin, skin_albedo = _skin_around(head, eye, albedo)
     if len(skin) < MIN_POINTS or not eye.iris_radius:
         return None
     towards = np.array([view.centre for view in views]) - eye.centre
@@ -130,7 +89,7 @@ def measure_iris_colour(
         report.check()
         if facing[i] < MIN_FACING_COSINE:
             break
-        colours.append(_in_frame(views[i], head, side, eye, skin, known))
+        colours.append(_measure_in_frame(views[i], head, side, eye, skin, skin_albedo))
     colours = [colour for colour in colours if colour is not None]
     return tuple(round(float(v), 4) for v in np.clip(np.median(colours, 0), 0.001, 1)) if colours else None
 
@@ -138,19 +97,7 @@ def measure_iris_colour(
 def find_iris_pixels(
     view: View, eye: Eyeball, shares: EyeShares, shape: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The pixels that show the iris between pupil and rim: where an eyeball has it, and the reader saw it.
-
-    Parameters
-    ----------
-    view : the camera
-    eye : in metres
-    shares : what the reader saw, in the picture's pixels
-    shape : of the view's picture
-
-    Returns
-    -------
-    Rows and columns [N].
-    """
+    """Return rows and columns [N] between pupil and rim of the eyeball's iris that the reader calls iris."""
     shrink = np.array([shape[1] / view.width, shape[0] / view.height])
     (middle,), (depth,) = view.project(np.array(eye.centre)[None])
     reach = 1.5 * eye.radius * view.camera.mean_focal_length() / depth
@@ -167,7 +114,7 @@ def find_iris_pixels(
 
 
 def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The vertices [N] of plain skin about an eye that are turned as it is, and their linear albedo [N, 3]."""
+    """Return the vertices [N] of plain skin about an eye that are turned as it is, and their linear albedo [N, 3]."""
     mesh, uvs = head.mesh, vertex_uvs(head.mesh)
     plain = raster.sample_uv(weigh_skin(512, np.zeros((8, 8))), uvs) > 0.5
     near = np.linalg.norm(mesh.vertices - eye.centre, axis=1) < REACH_RADII * eye.radius
@@ -175,21 +122,20 @@ def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarr
     return rows, np.maximum(raster.sample_uv(albedo, uvs[rows]), 1e-3)
 
 
-def _in_frame(
+def _measure_in_frame(
     view: View, head: Head, side: int, eye: Eyeball, skin: np.ndarray, skin_albedo: np.ndarray
 ) -> np.ndarray | None:
-    """The iris' albedo [3] by one frame; None where that does not show it, or not enough of the skin around."""
+    """Return the iris' albedo [3] by one frame; None if it does not show it, or not enough of the skin around."""
     frame = view.read()
-    linear, whole = images.srgb_to_linear(frame), frame.max(-1)
+    linear, shrink = images.srgb_to_linear(frame), [frame.shape[1] / view.width, frame.shape[0] / view.height]
     corners = view.project(head.mesh.vertices[list(lids.corners()[side])])[0]
-    seen = read_eye(frame, corners * [frame.shape[1] / view.width, frame.shape[0] / view.height], side == 0)
-    rows, columns = find_iris_pixels(view, eye, seen, frame.shape)
+    rows, columns = find_iris_pixels(view, eye, read_eye(frame, corners * shrink, side == 0), frame.shape)
     at = np.flatnonzero(find_visible(view, head.caster, head.mesh.vertices[skin], head.normals[skin]))
     if len(at) < MIN_POINTS or len(rows) < MIN_POINTS:
         return None
-    pixels = view.project(head.mesh.vertices[skin[at]])[0] * [frame.shape[1] / view.width, frame.shape[0] / view.height]
-    kept = raster.sample(whole, pixels) < BURNT_SRGB
-    if kept.sum() < MIN_POINTS:
+    pixels = view.project(head.mesh.vertices[skin[at]])[0] * shrink
+    usable = raster.sample(frame.max(-1), pixels) < BURNT_SRGB
+    if usable.sum() < MIN_POINTS:
         return None
-    light = np.median(raster.sample(linear, pixels[kept]) / skin_albedo[at][kept], axis=0)
+    light = np.median(raster.sample(linear, pixels[usable]) / skin_albedo[at][usable], axis=0)
     return np.median(linear[rows, columns], axis=0) / np.maximum(light, 1e-6)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The UVs that a released prior was trained in: the evidence is taken there from the built-in head's maps, and the
-solved maps back.
+"""UVs that a released prior was trained in, to which evidence goes and from which solved maps come back.
 
 The artist's own fitted mesh brings these UVs; nothing here knows which mesh it is. The released code works on a window
 of the map, and the bounds of its masks lie in it (their soft shapes are not at hand).
@@ -11,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -23,20 +22,18 @@ from ...capture.own_head import read_skin
 from ...face.head import Head
 from ...geometry import atlas, baking, meshes
 from ...solver.evidence import REFERENCE_TEXELS, Evidence, Extent
-from ...solver.lighting import Lights, shading_basis
+from ...solver.lighting import Lights, shade, shading_basis
 from ...solver.prior.prior import Prior, mean_at
 from .maps import MIN_ALBEDO, Maps, to_picture
 from .prior_files import load
 
 WINDOW = Extent(64, 128, 768, centred=False, factors=(1,))
-Box = tuple[int, int, int, int]
+# first and last row, first and last column at 1024, ends excluded: where the released code takes the skin tone, and the
+# supports of its face mask and of the mask that bounds shadows
 TONE_BOX, FACE_BOX, SHADOW_BOX = (289, 399, 470, 554), (131, 764, 177, 842), (225, 594, 248, 778)
-"""First and last row, first and last column at 1024, ends excluded: where the released code takes the skin tone, where
-its face mask and the mask that bounds shadows have their support."""
-MAX_DISTANCE_M = 0.012
-"""Farthest that the two fitted heads may lie apart."""
-FADE_TEXELS = 24.0
-"""Texels of a 1024 map over which the solved maps end where the window does."""
+MAX_DISTANCE_M = 0.012  # between the two fitted heads
+FADE_TEXELS = 24.0  # of a 1024 map, over which the solved maps end where the window does
+PROGRESS = "laying the prior's UVs over the head"
 REMEDY = (
     "Choose ICT-FaceKit's folder with the neutral mesh under Reconstruction, Head Mesh (in a terminal: "
     "--template) and run the stage Head again, or leave the prior empty to use ours."
@@ -45,28 +42,27 @@ REMEDY = (
 
 @dataclass(frozen=True)
 class Layout:
-    """there [C, C]: where the window's texels lie in the built-in head's maps; back [S, S]: where that head's texels
-    lie in the window's maps; face: the mean face of our prior, in the built-in UVs."""
+    """Layout of two heads' maps.
+
+    there [C, C]: where the window's texels lie in the built-in head's maps; back [S, S]: where that head's texels lie
+    in the window's maps; face: the mean face of our prior, in the built-in UVs.
+    """
 
     there: baking.TexelPartners
     back: baking.TexelPartners
     face: torch.Tensor
 
     def mean_face(self) -> torch.Tensor:
-        """Our prior's mean face in the window [7, C, C]."""
+        """Return our prior's mean face in the window [7, C, C]."""
         face = to_picture(self.face)
         normal = 2 * baking.bake_normals(face[..., 3:6] / 2 + 0.5, self.there) - 1
-        return _planes(
-            np.dstack([baking.bake(face[..., :3], self.there), normal, baking.bake(face[..., 6], self.there)])
-        )
+        albedo, specular = (baking.bake(maps, self.there) for maps in (face[..., :3], face[..., 6]))
+        return _planes(np.dstack([albedo, normal, specular]))
 
     def evidence(self, e: Evidence, boxes: bool) -> Evidence:
-        """The evidence in the window; with `boxes` the tone, the texture and M count within the released masks' bounds
-        alone."""
+        """Return the evidence in the window; `boxes` bounds the tone, the texture and M as the released masks do."""
         weight = self._there(e.weight) * torch.from_numpy(self.there.known)
-        changes = {
-            f.name: self._there(getattr(e, f.name)) for f in fields(e) if isinstance(getattr(e, f.name), torch.Tensor)
-        }
+        changes = {name: self._there(maps) for name, maps in vars(e).items() if isinstance(maps, torch.Tensor)}
         changes |= {
             "texture": self._there(e.texture * e.weight) / self._there(e.weight).clamp_min(1e-4),
             "weight": weight,
@@ -80,43 +76,36 @@ class Layout:
         return replace(e, **changes)
 
     def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: float, tone: torch.Tensor) -> Maps:
-        """The window's maps in the built-in UVs. Beyond the window the albedo is the texture under the solved global
-        light, or our mean face of that tone where nobody looked, without confidence.
+        """Return the window's maps in the built-in UVs, in which the evidence is.
 
-        Parameters
-        ----------
-        solved : the window's maps
-        e : the evidence in the built-in UVs
-        lights : that were solved
-        exposure : factor that the texture was multiplied by
-        tone : of the skin, linear RGB [3]
+        Beyond the window the albedo is the texture under the solved global light, or our mean face of that linear tone
+        [3] where nothing was seen, without confidence.
         """
         inside = self._inside()
         side = 2 * (torch.arange(e.size) + 0.5) / e.size - 1
         mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone[None])[0]
-        light = torch.einsum("ck,khw->chw", lights.glob, shading_basis(e.normal)).clamp_min(1e-2)
+        light = shade(lights.glob, shading_basis(e.normal)).clamp_min(1e-2)
         light = light / exposure / solved.gain[:, None, None]
-        seen = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(MIN_ALBEDO, 1)
+        albedo = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(MIN_ALBEDO, 1)
 
-        def joined(baked: np.ndarray, beyond: np.ndarray) -> np.ndarray:
+        def join(baked: np.ndarray, beyond: np.ndarray) -> np.ndarray:
             share = inside.reshape(inside.shape + (1,) * (baked.ndim - 2))
             return (share * baked + (1 - share) * beyond).astype(np.float32)
 
-        normal = joined(baking.bake_normals(solved.normal, self.back), to_picture(mean[3:6]) / 2 + 0.5) * 2 - 1
+        normal = join(baking.bake_normals(solved.normal, self.back), to_picture(mean[3:6]) / 2 + 0.5) * 2 - 1
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
         confidence = np.where(self.back.known, inside * baking.bake(solved.confidence, self.back), 0)
         return replace(
             solved,
-            diffuse=joined(baking.bake(solved.diffuse, self.back), to_picture(seen)),
+            diffuse=join(baking.bake(solved.diffuse, self.back), to_picture(albedo)),
             normal=(normal / 2 + 0.5).astype(np.float32),
-            specular=joined(baking.bake(solved.specular, self.back), ((mean[6] + 1) / 2).numpy()),
-            shading=joined(baking.bake(solved.shading, self.back), to_picture(light)),
+            specular=join(baking.bake(solved.specular, self.back), ((mean[6] + 1) / 2).numpy()),
+            shading=join(baking.bake(solved.shading, self.back), to_picture(light)),
             confidence=confidence.astype(np.float32),
         )
 
     def _inside(self) -> np.ndarray:
-        """[S, S]: 1 within the window's reach, falling to 0 at its border. Small holes, as in the folds of lids and
-        lips, are no border: they are bled over."""
+        """Return [S, S]: 1 within the window's reach, falling to 0 at its border. Small holes are no border."""
         texel = len(self.back.known) / REFERENCE_TEXELS
         missing = (self.back.covered & ~self.back.known).astype(np.uint8)
         disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(FADE_TEXELS / 2 * texel) + 1,) * 2)
@@ -124,8 +113,11 @@ class Layout:
         return np.clip(cv2.distanceTransform(1 - missing, cv2.DIST_L2, 5) / (FADE_TEXELS * texel), 0, 1)
 
     def fits(self, facial: np.ndarray) -> bool:
-        """Whether this is how the prior's UVs show a face: upright, not mirrored, all but the rim of it in the window,
-        and skin in the box of the tone. facial [S, S]: the built-in head's facial skin without lips, brows and eyes."""
+        """Return true if the prior's UVs show a face.
+
+        It is upright, not mirrored, all but its rim in the window, with skin in the box of the tone. facial [S, S]: the
+        built-in head's facial skin without lips, brows and eyes.
+        """
         known = self.there.known
         row, column = np.indices(known.shape)
         u, v = self.there.uv[known].T
@@ -136,35 +128,23 @@ class Layout:
         )
 
     def _there(self, maps: torch.Tensor) -> torch.Tensor:
-        """A map [S, S] or [C, S, S] of the built-in UVs in the window."""
+        """Return a map [S, S] or [C, S, S] of the built-in UVs in the window."""
         texels = maps.float().numpy()
         baked = baking.bake(texels if texels.ndim == 2 else texels.transpose(1, 2, 0), self.there)
         return torch.from_numpy(baked) if texels.ndim == 2 else _planes(baked)
 
 
 def round_size(size: int, multiple: int) -> int:
-    """The largest size up to `size` (but one step at least) of which the window is a whole number of the network's
-    `multiple` of texels."""
+    """Return the largest size up to `size` whose window is a whole number of `multiple` texels; at least one step."""
     step = 16 * multiple // math.gcd(12, multiple)
     return max(size // step, 1) * step
 
 
 def fit_layout(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Reporter) -> tuple[Layout, Prior]:
-    """The layout of the own head that lies in the capture, and a released prior with what it lacks to start from: the
-    mean face of ours, and the tones of skins.
+    """Return the layout of the own head in the capture, and a released prior with a mean face to start from, ours.
 
-    Parameters
-    ----------
-    capture : with the own head
-    head : the built-in one, fitted
-    e : the evidence, at whose size the layout is
-    prior : the released one
-    report : hears of progress
-
-    Raises
-    ------
-    Problem
-        Where there is no own head, or its UVs are not the prior's.
+    The head is the built-in one, fitted; the layout is at the evidence's size. Raises Problem if there is no own head,
+    or its UVs are not the prior's.
     """
     if not (capture.own_head.is_file() and capture.own_head_skin.is_file()):
         raise Problem("The authors' prior works in the UVs of another head, and none was fitted to this face.", REMEDY)
@@ -173,38 +153,24 @@ def fit_layout(capture: Capture, head: Head, e: Evidence, prior: Prior, report: 
     for first, end in runs:
         skin[first:end] = True
     skin &= (atlas.tiles(own) == 0).all(1)
-    strange = Problem(
-        f"The UVs of the fitted template {template} are not those the authors' prior was trained in.", REMEDY
-    )
-    if not skin.any():
-        raise strange
-    ours = load()
-    layout = make_layout(
-        head.mesh,
-        own,
-        skin,
-        e.size,
-        ours.mean_face,
-        lambda done: report.progress(done, 100, "laying the prior's UVs over the head"),
-    )
-    if not layout.fits(e.skin.numpy()):
-        raise strange
+    layout = None
+    if skin.any():
+        face = load().mean_face
+        layout = make_layout(head.mesh, own, skin, e.size, face, lambda done: report.progress(done, 100, PROGRESS))
+    if layout is None or not layout.fits(e.skin.numpy()):
+        raise Problem(
+            f"The UVs of the fitted template {template} are not those the authors' prior was trained in.", REMEDY
+        )
     return layout, prior.with_face(layout.mean_face())
 
 
 def make_layout(
     head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor, tick: Callable[[float], None]
 ) -> Layout:
-    """The layout of a mesh that lies on the head, for maps of size x size.
+    """Return the layout of a mesh that lies on the fitted built-in head, for maps of size x size.
 
-    Parameters
-    ----------
-    head : the built-in one, fitted
-    own : the artist's mesh, which lies on it
-    skin : bool [F], the triangles of `own` that count
-    size : texels along a side
-    face : the mean face of our prior, in the built-in UVs
-    tick : hears the share done, in [0, 1]
+    skin bool [F] marks the triangles of `own` that count; face is the mean face of our prior; `tick` gets the share
+    done.
     """
     there = baking.places(own, (0, 0), baking.Source(head), size, MAX_DISTANCE_M, tick, skin)
     top, left, side = (v * size // REFERENCE_TEXELS for v in (WINDOW.top, WINDOW.left, WINDOW.side))
@@ -217,8 +183,8 @@ def make_layout(
     return Layout(there, replace(back, uv=uv.astype(np.float32)), face)
 
 
-def _box(box: Box, side: int) -> torch.Tensor:
-    """[side, side]: 1 in a box of the 1024 map, seen in the window."""
+def _box(box: tuple[int, int, int, int], side: int) -> torch.Tensor:
+    """Return [side, side]: 1 in a box of the 1024 map, as it lies in the window."""
     top, bottom, left, right = (
         round((v - start) * side / WINDOW.side)
         for v, start in zip(box, (WINDOW.top,) * 2 + (WINDOW.left,) * 2, strict=True)
@@ -229,5 +195,5 @@ def _box(box: Box, side: int) -> torch.Tensor:
 
 
 def _planes(picture: np.ndarray) -> torch.Tensor:
-    """[H, W, C] -> [C, H, W]."""
+    """Return [H, W, C] as [C, H, W]."""
     return torch.from_numpy(np.ascontiguousarray(picture.transpose(2, 0, 1), np.float32))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the sampler's last state to the maps of the capture folder."""
+"""Turn the sampler's last state into the maps of the capture folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ...imaging import images
 from ...solver.evidence import Evidence
 from ...solver.extensions.marks import draw_cover
 from ...solver.extensions.split import enlarge_field
-from ...solver.objective import Observation, State, albedo
+from ...solver.objective import Observation, State, albedo, observation_of
 from ...solver.solution import Solution
 from ...solver.start import Start, mean_tone
 from .checkpoint import write_solution
@@ -28,9 +28,11 @@ MIN_ALBEDO = 0.004  # linear albedo below which no skin or hair lies
 
 @dataclass(frozen=True)
 class Maps:
-    """[S, S(, 3)] float32. diffuse and shading linear, diffuse * shading = I_UV; normal packed into [0, 1], tangent
-    space, OpenGL Y+; specular and confidence in [0, 1]; gain [3]: what the albedo was multiplied by to be of the skin
-    tone."""
+    """Maps [S, S(, 3)], float32.
+
+    diffuse and shading: linear, diffuse * shading = I_UV; normal: packed into [0, 1], tangent space, OpenGL Y+;
+    specular and confidence: in [0, 1]; gain [3]: factor that brought the albedo to the skin tone.
+    """
 
     diffuse: np.ndarray
     specular: np.ndarray
@@ -41,50 +43,42 @@ class Maps:
 
 
 def finish_maps(state: State, evidence: Evidence, start: Start, gain: torch.Tensor | None = None) -> Maps:
-    """Reads the maps out of \\hat x_0.
+    r"""Read the maps out of \hat x_0.
 
-    The albedo is rescaled once so that the mean of the confident facial skin is the skin tone; the shading takes the
-    inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn sample would be as
-    likely, but would look like something that was measured. So is the specular albedo, of which no term of the
-    likelihood knows.
-
-    Parameters
-    ----------
-    state : of the sampler, at its end
-    evidence : of the capture
-    start : what the run began with
-    gain : [3], by which the albedo is rescaled if it was found before
+    The albedo is rescaled once so that the mean of the confident facial skin is the skin tone, or by `gain` [3] if that
+    was found before; the shading takes the inverse, so that their product stays. Unseen texels are the mean face of
+    that tone: a drawn sample would be as likely, but would look like a measurement. So is the specular albedo, which no
+    term of the likelihood constrains.
     """
     shader = start.observations[1].shader
-    seen = evidence.weight.sqrt()
-    x = torch.lerp(start.reference, state.denoised, seen)[0]
+    share = evidence.weight.sqrt()
+    x = torch.lerp(start.reference, state.denoised, share)[0]
     with torch.no_grad():
         beside = enlarge_field(start.local, evidence.size).exp() / start.exposure
         shading = shader.total(state.lights).clamp_min(1e-3) * beside
     diffuse = albedo(x[None])
-    if start.marks:  # what is known to be no light is the skin's, be it ever so unlikely to the prior
-        kept = torch.from_numpy(draw_cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
-        diffuse = torch.lerp(diffuse, evidence.texture / shading, kept)
+    if start.marks:  # they are the skin's, however unlikely under the prior
+        cover = torch.from_numpy(draw_cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
+        diffuse = torch.lerp(diffuse, evidence.texture / shading, cover)
     diffuse = diffuse.clamp_min(MIN_ALBEDO)
     if gain is None:
         gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, start.recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
-    each = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], seen)  # the mean face is of the tone already
-    delivered = to_picture((diffuse * each).clamp(MIN_ALBEDO, 1))
+    gains = torch.lerp(torch.ones(3, 1, 1), gain[:, None, None], share)  # the mean face is of the tone already
+    delivered = to_picture((diffuse * gains).clamp(MIN_ALBEDO, 1))
     return Maps(
         delivered,
         specular,
         to_picture(normal),
-        to_picture(shading / each),
+        to_picture(shading / gains),
         estimate_confidence(evidence, delivered),
         gain,
     )
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
-    """Linear factors [3] that bring the mean under `weight` to `tone` [3]: the mean of linear values, or ("srgb") of
-    values to the power 1 / 2.2."""
+    """Return linear factors [3] that bring the mean, of linear or ("srgb") of encoded values, to `tone` [3]."""
     if rescale == "none":
         return torch.ones(3)
     gamma = 1.0 if rescale == "linear" else 2.2
@@ -98,15 +92,9 @@ def write_maps(
     conditions: dict[str, str],
     only: tuple[slice, slice] | None = None,
 ) -> None:
-    """The folder maps/, whole or not at all, with what a later solve of a part goes on from.
+    """Write maps/, whole or not at all, with the solution that a later solve of a part goes on from.
 
-    Parameters
-    ----------
-    capture : whose maps they are
-    maps : that were solved
-    solution : the state behind them
-    conditions : mask_edit's
-    only : rows and columns that are new; the others keep the values that their files have
+    `conditions` are mask_edit's. With `only`, rows and columns, all other texels keep the values of their files.
     """
 
     def put(write: Callable, name: str, image: np.ndarray, **options) -> None:
@@ -127,16 +115,8 @@ def write_maps(
 
 
 def write_preview(capture: Capture, state: State, observations: dict[int, Observation], report: Reporter) -> None:
-    """Writes preview/albedo.png and shading.png of a running solve, at the size it works at just now.
-
-    Parameters
-    ----------
-    capture : that is solved
-    state : of the sampler
-    observations : by coarsening factor
-    report : hears of the pictures
-    """
-    o = next(o for o in observations.values() if o.weight.shape == state.denoised.shape[-2:])
+    """Write preview/albedo.png and shading.png of a running solve, at the size that it works at just now."""
+    o = observation_of(state, observations)
     with torch.no_grad():
         shading = o.shader.total(state.lights).clamp_min(0).cpu()
     scale = 0.6 / max(float(np.percentile(shading.numpy(), 95)), 1e-6)
@@ -146,5 +126,5 @@ def write_preview(capture: Capture, state: State, observations: dict[int, Observ
 
 
 def to_picture(planes: torch.Tensor) -> np.ndarray:
-    """[C, H, W] -> [H, W, C]."""
+    """Return [C, H, W] as [H, W, C]."""
     return np.ascontiguousarray(planes.permute(1, 2, 0).numpy(), np.float32)

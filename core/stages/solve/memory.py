@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sampling where memory is short: the step that did not fit, and all after it, again in the network's low-memory mode.
-
-That mode keeps only the inputs of the network's layers for the gradient and computes what is inside them a second time:
-the result is the same.
-"""
+"""Sample where memory is short: a step that did not fit, and all after it, again in the network's low-memory mode."""
 
 from __future__ import annotations
 
@@ -22,7 +18,7 @@ from ...solver.objective import Observation, State
 from ...solver.prior.prior import ConditionedPrior, Prior
 from ...solver.sampler import Sampler
 
-# glibc's name for it, and the bytes from which on memory is asked of the system and given back to it
+# glibc's option, and the bytes from which on memory is taken from the system and given back to it
 MMAP_THRESHOLD, MMAP_BYTES = -3, 8 << 20
 RETRY_MESSAGE = (
     "There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is "
@@ -37,24 +33,17 @@ def sample_within_memory(
     on_step: Callable[[State, int], None] = lambda state, steps: None,
     log: Callable[[str], None] = lambda text: None,
 ) -> State:
-    """`Sampler.sample`, of a prior, to the same bytes whether it had to fall back or not.
+    """Do `Sampler.sample`, to the same bytes whether it had to fall back or not.
 
-    Parameters
-    ----------
-    sampler : its denoiser is a ConditionedPrior, whose network may be put into the low-memory mode
-    observations, state, on_step : as `Sampler.sample` takes them
-    log : is told if it had to fall back
-
-    Raises
-    ------
-    Problem : where the low-memory mode does not fit either
+    The denoiser is a ConditionedPrior; `log` gets a message about the fallback. Raises Problem if the low-memory mode
+    does not fit either.
     """
-    begun = _copied(state)
+    last = _copy(state)
 
     def keep(state: State, steps: int) -> None:
-        nonlocal begun
+        nonlocal last
         on_step(state, steps)
-        begun = _copied(state)
+        last = _copy(state)
 
     try:
         return sampler.sample(observations, state, keep)
@@ -63,29 +52,28 @@ def sample_within_memory(
             raise
         if sampler.denoiser.network.low_memory:
             raise Problem(
-                f"There was not enough memory for step {begun.step + 1} of {sampler.recipe.steps}, even in "
+                f"There was not enough memory for step {last.step + 1} of {sampler.recipe.steps}, even in "
                 "the low-memory mode.",
                 "Close other programs, choose a smaller map size for the solve, or the quality draft.",
             ) from error
-    # past the except block, which holds on to all that the step had computed
-    log(RETRY_MESSAGE.format(begun.step + 1, sampler.recipe.steps))
+    # outside of the except block, which holds on to all that the step had computed
+    log(RETRY_MESSAGE.format(last.step + 1, sampler.recipe.steps))
     spare_memory(sampler.denoiser)
-    return sample_within_memory(sampler, observations, begun, on_step, log)
+    return sample_within_memory(sampler, observations, last, on_step, log)
 
 
 def spare_memory(prior: Prior | ConditionedPrior) -> None:
-    """Turns the low-memory mode on, and gives what is free back to the system, now and from here on."""
+    """Turn the low-memory mode on, and give free memory back to the system, now and from here on."""
     prior.network.low_memory = True
     gc.collect()
     if torch.cuda.is_available():
         torch.cuda.empty_cache()
-    # glibc keeps freed maps for later, in pieces that others do not fit into; others do not
+    # glibc keeps freed maps for later, in pieces that others do not fit into; other libraries do not
     with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).mallopt(MMAP_THRESHOLD, MMAP_BYTES)
 
 
-def _copied(state: State) -> State:
-    """A state that the rest of a step cannot touch: the lights and their moments are moved in place, the maps are
-    replaced."""
+def _copy(state: State) -> State:
+    """Copy what the rest of a step would change: lights and moments are moved in place, maps are replaced."""
     lights = Lights(*(parameter.detach().clone() for parameter in state.lights.parameters()))
     return replace(state, lights=lights, moments=[moment.clone() for moment in state.moments])

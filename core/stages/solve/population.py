@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Estimate the skin tone that a camera's picture of skin stands for, and how sure that is.
+"""Estimate the skin tone behind a camera's picture of skin, and its uncertainty.
 
-A picture's colour of skin is the tone times exposure and light. Its brightness tells of the tone only as far as a
-camera's meter lets it, its colour only as far as the white point is known: both are a Gaussian around what simulated
-phones make of simulated people, or around what a measured white surface says. The prior is measured facial skin
-(`research.training tones` fits both): the people that were measured, their origins weighed alike; or, where a white
-surface tells the light and the prior must not draw a person to the middle, the same skin with every lightness alike.
-The estimate is the posterior's mean, so it never leaves the measured range. What is around the person does not count:
-it says little of the exposure, and white and black grounds moved real people by up to 64 L* (the page skin_tone.md).
+A picture's colour of skin is the tone times exposure and light. Its brightness reveals the tone only as far as a
+camera's meter allows, its colour only as far as the white point is known: both are a Gaussian around what simulated
+phones make of simulated people, or around a measured white surface. The prior is measured facial skin
+(`research.training tones` fits both): the people that were measured, their origins weighed alike; or, if a white
+surface reveals the light and the prior must not draw a person to the middle, the same skin with every lightness alike.
+The estimate is the posterior's mean, so it never leaves the measured range. The surroundings do not count: they say
+little of the exposure, and white and black grounds moved real people by up to 64 L* (the page skin_tone.md).
 """
 
 from __future__ import annotations
@@ -35,21 +35,20 @@ SHEEN_SIGMA_LOG = 0.5  # deviation of the sheen in log units: oily and dry skin
 MEASURED_SIGMA_LOG = 0.10, 0.025, 0.025
 # deviation of L* that is always stated: faces differ from their tone's mean in more ways than the model has
 MIN_SIGMA_L = 1.5
+# nodes and weights of a Gaussian's quadrature by three points (Gauss-Hermite)
 QUADRATURE = (-np.sqrt(3), 1 / 6), (0.0, 2 / 3), (np.sqrt(3), 1 / 6)
-"""Nodes and weights of a Gaussian's quadrature by three points (Gauss-Hermite)."""
+# individual typology angle in degrees above which a tone is of a group (Chardon et al. 1991; Del Bino and Bernerd 2013)
 TYPOLOGY_GROUPS = ((55, "very light"), (41, "light"), (28, "intermediate"), (10, "tan"), (-30, "brown"), (-91, "dark"))
-"""Individual typology angle in degrees above which a tone is of a group (Chardon et al. 1991; Del Bino and Bernerd
-2013)."""
 
 
 @dataclass(frozen=True)
 class Population:
-    """Measured people, and what phones show of them.
+    """Measured people, and how phones show them.
 
-    tones [N, 3] linear; share [N] of people, and even [N], the same with every lightness alike; what a phone shows of
-    a tone is slope [6, 3] times the `to_coordinates` of the tone with its sheen plus offset [6], with this covariance
-    [6, 6]: the coordinates of the best lit skin, and of skin facing the front over a white surface there;
-    colour_sigma_l: deviation of L* among people of one colour.
+    tones [N, 3] linear; share [N] of people, and even [N], the same with every lightness alike. A phone shows a tone as
+    slope [6, 3] times the `to_coordinates` of the tone with its sheen plus offset [6], with this covariance [6, 6]: the
+    coordinates of the best lit skin, and of skin facing the front over a white surface there. colour_sigma_l: deviation
+    of L* among people of one colour.
     """
 
     tones: np.ndarray
@@ -65,32 +64,24 @@ BEST_ROWS, OVER_WHITE_ROWS = slice(0, 3), slice(3, 6)  # rows of the model
 
 
 def estimate_from_scene(best: np.ndarray, source: str) -> SkinTone:
-    """The tone behind the colour of the best lit skin, linear [3]. Its deviation is at least what the colour of skin
-    leaves open under a known light: no frame tells the exposure."""
+    """Return the tone behind the best lit skin, linear [3], no surer than its colour is: no frame reveals exposure."""
     people = read_population()
     weight = _posterior(people, people.share, BEST_ROWS, to_coordinates(best))
     return _expect(people.tones, weight, source, people.colour_sigma_l)
 
 
 def estimate_from_white(front: np.ndarray, white: np.ndarray) -> SkinTone:
-    """The tone behind the colour of skin that faces the front, linear [3], where the measured colour of a white surface
-    that faces as the face does is `white` [3]."""
+    """Return the tone behind skin that faces the front, linear [3], by the colour [3] of a white surface there."""
     people = read_population()
-    weight = _posterior(
-        people,
-        people.even,
-        OVER_WHITE_ROWS,
-        to_coordinates(front) - to_coordinates(white),
-        np.square(MEASURED_SIGMA_LOG),
-    )
+    coordinates = to_coordinates(front) - to_coordinates(white)
+    weight = _posterior(people, people.even, OVER_WHITE_ROWS, coordinates, np.square(MEASURED_SIGMA_LOG))
     return _expect(people.tones, weight, WHITE_POINT, MIN_SIGMA_L)
 
 
 def _posterior(
     people: Population, prior: np.ndarray, rows: slice, coordinates: np.ndarray, variance: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """The probability [N] of each tone under a prior [N], where these rows of the model show `coordinates` [3];
-    `variance` [3] is added to the model's own."""
+    """Return the probability [N] of tones of prior [N] if rows of the model show `coordinates` [3] +- `variance`."""
     of_tones = to_coordinates(people.tones + SHEEN_REFLECTANCE)
     away = coordinates - of_tones @ people.slope[rows].T - people.offset[rows]  # [N, 3]
     # on dark skin sheen is much of what is seen
@@ -104,25 +95,24 @@ def _posterior(
 
 
 def to_coordinates(linear: np.ndarray) -> np.ndarray:
-    """Linear colours [..., 3] -> ln luminance, ln R/G, ln B/G [..., 3]."""
+    """Return ln luminance, ln R/G, ln B/G [..., 3] of linear colours [..., 3]."""
     log = np.log(np.maximum(linear, 1e-4))
-    return np.stack(
-        [np.log(np.maximum(linear @ LUMINANCE_WEIGHTS, 1e-4)), log[..., 0] - log[..., 1], log[..., 2] - log[..., 1]], -1
-    )
+    luminance = np.log(np.maximum(linear @ LUMINANCE_WEIGHTS, 1e-4))
+    return np.stack([luminance, log[..., 0] - log[..., 1], log[..., 2] - log[..., 1]], -1)
 
 
 def to_lab(linear: np.ndarray) -> np.ndarray:
-    """Linear sRGB [..., 3] -> CIE L*a*b* under D65."""
+    """Return CIE L*a*b* under D65 of linear sRGB [..., 3]."""
     return color.rgb2lab(images.linear_to_srgb(linear))
 
 
 def from_lab(lab: np.ndarray) -> np.ndarray:
-    """The inverse of `to_lab`; values outside of sRGB are brought to its border."""
+    """Return the linear sRGB of L*a*b* [..., 3]; colours outside of sRGB are brought to its border."""
     return np.clip(images.srgb_to_linear(color.lab2rgb(lab)), 1e-3, 1)
 
 
 def name_group(linear: np.ndarray) -> str:
-    """The name of a tone's group, by its typology angle."""
+    """Return the name of a tone's group, by its typology angle."""
     lightness, _, yellow = to_lab(linear)
     angle = np.degrees(np.arctan2(lightness - 50, yellow))
     return next(name for least, name in TYPOLOGY_GROUPS if angle > least)
@@ -150,7 +140,7 @@ def read_population() -> Population:
 
 
 def _expect(tones: np.ndarray, weight: np.ndarray, source: str, least_sigma_l: float) -> SkinTone:
-    """The mean of tones [N, 3] of these probabilities [N] in L*a*b*, with its deviation, error and group."""
+    """Return the mean of tones [N, 3] of these probabilities [N] in L*a*b*, with its deviation, error and group."""
     lab = to_lab(tones)
     mean = weight @ lab
     linear = from_lab(mean)

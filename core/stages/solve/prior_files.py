@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Priors from their files: ours (NAME.safetensors with its card NAME.json), or a folder with the authors' config.json
-and ckpt.pth."""
+"""Load priors: ours (NAME.safetensors with its card NAME.json), or the authors' config.json and ckpt.pth."""
 
 from __future__ import annotations
 
@@ -23,10 +22,9 @@ WEIGHTS = Path(__file__).parents[2] / DATA_FILES[0]
 
 
 def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = None) -> Prior:
-    """Our prior, or the authors' when `path` is a folder with config.json and ckpt.pth.
+    """Load our prior, or the authors' if `path` is a folder with config.json and ckpt.pth. Raises Problem.
 
-    Map-sized work runs in `dtype`, by default bfloat16 where the processor has it. Raises Problem for files that are
-    missing or of another kind.
+    Map-sized work runs in `dtype`, by default bfloat16 if the processor has it.
     """
     path = Path(path)
     if path.suffix != WEIGHTS.suffix:
@@ -43,13 +41,13 @@ def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = 
 
 
 def load_chosen(settings: Settings) -> Prior:
-    """The authors' prior where the settings name one, else ours, on the device of the settings."""
+    """Load the authors' prior if the settings name one, else ours, on the device of the settings."""
     chosen = settings.solve.prior
     return load(Path(chosen).expanduser() if chosen else WEIGHTS, settings.compute_device)
 
 
 def fast_dtype(device: str) -> torch.dtype:
-    """bfloat16 on a GPU or a processor that multiplies it, else float32."""
+    """Return bfloat16 for a GPU or a processor that multiplies it, else float32."""
     if str(device).startswith("cuda"):
         return torch.bfloat16
     return torch.bfloat16 if str(device) == "cpu" and torch.cpu._is_avx512_bf16_supported() else torch.float32
@@ -59,12 +57,9 @@ def _load_ours(path: Path) -> Prior:
     shipped_files.require_whole(path)
     card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     with safe_open(path, "pt") as file:
-        tensors = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    mean_face, spread, references = (
-        tensors.pop("mean_face"),
-        tensors.pop("spread"),
-        unpack_maps(tensors.pop("references"), tensors.pop("references_range")),
-    )
+        tensors = {name: file.get_tensor(name).float() for name in file.keys()}
+    mean_face, spread = tensors.pop("mean_face"), tensors.pop("spread")
+    references = unpack_maps(tensors.pop("references"), tensors.pop("references_range"))
     network = build_network(card)
     network.load_state_dict(tensors)
     return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, references)
@@ -81,13 +76,7 @@ def _load_released(folder: Path) -> ReleasedPrior:
             f"{folder / 'ckpt.pth'} does not fit the config.json beside it ({first[0].strip()}).", released.CHOOSE
         ) from error
     model, cond = config["model"], config["cond"]
-    sigmas = (
-        (float(model["sigma_min"]), float(model["sigma_max"])) if {"sigma_min", "sigma_max"} <= set(model) else None
-    )
-    return ReleasedPrior(
-        network,
-        cond["type"],
-        cond.get("pos_enc_freq", 0) if cond["type"] == "posenc" else 0,
-        sigmas,
-        released.read_noise(folder),
-    )
+    has_sigmas = {"sigma_min", "sigma_max"} <= set(model)
+    sigmas = (float(model["sigma_min"]), float(model["sigma_max"])) if has_sigmas else None
+    octaves = cond["pos_enc_freq"] if cond["type"] == "posenc" else 0
+    return ReleasedPrior(network, cond["type"], octaves, sigmas, released.read_noise(folder))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the solver refuses, told to the person: its exceptions as Problems, each with a way out."""
+"""Turn the solver's exceptions into Problems, each with a remedy."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ REMEDIES: dict[type[Exception], str] = {
     MissingMapError: f"Save the map it was trained with beside ckpt.pth as {NOISE_FILE}, float32 of shape 3, S, S.",
     DivergedError: "Check that the texture and the mask are those of this head, or choose the proximal guidance.",
 }
-"""What to do about an exception, whose own words say what is wrong."""
 
 
 @contextmanager
 def tell_refusals() -> Iterator[None]:
-    """Around what calls the solver, as a context or as a decorator."""
+    """Convert exceptions of what calls the solver, as a context or as a decorator."""
     try:
         yield
     except tuple(REMEDIES) as error:

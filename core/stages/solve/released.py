@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files of a prior as the method's authors release theirs: config.json and ckpt.pth of a folder, checked and
-completed.
-
-ckpt.pth is read as weights only: nothing in it is ever run.
-"""
+"""Read the authors' config.json and ckpt.pth, which is read as weights only: nothing in it is ever run."""
 
 from __future__ import annotations
 
@@ -20,11 +16,8 @@ from ...capture.regular_files import require_regular
 
 DATA_CHANNELS = 7
 COND_KINDS = ("coord", "posenc", "noise")
-NOISE_FILE = "noise.npy"
-"""Where the fixed random map of a prior that is conditioned on one is looked for: float32 [3, S, S] of the whole UV
-square."""
-MOST_NOISE_SIDE = 8192
-"""Texels: twice the side of the largest UV square that is solved."""
+NOISE_FILE = "noise.npy"  # the fixed random map of a prior that is conditioned on one: float32 [3, S, S], the UV square
+MAX_NOISE_SIDE = 8192  # texels: twice the side of the largest UV square that is solved
 CHOOSE = (
     "Choose the folder with the authors' config.json and ckpt.pth, as they released them, or leave the prior "
     "empty to use ours."
@@ -32,12 +25,11 @@ CHOOSE = (
 
 
 def read_config(folder: Path) -> dict:
-    """config.json with the entries that may be left out, as {"model": ..., "cond": ...}. Raises Problem for what is no
-    prior of ours to run."""
+    """Read config.json as {"model": ..., "cond": ...}, completed. Raises Problem for one that cannot be run."""
     path = folder / "config.json"
     try:
         config = read_json(path)
-        given, cond = dict(config["model"]), dict(config.get("cond") or {})
+        entries, cond = dict(config["model"]), dict(config.get("cond") or {})
         model = {
             "type": "image_v1",
             "patch_size": 1,
@@ -47,7 +39,7 @@ def read_config(folder: Path) -> dict:
             "cross_cond_dim": 0,
             "has_variance": False,
             "sigma_data": 1.0,
-            **given,
+            **entries,
         }
         if model["type"] != "image_v1":
             raise Problem(
@@ -81,8 +73,7 @@ def read_config(folder: Path) -> dict:
 
 
 def read_weights(folder: Path) -> dict[str, torch.Tensor]:
-    """The entry model_ema of ckpt.pth, or the file itself where it is a plain state dict: name -> float32 tensor.
-    Raises Problem for any other file."""
+    """Read model_ema of ckpt.pth, or the file as a plain state dict: name -> float32 tensor. Raises Problem."""
     path = folder / "ckpt.pth"
     try:
         with torch.serialization.safe_globals(_harmless()):
@@ -96,19 +87,15 @@ def read_weights(folder: Path) -> dict[str, torch.Tensor]:
             "Download it again from the authors' page.",
         ) from error
     state = state.get("model_ema", state) if isinstance(state, dict) else None
-    of_tensors = (
-        isinstance(state, dict)
-        and state
-        and all(isinstance(name, str) and isinstance(value, torch.Tensor) for name, value in state.items())
-    )
-    if not of_tensors:
+    if not (isinstance(state, dict) and state):
+        raise Problem(f"{path} holds no state dict of a network.", CHOOSE)
+    if not all(isinstance(name, str) and isinstance(value, torch.Tensor) for name, value in state.items()):
         raise Problem(f"{path} holds no state dict of a network.", CHOOSE)
     return {name: value.float() for name, value in state.items()}
 
 
 def read_noise(folder: Path) -> torch.Tensor | None:
-    """The fixed random map [1, 3, S, S] that a prior of condition `noise` was trained with, or None where the folder
-    carries none."""
+    """Read the fixed random map [1, 3, S, S] of a prior of condition `noise`; None without one. Raises Problem."""
     path = folder / NOISE_FILE
     if not path.is_file():
         return None
@@ -120,14 +107,9 @@ def read_noise(folder: Path) -> torch.Tensor | None:
             f"{path} cannot be read ({error}).", "Save the map again with numpy, as float32 of shape 3, S, S."
         ) from error
     shape = stored.shape
-    if (
-        len(shape) != 3
-        or shape[0] != 3
-        or shape[1] != shape[2]
-        or not 1 <= shape[1] <= MOST_NOISE_SIDE
-        or stored.dtype.kind != "f"
-        or not np.isfinite(noise := stored.astype(np.float32)).all()
-    ):
+    fits = len(shape) == 3 and shape == (3, shape[1], shape[1]) and 1 <= shape[1] <= MAX_NOISE_SIDE
+    noise = stored.astype(np.float32) if fits and stored.dtype.kind == "f" else np.full(1, np.nan)
+    if not np.isfinite(noise).all():
         raise Problem(
             f"{path} has the shape {shape}, or holds values that are not numbers.",
             "Save the map of the whole UV square, of shape 3, S, S.",
@@ -136,7 +118,7 @@ def read_noise(folder: Path) -> torch.Tensor | None:
 
 
 def _harmless() -> list:
-    """Beside tensors, what training programs leave in a checkpoint: numbers of numpy, and command line options."""
+    """List what training programs leave in a checkpoint beside tensors: numpy's numbers, and command line options."""
     scalar = np.float64(0).__reduce__()[0]
     kinds = [type(np.dtype(name)) for name in ("float64", "float32", "int64", "int32", "bool")]
     return [

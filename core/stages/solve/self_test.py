@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool behind Self-Test: the sample head solved again on this machine, and how near its albedo comes to the shipped
-one."""
+"""Tool behind Self-Test: solve the sample head again on this machine, and compare its albedo with the shipped one."""
 
 from __future__ import annotations
 
@@ -21,22 +20,16 @@ from .. import solve
 
 DATA_FILES = ("assets/self_test.json",)
 EXPECTED_FILE = Path(__file__).parents[2] / DATA_FILES[0]
-MAX_DEVIATIONS = 6
-"""How many of its own deviations the score may lie below what it was on average: every device draws other noise, and
-rounds otherwise."""
+MAX_DEVIATIONS = 6  # below the mean score: every device draws other noise, and rounds otherwise
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """A copy of the sample head, which is solved anew in its place -> the figures score_db, expected_db and seconds.
-    Raises Problem for a score that no sound machine has."""
+    """Leave the figures score_db, expected_db and seconds of a copy of the sample head, solved anew. Raises Problem."""
     expected = json.loads(EXPECTED_FILE.read_text(encoding="utf-8"))
     least = expected["mean_db"] - MAX_DEVIATIONS * expected["deviation_db"]
     score, seconds = measure(capture, settings, report)
-    for name, value in (
-        ("score_db", round(score, 2)),
-        ("expected_db", round(least, 2)),
-        ("seconds", round(seconds, 1)),
-    ):
+    figures = {"score_db": round(score, 2), "expected_db": round(least, 2), "seconds": round(seconds, 1)}
+    for name, value in figures.items():
         report.figure(name, value)
     where = settings.compute_device
     if not score >= least:
@@ -53,8 +46,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 
 def measure(capture: Capture, settings: Settings, report: Reporter) -> tuple[float, float]:
-    """Solves a copy of the sample head; (PSNR in dB of its facial skin's albedo against the shipped one's, sRGB;
-    seconds)."""
+    """Solve a copy of the sample head; return the PSNR in dB of its facial albedo to the shipped one, and seconds."""
     started = time.monotonic()
     solve.run(capture, settings, report)
     seconds = time.monotonic() - started

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin tone as a value: read once from the settings or estimated once, and from there on handed from function to
-function."""
+"""Skin tone as a value, read once from the settings or estimated once."""
 
 from __future__ import annotations
 
@@ -14,18 +13,18 @@ import torch
 from ...imaging import images
 from ...settings import colour_values
 
+# sources of a tone: the settings; an estimate from the frames as they were filmed, or with a measured white; one from
+# the texture; the solve before
 GIVEN, SCENE, WHITE_POINT, TEXTURE, EARLIER = "given", "scene", "white point", "texture", "earlier solve"
-"""Where a tone comes from: the settings; an estimate from the frames as they were filmed, or with a measured white; one
-from the texture; the solve before."""
 
 
 @dataclass(frozen=True)
 class SkinTone:
-    """The mean albedo of a person's facial skin, to as many decimals as a setting has (colour_values.TONE_DECIMALS).
+    """Mean albedo of a person's facial skin, to as many decimals as a setting has (colour_values.TONE_DECIMALS).
 
-    linear: linear sRGB [3] in (0, 1], numbers of float32. source: where it comes from. Of an estimate from the frames,
-    else None: deviation, one standard deviation of the lightness L*; error, the expected colour difference, delta E
-    2000; group, what such a tone is called (population.GROUPS).
+    linear: linear sRGB [3] in (0, 1], numbers of float32. Of an estimate from the frames, else None: deviation, one
+    standard deviation of the lightness L*; error, the expected colour difference, delta E 2000; group, the name of such
+    tones (population.TYPOLOGY_GROUPS).
     """
 
     linear: tuple[float, float, float]
@@ -36,12 +35,12 @@ class SkinTone:
 
     @classmethod
     def from_linear(cls, linear: np.ndarray | torch.Tensor, source: str, **other_fields) -> SkinTone:
-        """Of linear sRGB [3]; `other_fields` are the other fields."""
+        """Return the tone of linear sRGB [3]."""
         return cls.from_srgb(images.linear_to_srgb(np.asarray(linear, np.float32)), source, **other_fields)
 
     @classmethod
     def from_srgb(cls, srgb: np.ndarray | Sequence[float], source: str, **other_fields) -> SkinTone:
-        """Of encoded sRGB [3] in (0, 1]."""
+        """Return the tone of encoded sRGB [3] in (0, 1]."""
         rounded = [round(float(channel), colour_values.TONE_DECIMALS) for channel in srgb]
         linear = images.srgb_to_linear(np.array(rounded, np.float32))
         return cls(tuple(map(float, linear)), source, **other_fields)
@@ -58,6 +57,6 @@ class SkinTone:
 
 
 def read_given_tone(setting: str) -> SkinTone | None:
-    """The tone of settings.solve.skin_tone, None for auto. Raises Problem for what is no colour."""
-    given = colour_values.parse_skin_tone(setting)
-    return None if given is None else SkinTone.from_srgb(given, GIVEN)
+    """Return the tone of settings.solve.skin_tone, None for auto. Raises Problem if it is not a colour."""
+    srgb = colour_values.parse_skin_tone(setting)
+    return None if srgb is None else SkinTone.from_srgb(srgb, GIVEN)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other captures of the same person, in other light: they tell this one's light from the person's skin (split.py)."""
+"""Read other captures of the same person, in other light, which separate this one's light from the skin (split.py)."""
 
 from __future__ import annotations
 
@@ -12,16 +12,11 @@ from ...settings.settings import Settings
 from ...solver.evidence import Evidence
 from .capture_evidence import read_evidence
 
-SIDE_TEXELS = 512
-"""Side at which they are read: what they tell is larger than a cell of split.py."""
+SIDE_TEXELS = 512  # of the maps that are read, which have to resolve a cell of split.py
 
 
 def read_others(capture: Capture, settings: Settings, report: Reporter) -> list[Evidence]:
-    """What is known of the captures that settings.solve.together names; none without it.
-
-    A folder of several may hold this capture, too. Raises Problem where there is no other, and for one that has no
-    texture yet or whose head is damaged.
-    """
+    """Read the captures that settings.solve.together names, but for this one. Raises Problem for unusable ones."""
     named = captures_in(settings.solve.together)
     roots = [root for root in named if root.resolve() != capture.root.resolve()]
     if named and not roots:

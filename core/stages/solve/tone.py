@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin tone that a solve takes, given or estimated; and the tool behind Estimate, which tells it.
+"""Resolve the skin tone of a solve, given or estimated; and the tool behind Estimate.
 
-An estimate is made from the frames as they were filmed, where they and their cameras are there; else from the texture,
+An estimate is made from the frames as they were filmed, if they and their cameras are there; else from the texture,
 whose light the delighter took out.
 """
 
@@ -21,13 +21,12 @@ from .population import estimate_from_scene, estimate_from_white
 from .refusals import tell_refusals
 from .skin_tone import EARLIER, SCENE, TEXTURE, SkinTone, read_given_tone
 
-TONE_SIDE_TEXELS = 256
-"""Side at which the mean is taken: it needs no detail."""
+TONE_SIDE_TEXELS = 256  # of the maps: a mean needs no detail
 
 
 @tell_refusals()
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Leaves the figures of `tell_skin_tone`. Raises Problem where no facial skin was seen."""
+    """Leave the figures of `tell_skin_tone`. Raises Problem if no facial skin was seen."""
     report.progress(0, 1, "reading the texture, the head and the masks")
     head = read_filmed_head(capture)
     evidence = read_evidence(capture, head, TONE_SIDE_TEXELS)
@@ -37,31 +36,14 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 def resolve_skin_tone(
     capture: Capture, head: Head, settings: Settings, evidence: Evidence, report: Reporter
 ) -> SkinTone:
-    """The tone of a solve: the artist's, or the estimate.
-
-    Parameters
-    ----------
-    capture : that is solved
-    head : in the capture
-    settings : of the solve
-    evidence : in the built-in UVs
-    report : hears whether it is cancelled
-
-    Raises
-    ------
-    Problem
-        For a setting that is no colour.
-    NoSkinError
-        Where no facial skin was seen.
-    """
+    """Return the artist's tone, or the estimate. Raises Problem for a setting that is not a colour, and NoSkinError."""
     return read_given_tone(settings.solve.skin_tone) or estimate_skin_tone(capture, head, settings, evidence, report)
 
 
 def estimate_skin_tone(
     capture: Capture, head: Head, settings: Settings, evidence: Evidence, report: Reporter
 ) -> SkinTone:
-    """The tone that the frames tell under the measured white point, or without one; where frames or cameras are gone,
-    the texture's. Parameters and errors are those of `resolve_skin_tone`."""
+    """Estimate the tone from the frames, by a measured white point if there is one, or from the texture."""
     look = read_look(capture, head, evidence.alpha.numpy(), report)
     if look is None:
         return estimate_from_texture(evidence)
@@ -70,16 +52,18 @@ def estimate_skin_tone(
 
 
 def estimate_from_texture(evidence: Evidence) -> SkinTone:
-    """The tone that the texture tells. Raises NoSkinError where no facial skin was seen."""
+    """Estimate the tone from the texture. Raises NoSkinError."""
     lit = weigh_lit_skin(evidence).numpy()
     colours = evidence.texture.numpy().transpose(1, 2, 0)
     return estimate_from_scene(mean_best_lit(colours[lit > 0], lit[lit > 0]), TEXTURE)
 
 
 def tell_skin_tone(tone: SkinTone, settings: Settings, report: Reporter) -> None:
-    """Leaves the figures skin_tone_srgb (R, G, B in 0..1), skin_tone_source and, of an estimate, skin_tone_group,
-    skin_tone_deviation_l (of L*) and skin_tone_error_de (expected delta E 2000); and a finding where nothing measured
-    the light."""
+    """Leave figures of the tone, and a finding if no measurement revealed the light.
+
+    They are skin_tone_srgb (R, G, B in 0..1), skin_tone_source and, of an estimate, skin_tone_group,
+    skin_tone_deviation_l (of L*) and skin_tone_error_de (expected delta E 2000).
+    """
     report.figure("skin_tone_srgb", [round(float(v), TONE_DECIMALS) for v in tone.srgb])
     if tone.group is not None:
         report.figure("skin_tone_group", tone.group)

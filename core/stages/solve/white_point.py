@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The white point, measured: the linear colour that a white surface in the face's light has in the frames. A
-ColorChecker is found by itself (opencv-contrib's mcc), a grey card or white paper is pointed at.
+"""Measure the white point: the linear colour of a white surface in the face's light, in the frames.
 
-`run` is the tool behind the button Find ColorChecker. All frames of a capture are in one exposure (frames/drift.py), so
-any frame says it for all.
+A ColorChecker is found by itself (opencv-contrib's mcc), a grey card or white paper is pointed at. `run` is the tool
+behind the button Find ColorChecker. All frames of a capture have one exposure (frames/drift.py), so any frame serves.
 """
 
 from __future__ import annotations
@@ -17,9 +16,8 @@ from ...capture.messages import Problem, Reporter
 from ...imaging import images
 from ...settings.settings import CARDS, Settings
 
+# of a ColorChecker's neutral patches, white to neutral 3.5 (L* 96.5, 81.3, 66.8, 50.9, 35.7), mean of measured charts
 GREY_REFLECTANCES = np.array([0.914, 0.589, 0.363, 0.191, 0.088])
-"""Reflectance of a ColorChecker's neutral patches, white to neutral 3.5 (L* 96.5, 81.3, 66.8, 50.9, 35.7: the mean of
-measured charts)."""
 MAX_CHART_COST = 0.04  # above it mcc's chart is a guess
 MAX_UNEVENNESS_LOG = 0.25  # deviation in log units of the greys about one white above which they are no chart's
 USABLE_SRGB = 0.03, 0.96  # sRGB between which a patch has kept its value
@@ -29,8 +27,7 @@ MAX_STRAY_LOG = 0.15  # deviation in log units within a card
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Leaves the figures white_point (linear R, G, B) and white_point_frame. Raises Problem where no frame shows a
-    ColorChecker."""
+    """Leave the figures white_point (linear R, G, B) and white_point_frame. Raises Problem without a ColorChecker."""
     frames = sorted(capture.frames.glob("*.jpg"))
     frames = frames[:: max(1, len(frames) // MAX_FRAMES)]
     whites = {}
@@ -52,8 +49,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 
 def measure_chart_white(srgb: np.ndarray) -> np.ndarray | None:
-    """The linear white [3] that a ColorChecker Classic's greys in an sRGB frame [H, W, 3] agree on; None where none is
-    seen."""
+    """Return the linear white [3] of a ColorChecker Classic in an sRGB frame [H, W, 3]; None if there is none."""
     detector = cv2.mcc.CCheckerDetector_create()
     pixels = np.ascontiguousarray(np.round(255 * np.clip(srgb[..., ::-1], 0, 1)).astype(np.uint8))
     if not detector.process(pixels, cv2.mcc.MCC24, 1):
@@ -70,22 +66,9 @@ def measure_chart_white(srgb: np.ndarray) -> np.ndarray | None:
 
 
 def measure_card_white(srgb: np.ndarray, column: float, row: float, card: str) -> np.ndarray:
-    """The white that a card says at a pixel of a frame.
+    """Return the linear white [3] of a card, one of settings.CARDS, at a pixel of an sRGB frame [H, W, 3].
 
-    Parameters
-    ----------
-    srgb : [H, W, 3] in [0, 1], the frame
-    column, row : of the pixel, from the upper left
-    card : one of settings.CARDS
-
-    Returns
-    -------
-    Linear [3].
-
-    Raises
-    ------
-    Problem
-        Where the place is outside, burnt out or black, or uneven.
+    Column and row count from the upper left. Raises Problem if the place is outside, burnt out or black, or uneven.
     """
     height, width = srgb.shape[:2]
     if not (0 <= column < width and 0 <= row < height):

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the pictures that the texture was made of show a mark, each by itself: what one view alone saw (a highlight's
-gap, an eyelash) is none of the skin's."""
+"""Confirm marks by the views: what one view alone shows (a highlight's gap, an eyelash) is not the skin's."""
 
 from __future__ import annotations
 
@@ -23,48 +22,29 @@ MIN_VIEWS = 2  # views; where fewer saw it the texture alone decides
 
 
 def confirm_marks(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
-    """The marks that the delit views agree on.
-
-    Parameters
-    ----------
-    capture : with cameras and delit views; without them all marks stay
-    head : in the capture
-    marks : in texels of a map
-    size : of that map, in texels along a side
-    """
+    """Return the marks of a map of `size` texels that the delit views agree on; all of them without views."""
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return marks
     covered = head.raster(size)[0] >= 0
     points, normals = (head.interpolate(vectors, size) for vectors in (head.mesh.vertices, head.normals))
     at = tuple(np.round([[mark.row, mark.column] for mark in marks]).astype(int).clip(0, size - 1).T)
-    there = points[at], normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
-    seen, agreed = np.zeros(len(marks), int), np.zeros(len(marks), int)
+    unit = normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
+    views, agreeing = np.zeros(len(marks), int), np.zeros(len(marks), int)
     for view, path in delit_views(capture):
-        shown = find_visible(view, head.caster, *there) & covered[at]
+        shown = find_visible(view, head.caster, points[at], unit) & covered[at]
         if not shown.any():
             continue
         picture = np.log(np.maximum(images.read_linear(path), 1e-3)).mean(-1)
         for k in np.flatnonzero(shown):
             contrast = _contrast(view, picture, points, covered, marks[k])
-            seen[k] += contrast is not None
-            agreed[k] += contrast is not None and contrast > MIN_SHOWN_SHARE * marks[k].contrast
-    return [mark for mark, s, a in zip(marks, seen, agreed, strict=True) if s < MIN_VIEWS or a >= MIN_AGREED_SHARE * s]
+            views[k] += contrast is not None
+            agreeing[k] += contrast is not None and contrast > MIN_SHOWN_SHARE * marks[k].contrast
+    confirmed = (views < MIN_VIEWS) | (agreeing >= MIN_AGREED_SHARE * views)
+    return [mark for mark, keep in zip(marks, confirmed, strict=True) if keep]
 
 
 def find_visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Which points of a surface a view sees.
-
-    Parameters
-    ----------
-    view : the camera
-    caster : of the surface
-    points : [N, 3], in metres
-    normals : [N, 3], unit
-
-    Returns
-    -------
-    bool [N].
-    """
+    """Return bool [N]: points [N, 3] in metres with unit normals [N, 3] of the caster's surface that a view sees."""
     towards = view.centre - points
     facing = (towards * normals).sum(1) > MIN_FACING_COSINE * np.linalg.norm(towards, axis=1)
     pixels, _ = view.project(points)
@@ -73,8 +53,7 @@ def find_visible(view: View, caster: raster.RayCaster, points: np.ndarray, norma
 
 
 def _contrast(view: View, picture: np.ndarray, points: np.ndarray, covered: np.ndarray, mark: Mark) -> float | None:
-    """How much darker than what is around it a view's picture (log [H, W]) is at the mark or within a radius of it, as
-    views and head may be off by that much; None where the view's frame ends there."""
+    """Return how much darker a view (log [H, W]) is at a mark than around it; None if its frame ends there."""
     reach = int(np.ceil(3.5 * mark.radius + 1))
     row, column = round(mark.row), round(mark.column)
     window = slice(max(row - reach, 0), row + reach + 1), slice(max(column - reach, 0), column + reach + 1)

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size, the head completed; with masks of
-hair, the skin below it, and single hairs.
+"""Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size, with the head completed.
 
-Albedo, normals and specular are enlarged by a network, or by Lanczos resampling, which adds no detail; light and
-confidence by resampling.
+Masks of hair, the skin below it, and single hairs come with them. Albedo, normals and specular are enlarged by a
+network, or by Lanczos resampling, which adds no detail; light and confidence by resampling.
 """
 
 from __future__ import annotations
@@ -28,18 +27,15 @@ from .maps import HeadMaps, read_maps
 from .surface import lay_out
 from .whole_head import complete
 
+# rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make another
 STRIP_ROWS = 256
-"""Rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make
-another."""
-WRITERS = 2
-"""Maps that are encoded at once: each takes 0.5 GB meanwhile."""
-CROP_SIDE_SHARE = 0.12
-"""Side of the report's picture, as a share of the map."""
+WRITERS = 2  # maps that are encoded at once: each takes 0.5 GB meanwhile
+CROP_SIDE_SHARE = 0.12  # side of the report's picture, as a share of the map
 SHARES = {"network": 0.8, "lanczos": 0.3}  # of the time that the enlarging takes
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.maps_4k, whole or not at all."""
+    """Write capture.maps_4k, whole or not at all."""
     size, method = settings.upscale.size, settings.upscale.method
     guided = settings.upscale.frames_detail and capture.texture_detail.is_file()
     maps = read_maps(capture.maps, capture.texture_confidence)
@@ -48,58 +44,48 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("size_px", size)
     report.figure("frames_detail", "used" if guided else "none")
     report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
-    maps, hair_maps, hairs = _whole(capture, maps, settings, report)
-    share = SHARES[method]
-    large = enlarged(
-        maps, size, method, settings.compute_device, lambda done: report.progress(share * done, 1, "enlarging")
-    )
+    maps, hair_maps, hairs = _complete_head(capture, maps, settings, report)
+    share, check = SHARES[method], report.check
+    device = settings.compute_device
+    large = enlarged(maps, size, method, device, lambda done: report.progress(share * done, 1, "enlarging"))
+    srgb, normal, specular = large[..., :3], large[..., 3:6], large[..., 6]
     with replacing_folder(capture.maps_4k) as folder:
-        srgb = large[..., :3]
         if guided:
-            texture = len(images.read_mask(capture.texture_confidence))
-            detail.guide(
-                srgb,
-                images.read_data(capture.texture_detail),
-                texture,
-                lambda done: report.progress(share, 1, "fine detail"),
-            )
-        _picture(capture, srgb)
-        _write_together(
-            [
-                lambda: images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16, check=report.check),
-                lambda: images.write_data(
-                    folder / "normal.png",
-                    _mapped(large[..., 3:6], lambda vectors: vectors * 0.5 + 0.5),
-                    bits=16,
-                    check=report.check,
-                ),
-                *(
-                    []
-                    if hair_maps is None
-                    else [
-                        lambda: hair.write(folder, srgb, *hair_maps, report.check),
-                        lambda: grooming.write(folder / STRANDS, hairs),
-                    ]
-                ),
-                lambda: images.write_linear(
-                    folder / "diffuse_albedo.exr", _mapped(srgb, images.srgb_to_linear), check=report.check
-                ),
-                lambda: images.write_data(folder / "specular_albedo.png", large[..., 6], bits=16, check=report.check),
-                lambda: images.write_data(
-                    folder / "confidence.png", _resampled(maps.confidence, size), check=report.check
-                ),
-                lambda: images.write_linear(folder / "shading.exr", _resampled(maps.shading, size), check=report.check),
-            ],
-            lambda done: report.progress(share + done * (1 - share), 1, "writing the maps"),
-        )
+            band, texture = images.read_data(capture.texture_detail), len(images.read_mask(capture.texture_confidence))
+            detail.guide(srgb, band, texture, lambda done: report.progress(share, 1, "fine detail"))
+        _write_crop(capture, srgb)
+
+        def write_normal() -> None:
+            images.write_data(folder / "normal.png", _mapped(normal, lambda n: n * 0.5 + 0.5), bits=16, check=check)
+
+        def write_linear() -> None:
+            images.write_linear(folder / "diffuse_albedo.exr", _mapped(srgb, images.srgb_to_linear), check=check)
+
+        writes = [
+            lambda: images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16, check=check),
+            write_normal,
+            write_linear,
+            lambda: images.write_data(folder / "specular_albedo.png", specular, bits=16, check=check),
+            lambda: images.write_data(folder / "confidence.png", _resampled(maps.confidence, size), check=check),
+            lambda: images.write_linear(folder / "shading.exr", _resampled(maps.shading, size), check=check),
+        ]
+        if hair_maps is not None:  # the longest of them begin early
+            writes[2:2] = [
+                lambda: hair.write(folder, srgb, *hair_maps, check),
+                lambda: grooming.write(folder / STRANDS, hairs),
+            ]
+        _write_together(writes, lambda done: report.progress(share + done * (1 - share), 1, "writing the maps"))
     report.progress(1, 1)
 
 
-def _whole(
+def _complete_head(
     capture: Capture, maps: HeadMaps, settings: Settings, report: Reporter
 ) -> tuple[HeadMaps, tuple | None, dict[str, Strands]]:
-    """The maps of the whole head; the hair's masks, the albedo without it and where that differs, or None where they
-    are not asked for; single hairs."""
+    """Return the maps of the whole head, the hair's masks and skin, and single hairs.
+
+    The second are the masks, the albedo without hair and where that differs; None, and no hairs, if they are not asked
+    for.
+    """
     options = settings.upscale
     if not (options.whole_head or options.hair):
         return maps, None, {}
@@ -107,10 +93,9 @@ def _whole(
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse), report.check)
     if options.whole_head:
         report.progress(0, 1, "completing neck, ears and scalp")
-        seen, maps = maps, complete(maps, surface, report, settings.seed)
-        images.write_srgb(
-            capture.picture("upscale", "before_and_after_completion"), drawing.turned(surface, [seen, maps])
-        )
+        before, maps = maps, complete(maps, surface, report, settings.seed)
+        picture = drawing.draw_turned(surface, [before, maps])
+        images.write_srgb(capture.picture("upscale", "before_and_after_completion"), picture)
     if not options.hair:
         return maps, None, {}
     report.progress(0, 1, "finding brows, lashes and beard")
@@ -127,7 +112,8 @@ def _whole(
         report.log(
             f"Hair covers {behind} % of the brows: there they are grown like the other side, or as brows usually are."
         )
-    images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, masks, cleaned))
+    picture = drawing.draw_masks(maps.diffuse, masks, cleaned)
+    images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), picture)
     report.progress(0, 1, "growing hair")
     hairs = grooming.groom(maps, masks, cleaned, surface, settings.seed, check=report.check)
     report.figure("hairs", sum(len(strands.points) for strands in hairs.values()))
@@ -135,20 +121,9 @@ def _whole(
 
 
 def enlarged(maps: HeadMaps, size: int, method: str, device: str, progress) -> np.ndarray:
-    """The maps at another size. The network makes four times as many texels of a side; more or fewer than that are
-    resampled.
+    """Return diffuse (sRGB), unit normal and specular at another size: float32 [size, size, 7].
 
-    Parameters
-    ----------
-    maps : of the head
-    size : texels along a side
-    method : "network" or "lanczos"
-    device : that torch computes on
-    progress : hears the share done
-
-    Returns
-    -------
-    Diffuse (sRGB), unit normal and specular: float32 [size, size, 7].
+    The network makes four times as many texels of a side; more or fewer are resampled. `progress` gets the share done.
     """
     if method == "network" and size > len(maps.diffuse):
         from .enlarge import enlarge  # torch is only needed here
@@ -156,63 +131,59 @@ def enlarged(maps: HeadMaps, size: int, method: str, device: str, progress) -> n
         large = enlarge(maps, progress, device)
         if len(large) == size:
             return large
-        return _joined(images.srgb_to_linear(large[..., :3]), large[..., 3:6], large[..., 6], size, progress)
-    return _joined(maps.diffuse, maps.normal, maps.specular, size, progress)
+        return _join(images.srgb_to_linear(large[..., :3]), large[..., 3:6], large[..., 6], size, progress)
+    return _join(maps.diffuse, maps.normal, maps.specular, size, progress)
 
 
-def _joined(diffuse: np.ndarray, normal: np.ndarray, specular: np.ndarray, size: int, progress) -> np.ndarray:
-    """Maps [S, S(, C)], the diffuse linear, resampled to float32 [size, size, 7], the diffuse sRGB."""
+def _join(diffuse: np.ndarray, normal: np.ndarray, specular: np.ndarray, size: int, progress) -> np.ndarray:
+    """Resample maps [S, S(, C)], the diffuse linear, to float32 [size, size, 7], the diffuse sRGB."""
     joined = np.empty((size, size, 7), np.float32)
     joined[..., :3], joined[..., 6] = _resampled(diffuse, size), _resampled(specular, size)
     progress(0.6)
     joined[..., 3:6] = _resampled(normal, size)
     progress(1.0)
-    _by_strips(joined[..., :3], images.linear_to_srgb)
-    _by_strips(
-        joined[..., 3:6], lambda vectors: vectors / np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6)
-    )
+    _map_strips(joined[..., :3], images.linear_to_srgb)
+    _map_strips(joined[..., 3:6], lambda n: n / np.maximum(np.linalg.norm(n, axis=2, keepdims=True), 1e-6))
     return joined
 
 
 def _resampled(image: np.ndarray, size: int) -> np.ndarray:
-    """[H, W(, C)] -> [size, size(, C)], within the range of `image`: Lanczos overshoots at hard edges, and no albedo is
-    negative."""
+    """Resample [H, W(, C)] to [size, size(, C)], within the range of `image`, which Lanczos overshoots at edges."""
     if image.shape[:2] == (size, size):
         return image
     return np.clip(images.resize(image, size, size), image.min(), image.max())
 
 
 def _write_together(writes: list[Callable[[], None]], tick: Callable[[float], None]) -> None:
-    """Runs all of them, WRITERS at a time. `tick` hears the share done several times a second, and may raise to cancel,
-    as each of them may."""
+    """Run all of them, WRITERS at a time. `tick` gets the share done, and may raise to cancel, as each of them may."""
     with ThreadPoolExecutor(WRITERS) as pool:
         running = [pool.submit(write) for write in writes]
         try:
-            left = set(running)
-            while left:
-                left = wait(running, timeout=0.2, return_when=FIRST_EXCEPTION).not_done
-                for ended in set(running) - left:
+            pending = set(running)
+            while pending:
+                pending = wait(running, timeout=0.2, return_when=FIRST_EXCEPTION).not_done
+                for ended in set(running) - pending:
                     ended.result()  # raises what it raised
-                tick(1 - len(left) / len(writes))
+                tick(1 - len(pending) / len(writes))
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _mapped(image: np.ndarray, operation: Callable) -> np.ndarray:
-    """A copy with a texel-wise operation applied."""
+    """Return a copy with a texel-wise operation applied."""
     image = image.copy()
-    _by_strips(image, operation)
+    _map_strips(image, operation)
     return image
 
 
-def _by_strips(image: np.ndarray, operation) -> None:
-    """Applies a texel-wise operation in place."""
+def _map_strips(image: np.ndarray, operation: Callable) -> None:
+    """Apply a texel-wise operation in place."""
     for row in range(0, len(image), STRIP_ROWS):
         image[row : row + STRIP_ROWS] = operation(image[row : row + STRIP_ROWS])
 
 
-def _picture(capture: Capture, srgb: np.ndarray) -> None:
-    """A crop from the middle of the map, texel by texel."""
+def _write_crop(capture: Capture, srgb: np.ndarray) -> None:
+    """Write a crop from the middle of the map, texel by texel, for the report."""
     side = int(CROP_SIDE_SHARE * len(srgb))
     start = (len(srgb) - side) // 2
     images.write_srgb(capture.picture("upscale", "crop"), srgb[start : start + side, start : start + side])

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frames' own fine detail in the enlarged albedo: where the views agreed on a band of it, that band takes the place
-of what was made up."""
+"""Put the frames' own fine detail into the enlarged albedo.
+
+Where the views agreed on a band of it, that band takes the place of invented detail.
+"""
 
 from __future__ import annotations
 
@@ -13,19 +15,14 @@ import numpy as np
 from ...imaging import images
 
 STRIP_ROWS = 256
-COARSE_SIGMA_TEXELS = 1.0
-"""Sigma, in texels of the texture, of the blur that parts the bands: that of core/stages/texture/detail.py."""
+COARSE_SIGMA_TEXELS = 1.0  # of the texture, for the blur that parts the bands: that of core/stages/texture/detail.py
 
 
 def guide(srgb: np.ndarray, detail: np.ndarray, texture: int, progress: Callable[[float], None]) -> None:
-    """Puts the texture's own fine detail into an enlarged albedo, in place.
+    """Put the texture's fine detail into an enlarged albedo [S, S, 3], sRGB, in place.
 
-    Parameters
-    ----------
-    srgb : [S, S, 3] in [0, 1], the albedo
-    detail : [D, D, 2], the band of log luminance, already multiplied by the share of it that is certain, and that share
-    texture : side of the texture, in texels, that the band is finer than
-    progress : hears the share done
+    detail [D, D, 2] is the band of log luminance, already multiplied by the share of it that is certain, and that
+    share. The band is finer than a texture of that side, in texels. `progress` gets the share done.
     """
     size = len(srgb)
     sigma = COARSE_SIGMA_TEXELS * size / texture

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report's pictures of the whole head and of the hair: the head from where no camera stood, and the masks on the
-albedo."""
+"""Draw the report's pictures of the whole head, from where no camera stood, and of the hair."""
 
 from __future__ import annotations
 
@@ -14,36 +13,31 @@ from .hair import Hair
 from .maps import HeadMaps
 from .surface import HeadSurface
 
-VIEW_DIRECTIONS = {"left": (1, 0.1, 0), "back": (0.25, 1, 0.2), "below": (0.35, -0.6, -0.75)}
-"""Where the head is looked at from."""
+VIEW_DIRECTIONS = (1, 0.1, 0), (0.25, 1, 0.2), (0.35, -0.6, -0.75)  # from the left, the back, below
+# directions (right, up, towards the eye) and strengths
 LAMPS = (((0.8, 0.6, 1.0), 1.5), ((-1.2, 0.0, 0.5), 0.7), ((-0.2, 1.0, 0.2), 0.5))
-"""Directions (right, up, towards the eye) and strengths."""
 AMBIENT, GROUND = 0.15, 0.06
-REACH_MM = 165.0
-"""mm from the middle of a picture to its edge."""
+REACH_MM = 165.0  # from the middle of a picture to its edge
 SHININESS = 40  # exponent of Blinn's highlight
 TINTS = {"brows": (1.0, 0.1, 0.1), "lashes": (0.1, 0.9, 0.2), "beard": (0.1, 0.35, 1.0)}  # sRGB of the hairs, by growth
 FACE_EXTENT = 0.04, 0.96  # rows and columns of the map that the face fills
 
 
-def turned(surface: HeadSurface, several: list[HeadMaps], side: int = 240) -> np.ndarray:
-    """sRGB picture: a row for each of `several`, the head from VIEW_DIRECTIONS under three lamps."""
-    caster, normals, tangent = (
-        raster.RayCaster(surface.mesh),
-        vertex_normals(surface.mesh),
-        surfaces.tangents(surface.mesh),
-    )
+def draw_turned(surface: HeadSurface, several: list[HeadMaps], side: int = 240) -> np.ndarray:
+    """Return an sRGB picture: a row for each of `several`, the head from VIEW_DIRECTIONS under three lamps."""
+    mesh = surface.mesh
+    caster, normals, tangent = raster.RayCaster(mesh), vertex_normals(mesh), surfaces.tangents(mesh)
     columns = []
-    for direction in VIEW_DIRECTIONS.values():
+    for direction in VIEW_DIRECTIONS:
         towards, right, up = _axes(direction)
         row, column = np.mgrid[0:side, 0:side]
         across, along = ((at + 0.5) / side * 2 * REACH_MM - REACH_MM for at in (column, side - 1 - row))
-        middle = (surface.mesh.vertices.max(0) + surface.mesh.vertices.min(0)) / 2
+        middle = (mesh.vertices.max(0) + mesh.vertices.min(0)) / 2
         origins = middle + 500 * towards + across[..., None] * right + along[..., None] * up
         face, bary, _ = caster.first_hits(origins.reshape(-1, 3), np.repeat(-towards[None], side * side, 0))
         hit = face >= 0
-        axes = surfaces.frames(normals, surface.mesh.faces, *tangent, face[hit], bary[hit])
-        uv = (surface.mesh.uvs[surface.mesh.face_uvs[face[hit]]] * bary[hit][..., None]).sum(1)
+        axes = surfaces.frames(normals, mesh.faces, *tangent, face[hit], bary[hit])
+        uv = (mesh.uvs[mesh.face_uvs[face[hit]]] * bary[hit][..., None]).sum(1)
         pictures = []
         for maps in several:
             picture = np.full((side * side, 3), GROUND)
@@ -53,36 +47,20 @@ def turned(surface: HeadSurface, several: list[HeadMaps], side: int = 240) -> np
     return images.linear_to_srgb(np.hstack(columns))
 
 
-def masks(diffuse: np.ndarray, hair: Hair, cleaned: np.ndarray, side: int = 400) -> np.ndarray:
-    """A picture of the face: the albedo, the same with brows red, lashes green and beard blue, and the skin below.
-
-    Parameters
-    ----------
-    diffuse : [S, S, 3], linear albedo
-    hair : its masks
-    cleaned : [S, S, 3], linear albedo of the skin below
-    side : of each of the three, in pixels
-
-    Returns
-    -------
-    [side, 3 side, 3], sRGB.
-    """
+def draw_masks(diffuse: np.ndarray, hair: Hair, cleaned: np.ndarray, side: int = 400) -> np.ndarray:
+    """Return sRGB [side, 3 side, 3]: the face's albedo, its brows red, lashes green and beard blue, the skin below."""
     tinted = images.linear_to_srgb(diffuse) * 0.6
     for name, tint in TINTS.items():
         cover = getattr(hair, name)[..., None]
         tinted = tinted * (1 - cover) + np.float32(tint) * cover
     first, last = (round(share * len(diffuse)) for share in FACE_EXTENT)
     inner = np.s_[first:last, first:last]
-    return np.hstack(
-        [
-            images.resize(picture[inner], side, side)
-            for picture in (images.linear_to_srgb(diffuse), tinted, images.linear_to_srgb(cleaned))
-        ]
-    )
+    pictures = images.linear_to_srgb(diffuse), tinted, images.linear_to_srgb(cleaned)
+    return np.hstack([images.resize(picture[inner], side, side) for picture in pictures])
 
 
 def _axes(direction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit vectors towards the eye, to the picture's right, and up."""
+    """Return unit vectors towards the eye, to the picture's right, and up."""
     towards = np.asarray(direction, float) / np.linalg.norm(direction)
     right = np.cross([0, 0, 1.0], towards)
     right /= np.linalg.norm(right)
@@ -90,8 +68,7 @@ def _axes(direction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _lit(maps: HeadMaps, texel: np.ndarray, axes, eye) -> np.ndarray:
-    """Linear colours [N, 3] at texels [N, 2] (x, y) with tangent frames `axes`: Lambert, and Blinn's highlights (a
-    picture, not a measurement)."""
+    """Return linear colours [N, 3] at texels [N, 2] with tangent frames `axes`, by Lambert with Blinn's highlights."""
     albedo, tilted, level = (raster.sample(picture, texel) for picture in (maps.diffuse, maps.normal, maps.specular))
     normal = sum(tilted[:, i : i + 1] * axis for i, axis in enumerate(axes))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How glossy the solved skin is on the whole: materials take the specular map against its mean on cheeks and forehead,
-which is skin's 2.8 percent."""
+"""Measure how glossy the solved skin is: materials divide the specular map by its mean on cheeks and forehead."""
 
 from __future__ import annotations
 
@@ -13,8 +12,7 @@ WITHOUT = ("nose", "eyes", "brows", "lips", "nostrils")
 
 
 def on_cheeks_and_forehead(specular: np.ndarray, confidence: np.ndarray) -> float:
-    """The mean of the specular albedo [S, S] there, where the texture was seen; `confidence` [S, S] in [0, 1]. Over all
-    of the region where nothing was."""
+    """Return the mean specular albedo there under a confidence [S, S], or over all of it if nothing was seen."""
     size = len(specular)
     where = template.mask("skin", size) > 0.5
     for name in WITHOUT:

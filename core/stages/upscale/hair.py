@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Brows, lashes and beard as soft masks, and the albedo of the skin below them, so that hair can be groomed over clean
-skin.
+"""Find brows, lashes and beard as soft masks, and the albedo of the skin below, so that hair can be groomed over it.
 
-Hair is what differs from the skin that would be there, where such hair grows (growth.py); how much of it there is says
-how far it differs.
+Hair is what differs from the skin that would be there, where such hair grows (growth.py); how much it differs says how
+much hair there is.
 """
 
 from __future__ import annotations
@@ -24,23 +23,18 @@ from .maps import HeadMaps
 from .surface import HeadSurface
 from .whole_head import FEATURES, apart, seen_well
 
+# along the lower rims of the lids; where they are closed the lashes lie there
 LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133), (263, 249, 390, 373, 374, 380, 381, 382, 362)
-"""Along the lower rims of the lids; where they are closed the lashes lie there."""
-LASH_ZONE_MM = 1.6
-"""mm on either side of the rim in which lashes are looked for."""
+LASH_ZONE_MM = 1.6  # on either side of the rim in which lashes are looked for
+# log albedo by which hair must be darker than its skin to be found by that alone; the fair brows of some people are not
 LEAST_HAIR_LOG = 0.25
-"""Log albedo by which hair must be darker than its skin to be told from it by that alone; the fair brows of some people
-are not."""
-USUAL_COVER = {"brows": 0.5, "beard": 0.5}
-"""Share that hair covers where there is some,"""
-USUAL_COVER_SIGMA = 0.25
-"""and its deviation: what counts where hair is hardly another colour than its skin."""
+# share that hair covers where there is some, and its deviation: for hair that hardly differs from its skin in colour
+USUAL_COVER, USUAL_COVER_SIGMA = {"brows": 0.5, "beard": 0.5}, 0.25
 
 
 @dataclass(frozen=True)
 class Hair:
-    """How much of each texel hair covers, float32 [S, S] in [0, 1] each; hidden: how surely hair of the head lay before
-    it in the frames."""
+    """Share of each texel that hair covers, [S, S]; hidden: probability that hair of the head lay before it."""
 
     brows: np.ndarray
     lashes: np.ndarray
@@ -54,14 +48,9 @@ def find(
     part_shares: np.ndarray | None = None,
     check: Callable[[], None] = lambda: None,
 ) -> Hair:
-    """The hair of a face.
+    """Find the hair of a face.
 
-    Parameters
-    ----------
-    maps : of the head
-    surface : of the head, at their size
-    part_shares : [S, S, len(GROWTHS)] in [0, 1], what `read_parts` gives
-    check : may raise to cancel, here and below
+    part_shares [S, S, len(GROWTHS)] in [0, 1] is what `read_parts` gives. `check` may raise to cancel, here and below.
     """
     channels, _ = apart(maps)
     light = channels[..., :3].mean(2)
@@ -72,31 +61,19 @@ def find(
     darker = _skin(light[..., None], zones, grown.beard, grown.head, surface)[..., 0] - light
     lashes = _cover(_closed(light, texel) - light, zones["lashes"], grown.grain)
     if not grown.by_parser:
-        return Hair(
-            _cover(darker, grown.brows, grown.grain), lashes, _cover(darker, grown.beard, grown.grain), grown.head
-        )
-    brows, clearest = _told_cover(darker, grown.brows * (1 - grown.head), grown.grain, USUAL_COVER["brows"])
-    bearded, _ = _told_cover(darker, grown.beard, grown.grain, USUAL_COVER["beard"], clearest)
+        brows, bearded = (_cover(darker, zone, grown.grain) for zone in (grown.brows, grown.beard))
+        return Hair(brows, lashes, bearded, grown.head)
+    brows, clearest = _parsed_cover(darker, grown.brows * (1 - grown.head), grown.grain, USUAL_COVER["brows"])
+    bearded, _ = _parsed_cover(darker, grown.beard, grown.grain, USUAL_COVER["beard"], clearest)
     return Hair(_behind(brows, grown, surface), lashes, bearded, grown.head)
 
 
 def clean(
     maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0, check: Callable[[], None] = lambda: None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The skin below the hair.
+    """Return the linear albedo [S, S, 3] of the skin below the hair, and how far each texel was replaced [S, S].
 
-    Parameters
-    ----------
-    maps : of the head
-    hair : its masks, at the maps' size
-    surface : of the head, at their size
-    seed : of the grain that is painted
-    check : may raise to cancel
-
-    Returns
-    -------
-    Linear albedo [S, S, 3] without the hair, and how far each texel was replaced [S, S] in [0, 1]; 0 leaves the
-    albedo's bytes.
+    0 leaves the albedo's bytes. The seed is that of the painted grain.
     """
     channels, slopes = apart(maps)
     zones, texel = _zones(surface), float(np.median(surface.texel))
@@ -108,21 +85,16 @@ def clean(
     where = (share > 0) & surface.covered
     if not where.any():
         return maps.diffuse, share
-    skin = _skin(
-        channels,
-        zones,
-        cv2.dilate((hair.beard > 0.02).astype(np.float32), beard.disc(2.0 / texel)),
-        hair.hidden,
-        surface,
-    )
+    bearded = cv2.dilate((hair.beard > 0.02).astype(np.float32), beard.disc(2.0 / texel))
+    skin = _skin(channels, zones, bearded, hair.hidden, surface)
     check()
     lids = zones["lashes"][..., None]
-    skin = skin * (1 - lids) + _closed(channels, texel) * lids  # a field from beyond the sockets knows no lid
+    skin = skin * (1 - lids) + _closed(channels, texel) * lids  # a field from beyond the sockets has no lid
     bare = template.mask("skin", surface.size) * (1 - np.clip(20 * share, 0, 1)) * seen_well(maps.seen, surface)
     check()
-    learnt = grain.measure(channels, slopes, (bare > 0.99).astype(np.float32), surface, seed)
+    own_grain = grain.measure(channels, slopes, (bare > 0.99).astype(np.float32), surface, seed)
     check()
-    painted, _ = grain.paint(learnt, surface, where, seed + 1)
+    painted, _ = grain.paint(own_grain, surface, where, seed + 1)
     below = np.clip(np.exp((skin[where] + painted)[:, :3]), 0, 1)
     cleaned, blend = maps.diffuse.copy(), share[where][:, None]
     cleaned[where] = maps.diffuse[where] * (1 - blend) + below * blend
@@ -137,16 +109,9 @@ def write(
     share: np.ndarray,
     check: Callable[[], None] = lambda: None,
 ) -> None:
-    """The masks at the albedo's size, and the albedo without hair.
+    """Write the masks at the albedo's size, and the albedo without hair.
 
-    Parameters
-    ----------
-    folder : that they are written to
-    albedo : [L, L, 3], sRGB in [0, 1]; stays where `share` is 0
-    hair : the masks
-    cleaned : [S, S, 3], linear albedo of the skin below
-    share : [S, S] in [0, 1], where that is taken
-    check : may raise to cancel
+    albedo [L, L, 3], sRGB, stays where `share` [S, S] of the cleaned linear albedo [S, S, 3] is 0.
     """
     size = len(albedo)
     for name in ("brows", "lashes", "beard"):
@@ -164,7 +129,7 @@ def _enlarged(picture: np.ndarray, size: int) -> np.ndarray:
 
 
 def _zones(surface: HeadSurface) -> dict[str, np.ndarray]:
-    """Where brows, lashes and beard may grow, [S, S] in [0, 1] each."""
+    """Return where brows, lashes and beard may grow, [S, S] in [0, 1] each."""
     points = template.landmark_points(surface.mesh)
     size, position = surface.size, surface.position
     eyes = template.mask("eyes", size) > 0
@@ -179,7 +144,7 @@ def _zones(surface: HeadSurface) -> dict[str, np.ndarray]:
 
 
 def _off(position: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Distance [N] of points [N, 3] from the line between a and b."""
+    """Return the distance [N] of points [N, 3] from the line between a and b."""
     along = b - a
     share = np.clip(((position - a) @ along) / max(float(along @ along), 1e-9), 0, 1)
     return np.linalg.norm(position - a - share[:, None] * along, axis=1)
@@ -188,7 +153,7 @@ def _off(position: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _skin(
     channels: np.ndarray, zones: dict[str, np.ndarray], bearded: np.ndarray, hidden: np.ndarray, surface: HeadSurface
 ) -> np.ndarray:
-    """Channels [S, S, C] of the skin as they would be without hair, without detail."""
+    """Return channels [S, S, C] of the skin as they would be without hair, without detail."""
     size = surface.size
     other = np.maximum.reduce([*(template.mask(name, size) for name in (*FEATURES, "scalp")), zones["brows"]])
     weight = (1 - np.clip(1.5 * other, 0, 1)) * (1 - np.clip(4 * bearded, 0, 1)) * (1 - hidden)
@@ -196,25 +161,23 @@ def _skin(
 
 
 def _cover(darker: np.ndarray, zone: np.ndarray, usual: float) -> np.ndarray:
-    """Share of hair [S, S] from how much darker (in log albedo) than its skin a texel is: linear between the grain of
-    bare skin and the darkest hairs."""
-    there = zone > 0.5
-    full = float(np.percentile(darker[there], 99)) if there.sum() > 20 else 0.0
+    """Return the share of hair [S, S], linear from the grain of bare skin to the darkest hairs, by log darkness."""
+    growing = zone > 0.5
+    full = float(np.percentile(darker[growing], 99)) if growing.sum() > 20 else 0.0
     if full < max(LEAST_HAIR_LOG, 4 * usual):
         return np.zeros_like(zone)
     least, most = (1 - np.exp(-x) for x in (2 * usual, full))
     return (np.clip((1 - np.exp(-darker) - least) / (most - least), 0, 1) * zone).astype(np.float32)
 
 
-def _told_cover(
+def _parsed_cover(
     darker: np.ndarray, hair_share: np.ndarray, grain: float, usual: float, clearest: float = 0.0
 ) -> tuple[np.ndarray, float]:
-    """Share of hair [S, S] where the parser says that there is some, and how far below the skin's albedo the clearest
-    hairs lie, as a share of it.
+    """Return the share of hair [S, S] where the parser sees some, and the clearest hairs' difference from their skin.
 
-    What a texel is darker or lighter than its skin over what the clearest hairs are, and `usual`, each weighed by how
-    sure it is: the less hair differs from its skin, over the `grain` of that, the less does its contrast tell.
-    `clearest`: of the person's other dark hair, for stubble nowhere fills a texel.
+    That is a share of the skin's albedo. Two estimates are weighed by their certainty: the texel's difference from its
+    skin over that of the clearest hairs, and `usual`. The less hair differs from its skin, over the `grain` of that,
+    the less its contrast counts. `clearest` is of the person's other dark hair, for stubble nowhere fills a texel.
     """
     off, sure = 1 - np.exp(-darker), hair_share > 0.5
     if not sure.any():
@@ -229,13 +192,12 @@ def _told_cover(
 
 
 def _behind(brows: np.ndarray, grown: Growth, surface: HeadSurface) -> np.ndarray:
-    """Brows with those that lie behind hair of the head: as the other one is, where that is seen, and as brows usually
-    are where neither is."""
+    """Return the brows with those behind hair of the head: like the other one if that is seen, or as usual."""
     other, hidden = brows[:, ::-1], grown.head[:, ::-1]  # the template's two sides mirror each other on the map
     usual = USUAL_COVER["brows"] * template.mask("brows", surface.size)
     return brows * (1 - grown.head) + grown.head * (other * (1 - hidden) + usual * hidden)
 
 
 def _closed(picture: np.ndarray, texel: float) -> np.ndarray:
-    """A picture [S, S(, C)] without what is darker and narrower than 4 mm, and soft."""
+    """Return a picture [S, S(, C)] without what is darker and narrower than 4 mm, and soft."""
     return cv2.GaussianBlur(cv2.morphologyEx(picture, cv2.MORPH_CLOSE, beard.disc(2.0 / texel)), (0, 0), 1.0 / texel)

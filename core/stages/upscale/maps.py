@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The maps of a head as arrays: what the steps of this room hand on."""
+"""Read the maps of a head as arrays, which the steps of this stage hand on."""
 
 from __future__ import annotations
 
@@ -16,10 +16,13 @@ from ...imaging import images
 
 @dataclass(frozen=True)
 class HeadMaps:
-    """All float32 on S x S texels. diffuse [S, S, 3]: albedo, linear sRGB; normal [S, S, 3]: unit, tangent space,
-    OpenGL Y+; specular [S, S]: Principled BSDF's Specular IOR Level; confidence [S, S] in [0, 1]: how far the albedo is
-    believed; shading [S, S, 3]: linear, albedo x shading = texture; seen [S, S] in [0, 1]: how well the cameras saw a
-    texel, whatever is there: a dark beard is seen well and believed less."""
+    """Maps of a head, float32 on S x S texels.
+
+    diffuse [S, S, 3]: albedo, linear sRGB; normal [S, S, 3]: unit, tangent space, OpenGL Y+; specular [S, S]:
+    Principled BSDF's Specular IOR Level; confidence [S, S] in [0, 1]: of the albedo; shading [S, S, 3]: linear, albedo
+    x shading = texture; seen [S, S] in [0, 1]: how well the cameras saw a texel: a dark beard is seen well and has
+    little confidence.
+    """
 
     diffuse: np.ndarray
     normal: np.ndarray
@@ -30,9 +33,9 @@ class HeadMaps:
 
 
 def read_maps(folder: Path, texture_confidence: Path) -> HeadMaps:
-    """The maps that the solver wrote, and how well the texture saw each texel: not at all where the solver's confidence
-    is none, and as that says where the file of the texture's is gone. Raises Problem where a map is damaged or of
-    another size than the others.
+    """Read the solver's maps, and how well the texture saw each texel: not at all without confidence.
+
+    Raises Problem if a map is damaged or of another size than the others.
     """
     paths = {
         "diffuse": folder / "diffuse_albedo.exr",

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which way hair lies on the skin: along the strokes that the albedo has from the frames, which way along them by how
-such hair grows.
+"""Find which way hair lies on the skin: along the strokes of the albedo, from root to tip as such hair grows.
 
-By the structure tensor of the albedo's fine detail (Bigun and Granlund 1987) in the tangent plane.
+The strokes are found by the structure tensor of the albedo's fine detail (Bigun and Granlund 1987) in the tangent
+plane.
 """
 
 from __future__ import annotations
@@ -19,16 +19,13 @@ from ...geometry.views import lengths
 from ...imaging import images
 from .surface import HeadSurface
 
-COARSEST_MM = 0.7
-"""mm: what is smoother than that is skin, or the edge of a brow, and no stroke."""
-AROUND_MM = 1.5
-"""mm over which neighbouring hairs lie alike, and their strokes are taken together."""
+COARSEST_MM = 0.7  # smoother detail is skin, or the edge of a brow, and no stroke
+AROUND_MM = 1.5  # over which neighbouring hairs lie alike, and their strokes are taken together
 
 
 @dataclass(frozen=True)
 class HairTexels:
-    """The N texels on which hair grows. mask bool [S, S]; position [N, 3] mm, normal, tangent and bitangent [N, 3]
-    unit, row by row."""
+    """N texels on which hair grows, row by row: mask bool [S, S]; position [N, 3] in mm; unit vectors [N, 3]."""
 
     mask: np.ndarray
     position: np.ndarray
@@ -37,29 +34,25 @@ class HairTexels:
     bitangent: np.ndarray
 
     def flatten(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors [N, 3] in the tangent plane, [N, 2] along tangent and bitangent, unit."""
+        """Return vectors [N, 3] in the tangent plane, [N, 2] along tangent and bitangent, unit."""
         flat = np.stack([(vectors * self.tangent).sum(1), (vectors * self.bitangent).sum(1)], 1)
         return flat / np.maximum(lengths(flat), 1e-9)[:, None]
 
     def raise_up(self, flat: np.ndarray, index: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """The contrary, at the texels of `index`: [M, 2] to vectors [M, 3] along the skin."""
+        """Return [M, 2] of the tangent planes at the texels of `index` as vectors [M, 3] along the skin."""
         return flat[:, :1] * self.tangent[index] + flat[:, 1:] * self.bitangent[index]
 
 
 def lay_texels(surface: HeadSurface, mask: np.ndarray) -> HairTexels:
-    """The texels of `mask` bool [S, S], all of them on the head."""
+    """Return the texels of `mask` bool [S, S], all of them on the head."""
     tangent, bitangent = surface.frames(mask)
-    normal = raster.interpolate(
-        vertex_normals(surface.mesh), surface.mesh.faces, surface.face[mask], surface.bary[mask]
-    )
-    return HairTexels(
-        mask, surface.position[mask].astype(np.float64), normal / lengths(normal)[:, None], tangent, bitangent
-    )
+    mesh, position = surface.mesh, surface.position[mask].astype(np.float64)
+    normal = raster.interpolate(vertex_normals(mesh), mesh.faces, surface.face[mask], surface.bary[mask])
+    return HairTexels(mask, position, normal / lengths(normal)[:, None], tangent, bitangent)
 
 
 def measure_tensors(albedo: np.ndarray, texels: HairTexels, texel: float) -> np.ndarray:
-    """Structure tensors [N, 2, 2] of the strokes of a linear albedo [S, S, 3] in the tangent plane, of trace 1 (0 where
-    nothing is seen), over AROUND_MM: large across the strokes, small along them. texel: its width in mm."""
+    """Return tensors [N, 2, 2] of trace 1, large across a linear albedo's strokes, small along them; `texel` in mm."""
     grey = images.linear_to_srgb(albedo).mean(2)
     fine = cv2.GaussianBlur(grey - cv2.GaussianBlur(grey, (0, 0), COARSEST_MM / texel), (0, 0), 0.7)
     right, down = (cv2.Scharr(fine, cv2.CV_32F, *axis, scale=1 / 32) for axis in ((1, 0), (0, 1)))
@@ -70,18 +63,10 @@ def measure_tensors(albedo: np.ndarray, texels: HairTexels, texel: float) -> np.
 
 
 def choose_ways(tensors: np.ndarray, texels: HairTexels, usual: np.ndarray, trust: float) -> np.ndarray:
-    """How hairs lie along the skin.
+    """Return unit directions [N, 3] along the skin from root to tip.
 
-    Parameters
-    ----------
-    tensors : [N, 2, 2], of the strokes at the texels
-    texels : the N texels
-    usual : [N, 3], how such hair grows: tells root from tip, and the direction where strokes tell none
-    trust : the usual direction counts as strokes of this coherence
-
-    Returns
-    -------
-    Unit directions from root to tip [N, 3].
+    tensors [N, 2, 2] are the strokes'. `usual` [N, 3] is how such hair grows: it separates root from tip, and counts as
+    strokes of the coherence `trust`.
     """
     usual = texels.flatten(usual)
     across = np.stack([-usual[:, 1], usual[:, 0]], 1)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How hair of the face usually grows: by anatomy, from landmarks.
+"""Usual growth of the face's hair, by anatomy, from landmarks.
 
 Brows begin upright at the nose and lie along their arch from a third of it on; a moustache leaves the middle of the
 lip; a beard hangs.
@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
+# lower and upper landmarks of the person's brows, from the nose to the temple
 LEFT_BROW = ((285, 336), (295, 296), (282, 334), (283, 293), (276, 300))
 RIGHT_BROW = ((55, 107), (65, 66), (52, 105), (53, 63), (46, 70))
-"""Lower and upper landmarks of the person's brows, from the nose to the temple."""
 NOSE_BASE, MOUTH_CORNER = 2, 291
 
 
 def usual(growth: str, position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
-    """Directions from root to tip [N, 3], of any length and not yet along the skin, at positions [N, 3] mm with
-    landmarks [468, 3] mm."""
+    """Return directions from root to tip [N, 3], not yet along the skin, by landmarks [468, 3]; all in mm."""
     return _brows(position, landmarks) if growth == "brows" else _beard(position, landmarks)
 
 

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The whole head from the part that the cameras saw: its tone differs from that of the mean face by a smooth field over
-the surface, its pores and mottling come from the solved skin's own statistics.
+"""Complete the whole head from the part that the cameras saw.
 
-Scalp goes on as scalp and skin as skin: where cropped hair was seen, unseen scalp takes its tone. What was seen well
-keeps its values.
+Its tone differs from that of the mean face by a smooth field over the surface, its pores and mottling come from the
+solved skin's own statistics. Scalp goes on as scalp and skin as skin: if cropped hair was seen, unseen scalp takes its
+tone. What was seen well keeps its values.
 """
 
 from __future__ import annotations
@@ -24,28 +24,23 @@ from . import grain
 from .maps import HeadMaps
 from .surface import HeadSurface
 
-UNSEEN_CONFIDENCE, SEEN_CONFIDENCE = 0.015, 0.09
-"""The texture's confidence at which a texel counts as not seen, and from which on as seen well."""
-BELIEVED_CONFIDENCE = 0.5
-"""The solver's confidence from which on skin is plain enough to learn its grain from: a beard is not."""
-SPECK_MM = 1.5
-"""mm: darker lines and dots of it are strands before the face, not holes in what was seen."""
+UNSEEN_CONFIDENCE, SEEN_CONFIDENCE = 0.015, 0.09  # the texture's: a texel counts as not seen, and as seen well
+BELIEVED_CONFIDENCE = 0.5  # the solver's, from which skin is plain enough to learn its grain from: a beard is not
+SPECK_MM = 1.5  # darker lines and dots of that width are strands before the face, not holes in what was seen
+# inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the mean
+# face; then comes the fade
 SKIRT_MM, FEATHER_MM = 2.5, 5.0
-"""mm inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the
-mean face; then comes the fade."""
+# of the surroundings of a place on the scalp. A patch seen between hair, shadow and the border of the pictures is of
+# another tone and another stubble than what is invented around it, and looks like a stain
 SURROUNDINGS_MM = 10.0
-"""mm around a place on the scalp that count as its surroundings. A patch seen between hair, shadow and the border of
-the pictures is of another tone and another stubble than what is made up around it, and looks like a stain."""
+# shares of usual skin's confidence, of which a scalp that is seen as well has 0.6, for it may be hair: one whose
+# surroundings have the first is replaced, with the second kept
 GLANCED_SHARE, WATCHED_SHARE = 0.3, 0.5
-"""Shares of usual skin's confidence, of which a scalp that is seen as well has 0.6, for it may be hair: one whose
-surroundings were seen with the first is made up, with the second kept."""
-REACH_MM = 2.5
-"""mm below which detail is no tone."""
+REACH_MM = 2.5  # smaller detail is not the tone's
+# difference of log albedo from its surroundings at which the fringe of the seen part loses half of its weight: stray
+# light, clothes, hair in front
 ODD_LOG = 0.20
-"""Difference of log albedo from its surroundings at which the fringe of the seen part loses half of its say: stray
-light, clothes, hair in front."""
-LEAST_SCALP_MM2 = 1500.0
-"""mm^2 of scalp that must have been seen for it to have a tone of its own."""
+LEAST_SCALP_MM2 = 1500.0  # that must have been seen for the scalp to have a tone of its own
 DATA_FILES = ("weights/prior.safetensors",)
 MEAN_FACE = Path(__file__).resolve().parents[2] / DATA_FILES[0]
 FEATURES = ("brows", "lips", "eyes", "nostrils")
@@ -53,15 +48,10 @@ DARKEST_LINEAR = 0.004  # albedo below which a logarithm says nothing
 
 
 def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int = 0) -> HeadMaps:
-    """The maps with what was not seen replaced; shading and confidence as they were.
+    """Return the maps with unseen texels replaced; shading and confidence as they were.
 
-    Parameters
-    ----------
-    maps : of the head; texels whose `seen_well` is 1 keep their bytes, but for stray ones beyond the face and a scalp
-        that was seen badly
-    surface : of the head, at their size
-    report : hears whether it is cancelled, takes the share that was completed
-    seed : of the grain that is painted
+    Texels whose `seen_well` is 1 keep their bytes, but for stray ones beyond the face and a scalp that was seen badly.
+    The report gets the share that was completed, the seed is that of the painted grain.
     """
     report.check()
     seen = seen_well(maps.seen, surface)
@@ -79,9 +69,9 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     completed = ((1 - seen) * area).sum() / area.sum()
     report.figure("completed_share_percent", round(100 * float(completed), 1))
     plain = (template.mask("skin", size) * seen >= 0.99) & (maps.confidence >= BELIEVED_CONFIDENCE)
-    learnt = grain.measure(channels, slopes, plain.astype(np.float32), surface, seed)
+    own_grain = grain.measure(channels, slopes, plain.astype(np.float32), surface, seed)
     report.check()
-    painted, tilt = grain.paint(learnt, surface, holes, seed)
+    painted, tilt = grain.paint(own_grain, surface, holes, seed)
     share, own = seen[holes][:, None], channels - _low(channels, seen, surface)
     # two grains that know nothing of each other would cancel where they mix
     loud = 1 / np.sqrt(share**2 + (1 - share) ** 2)
@@ -91,26 +81,24 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
 
 
 def seen_well(seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
-    """HeadMaps' seen -> [S, S] in [0, 1]: 1 where the cameras saw enough, 0 where the solver had nothing but the mean
-    face, and a soft border on the seen side.
+    """Turn HeadMaps' seen into [S, S] in [0, 1]: 1 where the cameras saw enough, 0 where the solver had the mean face.
 
-    Holes in the face's features count as seen: their shape comes with the mean face, and no smooth field knows it.
+    The border is soft, on the seen side. Holes in the face's features count as seen: their shape comes with the mean
+    face, and no smooth field has it.
     """
     texel = float(np.median(surface.texel))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(1, round(SPECK_MM / texel)) + 1,) * 2)
     closed = cv2.morphologyEx(seen, cv2.MORPH_CLOSE, disc)
     closed = np.maximum(closed, _features(surface.size))
     enough = _smoothstep((closed - UNSEEN_CONFIDENCE) / (SEEN_CONFIDENCE - UNSEEN_CONFIDENCE))
-    inside = cv2.distanceTransform(
-        np.pad((closed >= UNSEEN_CONFIDENCE) | ~surface.covered, 1, mode="edge").astype(np.uint8), cv2.DIST_L2, 5
-    )[1:-1, 1:-1]
-    return (
-        enough * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT_MM) / FEATHER_MM) * surface.covered
-    ).astype(np.float32)
+    seen_part = np.pad((closed >= UNSEEN_CONFIDENCE) | ~surface.covered, 1, mode="edge").astype(np.uint8)
+    inside = cv2.distanceTransform(seen_part, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    faded = _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT_MM) / FEATHER_MM)
+    return (enough * faded * surface.covered).astype(np.float32)
 
 
 def _scalp_share(confidence: np.ndarray, seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
-    """[S, S] in [0, 1]: 1 off the scalp, and on it where its surroundings were seen about as well as usual skin."""
+    """Return [S, S]: 1 off the scalp, and on it where its surroundings were seen about as well as usual skin."""
     usual = float(np.median(confidence[seen == 1])) if (seen == 1).any() else 1.0
     around = surface.smooth(confidence[..., None], np.ones_like(confidence), SURROUNDINGS_MM)[..., 0]
     kept = _smoothstep((around / max(usual, 1e-6) - GLANCED_SHARE) / (WATCHED_SHARE - GLANCED_SHARE))
@@ -118,11 +106,11 @@ def _scalp_share(confidence: np.ndarray, seen: np.ndarray, surface: HeadSurface)
 
 
 def _without_strays(enough: np.ndarray, seen: np.ndarray, off: np.ndarray) -> np.ndarray:
-    """`enough` [S, S] without what was `seen` [S, S] at a glance only and lies `off` the head's tone (log albedo [S,
-    S]): light that was divided out wrongly, cloth, hair.
+    """Return `enough` [S, S] without what was `seen` [S, S] at a glance only and lies `off` the head's tone [S, S].
 
-    What one believes of a texel is a matter of both: off by ODD_LOG it has to be seen as much better as is missing to
-    usual skin. Nothing goes from the face, which every capture sees well and where marks are.
+    That is light that was divided out wrongly, cloth, or hair. A texel off by ODD_LOG, in log albedo, has to be seen as
+    much better as is missing to usual skin. Nothing goes from the face, which every capture sees well and where marks
+    are.
     """
     sure = np.clip(seen / max(float(np.median(seen[enough == 1])), 1e-6), 0, 1)
     missing = (1 - sure) * (1 - template.mask("face", len(seen))) * off / ODD_LOG
@@ -130,21 +118,13 @@ def _without_strays(enough: np.ndarray, seen: np.ndarray, off: np.ndarray) -> np
 
 
 def apart(maps: HeadMaps) -> tuple[np.ndarray, np.ndarray]:
-    """Log albedo and specular [S, S, 4], and the normal's slopes [S, S, 2]."""
+    """Return log albedo and specular [S, S, 4], and the normal's slopes [S, S, 2]."""
     channels = np.concatenate([np.log(np.maximum(maps.diffuse, DARKEST_LINEAR)), maps.specular[..., None]], 2)
     return channels, maps.normal[..., :2] / np.maximum(maps.normal[..., 2:], 0.1)
 
 
 def joined(maps: HeadMaps, mask: np.ndarray, channels: np.ndarray, slopes: np.ndarray | None = None) -> HeadMaps:
-    """The maps with new values at some texels.
-
-    Parameters
-    ----------
-    maps : stay as they are
-    mask : bool [S, S], of N texels
-    channels : [N, 4], log albedo and specular, as `apart` makes them
-    slopes : [N, 2], of the normal, x / z and y / z
-    """
+    """Return maps with new channels [N, 4] and slopes [N, 2], as `apart` makes them, at the N texels of bool [S, S]."""
     diffuse, specular, normal = maps.diffuse.copy(), maps.specular.copy(), maps.normal.copy()
     diffuse[mask] = np.clip(np.exp(channels[:, :3]), DARKEST_LINEAR, 1)
     specular[mask] = np.clip(channels[:, 3], 0, 1)
@@ -155,16 +135,11 @@ def joined(maps: HeadMaps, mask: np.ndarray, channels: np.ndarray, slopes: np.nd
 
 
 def _features(size: int) -> np.ndarray:
-    """[S, S] in [0, 1]."""
     return np.minimum(1, 2 * np.maximum.reduce([template.mask(name, size) for name in FEATURES]))
 
 
 def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: int) -> np.ndarray:
-    """Log albedo and specular [S, S, 4] without detail, everywhere: what is usual there, and a smooth field of how this
-    person differs from it.
-
-    Bare skin goes on over the scalp too, unless enough of the scalp was seen: then it has a field of its own.
-    """
+    """Return log albedo and specular [S, S, 4] without detail; a scalp that was hardly seen is bare skin."""
     scalp, usual = template.mask("scalp", surface.size), usual_skin(surface.size)
     bare = trust * (1 - _features(surface.size))
     bald = surface.smooth(usual, (1 - _features(surface.size)) * (1 - scalp) ** 4, REACH_MM)
@@ -180,8 +155,7 @@ def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: i
 
 
 def usual_skin(size: int) -> np.ndarray:
-    """The prior's mean face in the form of `apart`'s channels, [S, S, 4], its albedo over the skin tone: necks are
-    paler than cheeks, ears redder."""
+    """Return the prior's mean face in the form of `apart`'s channels [S, S, 4], its albedo over the skin tone."""
     shipped_files.require_whole(MEAN_FACE)
     with safe_open(MEAN_FACE, "numpy") as file:
         mean = file.get_tensor("mean_face").astype(np.float32).transpose(1, 2, 0)
@@ -190,9 +164,8 @@ def usual_skin(size: int) -> np.ndarray:
 
 
 def _low(channels: np.ndarray, observed: np.ndarray, surface: HeadSurface) -> np.ndarray:
-    return grain.blurred(
-        channels, np.maximum(observed, 1e-3).astype(np.float32), REACH_MM / float(np.median(surface.texel))
-    )
+    weight = np.maximum(observed, 1e-3).astype(np.float32)
+    return grain.blurred(channels, weight, REACH_MM / float(np.median(surface.texel)))
 
 
 def _smoothstep(share: np.ndarray) -> np.ndarray:

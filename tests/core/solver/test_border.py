@@ -17,6 +17,7 @@ from tests.fixtures.painted_skin import make
 SIZE = 256
 TEXEL = 1024 / SIZE
 Y, X = np.mgrid[:SIZE, :SIZE] * TEXEL
+SEEN = torch.ones(SIZE, SIZE)
 
 
 def light_and_mask(taken: float) -> tuple[torch.Tensor, torch.Tensor]:
@@ -29,10 +30,13 @@ def light_and_mask(taken: float) -> tuple[torch.Tensor, torch.Tensor]:
     return torch.from_numpy(skin.astype(np.float32)), torch.from_numpy(inside.astype(np.float32))
 
 
-@pytest.mark.parametrize("taken", [0.05, 0.2, 0.5])
+def missing(light: torch.Tensor, mask: torch.Tensor, weight: torch.Tensor = SEEN) -> np.ndarray:
+    return border.measure_missing_light(light, mask, weight, TEXEL).numpy()
+
+
+@pytest.mark.parametrize("taken", [0.05, 0.5])
 def test_a_known_step_is_told_at_the_border_with_caution_and_less_inwards(taken):
-    light, mask = light_and_mask(taken)
-    found = border.measure_missing_light(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()[40:-40]
+    found = missing(*light_and_mask(taken))[40:-40]
     within = 90 - np.abs(X - 500)[40:-40]
     at_border = (within > 0) & (within < 25)
     assert found[at_border].min() > 0.65 * taken - 0.01 and found.max() < taken + 0.01
@@ -40,11 +44,15 @@ def test_a_known_step_is_told_at_the_border_with_caution_and_less_inwards(taken)
     assert 0.2 * taken - 0.01 < middle < 0.6 * found[at_border].mean()
 
 
-def test_where_the_light_is_even_nothing_is_missing():
+def test_where_the_light_is_even_or_no_border_is_near_nothing_is_missing():
     light, mask = light_and_mask(0.0)
-    assert border.measure_missing_light(light, mask, torch.ones(SIZE, SIZE), TEXEL).max() < 0.02
-    nowhere = border.measure_missing_light(1 / light, 0 * mask, torch.ones(SIZE, SIZE), TEXEL)
-    assert nowhere.max() == 0, "and no mask has no border"
+    assert missing(light, mask).max() < 0.02 and missing(1 / light, 0 * mask).max() == 0
+    seen = torch.from_numpy((X < 600).astype(np.float32))
+    assert missing(light * (0.5 + 0.5 * seen), seen, seen).max() == 0, "the outline of what was seen is no border"
+    light, _ = light_and_mask(0.3)
+    half = torch.from_numpy((X < 500).astype(np.float32))  # its other edge is the shadow's own
+    wide = missing(light, (half + (light[0] < 0.8)).clamp(0, 1))
+    assert wide[128, int(570 / TEXEL)] > 0.18 and wide[128, int(400 / TEXEL)] < 0.01
 
 
 def test_steps_that_differ_more_than_a_delighter_leaves_are_mostly_the_skins_own():
@@ -52,30 +60,17 @@ def test_steps_that_differ_more_than_a_delighter_leaves_are_mostly_the_skins_own
     grows."""
     light, mask = light_and_mask(0.1)
     bearded = torch.from_numpy((np.abs(Y - 512) < 200).astype(np.float32))
-    clean = border.measure_missing_light(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()
-    steps = []
-    for dark in (0.9, 0.6, 0.3):
+    place = 128, int(430 / TEXEL)
+    shares = []
+    for dark in (0.9, 0.3):
         beard_inside = light * (1 - (1 - dark) * bearded * mask)
-        value = beard_inside.log().mean(0).numpy()
-        seen, sure = border.measure_border_steps(value, mask.numpy(), np.ones((SIZE, SIZE), np.float32), TEXEL)
-        share = border.estimate_light_share(seen, sure)
-        found = border.measure_missing_light(beard_inside, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()
-        assert share == pytest.approx(min(1, border.LEFT_LOG**2 / border.mean_and_deviation(seen, sure)[1] ** 2))
-        steps.append((share, found[128, int(430 / TEXEL)]))
-    (least, alike), _, (most, unlike) = steps
-    assert least == 1 and most < 0.2, steps
-    assert alike > clean[128, int(430 / TEXEL)] and unlike < 0.25, "a beard of 70 % is not taken for 70 % of the light"
-
-
-def test_the_outline_of_what_was_seen_is_no_border_and_far_from_one_nothing_is_known():
-    light, _ = light_and_mask(0.0)
-    seen = torch.from_numpy((X < 600).astype(np.float32))
-    assert border.measure_missing_light(light * (0.5 + 0.5 * seen), seen, seen, TEXEL).max() == 0
-    light, _ = light_and_mask(0.3)
-    half = torch.from_numpy((X < 500).astype(np.float32))  # its other edge is the shadow's own
-    mask = (half + (light[0] < 0.8)).clamp(0, 1)
-    wide = border.measure_missing_light(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()
-    assert wide[128, int(570 / TEXEL)] > 0.18 and wide[128, int(400 / TEXEL)] < 0.01
+        steps, sure = border.measure_border_steps(beard_inside.log().mean(0).numpy(), mask.numpy(), SEEN.numpy(), TEXEL)
+        shares.append((border.estimate_light_share(steps, sure), missing(beard_inside, mask)[place]))
+        deviation = border.mean_and_deviation(steps, sure)[1]
+        assert shares[-1][0] == pytest.approx(min(1, border.LEFT_LOG**2 / deviation**2))
+    (least, alike), (most, unlike) = shares
+    assert least == 1 and most < 0.2, shares
+    assert alike > missing(light, mask)[place] and unlike < 0.25, "a beard of 70 % is not taken for 70 % of the light"
 
 
 def test_a_beard_says_little_of_the_light(tmp_path):

@@ -55,10 +55,9 @@ def cost(taken: torch.Tensor, tone: float, shadow: float = 0.0, **recipe) -> flo
     return float(light_loss(None, denoised, o, replace(RECIPE, **recipe)))
 
 
-@pytest.mark.parametrize("tone", [0.2, 0.06, 0.03])
-def test_every_term_weighs_as_much_beside_the_data_on_dark_skin_as_on_light(tone):
+def test_every_term_weighs_as_much_beside_the_data_on_dark_skin_as_on_light():
     grid = 0.1 * torch.randn(3, SIZE, SIZE, generator=torch.Generator().manual_seed(0)) - 0.6
-    light, dark = (cost(grid, each, shadow=0.5) / each**2 for each in (0.45, tone))
+    light, dark = (cost(grid, tone, shadow=0.5) / tone**2 for tone in (0.45, 0.03))
     assert dark == pytest.approx(light, rel=1e-4)
 
 

@@ -10,7 +10,7 @@ import torch
 from core.solver.lighting import Lights, Shader, constant_light, fit_global, interpolation_matrix, shading_basis
 
 
-def sphere(rows: int = 200, columns: int = 400):
+def sphere(rows: int = 100, columns: int = 200):
     """Directions [3, rows, columns] and solid angles [rows, columns] of a quadrature over the sphere."""
     z, weight = np.polynomial.legendre.leggauss(rows)
     phi = (np.arange(columns) + 0.5) * 2 * np.pi / columns
@@ -49,9 +49,8 @@ def test_constant_light_shades_a_sphere_evenly():
     directions, _ = sphere(20, 40)
     shader = Shader(directions.float(), torch.zeros(20, 40), (2, 2))
     lights = Lights(constant_light(torch.tensor([0.5, 1.0, 2.0])), torch.zeros(3, 9, 2, 2), torch.ones(3))
-    assert torch.allclose(
-        shader.total(lights), torch.tensor([0.5, 1.0, 2.0])[:, None, None].expand(3, 20, 40), atol=1e-6
-    )
+    assert torch.allclose(shader.total(lights).amin((1, 2)), torch.tensor([0.5, 1.0, 2.0]), atol=1e-6)
+    assert torch.allclose(shader.total(lights).amax((1, 2)), torch.tensor([0.5, 1.0, 2.0]), atol=1e-6)
 
 
 @pytest.mark.parametrize("coloured", [True, False])

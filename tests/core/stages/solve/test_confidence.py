@@ -3,29 +3,22 @@
 """The confidence of the solved maps: how large an error is expected of a texel, less where it was seen less; and
 whether the benchmark finds deviations that were laid in."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import torch
 
+from core.face.head import read_filmed_head
 from core.imaging import images
-from core.solver.evidence import Evidence
 from core.stages.solve import confidence
+from core.stages.solve.capture_evidence import read_evidence
 from core.stages.solve.confidence import PLAIN_DEVIATION, estimate_confidence
 from research.benchmarks import confidence as benchmark
 from research.benchmarks.confidence import Errors, fit_deviations, judge
+from tests.fixtures.painted_skin import make, plain_evidence
 
 SIZE = 256
 PLANE = torch.ones(SIZE, SIZE)
 SKIN = np.full((SIZE, SIZE, 3), [0.42, 0.26, 0.18], np.float32)
-
-
-def plain_evidence(size: int, **changed: torch.Tensor) -> Evidence:
-    """Of skin that was seen well all over, lit as usual."""
-    ones, colours = torch.ones(size, size), torch.zeros(3, size, size)
-    plain = Evidence(colours, ones, 0 * ones, colours, ones > 0, ones, ones, ones, *[0 * ones] * 2, ones, 0 * ones)
-    return replace(plain, **changed)
 
 
 def told(albedo: np.ndarray = SKIN, **changed: torch.Tensor) -> float:
@@ -52,13 +45,7 @@ def test_variances_add_up():
 
 
 def test_how_bright_the_frames_were_is_over_the_skin_that_they_showed(tmp_path):
-    from core.capture.capture import Capture
-    from core.face.head import read_filmed_head
-    from core.stages.solve.capture_evidence import read_evidence
-    from research.benchmarks.uv_problems import make_plain_problem
-
-    capture = Capture(tmp_path)
-    make_plain_problem(9000, "self", SIZE).write(capture)
+    capture = make(tmp_path / "a.wildcap")
     alone = read_evidence(capture, read_filmed_head(capture), SIZE)
     skin = (alone.skin * alone.weight > 0.5).numpy()
     assert np.median(alone.filmed.numpy()[skin]) == pytest.approx(1, rel=1e-3), "of the texture, where no other is"
@@ -97,11 +84,3 @@ def test_what_knows_the_errors_gains_likelihood_and_a_constant_does_not():
     assert known["coverage"] == pytest.approx(0.683, abs=0.01) == known["coverage_absolute"]
     assert known["spearman"] > 0.15 and known["half"] < 0.8
     assert constant["gained"] == pytest.approx(0, abs=1e-3)
-
-
-def test_the_page_compares_what_ships_with_those_who_were_left_out():
-    record = benchmark.measure({f"capture {seed}": laid_in(seed, 1.0, 8000) for seed in range(3)})
-    best, others = (record["summary"][name]["gained"]["mean"] for name in (benchmark.BLURRED, benchmark.LEFT_OUT))
-    assert best > 0.04 and others > best - 0.01, "three people with one law: what two tell holds for the third"
-    text = "\n".join(body for _, body in benchmark.sections(record))
-    assert "| left out |" in text and "| most likely |" in text and "capture 2" in text

@@ -23,51 +23,28 @@ def skin(tmp_path) -> Capture:
     return make(tmp_path / "a.wildcap")
 
 
-def test_the_tone_is_that_of_the_skin_outside_of_the_mask(skin):
-    pytest.importorskip("torch")
-    from core.stages.solve import tone
-    from tests.fixtures.painted_skin import settings
-
-    def estimate() -> np.ndarray:
-        report = Reporter("skin_tone")
-        tone.run(skin, settings(), report)
-        return np.array(report.figures["skin_tone_srgb"])
-
-    lit = estimate()
-    assert 0.05 < lit.min() and lit.max() <= 1
-    images.write_data(skin.shadow_mask, images.read_mask(skin.shadow_mask_auto))
-    texture = images.read_linear(skin.texture)
-    dark = images.read_mask(skin.shadow_mask) > 0.5
-    texture[dark] *= 0.2
-    images.write_linear(skin.texture, texture)
-    assert np.abs(estimate() - lit).max() < 0.03, "what lies under the mask does not count"
-
-
 def test_snapping_brings_a_rough_border_to_the_shadows_own(skin):
-    pytest.importorskip("torch")
     from core.stages.solve import snapping
-    from tests.fixtures.painted_skin import SIZE, settings
+    from tests.fixtures.painted_skin import X, Y, settings
 
     rough = images.read_mask(skin.shadow_mask_auto)  # a hard disc, wider than the shadow
     report = Reporter("mask_edges")
     snapping.run(skin, settings(), report)
     snapped = images.read_mask(skin.shadow_mask_edges)
-    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
-    true = 1 / (1 + np.exp((np.hypot(x - 0.66, y - 0.55) - 0.09) / 0.006))
+    true = 1 / (1 + np.exp((np.hypot(X - 0.66, Y - 0.55) - 0.09) / 0.006))
     assert np.abs(snapped - true).mean() < 0.4 * np.abs(rough - true).mean()
     assert 10 < report.figures["moved_percent_of_mask"] < 60
     assert not skin.shadow_mask.exists(), "the artist's mask is the artist's"
 
 
 def test_a_tool_runs_as_a_job_and_leaves_no_record(skin):
-    pytest.importorskip("torch")
     before = skin.read()
     said = []
     run_job(write_job(skin, tool="skin_tone"), said.append)
     done = next(message for message in said if isinstance(message, StageDone))
     assert done.stage == "skin_tone" and len(done.figures["skin_tone_srgb"]) == 3
     assert skin.read() == before and not skin.lock.exists()
-    with pytest.raises(Exception, match="There is no tool named"):
+    with pytest.raises(Exception, match="tool"):
         write_job(skin, tool="magic")
 
 

@@ -8,17 +8,17 @@ import pytest
 import torch
 
 from core.capture.capture import Capture
-from core.capture.messages import Problem, Reporter
+from core.capture.messages import Problem
 from core.capture.stages import MAPS, by_name
 from core.settings.settings import Settings, from_json
+from core.solver import lights
 from core.solver.prior.network import UNet, UNetLayout
 from core.solver.recipes import Recipe
 from core.solver.sampler import Sampler, seed_noise
-from core.stages import solve
 from core.stages.solve.memory import sample_within_memory
-from tests.core.solver.test_sampler import SmoothPrior, observation, shadow_problem, start
-from tests.fixtures.painted_skin import make, settings
+from tests.fixtures.painted_skin import make, settings, solved
 from tests.fixtures.recorded import changed, record
+from tests.fixtures.small_problems import start, two_sizes
 
 REFUSALS = [
     MemoryError(),
@@ -28,18 +28,21 @@ REFUSALS = [
     ),
     RuntimeError("DefaultCPUAllocator: not enough memory: you tried to allocate 99 bytes."),
 ]
+RECIPE = Recipe(steps=6, coarse=((2, 0.5),))
+"""The map becomes finer within it."""
 
 
 class Refusing:
     """A denoiser that fails at call `at`, or from there on; in the backward pass where asked."""
 
-    def __init__(self, priors, at, error, backward=False, always=False):
-        self.priors, self.at, self.error, self.backward, self.always = priors, at, error, backward, always
+    def __init__(self, at, error, backward=False, always=False):
+        self.denoiser, self.seen = two_sizes(RECIPE.coarse)
+        self.at, self.error, self.backward, self.always = at, error, backward, always
         self.calls, self.network = 0, SimpleNamespace(low_memory=False)
 
     def __call__(self, x, sigma, coords):
         self.calls += 1
-        out = self.priors[x.shape[-1]](x, sigma, coords)
+        out = self.denoiser(x, sigma, coords)
         if self.calls == self.at or self.always and self.calls > self.at:
             if not self.backward:
                 raise self.error
@@ -49,37 +52,24 @@ class Refusing:
     def refuse(self, gradient):
         raise self.error
 
-
-def problem():
-    """Observations of a shadow at two sizes, and their denoisers: the map becomes finer within the run."""
-    prior, _, texture, mask, _ = shadow_problem(32)
-    half = observation(torch.nn.functional.avg_pool2d(texture, 2), torch.nn.functional.avg_pool2d(mask[None], 2)[0])
-    recipe = Recipe(steps=6, coarse=((2, 0.5),))
-    return {32: prior, 16: SmoothPrior(16)}, {1: observation(texture, mask), 2: half}, recipe
+    def sample(self, *callbacks):
+        return sample_within_memory(Sampler(self, RECIPE, seed_noise(1)), self.seen, start(-0.2), *callbacks)
 
 
 @pytest.fixture(scope="module")
 def unbroken():
-    priors, seen, recipe = problem()
+    denoiser, seen = two_sizes(RECIPE.coarse)
     sizes = []
-    sampler = Sampler(lambda x, s, c: priors[x.shape[-1]](x, s, c), recipe, seed_noise(1))
+    sampler = Sampler(denoiser, RECIPE, seed_noise(1))
     out = sampler.sample(seen, start(-0.2), lambda state, steps: sizes.append(state.x.shape[-1]))
     assert sizes[0] == 16 and sizes[-1] == 32
     return out
 
 
-@pytest.mark.parametrize("backward", [False, True])
-@pytest.mark.parametrize("at", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize(("at", "backward"), [(1, False), (3, True), (5, False), (6, True)])
 def test_a_step_that_did_not_fit_is_done_again_to_the_same_bytes(unbroken, at, backward):
-    priors, seen, recipe = problem()
-    prior, said, steps = Refusing(priors, at, REFUSALS[at % len(REFUSALS)], backward), [], []
-    out = sample_within_memory(
-        Sampler(prior, recipe, seed_noise(1)),
-        seen,
-        start(-0.2),
-        lambda state, of: steps.append(state.step),
-        said.append,
-    )
+    prior, said, steps = Refusing(at, REFUSALS[at % len(REFUSALS)], backward), [], []
+    out = prior.sample(lambda state, of: steps.append(state.step), said.append)
     assert torch.equal(out.denoised, unbroken.denoised) and torch.equal(out.x, unbroken.x)
     assert all(torch.equal(a, b) for a, b in zip(out.lights.parameters(), unbroken.lights.parameters(), strict=True))
     assert prior.network.low_memory and len(said) == 1 and f"step {at} of 6" in said[0]
@@ -87,9 +77,7 @@ def test_a_step_that_did_not_fit_is_done_again_to_the_same_bytes(unbroken, at, b
 
 
 def test_lights_that_did_not_fit_start_over_too(unbroken, monkeypatch):
-    from core.solver import lights as light_fit
-
-    calls, loss = [], light_fit.light_loss
+    calls, loss = [], lights.light_loss
 
     def refusing(*given):
         calls.append(1)
@@ -97,26 +85,23 @@ def test_lights_that_did_not_fit_start_over_too(unbroken, monkeypatch):
             raise MemoryError
         return loss(*given)
 
-    monkeypatch.setattr(light_fit, "light_loss", refusing)
-    priors, seen, recipe = problem()
-    out = sample_within_memory(Sampler(Refusing(priors, 0, None), recipe, seed_noise(1)), seen, start(-0.2))
+    monkeypatch.setattr(lights, "light_loss", refusing)
+    out = Refusing(0, None).sample()
     assert torch.equal(out.denoised, unbroken.denoised) and torch.equal(out.lights.grid, unbroken.lights.grid)
 
 
 @pytest.mark.parametrize("error", REFUSALS)
 def test_what_does_not_fit_in_either_mode_is_a_problem_with_a_remedy(error):
-    priors, seen, recipe = problem()
-    with pytest.raises(Problem, match="step 3 of 6") as raised:
-        sample_within_memory(Sampler(Refusing(priors, 3, error, always=True), recipe, seed_noise(1)), seen, start(-0.2))
+    with pytest.raises(Problem, match="step 1 of 6") as raised:
+        Refusing(1, error, always=True).sample()
     assert "smaller map size" in raised.value.remedy
 
 
 def test_other_errors_are_not_taken_for_a_lack_of_memory():
-    priors, seen, recipe = problem()
-    prior = Refusing(priors, 2, RuntimeError("mat1 and mat2 shapes cannot be multiplied"))
+    prior = Refusing(1, RuntimeError("mat1 and mat2 shapes cannot be multiplied"))
     with pytest.raises(RuntimeError, match="shapes"):
-        sample_within_memory(Sampler(prior, recipe, seed_noise(1)), seen, start(-0.2))
-    assert prior.calls == 2 and not prior.network.low_memory
+        prior.sample()
+    assert prior.calls == 1 and not prior.network.low_memory
 
 
 @pytest.mark.parametrize("norm", ["pixel", "group"])
@@ -129,11 +114,10 @@ def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, mo
     found = []
     for sparing in (True, False):
         if not sparing:
-
-            def plain(norm, convolution, x, mapped):
-                return convolution(torch.nn.functional.gelu(norm(x, mapped)))
-
-            monkeypatch.setattr("core.solver.prior.network_blocks.Shaped.convolve", plain)
+            monkeypatch.setattr(
+                "core.solver.prior.network_blocks.Shaped.convolve",
+                lambda norm, convolution, x, mapped: convolution(torch.nn.functional.gelu(norm(x, mapped))),
+            )
         x, kept = torch.linspace(-1, 1, 5 * 32 * 32).reshape(1, 5, 32, 32).requires_grad_(), {}
 
         def pack(saved, kept=kept):
@@ -151,37 +135,24 @@ def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, mo
 
 def test_the_stage_falls_back_and_its_maps_are_the_same(tmp_path, monkeypatch):
     """The shipped network: plain, failing once, and with the setting."""
-    options = {"guidance": "dps", "steps": 4}
-    plain, failing, chosen = (make(tmp_path / name) for name in ("plain.wildcap", "failing.wildcap", "chosen.wildcap"))
-    solved(plain, **options)
-    forward, calls, modes = UNet.forward, [], []
+    capture, options = make(tmp_path / "a.wildcap"), {"guidance": "dps", "steps": 4}
+    solved(capture, settings(**options))
+    plain = {name: (capture.maps / name).read_bytes() for name in MAPS}
+    forward, modes = UNet.forward, []
 
     def watched(network, *given):
-        calls.append(1)
         modes.append(network.low_memory)
-        if fails and len(calls) == 3:
+        if fails and len(modes) == 2:
             raise MemoryError
         return forward(network, *given)
 
     monkeypatch.setattr(UNet, "forward", watched)
-    for capture, fails, low in ((failing, True, False), (chosen, False, True)):
-        calls.clear()
+    for fails, low in ((True, False), (False, True)):
         modes.clear()
-        said = solved(capture, **options, low_memory=low)
-        assert any("step 3 of 4" in line and "low-memory" in line for line in said) == fails
+        said = solved(capture, settings(**options, low_memory=low))
+        assert any("step 2 of 4" in line and "low-memory" in line for line in said) == fails
         assert modes[0] == low and modes[-1]
-        assert {
-            name: (capture.maps / name).read_bytes() == (plain.maps / name).read_bytes() for name in MAPS
-        } == dict.fromkeys(MAPS, True)
-
-
-def solved(capture, **options):
-    """Runs the stage; what it said."""
-    said = []
-    solve.run(
-        capture, settings(**options), Reporter("solve", emit=lambda message: said.append(getattr(message, "text", "")))
-    )
-    return said
+        assert {name: (capture.maps / name).read_bytes() for name in MAPS} == plain
 
 
 def test_how_much_memory_is_used_decides_nothing(tmp_path):

@@ -1,12 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A prior of the authors' kind on a capture: maps go to the UVs it works in and come back to where they were, and the
-stage gives sensible maps.
+stage gives sensible maps."""
 
-The head with other UVs is the built-in one with its chart turned and moved to where such a prior expects a face.
-"""
-
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -14,11 +10,10 @@ import pytest
 import torch
 
 from core.capture import stages
-from core.capture.capture import Capture
-from core.capture.messages import Problem, Reporter
+from core.capture.messages import Problem
 from core.capture.stages import MAPS
 from core.face import template
-from core.geometry import meshes, raster
+from core.geometry import raster
 from core.imaging import images
 from core.settings.settings import from_json
 from core.solver.lighting import Lights
@@ -26,49 +21,19 @@ from core.stages import solve
 from core.stages.solve import layout
 from core.stages.solve.maps import Maps
 from core.stages.solve.prior_files import WEIGHTS, load
-from tests.core.stages.solve.test_released_prior import weights_of, write
-from tests.fixtures.painted_skin import SIZE, TONE, as_setting, make
+from tests.fixtures.authors_prior import (
+    MODEL,
+    bridge,
+    front,
+    other_head,
+    put_own_head,
+    seen_layouts,
+    settings,
+    weights_of,
+    write,
+)
+from tests.fixtures.painted_skin import SIZE, TONE, make, plain_evidence, solved
 from tests.fixtures.recorded import changed, record
-
-MODEL = {
-    "depths": [1, 1],
-    "channels": [32, 32],
-    "self_attn_depths": [False, False],
-    "mapping_out": 16,
-    "sigma_data": 0.5,
-    "sigma_min": 0.01,
-    "sigma_max": 80,
-}
-
-
-def front() -> meshes.Mesh:
-    """The built-in head without what lies far from its face: quicker to search."""
-    mesh = template.load()
-    middle = mesh.uvs[mesh.face_uvs].mean(1)
-    near = raster.sample(template.mask("face", 128), np.stack([middle[:, 0], 1 - middle[:, 1]], 1) * 128) > 0.02
-    return replace(mesh, faces=mesh.faces[near], face_uvs=mesh.face_uvs[near])
-
-
-def other_head(turn_deg: float = 12.0) -> meshes.Mesh:
-    """The built-in face in another order, 0.3 mm larger all around, its chart turned, a fifth smaller, the bridge of
-    the nose where the prior's tone box is."""
-    mesh, whole = front(), template.load()
-    face, bary = template.landmarks()
-    bridge = (whole.uvs[whole.face_uvs[face[[6, 197]]]] * bary[[6, 197], :, None]).sum(1).mean(0)
-    c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
-    uvs = (mesh.uvs - bridge) @ np.array([[c, s], [-s, c]]) * 0.8 + [0.5, 1 - 344 / 1024]
-    order = np.random.default_rng(0).permutation(len(mesh.faces))
-    grown = mesh.moved(mesh.vertices + 3e-4 * meshes.vertex_normals(mesh))
-    return replace(grown, uvs=uvs, faces=grown.faces[order], face_uvs=grown.face_uvs[order])
-
-
-def put_own_head(capture: Capture, own: meshes.Mesh, skin: np.ndarray | None = None) -> None:
-    """As the registration leaves it; skin bool [F] marks the triangles to paint, all by default."""
-    meshes.write_obj(capture.own_head, own)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.ones(len(own.faces), bool) if skin is None else skin, [0]])))
-    capture.own_head_skin.write_text(
-        json.dumps({"template": "other.obj", "skin_triangles": edges.reshape(-1, 2).tolist()})
-    )
 
 
 @pytest.fixture
@@ -82,38 +47,10 @@ def capture(tmp_path):
 @pytest.fixture
 def authors(tmp_path):
     """A folder as the authors' of a network with little to say: random, its output scaled down."""
-    state = weights_of(MODEL, 2, True)
+    cond = {"type": "coord"}
+    state = weights_of(MODEL, cond)
     state["inner_model.proj_out.weight"] *= 0.05
-    write(tmp_path / "authors", MODEL, {"type": "coord"}, state)
-    return tmp_path / "authors"
-
-
-def settings(prior, **options):
-    return from_json(
-        {
-            "solve": {
-                "size": SIZE,
-                "steps": 10,
-                "guidance": "proximal",
-                "skin_tone": as_setting(TONE),
-                "prior": str(prior),
-                **options,
-            }
-        }
-    )
-
-
-def seen_layouts(monkeypatch) -> list[layout.Layout]:
-    """Gets the layouts that runs from here on work in."""
-    fitted, kept = layout.fit_layout, []
-
-    def keep(*given):
-        found = fitted(*given)
-        kept.append(found[0])
-        return found
-
-    monkeypatch.setattr(layout, "fit_layout", keep)
-    return kept
+    return write(tmp_path / "authors", MODEL, cond, state)
 
 
 @pytest.fixture(scope="module")
@@ -129,33 +66,14 @@ def carried():
 
 def round_trip(there: layout.Layout, albedo: np.ndarray, normal: np.ndarray) -> Maps:
     """Maps of the built-in UVs taken to the window's and returned."""
-    size, other = len(albedo), there.there.covered.shape
-    gone = {
-        name: there._there(torch.from_numpy(m.transpose(2, 0, 1).copy())).permute(1, 2, 0).numpy()
-        for name, m in (("diffuse", albedo),)
-    }
-    flat = np.ones(other, np.float32)
-    solved = Maps(
-        gone["diffuse"],
-        flat,
-        layout.baking.bake_normals(normal, there.there),
-        np.repeat(flat[..., None], 3, 2),
-        flat,
-        torch.ones(3),
-    )
-    ones = torch.ones(size, size)
-    up = torch.zeros(3, size, size)
-    up[2] = 1
-    e = layout.Evidence(
-        torch.zeros(3, size, size), *[0 * ones] * 2, up, ones > 0, ones, ones, ones, *[0 * ones] * 2, ones, 0 * ones
-    )
-    return there.returned(
-        solved,
-        e,
-        Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)),
-        1.0,
-        torch.from_numpy(TONE),
-    )
+    size, flat = len(albedo), np.ones(there.there.covered.shape, np.float32)
+    diffuse = there._there(torch.from_numpy(albedo.transpose(2, 0, 1).copy())).permute(1, 2, 0).numpy()
+    turned = layout.baking.bake_normals(normal, there.there)
+    solved = Maps(diffuse, flat, turned, np.repeat(flat[..., None], 3, 2), flat, torch.ones(3))
+    up = torch.tensor([0.0, 0, 1])[:, None, None].expand(3, size, size)
+    evidence = plain_evidence(size, weight=torch.zeros(size, size), normal=up)
+    lights = Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3))
+    return there.returned(solved, evidence, lights, 1.0, torch.from_numpy(TONE))
 
 
 def test_a_smooth_map_survives_both_ways(carried):
@@ -178,13 +96,10 @@ def test_a_smooth_map_survives_both_ways(carried):
 def test_the_prior_is_asked_in_its_own_window_and_coordinates(carried):
     there, position, _ = carried
     assert there.there.covered.shape == (192, 192)
-    bridge = layout._box(layout.TONE_BOX, 192) > 0
-    assert bridge.sum() == pytest.approx(110 * 84 * (192 / 768) ** 2, rel=0.05)
-    at = there._there(torch.from_numpy(position.transpose(2, 0, 1).copy()))[:, bridge].mean(1)
-    face, bary = template.landmarks()
-    head = template.load()
-    wanted = (head.vertices[head.faces[face[[6, 197]]]] * bary[[6, 197], :, None]).sum(1).mean(0)
-    assert np.linalg.norm(at.numpy() - wanted) < 0.006
+    box = layout._box(layout.TONE_BOX, 192) > 0
+    assert box.sum() == pytest.approx(110 * 84 * (192 / 768) ** 2, rel=0.05)
+    at = there._there(torch.from_numpy(position.transpose(2, 0, 1).copy()))[:, box].mean(1)
+    assert np.linalg.norm(at.numpy() - bridge()[0]) < 0.006
     assert layout.round_size(1024, 8) == 1024 and layout.round_size(500, 8) == 480
     assert layout.round_size(1024, 64) * 3 / 4 % 64 == 0
 
@@ -193,7 +108,7 @@ def test_the_prior_is_asked_in_its_own_window_and_coordinates(carried):
 def test_the_stage_solves_with_it_and_answers_in_the_built_in_uvs(capture, authors, recipe, monkeypatch):
     monkeypatch.setitem(solve.RECIPES, "released", replace(solve.RECIPES["released"], steps=6, candidates=2, zeta=0.1))
     kept = seen_layouts(monkeypatch)
-    solve.run(capture, settings(authors, recipe=recipe), Reporter("solve"))
+    solved(capture, settings(authors, recipe=recipe))
     for name in MAPS:
         values = images.read_data(capture.maps / name)
         assert values.shape[:2] == (SIZE, SIZE) and np.isfinite(values).all(), name
@@ -220,13 +135,13 @@ def test_the_stage_solves_with_it_and_answers_in_the_built_in_uvs(capture, autho
 def test_without_the_other_head_or_with_other_uvs_it_says_what_to_do(capture, authors):
     put_own_head(capture, other_head(180.0))
     with pytest.raises(Problem, match="not those the authors' prior was trained in"):
-        solve.run(capture, settings(authors), Reporter("solve"))
+        solved(capture, settings(authors))
     capture.own_head.unlink()
     with pytest.raises(Problem, match="none was fitted") as found:
-        solve.run(capture, settings(authors), Reporter("solve"))
+        solved(capture, settings(authors))
     assert "--template" in found.value.remedy
     with pytest.raises(Problem, match="does not describe a prior"):
-        solve.run(capture, settings(capture.root), Reporter("solve"))
+        solved(capture, settings(capture.root))
 
 
 def test_another_checkpoint_or_head_makes_the_stage_stale_but_only_with_that_prior(capture, authors):

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from core.capture import stages
-from core.capture.messages import Problem, Reporter
+from core.capture.messages import CancelledError, Problem, Reporter
 from core.capture.together import captures_in, hash_inputs
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-from core.stages import solve
-from tests.fixtures.painted_skin import SIZE, brief_light, make, settings  # noqa: F401
+from core.stages.solve.together import read_others
+from tests.fixtures.painted_skin import SIZE, X, Y, make, settings, solved
 
 
 @pytest.fixture
@@ -24,45 +24,43 @@ def two(tmp_path):
     """Two captures of the same skin: the first in a soft spot of shade that no mask shows, the second in light from the
     other side."""
     first, second = (make(tmp_path / name / "Zoë.wildcap") for name in ("one", "two"))
-    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     texture = images.read_linear(first.texture)
-    spot = (1 - 0.4 * np.exp(-(((x - 0.36) / 0.07) ** 2) - ((y - 0.55) / 0.07) ** 2))[..., None]
+    spot = (1 - 0.4 * np.exp(-(((X - 0.36) / 0.07) ** 2) - ((Y - 0.55) / 0.07) ** 2))[..., None]
     images.write_linear(first.texture, texture * spot)
-    images.write_linear(second.texture, texture / (0.7 + 0.3 * x)[..., None] * (1.0 - 0.25 * x)[..., None])
+    images.write_linear(second.texture, texture / (0.7 + 0.3 * X)[..., None] * (1.0 - 0.25 * X)[..., None])
     return first, second, spot
-
-
-def albedo_of(capture, **options):
-    solve.run(capture, settings(steps=4, **options), Reporter("solve"))
-    return images.read_linear(capture.maps / "diffuse_albedo.exr")
 
 
 def test_shade_that_another_capture_does_not_have_is_light(two):
     first, second, spot = two
-    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     skin = template.mask("skin", SIZE) * template.mask("face", SIZE) > 0.5
-    inside, mirrored = (skin & (np.hypot(x - at, y - 0.55) < 0.06) for at in (0.36, 0.64))
+    inside, mirrored = (skin & (np.hypot(X - at, Y - 0.55) < 0.06) for at in (0.36, 0.64))
 
     def darker(albedo):
         return float(np.log(albedo[mirrored].mean() / albedo[inside].mean()))
 
-    alone, both = (darker(albedo_of(first, **options)) for options in ({}, {"together": str(second.root)}))
-    truth = darker(images.read_linear(first.texture) / spot / (0.7 + 0.3 * x)[..., None])
+    def solved_darker(**options):
+        solved(first, settings(steps=4, **options))
+        return darker(images.read_linear(first.maps / "diffuse_albedo.exr"))
+
+    alone, both = solved_darker(), solved_darker(together=str(second.root))
+    texture = images.read_linear(first.texture)
+    truth = darker(texture / spot / (0.7 + 0.3 * X)[..., None])
     assert abs(both - truth) < 0.7 * abs(alone - truth), (alone, both, truth)
     explained = images.read_linear(first.maps / "diffuse_albedo.exr") * images.read_linear(first.maps / "shading.exr")
-    texture = images.read_linear(first.texture)
     off = np.abs(explained - texture)[skin].mean()
     assert off < 0.06 * texture[skin].mean(), "albedo times shading is the texture still"
 
 
-def test_a_folder_of_captures_names_all_of_them_but_the_one_that_is_solved(two, tmp_path, brief_light):  # noqa: F811
-    first, second, _ = two
+def test_a_folder_of_captures_names_all_of_them_but_the_one_that_is_solved(two, tmp_path):
     several = tmp_path / "several"
-    for name, capture in (("a.wildcap", first), ("b.wildcap", second)):
+    for name, capture in zip(("a.wildcap", "b.wildcap"), two, strict=False):
         shutil.copytree(capture.root, several / name)
     assert [path.name for path in captures_in(str(several))] == ["a.wildcap", "b.wildcap"]
-    copy = type(first)(several / "a.wildcap")
-    assert np.array_equal(albedo_of(copy, together=str(several)), albedo_of(copy, together=str(several / "b.wildcap")))
+    first = type(two[0])(several / "a.wildcap")
+    (other,) = read_others(first, settings(together=str(several)), Reporter("solve"))
+    (alone,) = read_others(first, settings(together=str(two[1].root)), Reporter("solve"))
+    assert np.array_equal(other.texture, alone.texture)
 
 
 def test_what_cannot_be_solved_together_is_refused(two, tmp_path):
@@ -78,8 +76,7 @@ def test_what_cannot_be_solved_together_is_refused(two, tmp_path):
         (other.root, "not WildCap's head"),
     ):
         with pytest.raises(Problem, match=problem):
-            albedo_of(first, together=str(named))
-    assert not first.maps.exists()
+            read_others(first, settings(together=str(named)), Reporter("solve"))
 
 
 def test_of_another_capture_only_what_is_read_counts(two):
@@ -93,18 +90,9 @@ def test_of_another_capture_only_what_is_read_counts(two):
     assert set(stages.by_name("solve").reads) <= {name.partition("/")[2] for name in told}
 
 
-def test_in_a_light_that_is_too_strong_to_be_told_the_others_are_left_out_and_it_is_said(two, brief_light):  # noqa: F811
+def test_in_a_light_that_is_too_strong_to_be_told_it_is_said_that_the_others_are_left_out(two):
     first, second, _ = two
-    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
-    images.write_linear(
-        first.texture, images.read_linear(first.texture) * np.exp(3 * (x - 0.5))[..., None].astype(np.float32)
-    )
-    said = []
-    solve.run(
-        first,
-        settings(steps=4, together=str(second.root)),
-        Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))),
-    )
-    assert any("The other captures were not used" in text for text in said)
-    with_others = images.read_linear(first.maps / "diffuse_albedo.exr")
-    assert np.array_equal(albedo_of(first), with_others)
+    strong = np.exp(3 * (X - 0.5))[..., None].astype(np.float32)
+    images.write_linear(first.texture, images.read_linear(first.texture) * strong)
+    with pytest.raises(CancelledError):
+        solved(first, settings(together=str(second.root)), until="The other captures were not used")

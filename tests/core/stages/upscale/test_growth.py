@@ -14,8 +14,7 @@ from core.capture.messages import Problem
 from core.face import shown_parts, template
 from core.imaging import images
 from core.stages.upscale import hair
-from core.stages.upscale.maps import HeadMaps
-from tests.fixtures.hairy_head import SIZE, surface
+from tests.fixtures.hairy_head import SIZE, beard_zone, maps_of, surface
 
 LIGHT, DARK = np.array([0.5, 0.35, 0.28]), np.array([0.07, 0.045, 0.035])
 """Skins, linear albedo."""
@@ -26,7 +25,7 @@ BLACK, WHITE = np.array([0.015, 0.012, 0.01]), np.array([0.5, 0.48, 0.45])
 @cache
 def regions() -> tuple[np.ndarray, np.ndarray]:
     """Where brows and beard are painted, bool [S, S]."""
-    return template.mask("brows", SIZE) > 0.5, (hair._zones(surface())["beard"] > 0.9) & surface().covered
+    return template.mask("brows", SIZE) > 0.5, (beard_zone() > 0.9) & surface().covered
 
 
 def strewn(where: np.ndarray, mean: float, spread: float, seed: int) -> np.ndarray:
@@ -39,16 +38,7 @@ def found(skin: np.ndarray, layers: list[tuple[np.ndarray, np.ndarray]], parts: 
     albedo = skin * (1 + 0.02 * np.random.default_rng(9).standard_normal((SIZE, SIZE, 1)))
     for share, colour in layers:
         albedo = albedo * (1 - share[..., None]) + share[..., None] * colour
-    one = np.ones((SIZE, SIZE), np.float32)
-    maps = HeadMaps(
-        albedo.astype(np.float32),
-        one[..., None] * [0, 0, 1],
-        0.35 * one,
-        0.7 * one,
-        np.repeat(one[..., None], 3, 2),
-        one,
-    )
-    return hair.find(maps, surface(), parts)
+    return hair.find(maps_of(albedo), surface(), parts)
 
 
 def answer(brows: float = 0.0, beard: float = 0.0) -> np.ndarray:
