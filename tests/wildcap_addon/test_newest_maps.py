@@ -51,19 +51,21 @@ def test_maps_of_a_later_solve_are_worn_whatever_times_files_have(enlarged, name
     assert not is_at_4k(enlarged)
 
 
+@pytest.mark.parametrize(
+    ("change", "at_4k"),
+    [
+        (lambda capture: (capture.maps_4k / "normal.png").unlink(), False),
+        (lambda capture: shutil.rmtree(capture.maps), True),  # what is gone contradicts nothing
+    ],
+    ids=["an incomplete folder", "no solved maps"],
+)
+def test_an_incomplete_folder_is_not_worn(enlarged, change, at_4k):
+    change(enlarged)
+    assert is_at_4k(enlarged) == at_4k
+
+
 def test_other_settings_of_the_enlarging_do_not_take_its_maps_away(enlarged):
-    assert enlarged.state(UPSCALE, Settings()) == "done"
     assert enlarged.state(UPSCALE, from_json({"upscale": {"size": 2048}})) == "stale"
-    assert is_at_4k(enlarged)
-
-
-def test_an_incomplete_folder_is_not_worn(enlarged):
-    (enlarged.maps_4k / "normal.png").unlink()
-    assert not is_at_4k(enlarged)
-
-
-def test_solved_maps_that_are_gone_do_not_take_the_large_ones_away(enlarged):
-    shutil.rmtree(enlarged.maps)
     assert is_at_4k(enlarged)
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from core.capture import stages
+from core.capture.capture import Capture
 from tests.fixtures import standin
 from tests.fixtures.drawn import drawn
 from tests.fixtures.recorded import record
@@ -18,9 +20,6 @@ bpy = pytest.importorskip("bpy")
 @pytest.fixture
 def updated(addon, tmp_path, monkeypatch):
     """The stand-in's capture as if every stage had run, opened by an extension with other code. Returns its folder."""
-    from core.capture import stages
-    from core.capture.capture import Capture
-
     root = standin.make(tmp_path / "head.wildcap")
     standin.add_evidence(root)
     film = tmp_path / "film.mp4"
@@ -58,8 +57,6 @@ def next_operator(addon) -> str:
 
 
 def test_what_older_code_made_is_shown_as_such_and_can_be_made_again_by_a_click(addon, updated, monkeypatch):
-    from core.capture import stages
-
     assert look(addon).stages == dict.fromkeys(stages.NAMES, "older")
     texts = [text for text, _ in drawn(addon("panel").WILDCAP_PT_stages)]
     assert texts.count("made by 0.2.0") == len(stages.NAMES)
