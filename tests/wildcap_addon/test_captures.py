@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Captures in a .blend: chosen, dropped, several at once; the link that Save As keeps, and a capture that was moved."""
 
-import ast
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from core.capture import hashes
 from core.capture.capture import Capture
 from tests.fixtures import standin
 from tests.fixtures.refused import refuses
@@ -85,14 +83,6 @@ def test_drops_are_taken_where_the_tab_is_shown(addon):
     assert is_taken("WildCap") and not is_taken("Item") and not is_taken("")
     assert not is_taken("WildCap", 'IMAGE_EDITOR')
     assert set(handler.bl_file_extensions.split(";")) == {*source.VIDEOS, *source.PHOTOGRAPHS}
-
-
-def test_the_photographs_that_can_be_chosen_are_those_that_the_stage_reads_or_explains(addon):
-    # not imported: it needs OpenCV
-    path = Path(__file__).parents[2] / "core" / "stages" / "frames" / "photographs.py"
-    nodes = [node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.Assign)]
-    unread = next(ast.literal_eval(node.value) for node in nodes if node.targets[0].id == "UNREAD")
-    assert set(addon("capture.source").PHOTOGRAPHS) == {*hashes.PHOTOGRAPHS, *unread}
 
 
 def test_what_is_active_means_its_face_and_what_a_head_wears_means_the_head_s(addon, project):

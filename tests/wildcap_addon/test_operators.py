@@ -83,7 +83,6 @@ def test_in_an_empty_scene_each_operator_works_or_says_why_not(operators, capfd,
         ("without its head in the scene", 'OBJECT'),
         ("without its head in the scene", 'EDIT'),
         ("painting", 'TEXTURE_PAINT'),
-        ("painting", 'SCULPT'),
         ("its folder gone", 'OBJECT'),
     ],
 )

@@ -117,8 +117,6 @@ def test_the_terminal_runs_the_chain_with_the_solver_that_is_set_up(addon, captu
     # the chain's own exit code, and its words
     assert execute(["run", "a film.mp4", "new.wildcap", "--quality", "draft"]) == 2
     assert str(folder / "a film.mp4") in capfd.readouterr().err and (folder / "new.wildcap").is_dir()
-    assert execute(["run", "a film.mp4", "new.wildcap", "--settings", "mine.json"]) == 2
-    assert str(folder / "mine.json") in capfd.readouterr().err
     assert not (addon("jobs").ROOT / "new.wildcap").exists()
     with pytest.raises(SystemExit):
         execute(["run"])
