@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the .blend keeps: the list of captures and each one's settings. Groups are built from core.capture.settings.
+"""Properties of the .blend: the list of captures and each one's settings.
 
-Default, range, unit and tooltip of every setting are written there; run-time state lives in `jobs` and `status`.
+The groups are built from core.settings, which has every setting's default, range, unit and tooltip. Run-time state is
+in `jobs` and `status`.
 """
 
 from dataclasses import fields
@@ -20,12 +21,12 @@ from . import captures, preferences
 from . import hdri as worlds
 
 SUBTYPES = {"file": 'FILE_PATH', "file_or_folder": 'FILE_PATH', "folder": 'DIR_PATH'}
-"""How what names a place on the disk is chosen; in a file browser a folder can be named where a file is asked for."""
+"""Subtypes of paths; a browser for files also accepts a folder's name."""
 SHARED_TOOLTIPS = core_settings.tooltips(core_settings.Settings)
 
 
 def settings_group(stage: str, kind: type) -> type:
-    """A PropertyGroup with one property per field of a stage's settings."""
+    """Return a PropertyGroup with one property per field of a stage's settings."""
     annotations = {f.name: _property(f, core_settings.tooltips(kind)[f.name]) for f in fields(kind)}
     return type(
         f"WILDCAP_PG_{stage}", (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": kind.__doc__}
@@ -50,7 +51,7 @@ def _property(field, tooltip: str):
 
 
 def _choice(field, value: str) -> tuple[str, str, str]:
-    """An item of an EnumProperty: identifier, name, description."""
+    """Return an item of an EnumProperty: identifier, name, description."""
     card = delighter_cards.CARDS.get(value) if field.name == "delighter" else None
     if card:
         return value, card.title, card.what
@@ -75,7 +76,7 @@ def _apply_quality(self, context):
 
 
 class WILDCAP_PG_capture(bpy.types.PropertyGroup):
-    """One capture folder in the scene's list."""
+    """Item of the scene's list: one capture folder."""
 
     path: bpy.props.StringProperty(
         name="Capture Folder", subtype='DIR_PATH', description="The folder that holds everything about this face"
@@ -151,11 +152,11 @@ LIGHTS = (
     ('coloured', "Coloured", "Teal from one side, magenta from the other, a white strip from above", 6),
     ('hdri', "HDRI", "The surroundings of a panoramic picture", 3),
 )
-"""Identifier, name, tooltip, and the number by which files keep it (0 was once named studio)"""
+"""Identifier, name, tooltip, and the number that files store (0 was once named studio)."""
 
 
 class WILDCAP_PG_scene(bpy.types.PropertyGroup):
-    """The scene's captures and how they are lit."""
+    """The scene's captures and their light."""
 
     captures: bpy.props.CollectionProperty(type=WILDCAP_PG_capture)
     active_index: bpy.props.IntProperty(
@@ -244,7 +245,7 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
 
 
 def job_settings(item: WILDCAP_PG_capture) -> dict:
-    """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device. Paths are absolute."""
+    """Return a capture's settings for a job file: stage -> {name: value}, seed, device. Paths are absolute."""
     stage_settings = {
         stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()
     }
@@ -253,7 +254,7 @@ def job_settings(item: WILDCAP_PG_capture) -> dict:
 
 
 def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings) -> None:
-    """Has the fields say what a job of that quality with these settings would be told."""
+    """Set the fields to a job's quality and settings."""
     item.quality = quality
     for stage, kind in STAGE_KINDS.items():
         for f in fields(kind):
@@ -265,10 +266,9 @@ def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings)
 
 
 def _tone(item: WILDCAP_PG_capture) -> str:
-    """The skin tone as a job is told it: as the record wrote it from which the fields were taken, for as long as it is
-    that tone."""
-    told, chosen = _parsed_tone(item.solve.skin_tone), format_skin_tone(item.skin_tone)
-    return item.solve.skin_tone if told is not None and format_skin_tone(told) == chosen else chosen
+    """Return the skin tone as text; unchanged, it is the very text that `take` got, so that nothing becomes stale."""
+    recorded, chosen = _parsed_tone(item.solve.skin_tone), format_skin_tone(item.skin_tone)
+    return item.solve.skin_tone if recorded is not None and format_skin_tone(recorded) == chosen else chosen
 
 
 def _parsed_tone(text: str) -> tuple[float, float, float] | None:
@@ -284,8 +284,7 @@ def _value(group, field):
 
 
 def device(item: WILDCAP_PG_capture) -> str:
-    """'cpu', 'cuda' or 'mps': the capture's own choice, else what the solver's Python was found to compute on; 'auto'
-    where that is not known yet."""
+    """Return 'cpu', 'cuda' or 'mps': the capture's choice, else the solver's device; 'auto' before that is known."""
     return item.device if item.device != "auto" else preferences.get().device or "auto"
 
 

@@ -131,8 +131,8 @@ def test_who_asked_for_one_face_does_not_delete_another(addon, capture, monkeypa
     refuses("Another face is selected now", bpy.ops.wildcap.delete_face, root=another)
     assert (capture / "head.obj").is_file()
     asking, clicked = addon("asking"), []
-    monkeypatch.setattr(asking, "_click", lambda operator, meant: clicked.append((operator, meant())))
-    asking.find_answer(("question",), lambda task: 1, "delete_face", lambda: False)
+    monkeypatch.setattr(asking, "_open", lambda operator, is_wanted: clicked.append((operator, is_wanted())))
+    asking.find_answer(("question",), "looking", lambda task: 1, "delete_face", lambda: False)
     follow(addon)
     assert clicked == [("delete_face", False)] and asking.answer(("question",)) == 1
     asking.forget(("question",))

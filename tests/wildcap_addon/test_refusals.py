@@ -78,10 +78,10 @@ def test_what_is_painted_may_be_lost_on_the_way(addon, capture, item, session):
     image.reload()
     refuses("mask", addon("paint.mask_image").refresh, image, addon("captures").folder(item), 'SHADOW')
     bpy.data.images.remove(image)
-    refuses("mask is not in this file", bpy.ops.wildcap.edit_mask, kind='INVERT')
+    refuses("mask is no longer in this file", bpy.ops.wildcap.edit_mask, kind='INVERT')
     bpy.ops.object.mode_set(mode='OBJECT')
     bpy.data.objects.remove(addon("captures").head(bpy.context, item))
-    refuses("head is not in this scene", session.begin_painting, bpy.context, item, True)
+    refuses("in this scene", session.begin_painting, bpy.context, item, True)
 
 
 def test_the_set_up_keeps_its_buttons_while_it_works(addon):

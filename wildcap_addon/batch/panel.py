@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: the open batch: how far its faces are and its run is, and the way through the masks that wait."""
+"""Panel of the open batch: progress of its faces and its run, and the walk through the masks."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -30,11 +30,9 @@ class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
         problems.draw(layout, known.problem, width)
         if running.running():
             row = layout.row(align=True)
-            words = (
-                iface_("{} of {} faces").format(known.progress["ended"], known.progress["of"])
-                if known.progress
-                else iface_("Starting")
-            )
+            words = iface_("Starting")
+            if known.progress:
+                words = iface_("{} of {} faces").format(known.progress["ended"], known.progress["of"])
             row.progress(text=words, translate=False, factor=batches.share(known))
             row.operator("wildcap.cancel_batch", text="", icon='CANCEL')
             if batches.line(known):
@@ -56,17 +54,16 @@ class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
 
 
 def count_words(view: batches.BatchView) -> str:
-    """How far the faces are: 'Masks waiting: 5, done: 3, to do: 4'."""
-    of, seen = len(view.batch.faces), len(view.states)
+    """Describe the states of the faces: 'Masks waiting: 5, done: 3, to do: 4'."""
     waiting = len(batches.waiting())
-    accepted = view.count(WAITING) - waiting  # and not looked at since
+    accepted = view.count(WAITING) - waiting  # since their last look
     counts = [
         (waiting, iface_("masks waiting: {}")),
         (view.count(DONE), iface_("done: {}")),
         (view.count(WORKING), iface_("in work: {}")),
         (view.count(STOPPED), iface_("stopped: {}")),
         (view.count(TO_DO) + accepted, iface_("to do: {}")),
-        (of - seen, iface_("not looked at yet: {}")),
+        (len(view.batch.faces) - len(view.states), iface_("not looked at yet: {}")),
     ]
     text = ", ".join(words.format(count) for count, words in counts if count)
     return text[:1].upper() + text[1:]

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators on what a head is made with: the head mesh that is fitted beside the built-in one, and a look at what a
-delighter did."""
+"""Operators that choose the artist's own head mesh, and compare a frame before and after delighting."""
 
 from pathlib import Path
 
@@ -15,8 +14,10 @@ from . import delighters
 
 
 class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
-    """Fit the active mesh, too: the maps are baked into its UVs in the end. It is kept in the capture as it is now,
-    without its modifiers"""
+    """Fit the active mesh as well, and bake the maps into its UVs.
+
+    The capture stores it as it is now, without its modifiers.
+    """
 
     bl_idname = "wildcap.use_active_mesh"
     bl_label = "Use Active Mesh"
@@ -39,8 +40,7 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         item, thing = captures.require(context), context.view_layer.objects.active
-        name = bpy.path.clean_name(thing.name)
-        path = captures.folder(item).root / "template" / f"{name}.obj"
+        path = captures.folder(item).root / "template" / f"{bpy.path.clean_name(thing.name)}.obj"
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -65,8 +65,10 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_choose_template(FileOperator, CaptureOperator, bpy.types.Operator):
-    """Fit a head mesh of your own, too: an OBJ, or a folder with a neutral OBJ and its shapes, as ICT-FaceKit. Maps are
-    baked into its UVs"""
+    """Fit a head mesh of your own as well: an OBJ, or a folder with a neutral OBJ and its shapes, like ICT-FaceKit.
+
+    The maps are baked into its UVs.
+    """
 
     bl_idname = "wildcap.choose_template"
     bl_label = "Choose Head Mesh"
@@ -82,18 +84,17 @@ class WILDCAP_OT_choose_template(FileOperator, CaptureOperator, bpy.types.Operat
                 f"{path} is neither an OBJ nor a folder.",
                 "Choose an OBJ of a head, or a folder with a neutral OBJ and its shapes.",
             )
-        if path.is_dir() and not any(
-            "neutral" in file.name.lower() for file in (*path.glob("*.obj"), *path.glob("*/*.obj"))
-        ):
+        shapes = (*path.glob("*.obj"), *path.glob("*/*.obj")) if path.is_dir() else ()
+        if path.is_dir() and not any("neutral" in file.name.lower() for file in shapes):
             raise Problem(
-                f"{path} holds no OBJ with 'neutral' in its name.",
+                f"{path} contains no OBJ with 'neutral' in its name.",
                 "Choose the OBJ itself, or the folder of shapes (FaceXModel in ICT-FaceKit).",
             )
         captures.require(context).registration.template = str(path)
 
 
 class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
-    """Fit the built-in head alone"""
+    """Fit only the built-in head."""
 
     bl_idname = "wildcap.use_built_in_head"
     bl_label = "Built-In Head Alone"
@@ -110,13 +111,13 @@ class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_compare_delit(CaptureOperator, bpy.types.Operator):
-    """Show a frame before and after its light was taken out; click again for the next one"""
+    """Show a frame before and after delighting; click again for the next one."""
 
     bl_idname = "wildcap.compare_delit"
     bl_label = "Before and After"
 
     which: bpy.props.IntProperty(
-        name="Frame", default=-1, options={'SKIP_SAVE'}, description="Which of the delit frames; -1: the next one"
+        name="Frame", default=-1, options={'SKIP_SAVE'}, description="Number of the delit frame; -1: the next one"
     )
 
     def work(self, context):

@@ -23,7 +23,7 @@ def test_the_mask_painted_on_the_left_cheek_is_saved_on_the_left_cheek(mask_imag
     pixels[..., 3] = 1
     pixels[round(v * height), round(u * width)] = 1
     image.pixels.foreach_set(pixels.ravel())
-    mask_image.save_image(image, folder)
+    mask_image.store_mask(mask_image.mask_values(image), folder, 'SHADOW')
     assert (capture / "shadow_mask.png").read_bytes()[24:26] == b"\x08\x00", "8 bit grey"
     saved = bpy.data.images.load(str(capture / "shadow_mask.png"))
     saved.colorspace_settings.name = 'Non-Color'
@@ -38,7 +38,7 @@ def test_the_last_ten_masks_are_kept(mask_image, capture, item, addon):
     image = mask_image.load(folder)
     for value in (*np.linspace(0, 1, 12), 1):  # an unchanged mask is no new one
         fill(image, value)
-        mask_image.save_image(image, folder)
+        mask_image.store_mask(mask_image.mask_values(image), folder, 'SHADOW')
     assert len(list((capture / "mask_history").iterdir())) == 10
 
 

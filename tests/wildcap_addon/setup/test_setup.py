@@ -140,7 +140,6 @@ def test_a_python_that_cannot_run_the_solver_is_refused_by_name_and_tried_in_the
     operators, preferences, none = setup("setup.operators"), setup("preferences"), tmp_path / "none"
     refuses("There is no Python", operators.interpreter, tmp_path)
     refuses("torch .* is missing", bpy.ops.wildcap.use_python, filepath=str(bare.parent.parent))
-    task = operators.BackgroundTask("setup", lambda task: operators.try_out(task, none))
-    setup("jobs").start_worker("", "ask", task, lambda: setup("setup.checking").accept(none))
+    operators.try_out(none)
     follow(setup)
     assert "not a working Python" in setup("problems").of("").problem and preferences.python() is None

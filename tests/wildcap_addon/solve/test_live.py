@@ -74,12 +74,11 @@ def test_a_head_shows_what_it_did_after_a_solve_that_ended_in_another_mode(addon
 
 
 def test_the_preview_is_read_again_when_it_is_newer(addon, tmp_path):
-    preview, picture = addon("solve.preview"), tmp_path / "albedo.png"
+    pictures, picture = addon("frame_icons"), tmp_path / "albedo.png"
     icons, colours = [], [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
     for number, colour in enumerate(colours):
         picture.write_bytes(standin.plain(tuple(255 * v for v in colour)))
         os.utime(picture, (1e9 + number, 1e9 + number))  # Blender tells thumbnails apart by whole seconds
-        icons.append(preview.icon(picture))
-        assert [round(c) for c in preview._icons[str(picture)].image_pixels_float[:3]] == list(colour)
-    preview.forget()
+        icons.append(pictures.load(picture))
+        assert [round(c) for c in pictures._icons[str(picture)].image_pixels_float[:3]] == list(colour)
     assert len(set(icons)) == 1
